@@ -1,0 +1,1 @@
+"""The example pair of a scanner and a scan, which ``tablegen init`` copies."""

@@ -1,0 +1,1 @@
+"""Templates of what tablegen emits, and the static runtime that plays it."""

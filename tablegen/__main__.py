@@ -1,0 +1,5 @@
+"""``python -m tablegen``."""
+
+from tablegen.cli import main
+
+main()

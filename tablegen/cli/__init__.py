@@ -1,0 +1,67 @@
+"""The command line. Results go to stdout, messages to stderr; see ``tablegen.cli.status`` for the exit statuses.
+
+Commands import what they need when they run, so that ``--version`` and ``--help`` answer at once.
+"""
+
+import sys
+
+import click
+
+from tablegen import __version__
+from tablegen.cli.build import build
+from tablegen.cli.check import check
+from tablegen.cli.common import Failure
+from tablegen.cli.init import init
+from tablegen.cli.schema import schema
+from tablegen.cli.show import show
+from tablegen.cli.status import Status
+
+
+@click.group(
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+    epilog="""\b
+A first minute:
+  tablegen init demo                        write a commented scanner and scan
+  tablegen show demo/annexin_200nm.toml     what would be played, and how well
+  tablegen build demo/annexin_200nm.toml -o build
+
+\b
+Exit status: 0 done, 1 output is stale (build --check), 2 wrong input or usage,
+3 a limit of the certificate is broken, 4 cannot write, 130 interrupted.""",
+)
+@click.version_option(__version__, prog_name="tablegen", message="%(prog)s %(version)s")
+def cli() -> None:
+    """Make piezo scanners move straight: compensated scan waveforms as fixed-point tables, in C and Verilog.
+
+    A scan file (what to image today) names a scanner file (calibrated once). Voltages are at the piezo, and
+    units are part of every key.
+    """
+
+
+for command in (build, check, show, init, schema):
+    cli.add_command(command)
+
+
+def main() -> None:
+    """Run the command line and exit with its status."""
+    sys.exit(_run())
+
+
+def _run() -> int:
+    try:
+        result = cli.main(standalone_mode=False)
+        sys.stdout.flush()
+        return int(result or 0)
+    except Failure as failure:
+        failure.show()
+        return failure.status
+    except click.ClickException as error:
+        error.show()
+        return error.exit_code
+    except (click.Abort, KeyboardInterrupt):
+        click.echo("interrupted; the output directory was left as it was", err=True)
+        return Status.INTERRUPTED
+    except BrokenPipeError:
+        # The reader of a pipe went away: nothing is left to say, and Python's own flush at exit must not complain.
+        sys.stdout = None
+        return Status.OK

@@ -1,0 +1,74 @@
+"""What several commands share: the way from a path to a certified plan, and how its failures are told."""
+
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, NoReturn
+
+import click
+
+from tablegen.cli.status import Status
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from tablegen.certificate import Certificate
+    from tablegen.plan import Plan
+
+scan_argument = click.argument("scan", type=click.Path(path_type=Path), metavar="SCAN.TOML")
+
+
+class Failure(click.ClickException):
+    """Lines for stderr and an exit status."""
+
+    def __init__(self, lines: "Sequence[object]", status: Status) -> None:
+        super().__init__("\n".join(map(str, lines)))
+        self.status = status
+
+    def show(self, file: object = None) -> None:
+        """Print the lines as they are, without a prefix, so that editors can parse ``file:line:``."""
+        click.echo(self.message, err=True)
+
+
+def fail(lines: "Sequence[object]", status: Status) -> NoReturn:
+    """End the command."""
+    raise Failure(lines, status)
+
+
+def planned(scan: Path) -> "tuple[Plan, dict[str, Certificate]]":
+    """Load, plan and certify a scan; every failure ends the command with its status."""
+    # No linear algebra library is used, and its threads would only spin: a third of the cost of importing numpy.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    from tablegen.certificate import broken_limits, certify
+    from tablegen.config.load import load
+    from tablegen.plan import make_plan
+    from tablegen.problems import Rejected
+
+    try:
+        setup = load(scan)
+        plan = make_plan(setup)
+    except Rejected as rejected:
+        fail(rejected.problems, Status.WRONG_INPUT)
+    progress = _Progress()
+    certificates = certify(plan, progress.tell)
+    progress.clear()
+    if broken := broken_limits(plan, certificates, setup.scan_file):
+        fail(broken, Status.BROKEN_LIMIT)
+    return plan, certificates
+
+
+class _Progress:
+    """A line on the terminal while a long frame is measured; nothing where stderr is no terminal."""
+
+    def __init__(self) -> None:
+        self._shown = -1
+
+    def tell(self, axis: str, share: float) -> None:
+        percent = int(100 * share)
+        if sys.stderr.isatty() and percent > self._shown:
+            click.echo(f"\rmeasuring every tick of the {axis} period: {percent:3d} %", err=True, nl=False)
+            self._shown = percent
+
+    def clear(self) -> None:
+        if self._shown >= 0:
+            click.echo("\r" + " " * 60 + "\r", err=True, nl=False)

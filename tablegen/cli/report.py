@@ -1,0 +1,95 @@
+"""Tables and plots for the terminal."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tablegen.certificate import Certificate
+from tablegen.numerics.arrays import Floats
+from tablegen.plan import LinePlan, Plan
+from tablegen.summary import rate
+
+_WIDTH, _HEIGHT = 64, 8  # characters; a braille character is 2 by 4 dots
+_BRAILLE = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))
+
+
+def certificate_table(plan: Plan, certificates: dict[str, Certificate]) -> list[str]:
+    """The certificate of both axes, a line an axis."""
+    schedule = plan.schedule
+    lines = [
+        f"{plan.name} on {plan.scanner!r}: {rate(schedule.line_rate)} lines of {schedule.ticks} ticks, "
+        f"{schedule.lines} lines a frame, {rate(schedule.frame_rate)} frames",
+        "",
+        "                      error [LSB]   scaling error in the window [%, peak to peak]",
+        "axis  drive [V p-p]    max    rms   direction  uncompensated  emitted  band limit  size   step/limit",
+    ]
+    for line in plan.lines:
+        certificate = certificates[line.axis]
+        for i, (side, error) in enumerate(certificate.scaling.items()):
+            start = f"{line.axis:<4}  {line.drive.v_amplitude:13.4f}  {certificate.max_error_lsb:5.3f}  "
+            start += f"{certificate.rms_error_lsb:5.3f}"
+            step = f"{certificate.largest_step}/{certificate.max_step}"
+            if i:
+                start, step = " " * len(start), ""
+            lines.append(
+                f"{start}   {side:<9}  {error.uncompensated:13.2f}  {error.total:7.3f}  {error.band_limit:10.4f}  "
+                f"{error.size:+.3f}  {step}".rstrip()
+            )
+    return lines
+
+
+def plots(line: LinePlan, unicode: bool) -> list[str]:
+    """The drive of one period, and what the compensation adds to the uncompensated line."""
+    count = 4 * _WIDTH
+    t = np.arange(count) / count
+    w = line.series.value(t)
+    volts = line.drive.v_offset + line.drive.v_amplitude * (w - 0.5)
+    turn = line.drive.turn
+    triangle = np.where(t <= turn, t / turn, (1.0 - t) / (1.0 - turn))
+    inside = _window_marks(line)
+    return [
+        f"{line.axis} drive [V]",
+        *_plot(volts, inside, unicode),
+        f"{line.axis} drive less the uncompensated line [% of the scan]",
+        *_plot(100.0 * (w - triangle), inside, unicode),
+    ]
+
+
+def _window_marks(line: LinePlan) -> str:
+    """A character for each column: where the image is taken."""
+    low, high = line.band_limit.window
+    turn, marks = line.drive.turn, []
+    for column in range(_WIDTH):
+        t = (column + 0.5) / _WIDTH
+        forward = t <= turn
+        position = t / turn if forward else (1.0 - t) / (1.0 - turn)
+        images = low <= position <= high and (forward or line.band_limit.directions == "both")
+        marks.append((">" if forward else "<") if images else "-")
+    return "".join(marks)
+
+
+def _plot(values: Floats, marks: str, unicode: bool) -> list[str]:
+    low, high = float(np.min(values)), float(np.max(values))
+    span = high - low or 1.0
+    rows = _dots(values, low, span) if unicode else _stars(values, low, span)
+    labels = {0: f"{high:10.4g}", _HEIGHT - 1: f"{low:10.4g}"}
+    lines = [f"{labels.get(i, ''):>10} |{row}".rstrip() for i, row in enumerate(rows)]
+    return [*lines, " " * 11 + "+" + marks]
+
+
+def _dots(values: Floats, low: float, span: float) -> Sequence[str]:
+    cells = np.zeros((_HEIGHT, _WIDTH), dtype=np.int64)
+    tall, wide = 4 * _HEIGHT, 2 * _WIDTH
+    levels = np.rint((1.0 - (values - low) / span) * (tall - 1)).astype(int)
+    for i, level in enumerate(levels):
+        column = i * wide // len(levels)
+        cells[level // 4, column // 2] |= _BRAILLE[level % 4][column % 2]
+    return ["".join(chr(0x2800 + cell) if cell else " " for cell in row) for row in cells]
+
+
+def _stars(values: Floats, low: float, span: float) -> Sequence[str]:
+    grid = [[" "] * _WIDTH for _ in range(_HEIGHT)]
+    levels = np.rint((1.0 - (values - low) / span) * (_HEIGHT - 1)).astype(int)
+    for i, level in enumerate(levels):
+        grid[level][i * _WIDTH // len(levels)] = "*"
+    return ["".join(row) for row in grid]

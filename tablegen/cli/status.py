@@ -1,0 +1,14 @@
+"""Exit statuses, one for each thing that a script may want to tell apart."""
+
+from enum import IntEnum
+
+
+class Status(IntEnum):
+    """What the process ends with."""
+
+    OK = 0
+    STALE = 1
+    WRONG_INPUT = 2
+    BROKEN_LIMIT = 3
+    CANNOT_WRITE = 4
+    INTERRUPTED = 130

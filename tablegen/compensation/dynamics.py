@@ -1,0 +1,101 @@
+"""Linear dynamics of the scanner, and their inverse for each harmonic of the scan."""
+
+from dataclasses import dataclass
+from math import sqrt
+from typing import Protocol
+
+import numpy as np
+
+from tablegen.numerics.arrays import Bools, Floats
+from tablegen.numerics.elementary import exp
+from tablegen.numerics.turns import sine_and_cosine
+from tablegen.problems import Unphysical
+
+
+class Response(Protocol):
+    """A frequency response, normalised to 1 at 0 Hz."""
+
+    def inverse(self, f_hz: Floats) -> tuple[Floats, Floats]:
+        """Real and imaginary part of 1 / H(f)."""
+
+    @property
+    def resonance_hz(self) -> float:
+        """Where the response is largest."""
+
+    @property
+    def half_width_hz(self) -> float:
+        """Half the width of the resonance."""
+
+
+@dataclass(frozen=True, slots=True)
+class SecondOrder:
+    """H = exp(-i 2 pi f delay) / (1 - r^2 + i r / Q), r = f / frequency."""
+
+    frequency_hz: float
+    quality: float
+    delay_s: float = 0.0
+
+    def inverse(self, f_hz: Floats) -> tuple[Floats, Floats]:
+        """Real and imaginary part of 1 / H(f)."""
+        r = f_hz / self.frequency_hz
+        real, imaginary = 1.0 - r * r, r / self.quality
+        s, c = sine_and_cosine(f_hz * self.delay_s)
+        return real * c - imaginary * s, real * s + imaginary * c
+
+    @property
+    def resonance_hz(self) -> float:
+        """The undamped resonance."""
+        return self.frequency_hz
+
+    @property
+    def half_width_hz(self) -> float:
+        """Half the width at half the power."""
+        return self.frequency_hz / (2.0 * self.quality)
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A response as measured: ascending Hz, gain relative to that at low frequency, phase in turns."""
+
+    f_hz: Floats
+    gain: Floats
+    phase_turns: Floats
+
+    def inverse(self, f_hz: Floats) -> tuple[Floats, Floats]:
+        """Real and imaginary part of 1 / H(f); gain and phase linear between the points, constant below the first."""
+        f = np.maximum(f_hz, self.f_hz[0])
+        if f.size and float(np.max(f)) > self.f_hz[-1]:
+            top = float(self.f_hz[-1])
+            raise Unphysical(f"the response is measured up to {top:g} Hz; the scan plays up to {float(np.max(f)):g} Hz")
+        right = np.clip(np.searchsorted(self.f_hz, f), 1, len(self.f_hz) - 1)
+        left = right - 1
+        share = (f - self.f_hz[left]) / (self.f_hz[right] - self.f_hz[left])
+        gain = self.gain[left] + share * (self.gain[right] - self.gain[left])
+        s, c = sine_and_cosine(self.phase_turns[left] + share * (self.phase_turns[right] - self.phase_turns[left]))
+        return c / gain, -s / gain
+
+    @property
+    def resonance_hz(self) -> float:
+        """The frequency of the largest gain."""
+        return float(self.f_hz[np.argmax(self.gain)])
+
+    @property
+    def half_width_hz(self) -> float:
+        """Half the range over which the gain is above its maximum / sqrt(2)."""
+        high = self.f_hz[self.gain >= float(np.max(self.gain)) / sqrt(2.0)]
+        return max(float(high[-1] - high[0]) / 2.0, float(np.min(np.diff(self.f_hz))))
+
+
+def capped_inverse(response: Response, f_hz: Floats, max_boost_db: float) -> tuple[Floats, Floats, Bools]:
+    """1 / H at each frequency, its size limited to the boost and its phase kept; and where the limit held it back."""
+    real, imaginary = response.inverse(f_hz)
+    size = np.sqrt(real * real + imaginary * imaginary)
+    ceiling = decibels(max_boost_db)
+    held = size > ceiling
+    factor = np.where(held, ceiling / np.where(held, size, 1.0), 1.0)
+    return real * factor, imaginary * factor, held
+
+
+def decibels(value_db: float) -> float:
+    """The amplitude ratio of a value in dB, from basic operations: 10^(dB / 20)."""
+    return exp(value_db * 0.11512925464970228)  # ln(10) / 20

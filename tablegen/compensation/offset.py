@@ -1,0 +1,92 @@
+"""Dependence of the sensitivity on the offset voltage, equations (1)-(4), and the position that an offset gives."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tablegen.numerics.arrays import tree_sum
+from tablegen.numerics.linear import Cholesky
+from tablegen.problems import Unphysical
+
+_PANELS = 1024  # of Simpson's rule; the integrand is smooth and the error below 1e-13
+
+
+@dataclass(frozen=True, slots=True)
+class OffsetLaw:
+    """m(p) = 1 + alpha p + beta p^2, equation (1), with p in [-1, 1]; all dimensionless."""
+
+    alpha: float = 0.0
+    beta: float = 0.0
+
+    def __post_init__(self) -> None:
+        vertex = -self.alpha / (2.0 * self.beta) if self.beta else 0.0
+        lowest = min(self.factor(p) for p in (-1.0, 1.0, max(-1.0, min(1.0, vertex))))
+        if lowest <= 0.0:
+            raise Unphysical(f"the amplitude factor falls to {lowest:.4g} inside [0, v_max]; it has to stay above 0")
+
+    @classmethod
+    def from_ends(cls, m_minus: float, m_plus: float) -> "OffsetLaw":
+        """From the factors at p = -1 and p = +1, equations (3) and (4)."""
+        return cls(0.5 * (m_plus - m_minus), 0.5 * (m_plus + m_minus) - 1.0)
+
+    @classmethod
+    def fit(cls, p: list[float], apparent: list[float]) -> "OffsetLaw":
+        """From apparent sizes of one object (any unit) at three or more p: least squares, exact for three.
+
+        The p of each point is taken as it is, since the paper advises points away from the edges. The apparent
+        size is proportional to m; the size at the centre comes out of the fit.
+        """
+        if len(set(p)) < 3:
+            raise Unphysical(f"{len(set(p))} different offsets do not determine a parabola; at least 3 are needed")
+        x, y = np.asarray(p), np.asarray(apparent)
+        # Orthogonal to the constant first: the normal equations of three close offsets stay accurate.
+        middle = float(tree_sum(x)) / len(x)
+        powers = np.stack([np.ones_like(x), x - middle, (x - middle) ** 2])
+        scale = np.sqrt(tree_sum(powers * powers))
+        powers = powers / scale[:, None]
+        try:
+            factor = Cholesky(tree_sum(powers[:, None, :] * powers[None, :, :]))
+        except ArithmeticError:
+            raise Unphysical("the offsets are too close together to determine a parabola") from None
+        c = factor.solve(tree_sum(powers * y))
+        residual = y - c[0] * powers[0] - c[1] * powers[1] - c[2] * powers[2]
+        c = (c + factor.solve(tree_sum(powers * residual))) / scale
+        quadratic, linear = float(c[2]), float(c[1] - 2.0 * c[2] * middle)
+        centre = float(c[0] - c[1] * middle + c[2] * middle * middle)
+        if centre <= 0.0:
+            raise Unphysical(f"the fit gives an apparent size of {centre:.4g} at the centre; it has to be above 0")
+        return cls(linear / centre, quadratic / centre)
+
+    def factor(self, p: float) -> float:
+        """m(p), equation (1)."""
+        return 1.0 + self.alpha * p + self.beta * p * p
+
+    def position_nm(self, v_offset: float, v_max: float, k_nm_per_v: float) -> float:
+        """Position in nm above that at 0 V: the integral of the local slope k / m over the offset voltage."""
+        if v_offset == 0.0:
+            return 0.0
+        p = 2.0 * (v_offset * (np.arange(_PANELS + 1) / _PANELS)) / v_max - 1.0
+        slope = 1.0 / (1.0 + self.alpha * p + self.beta * p * p)
+        weights = np.full(_PANELS + 1, 2.0)
+        weights[1::2] = 4.0
+        weights[0] = weights[-1] = 1.0
+        return k_nm_per_v * v_offset * float(tree_sum(weights * slope)) / (3.0 * _PANELS)
+
+    def voltage_at(self, position_nm: float, v_max: float, k_nm_per_v: float) -> float:
+        """The offset voltage that gives a position; the inverse of ``position_nm``."""
+        reach = self.position_nm(v_max, v_max, k_nm_per_v)
+        if not 0.0 <= position_nm <= reach:
+            raise Unphysical(f"{position_nm:g} nm is outside the 0..{reach:.6g} nm that 0..{v_max:g} V reach")
+        v = v_max * position_nm / reach
+        for _ in range(60):  # Newton on a smooth, increasing function; a bound, not a hope
+            error = self.position_nm(v, v_max, k_nm_per_v) - position_nm
+            step = error * self.factor(normalised_offset(v, v_max)) / k_nm_per_v
+            v = min(max(v - step, 0.0), v_max)
+            if abs(step) <= 1e-15 * v_max:
+                break
+        return v
+
+
+def normalised_offset(v_offset: float, v_max: float) -> float:
+    """p = 2 V_offset / V_max - 1, equation (2)."""
+    return 2.0 * v_offset / v_max - 1.0

@@ -1,0 +1,170 @@
+"""Plain TOML values to the frozen types of the schema, with every fault found on the way."""
+
+import math
+from typing import Any, TypeVar
+
+import msgspec.inspect as types
+from msgspec import Struct
+
+from tablegen.config.toml import join_key
+from tablegen.problems import Document, Problems
+
+T = TypeVar("T", bound=Struct)
+
+_WRONG = object()  # the value of a key that was reported already
+_UNITS = ("_nm", "_v", "_hz", "_s", "_nm_per_v", "_v_per_s", "_db", "_lsb", "_percent")
+
+
+def decode(kind: type[T], values: dict[str, Any], document: Document, problems: Problems) -> T | None:
+    """Build ``kind`` from a table of TOML values; None, and at least one problem, where that cannot be."""
+    built = _Decoder(document, problems).struct(types.type_info(kind), values, "")
+    return built if isinstance(built, kind) else None
+
+
+class _Decoder:
+    def __init__(self, document: Document, problems: Problems) -> None:
+        self._document = document
+        self._problems = problems
+
+    def _wrong(self, key: str, why: str) -> object:
+        self._problems.add(self._document, key, why)
+        return _WRONG
+
+    def _any(self, kind: types.Type, value: Any, key: str) -> Any:
+        match kind:
+            case types.Metadata():
+                return self._any(kind.type, value, key)
+            case types.UnionType():  # in the schema always "something or None", and TOML has no null
+                return self._any(next(t for t in kind.types if not isinstance(t, types.NoneType)), value, key)
+            case types.StructType():
+                return self.struct(kind, value, key)
+            case types.ListType():
+                return self._list(kind, value, key)
+            case types.TupleType():
+                return self._tuple(kind, value, key)
+            case types.FloatType():
+                return self._number(kind, value, key)
+            case types.IntType():
+                return self._integer(kind, value, key)
+            case types.StrType():
+                return self._text(kind, value, key)
+            case types.LiteralType():
+                if value in kind.values and isinstance(value, str):
+                    return value
+                accepted = ", ".join(map(repr, kind.values))
+                return self._wrong(key, f"{_shown(value)} is none of {accepted}")
+            case types.BoolType():
+                return value if isinstance(value, bool) else self._wrong(key, f"{_shown(value)} is not true or false")
+        raise NotImplementedError(kind)  # pragma: no cover - a type that the schema does not use
+
+    def struct(self, kind: types.Type, value: Any, key: str) -> Any:
+        assert isinstance(kind, types.StructType)
+        if not isinstance(value, dict):
+            return self._wrong(key, f"{_shown(value)} is not a table")
+        known = {field.encode_name: field for field in kind.fields}
+        good, built = True, {}
+        unknown = [name for name in value if name not in known]
+        for name in unknown:
+            good = False
+            self._wrong(join_key(key, name), f"unknown key{_suggestion(name, [k for k in known if k not in value])}")
+        for name, field in known.items():
+            if name in value:
+                built[name] = self._any(field.type, value[name], join_key(key, name))
+                good = good and built[name] is not _WRONG
+            elif field.required:
+                good = False
+                if not any(name in _meant(other, known) for other in unknown):
+                    kind_of = "table" if isinstance(field.type, types.StructType) else "key"
+                    self._wrong(join_key(key, name), f"missing; this {kind_of} is required")
+        return kind.cls(**built) if good else _WRONG
+
+    def _list(self, kind: types.ListType, value: Any, key: str) -> Any:
+        if not isinstance(value, list):
+            return self._wrong(key, f"{_shown(value)} is not an array")
+        if kind.min_length is not None and len(value) < kind.min_length:
+            return self._wrong(key, f"{len(value)} entries are too few, at least {kind.min_length} are needed")
+        if kind.max_length is not None and len(value) > kind.max_length:
+            return self._wrong(key, f"{len(value)} entries are too many, at most {kind.max_length} are taken")
+        built = [self._any(kind.item_type, item, f"{key}[{i}]") for i, item in enumerate(value)]
+        return _WRONG if any(item is _WRONG for item in built) else built
+
+    def _tuple(self, kind: types.TupleType, value: Any, key: str) -> Any:
+        count = len(kind.item_types)
+        if not isinstance(value, list) or len(value) != count:
+            return self._wrong(key, f"{_shown(value)} is not an array of {count} numbers")
+        built = [
+            self._any(t, item, f"{key}[{i}]") for i, (t, item) in enumerate(zip(kind.item_types, value, strict=True))
+        ]
+        return _WRONG if any(item is _WRONG for item in built) else tuple(built)
+
+    def _number(self, kind: types.FloatType, value: Any, key: str) -> Any:
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            return self._wrong(key, f"{_shown(value)} is not a number")
+        if isinstance(value, float) and not math.isfinite(value):
+            return self._wrong(key, f"{value} is not a finite number")
+        if not self._in_range(kind, value, key):
+            return _WRONG
+        return float(value)
+
+    def _integer(self, kind: types.IntType, value: Any, key: str) -> Any:
+        if isinstance(value, bool) or not isinstance(value, int):
+            return self._wrong(key, f"{_shown(value)} is not a whole number")
+        return value if self._in_range(kind, value, key) else _WRONG
+
+    def _in_range(self, kind: types.FloatType | types.IntType, value: float, key: str) -> bool:
+        shown = _shown(value)
+        if kind.le is not None and value > kind.le:
+            self._wrong(key, f"{shown} is above {kind.le:.12g}")
+        elif kind.ge is not None and value < kind.ge:
+            self._wrong(key, f"{shown} is below {kind.ge:.12g}")
+        elif kind.lt is not None and value >= kind.lt:
+            self._wrong(key, f"{shown} is not below {kind.lt:.12g}")
+        elif kind.gt is not None and value <= kind.gt:
+            self._wrong(key, f"{shown} is not above {kind.gt:.12g}")
+        else:
+            return True
+        return False
+
+    def _text(self, kind: types.StrType, value: Any, key: str) -> Any:
+        if not isinstance(value, str):
+            return self._wrong(key, f"{_shown(value)} is not a text in quotes")
+        if kind.min_length is not None and len(value) < kind.min_length:
+            return self._wrong(key, "is empty")
+        if kind.max_length is not None and len(value) > kind.max_length:
+            return self._wrong(key, f"{len(value)} characters are too many, at most {kind.max_length} are taken")
+        return value
+
+
+def _meant(name: str, known: Any) -> list[str]:
+    """The known keys that an unknown one was probably meant to be: with its unit, or without a typing error."""
+    with_unit = [k for k in known if any(k == name + unit for unit in _UNITS)]
+    stem = name.rsplit("_", 1)[0]
+    other_unit = [k for k in known if any(k == stem + unit for unit in _UNITS)] if "_" in name else []
+    if with_unit or other_unit:
+        return with_unit or other_unit
+    from difflib import get_close_matches  # here: only a mistaken key needs it
+
+    return get_close_matches(name, list(known), n=1, cutoff=0.6)
+
+
+def _suggestion(name: str, known: list[str]) -> str:
+    meant = _meant(name, known)
+    if not meant:
+        return f"; known here: {', '.join(sorted(known))}" if known else ""
+    unit = " (units are part of the name)" if any(m == name + unit for m in meant for unit in _UNITS) else ""
+    return f"; did you mean {' or '.join(meant)}?{unit}"
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, dict):
+        return "a table"
+    if isinstance(value, list):
+        return f"an array of {len(value)}"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int) and value.bit_length() > 1000:  # Python refuses to print the longest ones
+        return f"a whole number of {value.bit_length()} bits"
+    if isinstance(value, float):
+        return f"{value:.12g}"
+    shown = repr(value)
+    return shown if len(shown) <= 60 else shown[:57] + "..."

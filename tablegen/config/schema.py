@@ -1,0 +1,228 @@
+"""The two input files as frozen types: a scanner is calibrated once and shared, a scan changes daily.
+
+Units are part of every name. The ranges stand here once: the decoder checks them, ``tablegen schema`` prints them.
+"""
+
+from typing import Annotated, Literal
+
+from msgspec import Meta, Struct
+
+Name = Annotated[str, Meta(min_length=1, max_length=64)]
+FileName = Annotated[str, Meta(min_length=1, max_length=1024)]
+Volts = Annotated[float, Meta(ge=-1e5, le=1e5)]
+PositiveVolts = Annotated[float, Meta(ge=1e-3, le=1e5)]
+Nanometres = Annotated[float, Meta(ge=1e-6, le=1e9)]
+Hertz = Annotated[float, Meta(ge=1e-6, le=1e10)]
+Normalised = Annotated[float, Meta(gt=0.0, lt=1.0)]
+Residual = Annotated[float, Meta(ge=0.0, lt=0.5)]
+Decay = Annotated[float, Meta(ge=1e-6, le=100.0)]
+Factor = Annotated[float, Meta(ge=0.1, le=10.0)]
+Percent = Annotated[float, Meta(gt=0.0, le=1000.0)]
+Window = tuple[Annotated[float, Meta(ge=0.0, le=1.0)], Annotated[float, Meta(ge=0.0, le=1.0)]]
+
+
+class Table(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """How the waveform is stored on the device."""
+
+    mode: Annotated[
+        Literal["interpolated", "direct"],
+        Meta(description="interpolated: `length` words and linear interpolation; direct: one word a tick"),
+    ] = "interpolated"
+    length: Annotated[int, Meta(ge=4, le=65536, description="words; interpolated: a power of two")] | None = None
+    bits: Annotated[int, Meta(ge=8, le=24, description="bits of a table word")] = 16
+
+
+class BandLimit(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Which harmonics are played, and over which window the scan has to be straight."""
+
+    method: Annotated[
+        Literal["window", "lanczos", "truncate"],
+        Meta(description="window: fitted inside the imaging window, the turnarounds free; others: of the whole line"),
+    ] = "window"
+    harmonics: Annotated[int, Meta(ge=1, le=512, description="highest harmonic of the line rate")] | None = None
+    cutoff_hz: Annotated[Hertz, Meta(description="highest frequency; or give `harmonics`")] | None = None
+    window: Annotated[Window, Meta(description="imaging window in normalised position, of each branch")] = (
+        0.1,
+        0.9,
+    )
+    directions: Annotated[Literal["both", "forward"], Meta(description="the branches that image")] = "both"
+
+
+class FastAxis(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The axis that moves once a line."""
+
+    size_nm: Annotated[Nanometres, Meta(description="scan size; or give `size_v`")] | None = None
+    size_v: Annotated[PositiveVolts, Meta(description="scan voltage V_scan at the piezo, before m and g")] | None = None
+    size_of: Annotated[
+        Literal["line", "window"],
+        Meta(description="what `size_nm` measures: the whole line, or the imaging window"),
+    ] = "line"
+    offset_v: Annotated[Volts, Meta(description="offset voltage at the piezo; or give `offset_nm`")] | None = None
+    offset_nm: Annotated[float, Meta(ge=0.0, le=1e9, description="position above that at 0 V")] | None = None
+    park_v: Annotated[Volts, Meta(description="where park leaves the piezo; the offset if not given")] | None = None
+    turn: Annotated[Normalised, Meta(description="turning point: fraction of the period spent going forward")] = 0.5
+    band_limit: BandLimit = BandLimit()
+    table: Table = Table()
+
+
+class SlowAxis(FastAxis, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The axis that moves once a frame."""
+
+    motion: Annotated[
+        Literal["ramp", "step"],
+        Meta(description="ramp: moves at every tick; step: once a line, at its start"),
+    ] = "ramp"
+
+
+class Dac(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The converter. Code c gives v_min + (v_max - v_min) c / 2^bits."""
+
+    bits: Annotated[int, Meta(ge=8, le=24)]
+    coding: Literal["offset-binary", "twos-complement"] = "offset-binary"
+    v_min: Annotated[Volts, Meta(description="voltage at code 0")]
+    v_max: Annotated[Volts, Meta(description="voltage one LSB above the highest code")]
+    update_rate_hz: Annotated[float, Meta(ge=1.0, le=1e9)]
+    align: Annotated[Literal["right", "left"], Meta(description="of the code in the word sent")] = "right"
+    word_bits: Annotated[int, Meta(ge=8, le=32, description="bits of the word sent; `bits` if not given")] | None = None
+
+
+class Amplifier(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Piezo voltage = gain * converter voltage + bias_v."""
+
+    gain: Annotated[float, Meta(ge=-1e4, le=1e4)]
+    bias_v: Volts = 0.0
+    max_slew_v_per_s: Annotated[float, Meta(ge=1e-3, le=1e12, description="at the piezo")] | None = None
+
+
+class Timing(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Pixels, lines and rates."""
+
+    pixels: Annotated[int, Meta(ge=1, le=65536, description="per line and direction, over the imaging window")]
+    lines: Annotated[int, Meta(ge=1, le=65536, description="line periods per frame")]
+    line_rate_hz: Annotated[float, Meta(ge=1e-3, le=1e6)]
+    ticks_per_line: (
+        Annotated[int, Meta(ge=8, le=1 << 24, description="instead of the nearest to the line rate")] | None
+    ) = None
+    ticks_per_pixel: (
+        Annotated[int, Meta(ge=1, le=1 << 20, description="choose the line so that each pixel is this many ticks")]
+        | None
+    ) = None
+    settle_lines: Annotated[int, Meta(ge=0, le=255, description="lines played with valid low after a change")] = 2
+
+
+class Limits(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What the certificate may not exceed."""
+
+    max_error_lsb: Annotated[float, Meta(gt=0.0, le=1e6)] | None = None
+    max_scaling_error_percent: Percent | None = None
+
+
+class Emit(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What the build writes."""
+
+    header_only: Annotated[bool, Meta(description="tables inside the header instead of a .c file beside it")] = False
+
+
+class Scan(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """One scan."""
+
+    name: Annotated[Name, Meta(description="prefix of every emitted file and identifier")]
+    scanner: Annotated[FileName, Meta(description="scanner file, relative to this one")]
+    dac: Dac
+    amplifier: Amplifier
+    timing: Timing
+    x: FastAxis
+    y: SlowAxis
+    limits: Limits = Limits()
+    emit: Emit = Emit()
+
+
+class OffsetPoint(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The apparent size of one object at one offset voltage."""
+
+    offset_v: Volts
+    apparent_nm: Nanometres
+
+
+class Offset(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Amplitude factor against offset voltage, (1)-(4): one of the three ways to give it."""
+
+    m_minus: Annotated[Factor, Meta(description="amplitude factor at an offset of 0 V")] | None = None
+    m_plus: Annotated[Factor, Meta(description="amplitude factor at an offset of v_max")] | None = None
+    alpha: Annotated[float, Meta(ge=-1.0, le=1.0, description="linear term of (1)")] | None = None
+    beta: Annotated[float, Meta(ge=-1.0, le=1.0, description="quadratic term of (1)")] | None = None
+    points: (
+        Annotated[
+            list[OffsetPoint],
+            Meta(min_length=3, max_length=1000, description="apparent sizes at three or more offsets"),
+        ]
+        | None
+    ) = None
+
+
+class Size(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Scan size against scan voltage, (5)-(12)."""
+
+    k_nm_per_v: Annotated[float, Meta(ge=1e-6, le=1e6, description="calibrated at base_nm")]
+    beta: Annotated[float, Meta(gt=-0.5, le=100.0, description="0 is the linear scanner")] = 0.0
+    base_nm: Annotated[Nanometres, Meta(description="scan size of the calibration")] = 200.0
+    v_threshold: Annotated[float, Meta(gt=0.0, le=1.0, description="normalised; linear above")] = 0.5
+
+
+class Branch(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Hysteresis of one direction, (22); u_peak in sweep-aligned coordinates for both directions."""
+
+    beta_max: Annotated[Residual, Meta(description="peak residual at full scale")]
+    rho: Annotated[Decay, Meta(description="dimensionless decay constant of (22)")] = 1.5
+    u_peak: Annotated[Normalised, Meta(description="where the residual peaks; harmonic model only")] | None = None
+
+
+class Branches(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Both directions, as calibrated at one turning point."""
+
+    turn: Normalised
+    forward: Branch
+    backward: Branch
+
+
+class Hysteresis(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Hysteresis of the line, (13)-(22)."""
+
+    model: Literal["harmonic", "sinusoidal", "triangle"] = "harmonic"
+    branches: Annotated[list[Branches], Meta(max_length=64)] = []
+
+
+class Frequency(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Loss of amplitude with frequency, (23)."""
+
+    alpha: Annotated[float, Meta(ge=0.0, le=0.5, description="relative amplitude lost per decade")]
+    reference_hz: Annotated[Hertz, Meta(description="rate at which the scanner was calibrated")]
+
+
+class Resonance(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Inverse dynamics: each harmonic divided by the response; either second order with delay, or measured."""
+
+    frequency_hz: Hertz | None = None
+    quality: Annotated[float, Meta(ge=0.1, le=1e5)] | None = None
+    delay_s: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.0
+    response: Annotated[FileName, Meta(description="CSV of the measured response: hz, gain, phase_deg")] | None = None
+    max_boost_db: Annotated[float, Meta(ge=0.0, le=60.0, description="no harmonic is raised by more")] = 6.0
+
+
+class ScannerAxis(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Calibration of one axis."""
+
+    size: Size
+    offset: Offset | None = None
+    hysteresis: Hysteresis | None = None
+    frequency: Frequency | None = None
+    resonance: Resonance | None = None
+
+
+class Scanner(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A calibrated scanner."""
+
+    name: Name
+    v_max: Annotated[PositiveVolts, Meta(description="maximum output of the piezo driver")]
+    x: ScannerAxis
+    y: ScannerAxis

@@ -1,0 +1,212 @@
+"""TOML text to plain values, and the line of every key.
+
+The standard library parses and validates; it does not say where things stand, so a second, lenient walk over
+the (by then known to be valid) text notes the line of each key.
+"""
+
+import os
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from tablegen.problems import Document, Problem, Rejected
+
+_BARE_KEY = frozenset("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_")
+_ESCAPES = {"b": "\b", "t": "\t", "n": "\n", "f": "\f", "r": "\r", '"': '"', "\\": "\\"}
+_MAXIMUM_BYTES = 4 << 20
+
+
+def read_toml(path: Path, name: str) -> tuple[dict[str, Any], Document]:
+    """Return the values of a file and the places of its keys.
+
+    ``name`` is what messages call the file. Raises ``Rejected`` where it cannot be read or is not TOML.
+    """
+    try:
+        size = os.stat(path).st_size
+        if size > _MAXIMUM_BYTES:
+            raise Rejected([Problem(name, 0, "", f"{size} bytes; a configuration has at most {_MAXIMUM_BYTES}")])
+        text = path.read_bytes().decode("utf-8")
+    except OSError as error:
+        raise Rejected([Problem(name, 0, "", f"cannot be read: {error.strerror or error}")]) from None
+    except UnicodeDecodeError as error:
+        line = error.object.count(b"\n", 0, error.start) + 1
+        raise Rejected([Problem(name, line, "", f"byte 0x{error.object[error.start]:02x} is not UTF-8")]) from None
+    text = text.replace("\r\n", "\n")
+    try:
+        values = tomllib.loads(text)
+        return values, Document(name, _KeyLines(text).locate())
+    except tomllib.TOMLDecodeError as error:
+        raise Rejected([_syntax_problem(name, text, str(error))]) from None
+    except RecursionError:
+        raise Rejected([Problem(name, 0, "", "nested too deeply for a configuration")]) from None
+    except ValueError as error:  # a number beyond what the parser converts
+        raise Rejected([Problem(name, 0, "", f"not TOML: {error}")]) from None
+
+
+def _syntax_problem(name: str, text: str, message: str) -> Problem:
+    head, found, place = message.rpartition(" (at ")
+    if not found:
+        return Problem(name, 0, "", f"not TOML: {message}")
+    if place.startswith("line "):
+        line = int(place[5:].split(",")[0])
+        return Problem(name, line, "", f"not TOML: {head}, column {place.split('column ')[1].rstrip(')')}")
+    return Problem(name, max(text.rstrip("\n").count("\n") + 1, 1), "", f"not TOML: {head} at the end of the file")
+
+
+def join_key(prefix: str, key: str) -> str:
+    """``x`` and ``table`` give ``x.table``; a key that is not bare is quoted."""
+    shown = key if key and _BARE_KEY.issuperset(key) else '"' + key.encode("unicode_escape").decode() + '"'
+    return f"{prefix}.{shown}" if prefix else shown
+
+
+class _KeyLines:
+    """One walk over valid TOML text that notes on which line each key stands."""
+
+    def __init__(self, text: str) -> None:
+        self._text = text
+        self._at = 0
+        self._line = 1
+        self._lines: dict[str, int] = {}
+        self._elements: dict[str, int] = {}  # elements seen so far of each array of tables
+
+    def locate(self) -> dict[str, int]:
+        table = ""
+        self._skip(" \t\n")
+        while self._at < len(self._text):
+            if self._text.startswith("[[", self._at):
+                table = self._header(2)
+            elif self._text[self._at] == "[":
+                table = self._header(1)
+            else:
+                self._pair(table)
+            self._skip(" \t\n")
+        return self._lines
+
+    def _header(self, brackets: int) -> str:
+        self._advance(brackets)
+        keys = self._key()
+        path = ""
+        for depth, key in enumerate(keys):
+            path = join_key(path, key)
+            if brackets == 2 and depth == len(keys) - 1:
+                self._lines.setdefault(path, self._line)
+                self._elements[path] = self._elements.get(path, 0) + 1
+            if path in self._elements:
+                path += f"[{self._elements[path] - 1}]"
+            self._lines.setdefault(path, self._line)
+        self._skip(" \t")
+        self._advance(brackets)
+        return path
+
+    def _pair(self, table: str) -> None:
+        line = self._line
+        path = table
+        for key in self._key():
+            path = join_key(path, key)
+            self._lines.setdefault(path, line)
+        self._skip(" \t")
+        self._advance(1)  # =
+        self._value(path)
+
+    def _key(self) -> list[str]:
+        keys = []
+        while True:
+            self._skip(" \t")
+            if self._text[self._at] in "\"'":
+                keys.append(self._string())
+            else:
+                start = self._at
+                while self._at < len(self._text) and self._text[self._at] in _BARE_KEY:
+                    self._at += 1
+                keys.append(self._text[start : self._at])
+            self._skip(" \t")
+            if self._text[self._at] != ".":
+                return keys
+            self._advance(1)
+
+    def _value(self, path: str) -> None:
+        self._skip(" \t")
+        opening = self._text[self._at]
+        if opening in "\"'":
+            self._string()
+        elif opening == "[":
+            self._array(path)
+        elif opening == "{":
+            self._inline_table(path)
+        else:
+            while self._at < len(self._text) and self._text[self._at] not in ",]}#\n":
+                self._at += 1
+
+    def _array(self, path: str) -> None:
+        self._advance(1)
+        index = 0
+        while True:
+            self._skip(" \t\n,")
+            if self._text[self._at] == "]":
+                return self._advance(1)
+            element = f"{path}[{index}]"
+            self._lines[element] = self._line
+            self._value(element)
+            index += 1
+
+    def _inline_table(self, path: str) -> None:
+        self._advance(1)
+        while True:
+            self._skip(" \t\n,")
+            if self._text[self._at] == "}":
+                return self._advance(1)
+            self._pair(path)
+
+    def _string(self) -> str:
+        quote = self._text[self._at]
+        if self._text.startswith(quote * 3, self._at):
+            end = self._at + 3
+            while not self._text.startswith(quote * 3, end):
+                end += 2 if quote == '"' and self._text[end] == "\\" else 1
+            end += 3
+            while end < len(self._text) and self._text[end] == quote:  # quotes just before the closing three
+                end += 1
+            body = self._text[self._at + 3 : end - 3]
+        else:
+            end = self._at + 1
+            while self._text[end] != quote:
+                end += 2 if quote == '"' and self._text[end] == "\\" else 1
+            body = self._text[self._at + 1 : end]
+            end += 1
+        self._advance(end - self._at)
+        return _unescape(body) if quote == '"' else body
+
+    def _skip(self, blanks: str) -> None:
+        """Skip the given blanks, and comments where a line may end."""
+        while self._at < len(self._text):
+            character = self._text[self._at]
+            if character in blanks:
+                self._advance(1)
+            elif character == "#" and "\n" in blanks:
+                end = self._text.find("\n", self._at)
+                self._at = len(self._text) if end < 0 else end
+            else:
+                return
+
+    def _advance(self, count: int) -> None:
+        self._line += self._text.count("\n", self._at, self._at + count)
+        self._at += count
+
+
+def _unescape(body: str) -> str:
+    if "\\" not in body:
+        return body
+    out, at = [], 0
+    while at < len(body):
+        if body[at] != "\\":
+            out.append(body[at])
+            at += 1
+            continue
+        code = body[at + 1]
+        digits = {"u": 4, "U": 8}.get(code, 0)
+        if digits:
+            out.append(chr(int(body[at + 2 : at + 2 + digits], 16)))
+        else:
+            out.append(_ESCAPES.get(code, code))
+        at += 2 + digits
+    return "".join(out)

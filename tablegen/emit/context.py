@@ -1,0 +1,141 @@
+"""What the templates see: every number already text, every name already whole."""
+
+from typing import Any
+
+import numpy as np
+
+from tablegen import __version__
+from tablegen.certificate import Certificate
+from tablegen.fixedpoint.output import GAIN_BITS
+from tablegen.fixedpoint.phase import PHASE_BITS
+from tablegen.fixedpoint.synthesis import FRACTION_BITS, WORD_BITS
+from tablegen.numerics.arrays import Ints
+from tablegen.plan import LinePlan, Plan
+from tablegen.summary import summary
+
+_PER_ROW = 10
+
+
+def template_context(plan: Plan, certificates: dict[str, Certificate], digest: str) -> dict[str, Any]:
+    """The context of every template."""
+    schedule = plan.schedule
+    sequence = {
+        "UPDATE_RATE_MILLIHZ": round(schedule.update_rate_hz * 1000),
+        "LINE_TICKS": schedule.ticks,
+        "FRAME_LINES": schedule.lines,
+        "PIXELS": schedule.pixels,
+        "SETTLE_LINES": schedule.settle_lines,
+        "TURN_TICK": schedule.turn_tick,
+        "FORWARD_FIRST_TICK": schedule.forward.first,
+        "FORWARD_TICKS": schedule.forward.count,
+        "BACKWARD_FIRST_TICK": schedule.backward.first,
+        "BACKWARD_TICKS": schedule.backward.count,
+        "TURN_LINE": schedule.turn_line,
+        "UP_FIRST_LINE": schedule.up.first,
+        "UP_LINES": schedule.up.count,
+        "DOWN_FIRST_LINE": schedule.down.first,
+        "DOWN_LINES": schedule.down.count,
+    }
+    return {
+        "version": __version__,
+        "name": plan.name,
+        "NAME": plan.name.upper(),
+        "hash": digest,
+        "header_only": plan.header_only,
+        "summary": [comment_safe(line) for line in summary(plan, certificates)],
+        "sequence": {key: _Number(value) for key, value in sequence.items()},
+        "phase_bits": PHASE_BITS,
+        "gain_bits": GAIN_BITS,
+        "axes": [_axis(plan, line) for line in plan.lines],
+    }
+
+
+def comment_safe(text: str) -> str:
+    """Text that cannot end a comment, continue a line, or leave ASCII."""
+    plain = text.encode("ascii", "backslashreplace").decode("ascii")
+    return plain.replace("*/", "* /").replace("\\", "/").rstrip()
+
+
+class _Number:
+    """An integer and its spellings."""
+
+    def __init__(self, value: int) -> None:
+        self.c = _c_literal(value)
+        self.verilog = _verilog_literal(value)
+        self.verilog_range = "[31:0]" if _verilog_width(value) == 32 else "[63:0]"
+
+
+def _c_literal(value: int) -> str:
+    if value > 0x7FFFFFFF or value < -0x7FFFFFFF:
+        return f"UINT32_C({value})" if 0 <= value <= 0xFFFFFFFF else f"INT64_C({value})"
+    if value > 32767 or value < -32767:  # an int has 16 bits on some microcontrollers
+        return f"INT32_C({value})"
+    return str(value) if value >= 0 else f"({value})"
+
+
+def _verilog_width(value: int) -> int:
+    return 32 if -0x7FFFFFFF <= value <= 0x7FFFFFFF else 64
+
+
+def _verilog_literal(value: int) -> str:
+    width = _verilog_width(value)
+    return f"{width}'sd{value}" if value >= 0 else f"-{width}'sd{-value}"
+
+
+def _axis(plan: Plan, line: LinePlan) -> dict[str, Any]:
+    program, output = line.program, line.program.output
+    prefix = f"{plan.name}_{line.axis}"
+    interpolated = program.mode == "interpolated"
+    constants = {
+        "TABLE_LENGTH": len(program.words),
+        "TABLE_BITS": program.bits,
+        "INDEX_BITS": len(program.words).bit_length() - 1 if interpolated else 0,
+        "INTERPOLATED": int(interpolated),
+        "GUARD_BITS": program.guard,
+        "HARMONICS": line.fourier.harmonics,
+        "FOURIER_LENGTH": 2 * line.fourier.harmonics + 1,
+        "FOURIER_FRACTION_BITS": FRACTION_BITS,
+        "HOLD_TICKS": program.hold,
+        "PHASE_PERIOD": program.phase.ticks,
+        "PHASE_STEP": program.phase.step,
+        "PHASE_REMAINDER": program.phase.remainder,
+        "GAIN_WORD": output.gain_word,
+        "GAIN_Q": output.gain_q,
+        "OFFSET_WORD": output.offset_word,
+        "OFFSET_CODE": output.offset_code,
+        "CODE_MIN": output.code_min,
+        "CODE_MAX": output.code_max,
+        "MAX_STEP": output.max_step,
+        "PARK_CODE": output.park_code,
+        "DAC_BITS": output.dac_bits,
+        "DAC_WORD_BITS": output.word_bits,
+        "DAC_TWOS_COMPLEMENT": int(output.coding == "twos-complement"),
+        "DAC_LEFT_ALIGNED": int(output.align == "left"),
+    }
+    return {
+        "axis": line.axis,
+        "prefix": prefix,
+        "PREFIX": prefix.upper(),
+        "constants": {key: _Number(value) for key, value in constants.items()},
+        "word_type": _word_type(program.bits),
+        "table_rows": _rows(program.words),
+        "fourier_rows": _rows(fourier_order(line)),
+        "interpolated": interpolated,
+        "table_memory": f"{prefix}.mem",
+        "fourier_memory": f"{prefix}_fourier.mem",
+        "fourier_bits": WORD_BITS,
+    }
+
+
+def fourier_order(line: LinePlan) -> Ints:
+    """Fourier words in the order in which devices hold them: a0, a1..aH, b1..bH."""
+    return np.concatenate([[line.fourier.a0], line.fourier.a, line.fourier.b])
+
+
+def _word_type(bits: int) -> str:
+    return "int8_t" if bits <= 8 else "int16_t" if bits <= 16 else "int32_t"
+
+
+def _rows(words: Ints) -> list[str]:
+    values = [str(word) for word in words.tolist()]
+    return [", ".join(values[i : i + _PER_ROW]) for i in range(0, len(values), _PER_ROW)]

@@ -1,0 +1,47 @@
+"""A plan and its certificates to a map of file name to content; nothing touches the disk here."""
+
+from functools import cache
+from typing import Any
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+from tablegen.certificate import Certificate
+from tablegen.emit.context import fourier_order, template_context
+from tablegen.emit.manifest import MANIFEST, manifest_file
+from tablegen.emit.memory import memory_file
+from tablegen.fixedpoint.synthesis import WORD_BITS
+from tablegen.plan import Plan
+from tablegen.record import content_hash, plan_record
+from tablegen.resources import resource_folder
+
+
+def render(plan: Plan, certificates: dict[str, Certificate]) -> dict[str, bytes]:
+    """Every file of a build, the manifest last."""
+    record = plan_record(plan)
+    digest = content_hash(record)
+    context = template_context(plan, certificates, digest)
+    files = {f"{plan.name}.h": _template("c/tables.h.j2", context)}
+    if not plan.header_only:
+        files[f"{plan.name}.c"] = _template("c/tables.c.j2", context)
+    files[f"{plan.name}.vh"] = _template("verilog/tables.vh.j2", context)
+    for line, names in zip(plan.lines, context["axes"], strict=True):
+        files[names["table_memory"]] = memory_file(line.program.words, line.program.bits)
+        files[names["fourier_memory"]] = memory_file(fourier_order(line), WORD_BITS)
+    files[MANIFEST] = manifest_file(record, digest, certificates, files)
+    return files
+
+
+@cache
+def _environment() -> Environment:
+    return Environment(
+        loader=FileSystemLoader(resource_folder("firmware_templates")),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,
+    )
+
+
+def _template(name: str, context: dict[str, Any]) -> bytes:
+    return _environment().get_template(name).render(context).encode("ascii")

@@ -1,0 +1,39 @@
+"""From phase to sample: which two words, and how far between them."""
+
+import numpy as np
+
+from tablegen.fixedpoint.phase import PHASE_BITS
+from tablegen.fixedpoint.rounding import shift_round
+from tablegen.numerics.arrays import Ints
+
+# 15 bits of fraction: the difference of two 16-bit words times the fraction is at most 65535 * 32767 < 2^31, so that
+# a 32-bit multiplication serves every table of up to 16 bits, whatever is in it.
+FRACTION_BITS = 15
+# The sample keeps up to 4 bits below the word's LSB, and is never wider than the 25-bit port of a DSP block.
+_GUARD_BITS = 4
+MAXIMUM_SAMPLE_BITS = 25
+MAXIMUM_INDEX_BITS = PHASE_BITS - FRACTION_BITS
+
+
+def guard_bits(word_bits: int) -> int:
+    """Bits that a sample has below the LSB of a table word: 4, and fewer above 21-bit words."""
+    return min(_GUARD_BITS, MAXIMUM_SAMPLE_BITS - word_bits)
+
+
+def interpolate(table: Ints, phase: Ints, guard: int) -> Ints:
+    """Samples at phases in [0, 2^32), from a table of 2^P words, P <= 17.
+
+    sample = t0 2^G + round((t1 - t0) fraction / 2^(15 - G)), ties up; the word after the last is the first.
+    |t1 - t0| < 2^24 and fraction < 2^15, hence the product stays below 2^39.
+    """
+    index_bits = len(table).bit_length() - 1
+    index = phase >> (PHASE_BITS - index_bits)
+    fraction = (phase >> (PHASE_BITS - index_bits - FRACTION_BITS)) & ((1 << FRACTION_BITS) - 1)
+    here: Ints = table[index]
+    there: Ints = table[(index + 1) & (len(table) - 1)]
+    return (here << guard) + shift_round((there - here) * fraction, FRACTION_BITS - guard)
+
+
+def direct(table: Ints, k: Ints, guard: int) -> Ints:
+    """Samples of a table with one word a tick: word k 2^G."""
+    return np.asarray(table[k] << guard)

@@ -1,0 +1,56 @@
+"""From sample to code: gain, offset, rounding, clamp, and the coding of the converter."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tablegen.fixedpoint.rounding import shift_round
+from tablegen.numerics.arrays import Ints
+
+GAIN_BITS = 18  # signed; the narrow port of a DSP block
+# A gain of 2^16 makes a full-scale table a full-scale output; the range is [-2, 2) of that.
+UNIT_GAIN_BITS = 16
+
+
+@dataclass(frozen=True, slots=True)
+class Output:
+    """code = clamp(round((gain_word sample + offset_word) / 2^gain_q), code_min, code_max), ties up.
+
+    Codes are straight binary, 0 at the converter's v_min; ``offset_word`` is the offset in codes with ``gain_q``
+    fraction bits, ``offset_code`` the nearest whole code to it.
+    """
+
+    gain_word: int
+    gain_q: int
+    offset_word: int
+    code_min: int
+    code_max: int
+    max_step: int
+    park_code: int
+    dac_bits: int
+    coding: str
+    align: str
+    word_bits: int
+
+    @property
+    def offset_code(self) -> int:
+        """The offset as the nearest code."""
+        return shift_round(self.offset_word, self.gain_q)
+
+    def unclamped(self, sample: Ints) -> Ints:
+        """Codes before the clamp.
+
+        |gain_word| <= 2^17 and |sample| <= 2^24 give a product of at most 2^41; |offset_word| < 2^42 by
+        construction; the sum and its rounding stay below 2^43.
+        """
+        return shift_round(self.gain_word * sample + self.offset_word, self.gain_q)
+
+    def code(self, sample: Ints) -> Ints:
+        """Codes as the converter plays them."""
+        return np.clip(self.unclamped(sample), self.code_min, self.code_max)
+
+    def word(self, code: int) -> int:
+        """A code as it is sent to the converter: its coding, then its alignment."""
+        if self.coding == "twos-complement":
+            code ^= 1 << (self.dac_bits - 1)
+        return code << (self.word_bits - self.dac_bits) if self.align == "left" else code

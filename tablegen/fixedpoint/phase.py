@@ -1,0 +1,39 @@
+"""Coherent rational phase: phase k of a line of L ticks is exactly floor(k 2^32 / L), without a multiplier."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tablegen.numerics.arrays import Ints
+
+PHASE_BITS = 32
+MAXIMUM_TICKS = (1 << 31) - 1
+
+
+@dataclass(frozen=True, slots=True)
+class RationalPhase:
+    """Phase of a period of ``ticks`` ticks, 1 <= ticks <= 2^31 - 1.
+
+    The device adds ``step`` every tick, and 1 more whenever the remainder, which grows by ``remainder``
+    modulo ``ticks``, wraps. After ``ticks`` ticks both are back at 0: no drift, for ever.
+    """
+
+    ticks: int
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.ticks <= MAXIMUM_TICKS:
+            raise ValueError(f"{self.ticks} ticks are outside 1..{MAXIMUM_TICKS}")
+
+    @property
+    def step(self) -> int:
+        """floor(2^32 / L), the integer step; 32 bits for L >= 2."""
+        return (1 << PHASE_BITS) // self.ticks
+
+    @property
+    def remainder(self) -> int:
+        """2^32 mod L."""
+        return (1 << PHASE_BITS) % self.ticks
+
+    def at(self, k: Ints) -> Ints:
+        """floor(k 2^32 / L) for k in [0, L): k < 2^31, hence k 2^32 < 2^63."""
+        return (np.asarray(k, dtype=np.int64) << PHASE_BITS) // self.ticks

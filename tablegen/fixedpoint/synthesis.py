@@ -1,0 +1,82 @@
+"""Fourier words, and the integer synthesis that renders them into table words on the host and on the device alike."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tablegen.fixedpoint.rounding import round_half_up, round_number, saturate, shift_round, signed_limits
+from tablegen.numerics.arrays import Floats, Ints
+from tablegen.numerics.turns import sine
+from tablegen.waveform.series import FourierSeries
+
+WORD_BITS = 32
+FRACTION_BITS = 30  # Q2.30: |s| <= 1 bounds every coefficient by 4/pi
+SINE_FRACTION_BITS = 30
+ACCUMULATOR_BITS = 64
+
+
+@dataclass(frozen=True, eq=False)
+class FourierWords:
+    """s(t) = (2 w(t) - 1) / scale in Q2.30: s = a0 + sum a_n cos + b_n sin, each an int32 divided by 2^30."""
+
+    a0: int
+    a: Ints
+    b: Ints
+
+    @property
+    def harmonics(self) -> int:
+        """H, the highest harmonic."""
+        return len(self.a)
+
+
+def encode(series: FourierSeries, scale: float) -> FourierWords:
+    """The words of a waveform, (2 w - 1) / scale, rounded to nearest, ties up."""
+    unit = float(1 << FRACTION_BITS)
+    high = signed_limits(WORD_BITS)[1]
+    a0 = round_number((2.0 * series.a0 - 1.0) / scale * unit)
+    a, b = (round_half_up(2.0 * c / scale * unit) for c in (series.a, series.b))
+    largest = max(abs(a0), int(np.max(np.abs(a))), int(np.max(np.abs(b))))
+    if largest > high:
+        raise OverflowError(f"a Fourier word of {largest} does not fit {WORD_BITS} bits")
+    # Each product is at most |word| 2^30; their sum and the rounding have to stay inside 64 bits.
+    total = (abs(a0) + int(np.sum(np.abs(a))) + int(np.sum(np.abs(b)))) << SINE_FRACTION_BITS
+    if total >= 1 << (ACCUMULATOR_BITS - 2):
+        raise OverflowError(f"the Fourier words sum to {total / 2.0**60:.3f}, the accumulator holds 4")
+    return FourierWords(a0, a, b)
+
+
+def decode(words: FourierWords, scale: float) -> FourierSeries:
+    """The waveform w that the words stand for."""
+    unit = scale / float(1 << (FRACTION_BITS + 1))
+    return FourierSeries(0.5 + unit * words.a0, unit * words.a.astype(np.float64), unit * words.b.astype(np.float64))
+
+
+def sine_table(length: int) -> Ints:
+    """round(2^30 sin(2 pi j / length)) for j in [0, length), ties away from 0 so that the table is odd.
+
+    A device keeps a quarter of it: for a length divisible by 4 the rest follows by symmetry, word for word.
+    """
+    value = sine(np.arange(length) / length) * float(1 << SINE_FRACTION_BITS)
+    magnitude: Floats = np.abs(value)
+    return np.where(value < 0.0, -round_half_up(magnitude), round_half_up(magnitude))
+
+
+def synthesize(words: FourierWords, length: int, bits: int) -> Ints:
+    """Table words k = 0..length-1: saturate(round(2^(bits-1) s(k / length))), ties up, int64 of shape (length,).
+
+    acc = a0 2^30 + sum_n a_n C[n k mod length] + b_n S[n k mod length], exact in 64 bits, so that the order of the
+    terms and any use of symmetry do not matter; C[j] is S[j + length/4], or the cosine rounded alike
+    where the length is not divisible by 4. Then one rounding shift by 60 - (bits - 1).
+    """
+    sines = sine_table(length)
+    if length % 4 == 0:
+        cosines = np.roll(sines, -(length // 4))
+    else:
+        value = sine(np.arange(length) / length + 0.25) * float(1 << SINE_FRACTION_BITS)
+        cosines = np.where(value < 0.0, -round_half_up(-value), round_half_up(value))
+    accumulator = np.full(length, words.a0 << SINE_FRACTION_BITS, dtype=np.int64)
+    k = np.arange(length, dtype=np.int64)
+    for n in range(1, words.harmonics + 1):
+        at = (n * k) % length
+        accumulator += words.a[n - 1] * cosines[at] + words.b[n - 1] * sines[at]
+    return saturate(shift_round(accumulator, FRACTION_BITS + SINE_FRACTION_BITS - (bits - 1)), bits)

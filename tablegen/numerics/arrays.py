@@ -1,0 +1,29 @@
+"""Array types, and sums whose order does not depend on the processor."""
+
+from collections.abc import Sequence
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+Floats: TypeAlias = npt.NDArray[np.float64]
+Ints: TypeAlias = npt.NDArray[np.int64]
+Bools: TypeAlias = npt.NDArray[np.bool_]
+FloatsLike: TypeAlias = float | Sequence[float] | npt.NDArray[np.floating] | Ints
+
+
+def frozen(array: npt.NDArray[np.generic]) -> npt.NDArray[np.generic]:
+    """The same array, read-only from here on."""
+    array.setflags(write=False)
+    return array
+
+
+def tree_sum(values: Floats) -> Floats:
+    """Sum along the last axis by halving, an order that every machine shares."""
+    size = 1 << max(values.shape[-1] - 1, 0).bit_length()
+    padded = np.zeros((*values.shape[:-1], size))
+    padded[..., : values.shape[-1]] = values
+    while size > 1:
+        size //= 2
+        padded = padded[..., :size] + padded[..., size : 2 * size]
+    return padded[..., 0]

@@ -1,0 +1,82 @@
+"""Sine and cosine of an angle in turns (1 turn = 2 pi rad).
+
+The reduction to an eighth of a turn is exact, hence sin(1/2) is 0 and cos(1/4) is 0, not 6e-17: the removable
+singularities of the closed forms need no special cases. The error is below 1.5 units in the last place.
+"""
+
+from math import pi, tau
+
+import numpy as np
+
+from tablegen.numerics.arrays import Floats, FloatsLike
+
+# Taylor series about 0: at pi/4 the first omitted terms are 4e-20 (sine) and 8e-21 (cosine).
+_SINE_TERMS = 9
+_COSINE_TERMS = 10
+
+
+def _reciprocal_factorials(first: int, terms: int) -> list[float]:
+    signed, factorial = [], 1
+    for k in range(1, first + 1):
+        factorial *= k
+    for term in range(terms):
+        signed.append((-1) ** term / factorial)
+        factorial *= (first + 2 * term + 1) * (first + 2 * term + 2)
+    return signed
+
+
+_SINE = _reciprocal_factorials(1, _SINE_TERMS)
+_COSINE = _reciprocal_factorials(0, _COSINE_TERMS)
+
+
+def _horner(coefficients: list[float], square: Floats) -> Floats:
+    value = np.full_like(square, coefficients[-1])
+    for coefficient in reversed(coefficients[:-1]):
+        value = value * square + coefficient
+    return value
+
+
+def sine_and_cosine(turns: FloatsLike) -> tuple[Floats, Floats]:
+    """Return (sin(2 pi turns), cos(2 pi turns)), of the argument's shape."""
+    x = np.asarray(turns, dtype=np.float64)
+    x = x - np.rint(x)
+    quadrant = np.rint(4.0 * x)
+    angle = (x - 0.25 * quadrant) * tau
+    square = angle * angle
+    sine = angle * _horner(_SINE, square)
+    cosine = _horner(_COSINE, square)
+    odd = quadrant.astype(np.int64) & 1 == 1
+    wrapped = quadrant.astype(np.int64) & 3
+    sine, cosine = np.where(odd, cosine, sine), np.where(odd, sine, cosine)
+    return np.where(wrapped >= 2, -sine, sine), np.where((wrapped == 1) | (wrapped == 2), -cosine, cosine)
+
+
+def sine(turns: FloatsLike) -> Floats:
+    """sin(2 pi turns)."""
+    return sine_and_cosine(turns)[0]
+
+
+def cosine(turns: FloatsLike) -> Floats:
+    """cos(2 pi turns)."""
+    return sine_and_cosine(turns)[1]
+
+
+def sinc(y: FloatsLike) -> Floats:
+    """sin(pi y) / (pi y), exactly 1 at y = 0 and exactly 0 at every other whole y."""
+    x = np.asarray(y, dtype=np.float64)
+    safe = np.where(x == 0.0, 1.0, x)
+    return np.where(x == 0.0, 1.0, sine(0.5 * safe) / (pi * safe))
+
+
+def spherical_bessel_1(y: FloatsLike) -> Floats:
+    """j1(pi y) = (sin(pi y) - pi y cos(pi y)) / (pi y)^2, by its series where the difference would cancel."""
+    x = np.asarray(y, dtype=np.float64)
+    small = np.abs(x) < 0.3
+    safe = np.where(small, 1.0, x) * pi
+    s, c = sine_and_cosine(np.where(small, 1.0, x) * 0.5)
+    square = (np.where(small, x, 0.0) * pi) ** 2
+    series, denominator = [], 3.0
+    for term in range(8):  # z / 3 (1 - z^2/10 + z^4/280 - ...), 1e-20 left at z = 0.3 pi
+        series.append(1.0 / denominator)
+        denominator *= -2.0 * (term + 1) * (2 * term + 5)
+    return np.where(small, x * pi * _horner(series, square), (s - safe * c) / (safe * safe))

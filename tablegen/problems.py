@@ -1,0 +1,76 @@
+"""What is wrong with an input, where it stands, and how all of it is reported at once."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+
+class Unphysical(ValueError):
+    """A quantity that the physics or the arithmetic cannot serve; the message says by how much and what would fit."""
+
+
+class Problem(NamedTuple):
+    """One fault of the input, printed as ``scan.toml:14: x.table.bits: 30 is above 24``."""
+
+    file: str
+    line: int
+    key: str
+    why: str
+
+    def __str__(self) -> str:
+        place = f"{self.file}:{self.line}" if self.line else self.file
+        return f"{place}: {self.key}: {self.why}" if self.key else f"{place}: {self.why}"
+
+
+class Rejected(Exception):
+    """The input was refused; ``problems`` holds every fault found, in the order of the files."""
+
+    def __init__(self, problems: list[Problem]) -> None:
+        self.problems = sorted(set(problems), key=lambda p: (p.file, p.line))
+        super().__init__("\n".join(map(str, self.problems)))
+
+
+@dataclass(frozen=True)
+class Document:
+    """A TOML file as the user named it, and the line on which each of its keys stands."""
+
+    name: str
+    lines: dict[str, int] = field(default_factory=dict)
+
+    def line_of(self, key: str) -> int:
+        """The line of a key such as ``x.hysteresis.branches[0].turn``; of what encloses it if it is not written."""
+        while key:
+            if key in self.lines:
+                return self.lines[key]
+            cut = max(key.rfind("."), key.rfind("["))
+            key = key[:cut] if cut > 0 else ""
+        return 1
+
+    def problem(self, key: str, why: str) -> Problem:
+        """A problem of this document's key."""
+        return Problem(self.name, self.line_of(key), key, why)
+
+
+class Problems:
+    """Collects problems, so that one run reports them all."""
+
+    def __init__(self) -> None:
+        self.found: list[Problem] = []
+
+    def add(self, document: Document, key: str, why: str) -> None:
+        """Note one problem and go on."""
+        self.found.append(document.problem(key, why))
+
+    @contextmanager
+    def at(self, document: Document, key: str) -> Iterator[None]:
+        """Turn an ``Unphysical`` raised inside into a problem of this key."""
+        try:
+            yield
+        except Unphysical as reason:
+            self.add(document, key, str(reason))
+
+    def stop_if_any(self) -> None:
+        """Raise ``Rejected`` if anything was found so far."""
+        if self.found:
+            raise Rejected(self.found)

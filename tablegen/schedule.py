@@ -1,0 +1,178 @@
+"""Which tick belongs to which line, pixel and direction; one counter for both axes.
+
+All of it is decided in exact fractions: a window edge at 0.1 of the line is 1/10, not the float beside it.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from math import ceil, floor
+
+from tablegen.config.load import Setup
+from tablegen.config.schema import FastAxis
+from tablegen.fixedpoint.phase import MAXIMUM_TICKS
+from tablegen.problems import Problems
+
+MAXIMUM_LINE_TICKS = 1 << 24
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """A stretch [first, first + count) of ticks of a line, or of lines of a frame; empty where nothing is imaged."""
+
+    first: int
+    count: int
+
+    @property
+    def stop(self) -> int:
+        """The first tick (or line) after it."""
+        return self.first + self.count
+
+    def __contains__(self, k: int) -> bool:
+        return self.first <= k < self.stop
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """Ticks of a line, lines of a frame, and where they image.
+
+    ``forward`` and ``backward`` are in ticks of the line, ``up`` and ``down`` in lines of the frame (y forward and
+    backward). ``turn_tick`` is the first tick of the backward sweep, ``turn_line`` the first line that starts in it.
+    """
+
+    ticks: int
+    lines: int
+    update_rate_hz: Fraction
+    requested_hz: float
+    pixels: int
+    settle_lines: int
+    turn_tick: int
+    forward: Window
+    backward: Window
+    turn_line: int
+    up: Window
+    down: Window
+
+    @property
+    def frame_ticks(self) -> int:
+        """Ticks of a frame."""
+        return self.ticks * self.lines
+
+    @property
+    def line_rate(self) -> Fraction:
+        """Lines per second, exactly."""
+        return self.update_rate_hz / self.ticks
+
+    @property
+    def frame_rate(self) -> Fraction:
+        """Frames per second, exactly."""
+        return self.line_rate / self.lines
+
+    @property
+    def pixel_ticks(self) -> Fraction:
+        """Ticks per pixel of the forward sweep; pixel p starts at the tick floor(p pixel_ticks) of the window."""
+        return Fraction(self.forward.count, self.pixels)
+
+
+def exact(value: float) -> Fraction:
+    """The decimal fraction that a float of a configuration was written as."""
+    return Fraction(repr(value))
+
+
+def make_schedule(setup: Setup, problems: Problems) -> Schedule | None:
+    """Lay a scan out in ticks; None where ``problems`` grew."""
+    scan, file = setup.scan, setup.scan_file
+    timing = scan.timing
+    before = len(problems.found)
+    rate = exact(scan.dac.update_rate_hz)
+    key = "timing.line_rate_hz"
+    if timing.ticks_per_line is not None:
+        ticks, key = timing.ticks_per_line, "timing.ticks_per_line"
+    elif timing.ticks_per_pixel is not None:
+        key = "timing.ticks_per_pixel"
+        share = _width(scan.x) * exact(scan.x.turn)
+        wanted = timing.pixels * timing.ticks_per_pixel / share
+        ticks = round(wanted)
+        if wanted.denominator != 1:
+            problems.add(
+                file,
+                key,
+                f"{timing.pixels} pixels of {timing.ticks_per_pixel} ticks in {float(share):g} of the line make "
+                f"{float(wanted):.6g} ticks a line, which is not whole; change pixels, x.turn or the window",
+            )
+    else:
+        ticks = floor(rate / exact(timing.line_rate_hz) + Fraction(1, 2))
+    if not 8 <= ticks <= MAXIMUM_LINE_TICKS:
+        low, high = float(rate / MAXIMUM_LINE_TICKS), float(rate / 8)
+        problems.add(
+            file,
+            key,
+            f"a line of {ticks} ticks is outside 8..{MAXIMUM_LINE_TICKS}; at {float(rate):g} updates a second "
+            f"the line rate can be {low:.4g} to {high:.6g} Hz",
+        )
+    elif ticks * timing.lines > MAXIMUM_TICKS:
+        problems.add(
+            file,
+            "timing.lines",
+            f"{timing.lines} lines of {ticks} ticks are {ticks * timing.lines} ticks a frame, above {MAXIMUM_TICKS}; "
+            f"at most {MAXIMUM_TICKS // ticks} lines fit",
+        )
+    if len(problems.found) > before:
+        return None
+
+    forward, backward = _windows(scan.x, ticks, ceil, ceil)
+    up, down = _windows(scan.y, timing.lines, ceil, floor)
+    if forward.count < timing.pixels:
+        problems.add(
+            file,
+            "timing.pixels",
+            f"{timing.pixels} pixels do not fit the {forward.count} ticks of the imaging window; take at most "
+            f"{forward.count}, or a line rate up to {float(rate / ticks) * forward.count / timing.pixels:.6g} Hz",
+        )
+    if scan.x.band_limit.directions == "both" and backward.count < timing.pixels:
+        problems.add(
+            file,
+            "timing.pixels",
+            f"{timing.pixels} pixels do not fit the {backward.count} ticks of the backward imaging window; "
+            f"take at most {backward.count}, or directions = 'forward'",
+        )
+    if up.count < 1:
+        problems.add(file, "y.band_limit.window", f"not one of the {timing.lines} lines lies inside it; widen it")
+    if len(problems.found) > before:
+        return None
+    return Schedule(
+        ticks=ticks,
+        lines=timing.lines,
+        update_rate_hz=rate,
+        requested_hz=timing.line_rate_hz,
+        pixels=timing.pixels,
+        settle_lines=timing.settle_lines,
+        turn_tick=ceil(exact(scan.x.turn) * ticks),
+        forward=forward,
+        backward=backward,
+        turn_line=ceil(exact(scan.y.turn) * timing.lines),
+        up=up,
+        down=down,
+    )
+
+
+def _width(axis: FastAxis) -> Fraction:
+    low, high = axis.band_limit.window
+    return exact(high) - exact(low)
+
+
+def _windows(
+    axis: FastAxis, period: int, start: Callable[[Fraction], int], stop: Callable[[Fraction], int]
+) -> tuple[Window, Window]:
+    """The imaging windows of both sweeps, in ticks (or lines) of a period; the backward one runs from high to low."""
+    low, high = (exact(edge) for edge in axis.band_limit.window)
+    turn = exact(axis.turn)
+
+    def between(begin: Fraction, end: Fraction) -> Window:
+        first = start(begin * period)
+        return Window(first, max(stop(end * period) - first, 0))
+
+    forward = between(turn * low, turn * high)
+    if axis.band_limit.directions == "forward":
+        return forward, Window(0, 0)
+    return forward, between(turn + (1 - turn) * (1 - high), turn + (1 - turn) * (1 - low))

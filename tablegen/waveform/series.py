@@ -1,0 +1,61 @@
+"""A real, periodic, band-limited waveform: w(t) = a0 + sum_n a_n cos(2 pi n t) + b_n sin(2 pi n t)."""
+
+from dataclasses import dataclass
+from math import tau
+
+import numpy as np
+
+from tablegen.numerics.arrays import Floats, FloatsLike
+from tablegen.numerics.turns import sine_and_cosine
+
+
+@dataclass(frozen=True, eq=False)
+class FourierSeries:
+    """Coefficients of one period; ``a[n - 1]`` and ``b[n - 1]`` belong to harmonic n = 1..H. Dimensionless."""
+
+    a0: float
+    a: Floats
+    b: Floats
+
+    @property
+    def harmonics(self) -> int:
+        """H, the highest harmonic."""
+        return len(self.a)
+
+    def value(self, t: FloatsLike, derivative: int = 0) -> Floats:
+        """w, or its derivative with respect to t, at times in periods; of the shape of ``t``."""
+        t = np.asarray(t, dtype=np.float64)
+        total = np.full(t.shape, self.a0 if derivative == 0 else 0.0)
+        for n in range(1, self.harmonics + 1):
+            s, c = sine_and_cosine(n * t)
+            total = total + self._term(n, derivative, s, c)
+        return total
+
+    def on_grid(self, count: int, derivative: int = 0) -> Floats:
+        """As ``value`` at k / count for k in [0, count), by one table of sines for all harmonics."""
+        s, c = sine_and_cosine(np.arange(count) / count)
+        k = np.arange(count)
+        total = np.full(count, self.a0 if derivative == 0 else 0.0)
+        for n in range(1, self.harmonics + 1):
+            at = (n * k) % count
+            total = total + self._term(n, derivative, s[at], c[at])
+        return total
+
+    def _term(self, n: int, derivative: int, s: Floats, c: Floats) -> Floats:
+        a, b = float(self.a[n - 1]), float(self.b[n - 1])
+        for _ in range(derivative % 4):  # d/dt turns (a, b) into 2 pi n (b, -a)
+            a, b = b, -a
+        factor = (tau * n) ** derivative
+        return (factor * a) * c + (factor * b) * s
+
+    def peak_slope(self) -> float:
+        """max |w'| per period, on a grid of 32 points per period of the highest harmonic."""
+        return float(np.max(np.abs(self.on_grid(32 * self.harmonics, 1))))
+
+    def peak_acceleration(self) -> float:
+        """max |w''| per period squared, on a grid of 32 points per period of the highest harmonic."""
+        return float(np.max(np.abs(self.on_grid(32 * self.harmonics, 2))))
+
+    def times(self, real: Floats, imaginary: Floats) -> "FourierSeries":
+        """The series with harmonic n multiplied by real[n - 1] + i imaginary[n - 1]; the mean stays."""
+        return FourierSeries(self.a0, self.a * real + self.b * imaginary, self.b * real - self.a * imaginary)

@@ -1,0 +1,176 @@
+"""The band-limited waveform that is straight where the image is taken, and gentle where it is not.
+
+Minimised over the coefficients c::
+
+    J(c) = sum_j [ (w'(t_j) - u'(t_j))^2 / u'(t_j)^2 + VALUE_WEIGHT (w(t_j) - u(t_j))^2 ] / N
+         + SMOOTHNESS sum_n (2 pi n)^4 (a_n^2 + b_n^2) / 2
+
+subject to 0 <= w <= 1. The t_j are the Gauss-Chebyshev nodes of each imaging window: equal weights there are the
+weight 1 / sqrt(x (1 - x)) of the near-minimax approximation, so that the error does not pile up at the
+edges of the window, where it would cost image. The last term is the mean square acceleration: it picks, of all
+waveforms that are as straight, the one that excites the scanner least. Derivation: docs/waveform.md.
+"""
+
+from math import tau
+
+import numpy as np
+
+from tablegen.compensation.hysteresis import LineShape
+from tablegen.numerics.arrays import Floats, tree_sum
+from tablegen.numerics.linear import Cholesky
+from tablegen.numerics.turns import cosine, sine_and_cosine
+from tablegen.problems import Unphysical
+from tablegen.waveform.series import FourierSeries
+
+# Keeps the fit on the line, not only parallel to it, where the harmonics are too few for both.
+VALUE_WEIGHT = 100.0
+# Small enough to cost nothing inside the window (0.005 % at H = 32), large enough to keep the system regular.
+SMOOTHNESS = 1e-12
+# Where the fit would leave [0, 1] its extremes are held this far inside.
+_MARGIN = 1e-3
+_ROUNDS = 40
+
+
+def fit_window(shape: LineShape, harmonics: int, window: tuple[float, float], both: bool) -> FourierSeries:
+    """Fit harmonics 1..``harmonics`` to the line inside ``window`` (normalised position) of the imaging branches.
+
+    Raises ``Unphysical`` where the range [0, 1] and the harmonics do not go together.
+    """
+    times = _nodes(shape.turn, harmonics, window, both)
+    slope = shape.slope(times)
+    slope_weight = 1.0 / (slope * slope)
+    value_weight = np.full_like(times, VALUE_WEIGHT)
+    normal, right = _normal_equations(times, shape.value(times), slope, value_weight, slope_weight, harmonics)
+    try:
+        factor = Cholesky(normal)
+    except ArithmeticError:  # pragma: no cover - the smoothness term keeps every pivot positive
+        raise Unphysical("the window fit is singular; ask for fewer harmonics or a wider window") from None
+    free = factor.solve(right)
+    return _within_range(free, factor, harmonics)
+
+
+def _nodes(turn: float, harmonics: int, window: tuple[float, float], both: bool) -> Floats:
+    count = 4 * harmonics + 32
+    x = 0.5 - 0.5 * cosine((np.arange(count) + 0.5) / (2 * count))
+    position = window[0] + (window[1] - window[0]) * x
+    forward = turn * position
+    if not both:
+        return forward
+    return np.concatenate([forward, turn + (1.0 - turn) * (1.0 - position)])
+
+
+def _normal_equations(
+    times: Floats, value: Floats, slope: Floats, value_weight: Floats, slope_weight: Floats, harmonics: int
+) -> tuple[Floats, Floats]:
+    """Gram matrix and right side in the basis 1, cos 1..H, sin 1..H.
+
+    Products of two harmonics depend on the sum and the difference of their numbers alone, so that 4 H + 2 sums
+    over the nodes give all (2 H + 1)^2 entries.
+    """
+    n = np.arange(2 * harmonics + 1, dtype=np.float64)
+    s, c = sine_and_cosine(n[:, None] * times[None, :])
+    count = len(times)
+
+    def sums(weight: Floats, rows: slice = slice(None)) -> tuple[Floats, Floats]:
+        return tree_sum(c[rows] * weight) / count, tree_sum(s[rows] * weight) / count
+
+    order = np.arange(harmonics + 1)
+    minus, plus = order[:, None] - order[None, :], order[:, None] + order[None, :]
+    sign = np.sign(minus)
+    normal = np.zeros((2 * harmonics + 1, 2 * harmonics + 1))
+    for weight, derivative in ((value_weight, False), (slope_weight, True)):
+        cosines, sines = sums(weight)
+        cos_cos = 0.5 * (cosines[np.abs(minus)] + cosines[plus])
+        sin_sin = 0.5 * (cosines[np.abs(minus)] - cosines[plus])
+        sin_cos = 0.5 * (sines[plus] + sign * sines[np.abs(minus)])  # sin of the row, cosine of the column
+        if derivative:  # cos -> -2 pi n sin, sin -> +2 pi n cos
+            rate = tau * order
+            scale = rate[:, None] * rate[None, :]
+            cos_cos, sin_sin, sin_cos = scale * sin_sin, scale * cos_cos, -scale * sin_cos.T
+        normal[: harmonics + 1, : harmonics + 1] += cos_cos
+        normal[harmonics + 1 :, harmonics + 1 :] += sin_sin[1:, 1:]
+        normal[harmonics + 1 :, : harmonics + 1] += sin_cos[1:, :]
+        normal[: harmonics + 1, harmonics + 1 :] += sin_cos[1:, :].T
+
+    low = slice(0, harmonics + 1)
+    value_c, value_s = sums(value_weight * value, low)
+    slope_c, slope_s = sums(slope_weight * slope, low)
+    rate = tau * order
+    right = np.concatenate([value_c - rate * slope_s, (value_s + rate * slope_c)[1:]])
+
+    energy = 0.5 * SMOOTHNESS * rate**4
+    diagonal = np.arange(2 * harmonics + 1)
+    normal[diagonal, diagonal] += np.concatenate([energy, energy[1:]])
+    return normal, right
+
+
+def _series(c: Floats, harmonics: int) -> FourierSeries:
+    return FourierSeries(float(c[0]), c[1 : harmonics + 1], c[harmonics + 1 :])
+
+
+def _within_range(free: Floats, factor: Cholesky, harmonics: int) -> FourierSeries:
+    """The minimiser of the same J with its extremes held inside [0, 1], by equality at those that would leave.
+
+    Active set on a grid of 32 points per period of the highest harmonic: add the worst offender of each excursion,
+    drop what holds nothing back, solve again. With Z = A^-1 C^T the constrained minimum is free + Z multiplier.
+    """
+    points = 32 * harmonics
+    grid = np.arange(points) / points
+    active: list[tuple[int, float]] = []  # grid point, level
+    columns: dict[int, Floats] = {}
+    c = free
+    for _ in range(_ROUNDS):
+        w = _series(c, harmonics).on_grid(points)
+        if float(np.min(w)) >= 0.0 and float(np.max(w)) <= 1.0:
+            return _series(c, harmonics)
+        held = {point for point, _ in active}
+        for point in _excursions(w):
+            if point not in held:
+                active.append((point, 1.0 - _MARGIN if w[point] > 0.5 else _MARGIN))
+        if len(active) > harmonics:
+            break
+        for point, _ in active:
+            if point not in columns:
+                columns[point] = _basis(float(grid[point]), harmonics)
+        active, c = _hold(free, factor, active, columns)
+    low, high = float(np.min(w)), float(np.max(w))
+    raise Unphysical(
+        f"{harmonics} harmonics straight in this window swing over {low:.4f}..{high:.4f} of the line; "
+        f"ask for more harmonics, a narrower window, or another method"
+    )
+
+
+def _excursions(w: Floats) -> list[int]:
+    """The extreme point of every stretch outside [0, 1]; near neighbours are the same excursion."""
+    beyond = np.maximum(w - 1.0, -w)
+    peak = (beyond > 0.0) & (beyond >= np.roll(beyond, 1)) & (beyond > np.roll(beyond, -1))
+    return [int(point) for point in np.flatnonzero(peak)]
+
+
+def _basis(t: float, harmonics: int) -> Floats:
+    s, c = sine_and_cosine(np.arange(harmonics + 1) * t)
+    return np.concatenate([c, s[1:]])
+
+
+def _hold(
+    free: Floats, factor: Cholesky, active: list[tuple[int, float]], columns: dict[int, Floats]
+) -> tuple[list[tuple[int, float]], Floats]:
+    """Solve with equality at the active points; points whose multiplier pulls outwards are let go."""
+    while True:
+        rows = np.stack([columns[point] for point, _ in active])
+        responses = np.stack([factor.solve(row) for row in rows])
+        levels = np.array([level for _, level in active])
+        gram = tree_sum(rows[:, None, :] * responses[None, :, :])
+        lack = levels - tree_sum(rows * free)
+        try:
+            multiplier = Cholesky(0.5 * (gram + gram.T)).solve(lack)
+        except ArithmeticError:
+            raise Unphysical("the range [0, 1] cannot be held with so few harmonics; ask for more") from None
+        outward = [i for i, (_, level) in enumerate(active) if (multiplier[i] > 0.0) == (level > 0.5)]
+        if not outward or len(active) == 1:
+            c = free.copy()
+            for i in range(len(active)):
+                c = c + multiplier[i] * responses[i]
+            return active, c
+        worst = max(outward, key=lambda i: abs(multiplier[i]))
+        active = [entry for i, entry in enumerate(active) if i != worst]
