@@ -119,8 +119,10 @@ def _within_range(free: Floats, factor: Cholesky, harmonics: int) -> FourierSeri
     active: list[tuple[int, float]] = []  # grid point, level
     columns: dict[int, Floats] = {}
     c = free
-    for _ in range(_ROUNDS):
+    swing = (0.0, 1.0)  # of the free fit, for the message
+    for attempt in range(_ROUNDS):
         w = _series(c, harmonics).on_grid(points)
+        swing = swing if attempt else (float(np.min(w)), float(np.max(w)))
         if float(np.min(w)) >= 0.0 and float(np.max(w)) <= 1.0:
             return _series(c, harmonics)
         held = {point for point, _ in active}
@@ -133,9 +135,8 @@ def _within_range(free: Floats, factor: Cholesky, harmonics: int) -> FourierSeri
             if point not in columns:
                 columns[point] = _basis(float(grid[point]), harmonics)
         active, c = _hold(free, factor, active, columns)
-    low, high = float(np.min(w)), float(np.max(w))
     raise Unphysical(
-        f"{harmonics} harmonics straight in this window swing over {low:.4f}..{high:.4f} of the line; "
+        f"{harmonics} harmonics straight in this window swing over {swing[0]:.4f}..{swing[1]:.4f} of the line; "
         f"ask for more harmonics, a narrower window, or another method"
     )
 

@@ -1,0 +1,183 @@
+"""The certificate against measurements by other means, and the controls that show that each figure can be bad."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from variants import plan_of, setup_of
+
+from tablegen import certificate as module
+from tablegen.certificate import broken_limits, certify
+from tablegen.compensation.hysteresis import BranchShape
+from tablegen.plan import LinePlan, Plan, make_plan
+
+FREE = {"limits.max_error_lsb": "", "limits.max_scaling_error_percent": ""}
+
+
+@pytest.fixture(scope="module")
+def example(tmp_path_factory: pytest.TempPathFactory) -> Plan:
+    return plan_of(tmp_path_factory.mktemp("example"))
+
+
+def series_by_numpy(line: LinePlan, t: np.ndarray) -> np.ndarray:
+    n = np.arange(1, line.series.harmonics + 1)
+    angle = 2 * np.pi * np.outer(t, n)
+    return line.series.a0 + np.cos(angle) @ line.series.a + np.sin(angle) @ line.series.b
+
+
+def with_words(plan: Plan, words: np.ndarray) -> Plan:
+    return replace(plan, x=replace(plan.x, program=replace(plan.x.program, words=words)))
+
+
+def test_errors_are_those_of_every_tick(example: Plan) -> None:
+    certificates = certify(example)
+    for line in example.lines:
+        ticks = line.program.ticks
+        codes = line.program.codes(np.arange(ticks))
+        volts = line.drive.v_offset + line.drive.v_amplitude * (series_by_numpy(line, np.arange(ticks) / ticks) - 0.5)
+        asked = ((volts - 50.0) / 10.0 + 5.0) / 10.0 * 65536
+        error = codes - asked
+        c = certificates[line.axis]
+        assert c.ticks == ticks
+        assert c.max_error_lsb == pytest.approx(float(np.max(np.abs(error))), abs=1e-6)
+        assert c.rms_error_lsb == pytest.approx(float(np.sqrt(np.mean(error**2))), rel=1e-6)
+        assert (c.lowest_code, c.highest_code) == (codes.min(), codes.max())
+        assert c.largest_step == int(np.max(np.abs(np.diff(np.append(codes, codes[0])))))
+        power = np.abs(np.fft.rfft(codes - codes.mean())) ** 2
+        beyond = 10 * np.log10(power[line.series.harmonics + 1 :].sum() / power.sum())
+        # The figure also holds what quantisation leaves below the cutoff, so it may only be the larger one.
+        assert beyond - 0.01 <= c.beyond_cutoff_db <= beyond + 0.5
+
+
+def test_the_example_is_within_its_numbers(example: Plan) -> None:
+    certificates = certify(example)
+    assert certificates["x"].max_error_lsb <= 0.60
+    assert certificates["y"].max_error_lsb <= 0.80
+    for c in certificates.values():
+        assert c.max_error_lsb <= 1.0
+        assert abs(c.size_error_percent) < 0.001
+        assert all(error.band_limit <= 0.02 for error in c.scaling.values())
+
+
+def test_scaling_error_is_that_of_the_modelled_scanner(example: Plan) -> None:
+    """Play the codes through the model exactly: quasi-static drive by DFT, position by bisection, chords of 1/20."""
+    line = example.x
+    ticks = line.program.ticks
+    codes = line.program.codes(np.arange(ticks)).astype(float)
+    w = (codes * line.converter.v_per_code + line.converter.v_zero - line.drive.v_offset) / line.drive.v_amplitude + 0.5
+    # The dynamics undo the inverse on the played harmonics; the noise of quantisation is taken as it is.
+    n = np.arange(1, 33)
+    r = n * 400.0 / 40e3
+    spectrum = np.fft.rfft(w)
+    spectrum[1:33] /= 1 - r**2 + 1j * r / 20.0
+    w = np.fft.irfft(spectrum, ticks)
+    for side, branch in (("forward", line.drive.shape.forward), ("backward", line.drive.shape.backward)):
+        k = np.arange(63, 563) if side == "forward" else np.arange(688, 1188)
+        sweep = k / 625 if side == "forward" else (k - 625) / 625
+        drive = w[k] if side == "forward" else 1 - w[k]
+        position = bisect(branch, drive)
+        chords = (position[31:] - position[:-31]) / (sweep[31:] - sweep[:-31])
+        total = 100 * (chords.max() - chords.min())
+        # The noise at the resonance itself differs (it is attenuated or raised a little); the figure is chord noise.
+        assert certify(example)["x"].scaling[side].total == pytest.approx(total, rel=0.08)
+
+
+def bisect(branch: BranchShape, u: np.ndarray) -> np.ndarray:
+    low, high = np.zeros_like(u), np.ones_like(u)
+    for _ in range(60):
+        middle = (low + high) / 2
+        below = branch.value(middle) < u
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    return low
+
+
+def test_uncompensated_is_the_slope_of_a_triangle_through_the_scanner(example: Plan) -> None:
+    error = certify(example)["x"].scaling["forward"].uncompensated
+    x = np.linspace(0.1, 0.9, 4001)
+    position = bisect(example.x.drive.shape.forward, x)
+    slope = np.gradient(position, x)
+    middle = np.interp(0.5, x, slope)
+    assert error == pytest.approx(100 * (slope.max() - slope.min()) / middle, rel=2e-3)
+
+
+def test_one_wrong_word_is_seen(example: Plan) -> None:
+    words = example.x.program.words.copy()
+    words[500] += 60  # 12 codes at a gain of 0.2
+    bad = certify(with_words(example, words))["x"]
+    assert bad.max_error_lsb > 8.0
+    assert bad.scaling["forward"].total > 1.0
+
+
+def test_a_truncating_table_is_seen(example: Plan) -> None:
+    """Truncation instead of rounding: half an LSB of the table, all of one sign."""
+    coarse = (example.x.program.words >> 8) << 8
+    good, bad = certify(example)["x"], certify(with_words(example, coarse))["x"]
+    assert bad.rms_error_lsb > 20 * good.rms_error_lsb
+
+
+def test_band_limit_and_boost_limit_are_told_apart(tmp_path: Path) -> None:
+    ringing = certify(plan_of(tmp_path, {**FREE, "x.band_limit.method": '"truncate"'}))["x"].scaling["forward"]
+    assert ringing.band_limit > 10.0
+    assert ringing.model == 0.0
+    held = plan_of(tmp_path, FREE, {"x.resonance.frequency_hz": "4000.0", "x.resonance.max_boost_db": "3.0"})
+    error = certify(held)["x"].scaling["forward"]
+    assert error.band_limit < 0.02
+    assert error.model > 1.0
+    assert error.total > 0.8 * error.model
+
+
+def test_a_scan_of_the_wrong_size_is_seen(tmp_path: Path) -> None:
+    """Too few harmonics for a wide window: the extent of the image is off, not only its straightness."""
+    edits = {**FREE, "x.band_limit.harmonics": "3", "x.band_limit.window": "[0.02, 0.98]"}
+    assert abs(certify(plan_of(tmp_path, edits))["x"].size_error_percent) > 1.0
+
+
+def test_coarse_converter_shows_in_quantisation(tmp_path: Path) -> None:
+    fine = certify(plan_of(tmp_path, FREE))["x"].scaling["forward"].quantisation
+    coarse = certify(plan_of(tmp_path, {**FREE, "dac.bits": "12"}))["x"].scaling["forward"].quantisation
+    assert coarse == pytest.approx(16 * fine, rel=0.4)
+
+
+@pytest.mark.parametrize("chunk", [1000, 77777])
+def test_long_frames_in_pieces_measure_the_same(example: Plan, monkeypatch: pytest.MonkeyPatch, chunk: int) -> None:
+    whole = certify(example)["y"]
+    monkeypatch.setattr(module, "_CHUNK", chunk)
+    pieces = certify(example)["y"]
+    for name in ("max_error_lsb", "rms_error_lsb", "lowest_code", "largest_step", "beyond_cutoff_db"):
+        assert getattr(pieces, name) == pytest.approx(getattr(whole, name), rel=1e-9)
+    assert pieces.scaling["forward"].total == pytest.approx(whole.scaling["forward"].total, rel=1e-9)
+    monkeypatch.setattr(module, "_KEPT", 30000)  # every 9th error kept for the chords
+    thinned = certify(example)["y"]
+    assert thinned.max_error_lsb == pytest.approx(whole.max_error_lsb, rel=1e-9)
+    assert thinned.scaling["forward"].total == pytest.approx(whole.scaling["forward"].total, rel=0.1)
+
+
+def test_progress_is_told_for_long_frames(example: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[tuple[str, float]] = []
+    monkeypatch.setattr(module, "_CHUNK", 50000)
+    certify(example, lambda axis, share: told.append((axis, share)))
+    assert told == [("y", 0.2), ("y", 0.4), ("y", 0.6), ("y", 0.8)]
+
+
+def test_a_resonance_inside_the_band_is_seen(tmp_path: Path) -> None:
+    quiet = certify(plan_of(tmp_path, FREE))["x"].at_resonance_db
+    plan = plan_of(tmp_path, FREE, {"x.resonance.frequency_hz": "6000.0"})
+    loud = certify(plan)["x"].at_resonance_db
+    assert quiet is not None
+    assert loud is not None
+    assert quiet < -95.0
+    power = plan.x.series.a**2 + plan.x.series.b**2
+    assert loud == pytest.approx(10 * np.log10(power[14] / power.sum()), abs=0.5)
+    assert loud > quiet + 10.0
+
+
+def test_broken_limits_name_the_part_and_the_remedy(tmp_path: Path) -> None:
+    edits = {"x.band_limit.method": '"truncate"', "limits.max_error_lsb": "0.7"}
+    setup = setup_of(tmp_path, edits)
+    plan = make_plan(setup)
+    text = [str(p) for p in broken_limits(plan, certify(plan), setup.scan_file)]
+    assert len(text) == 2
+    assert "limits.max_error_lsb: the y axis errs by up to 0.7488 LSB, above 0.7; lengthen or widen y.table" in text[1]
+    assert "limits.max_scaling_error_percent: the x axis has a scaling error of " in text[0]
+    assert "above 0.5 %; most of it is the band limit: more x.band_limit.harmonics" in text[0]

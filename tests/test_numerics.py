@@ -1,0 +1,85 @@
+"""Reproducible arithmetic against mpmath: accuracy, exact zeros, symmetry."""
+
+import mpmath as mp
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tablegen.numerics.arrays import tree_sum
+from tablegen.numerics.elementary import exp, log10
+from tablegen.numerics.linear import Cholesky
+from tablegen.numerics.turns import cosine, sinc, sine, sine_and_cosine, spherical_bessel_1
+
+mp.mp.dps = 40
+turns = st.floats(-1e4, 1e4, allow_nan=False)
+
+
+@given(turns)
+def test_sine_and_cosine_are_within_two_and_a_half_ulp(x: float) -> None:
+    exact = mp.mpf(x) - round(x)
+    for value, reference in zip(sine_and_cosine(x), (mp.sinpi(2 * exact), mp.cospi(2 * exact)), strict=True):
+        ulp = np.spacing(max(abs(float(reference)), 1e-300))
+        # Near a zero the argument's own reduction is exact, so the bound holds there as well.
+        assert abs(mp.mpf(float(value)) - reference) <= 2.5 * ulp
+
+
+@given(st.integers(-(10**6), 10**6))
+def test_zeros_and_extremes_are_exact(n: int) -> None:
+    assert float(sine(n / 2)) == 0.0
+    assert float(cosine(n / 2 + 0.25)) == 0.0
+    assert float(cosine(n)) == 1.0
+    assert float(sine(n + 0.25)) == 1.0
+    assert float(sinc(n)) == (1.0 if n == 0 else 0.0)
+
+
+@given(turns)
+def test_symmetry_is_exact(x: float) -> None:
+    assert float(sine(-x)) == -float(sine(x))
+    assert float(cosine(-x)) == float(cosine(x))
+
+
+@given(st.floats(-600.0, 600.0))
+def test_spherical_bessel_function(y: float) -> None:
+    with mp.workdps(60):
+        z = mp.pi * mp.mpf(y)
+        reference = z / 3 if abs(z) < mp.mpf(10) ** -12 else (mp.sin(z) - z * mp.cos(z)) / z**2
+    assert abs(mp.mpf(float(spherical_bessel_1(y))) - reference) < 4e-16
+
+
+@pytest.mark.parametrize("y", [0.2999999999, 0.3, 0.3000000001, 1e-8, 1e-100, 0.0])
+def test_spherical_bessel_function_where_its_two_forms_meet(y: float) -> None:
+    with mp.workdps(450):  # the plain formula, with digits to spare for its cancellation
+        z = mp.pi * mp.mpf(y)
+        reference = (mp.sin(z) - z * mp.cos(z)) / z**2 if y else mp.mpf(0)
+    assert float(spherical_bessel_1(y)) == pytest.approx(float(reference), rel=5e-15, abs=1e-300)
+
+
+@given(st.floats(-700.0, 700.0))
+def test_exp_is_correctly_rounded(x: float) -> None:
+    assert exp(x) == float(mp.exp(mp.mpf(x)))
+
+
+@given(st.floats(1e-300, 1e300))
+def test_log10_is_correctly_rounded(x: float) -> None:
+    assert log10(x) == float(mp.log10(mp.mpf(x)))
+
+
+@given(st.integers(1, 300), st.integers(0, 2**32 - 1))
+def test_tree_sum_is_a_sum(size: int, seed: int) -> None:
+    values = np.random.default_rng(seed).standard_normal((3, size))
+    assert tree_sum(values) == pytest.approx([float(mp.fsum(row.tolist())) for row in values], abs=1e-12)
+
+
+@pytest.mark.parametrize("size", [1, 2, 7, 65])
+def test_cholesky_against_lapack(size: int) -> None:
+    random = np.random.default_rng(size)
+    root = random.standard_normal((size, size))
+    matrix = root @ root.T + size * np.eye(size)
+    right = random.standard_normal(size)
+    assert Cholesky(matrix).solve(right) == pytest.approx(np.linalg.solve(matrix, right), rel=1e-10)
+
+
+def test_cholesky_refuses_what_is_not_positive_definite() -> None:
+    with pytest.raises(ArithmeticError, match="pivot 1 of 2"):
+        Cholesky(np.array([[1.0, 2.0], [2.0, 1.0]]))
