@@ -1,6 +1,6 @@
 """Tables and plots for the terminal."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -46,12 +46,16 @@ def plots(line: LinePlan, unicode: bool) -> list[str]:
     volts = line.drive.v_offset + line.drive.v_amplitude * (w - 0.5)
     turn = line.drive.turn
     triangle = np.where(t <= turn, t / turn, (1.0 - t) / (1.0 - turn))
-    inside = _window_marks(line)
+    marks = _window_marks(line)
+    imaged = np.array([mark != "-" for mark in marks]).repeat(count // _WIDTH)
+    if not imaged.any():  # a window narrower than a column
+        imaged[:] = True
+    added = np.where(imaged, 100.0 * (w - triangle), np.nan)
     return [
         f"{line.axis} drive [V]",
-        *_plot(volts, inside, unicode),
-        f"{line.axis} drive less the uncompensated line [% of the scan]",
-        *_plot(100.0 * (w - triangle), inside, unicode),
+        *_plot(volts, marks, unicode),
+        f"{line.axis} drive less the uncompensated line, where it images [% of the scan]",
+        *_plot(added, marks, unicode),
     ]
 
 
@@ -69,7 +73,7 @@ def _window_marks(line: LinePlan) -> str:
 
 
 def _plot(values: Floats, marks: str, unicode: bool) -> list[str]:
-    low, high = float(np.min(values)), float(np.max(values))
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
     span = high - low or 1.0
     rows = _dots(values, low, span) if unicode else _stars(values, low, span)
     labels = {0: f"{high:10.4g}", _HEIGHT - 1: f"{low:10.4g}"}
@@ -77,19 +81,24 @@ def _plot(values: Floats, marks: str, unicode: bool) -> list[str]:
     return [*lines, " " * 11 + "+" + marks]
 
 
+def _levels(values: Floats, low: float, span: float, height: int) -> Iterator[tuple[int, int]]:
+    """Index and row, from the top, of every value that is a number."""
+    for i, value in enumerate(values.tolist()):
+        if value == value:
+            yield i, round((1.0 - (value - low) / span) * (height - 1))
+
+
 def _dots(values: Floats, low: float, span: float) -> Sequence[str]:
     cells = np.zeros((_HEIGHT, _WIDTH), dtype=np.int64)
     tall, wide = 4 * _HEIGHT, 2 * _WIDTH
-    levels = np.rint((1.0 - (values - low) / span) * (tall - 1)).astype(int)
-    for i, level in enumerate(levels):
-        column = i * wide // len(levels)
+    for i, level in _levels(values, low, span, tall):
+        column = i * wide // len(values)
         cells[level // 4, column // 2] |= _BRAILLE[level % 4][column % 2]
     return ["".join(chr(0x2800 + cell) if cell else " " for cell in row) for row in cells]
 
 
 def _stars(values: Floats, low: float, span: float) -> Sequence[str]:
     grid = [[" "] * _WIDTH for _ in range(_HEIGHT)]
-    levels = np.rint((1.0 - (values - low) / span) * (_HEIGHT - 1)).astype(int)
-    for i, level in enumerate(levels):
-        grid[level][i * _WIDTH // len(levels)] = "*"
+    for i, level in _levels(values, low, span, _HEIGHT):
+        grid[level][i * _WIDTH // len(values)] = "*"
     return ["".join(row) for row in grid]

@@ -28,7 +28,10 @@ class Table(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         Literal["interpolated", "direct"],
         Meta(description="interpolated: `length` words and linear interpolation; direct: one word a tick"),
     ] = "interpolated"
-    length: Annotated[int, Meta(ge=4, le=65536, description="words; interpolated: a power of two")] | None = None
+    length: (
+        Annotated[int, Meta(ge=4, le=65536, description="words; interpolated: a power of two, 2048 if not given")]
+        | None
+    ) = None
     bits: Annotated[int, Meta(ge=8, le=24, description="bits of a table word")] = 16
 
 
@@ -39,7 +42,13 @@ class BandLimit(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         Literal["window", "lanczos", "truncate"],
         Meta(description="window: fitted inside the imaging window, the turnarounds free; others: of the whole line"),
     ] = "window"
-    harmonics: Annotated[int, Meta(ge=1, le=512, description="highest harmonic of the line rate")] | None = None
+    harmonics: (
+        Annotated[
+            int,
+            Meta(ge=1, le=512, description="highest harmonic of the rate; 32 if neither this nor `cutoff_hz` is given"),
+        ]
+        | None
+    ) = None
     cutoff_hz: Annotated[Hertz, Meta(description="highest frequency; or give `harmonics`")] | None = None
     window: Annotated[Window, Meta(description="imaging window in normalised position, of each branch")] = (
         0.1,
@@ -77,11 +86,13 @@ class SlowAxis(FastAxis, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class Dac(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The converter. Code c gives v_min + (v_max - v_min) c / 2^bits."""
 
-    bits: Annotated[int, Meta(ge=8, le=24)]
-    coding: Literal["offset-binary", "twos-complement"] = "offset-binary"
+    bits: Annotated[int, Meta(ge=8, le=24, description="resolution; arithmetic is in straight codes 0..2^bits - 1")]
+    coding: Annotated[Literal["offset-binary", "twos-complement"], Meta(description="of the word sent")] = (
+        "offset-binary"
+    )
     v_min: Annotated[Volts, Meta(description="voltage at code 0")]
     v_max: Annotated[Volts, Meta(description="voltage one LSB above the highest code")]
-    update_rate_hz: Annotated[float, Meta(ge=1.0, le=1e9)]
+    update_rate_hz: Annotated[float, Meta(ge=1.0, le=1e9, description="ticks a second; both axes share them")]
     align: Annotated[Literal["right", "left"], Meta(description="of the code in the word sent")] = "right"
     word_bits: Annotated[int, Meta(ge=8, le=32, description="bits of the word sent; `bits` if not given")] | None = None
 
@@ -89,8 +100,8 @@ class Dac(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class Amplifier(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Piezo voltage = gain * converter voltage + bias_v."""
 
-    gain: Annotated[float, Meta(ge=-1e4, le=1e4)]
-    bias_v: Volts = 0.0
+    gain: Annotated[float, Meta(ge=-1e4, le=1e4, description="negative for an inverting amplifier")]
+    bias_v: Annotated[Volts, Meta(description="piezo voltage at 0 V of the converter")] = 0.0
     max_slew_v_per_s: Annotated[float, Meta(ge=1e-3, le=1e12, description="at the piezo")] | None = None
 
 
@@ -99,7 +110,7 @@ class Timing(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     pixels: Annotated[int, Meta(ge=1, le=65536, description="per line and direction, over the imaging window")]
     lines: Annotated[int, Meta(ge=1, le=65536, description="line periods per frame")]
-    line_rate_hz: Annotated[float, Meta(ge=1e-3, le=1e6)]
+    line_rate_hz: Annotated[float, Meta(ge=1e-3, le=1e6, description="forward and backward make one line")]
     ticks_per_line: (
         Annotated[int, Meta(ge=8, le=1 << 24, description="instead of the nearest to the line rate")] | None
     ) = None
@@ -113,8 +124,12 @@ class Timing(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class Limits(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What the certificate may not exceed."""
 
-    max_error_lsb: Annotated[float, Meta(gt=0.0, le=1e6)] | None = None
-    max_scaling_error_percent: Percent | None = None
+    max_error_lsb: (
+        Annotated[float, Meta(gt=0.0, le=1e6, description="largest error of any code, in LSB of the converter")] | None
+    ) = None
+    max_scaling_error_percent: (
+        Annotated[Percent, Meta(description="peak to peak over the imaging window, and of the window's size")] | None
+    ) = None
 
 
 class Emit(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -140,8 +155,8 @@ class Scan(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class OffsetPoint(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The apparent size of one object at one offset voltage."""
 
-    offset_v: Volts
-    apparent_nm: Nanometres
+    offset_v: Annotated[Volts, Meta(description="offset voltage of the image")]
+    apparent_nm: Annotated[Nanometres, Meta(description="size of the object, or lattice constant, as it appeared")]
 
 
 class Offset(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -180,7 +195,7 @@ class Branch(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class Branches(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Both directions, as calibrated at one turning point."""
 
-    turn: Normalised
+    turn: Annotated[Normalised, Meta(description="turning point of the calibration")]
     forward: Branch
     backward: Branch
 
@@ -188,8 +203,13 @@ class Branches(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class Hysteresis(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Hysteresis of the line, (13)-(22)."""
 
-    model: Literal["harmonic", "sinusoidal", "triangle"] = "harmonic"
-    branches: Annotated[list[Branches], Meta(max_length=64)] = []
+    model: Annotated[
+        Literal["harmonic", "sinusoidal", "triangle"],
+        Meta(description="harmonic: (17)-(21); sinusoidal: (15); triangle: not compensated"),
+    ] = "harmonic"
+    branches: Annotated[
+        list[Branches], Meta(max_length=64, description="one entry a calibrated turn; interpolated between")
+    ] = []
 
 
 class Frequency(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -202,10 +222,15 @@ class Frequency(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class Resonance(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Inverse dynamics: each harmonic divided by the response; either second order with delay, or measured."""
 
-    frequency_hz: Hertz | None = None
-    quality: Annotated[float, Meta(ge=0.1, le=1e5)] | None = None
-    delay_s: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.0
-    response: Annotated[FileName, Meta(description="CSV of the measured response: hz, gain, phase_deg")] | None = None
+    frequency_hz: Annotated[Hertz, Meta(description="undamped resonance")] | None = None
+    quality: Annotated[float, Meta(ge=0.1, le=1e5, description="quality factor")] | None = None
+    delay_s: Annotated[float, Meta(ge=0.0, le=1.0, description="dead time of amplifier and scanner")] = 0.0
+    response: (
+        Annotated[
+            FileName, Meta(description="CSV of the measured response, relative to this file; header hz,gain,phase_deg")
+        ]
+        | None
+    ) = None
     max_boost_db: Annotated[float, Meta(ge=0.0, le=60.0, description="no harmonic is raised by more")] = 6.0
 
 
@@ -222,7 +247,9 @@ class ScannerAxis(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
 class Scanner(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A calibrated scanner."""
 
-    name: Name
-    v_max: Annotated[PositiveVolts, Meta(description="maximum output of the piezo driver")]
+    name: Annotated[Name, Meta(description="for reports")]
+    v_max: Annotated[
+        PositiveVolts, Meta(description="maximum output of the piezo driver; normalised voltages refer to it")
+    ]
     x: ScannerAxis
     y: ScannerAxis

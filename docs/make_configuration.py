@@ -1,0 +1,113 @@
+"""Write docs/configuration.md from the schema, so that the page and the program cannot differ.
+
+Usage: python docs/make_configuration.py
+"""
+
+from pathlib import Path
+
+import msgspec.inspect as types
+
+from tablegen.config.schema import Scan, Scanner
+
+PAGE = Path(__file__).with_name("configuration.md")
+INTRODUCTION = """\
+# The two input files
+
+Written by `python docs/make_configuration.py` from `tablegen/config/schema.py`. `tablegen init` writes a commented
+pair to start from, `tablegen schema scan` and `tablegen schema scanner` print JSON Schema for editors.
+
+Voltages are at the piezo unless a key says otherwise. Units are part of every key. A key without a default may be left
+out where its meaning names an alternative ("or give"). Unknown keys are errors. Beyond the ranges below, a build
+checks that the drive stays inside the driver and the converter, the slew rate inside the amplifier, the harmonics
+inside what a line and a table carry, and the hysteresis inside where its model holds.
+"""
+
+
+def page() -> str:
+    """The whole page."""
+    parts = [INTRODUCTION]
+    for title, kind in (("Scan file", Scan), ("Scanner file", Scanner)):
+        parts += [f"## {title}\n", *_tables(types.type_info(kind), "", {})]
+    return "\n".join(parts)
+
+
+def _tables(kind: types.Type, path: str, written: dict[type, str]) -> list[str]:
+    """The table of a struct and of what it holds; a struct that was written before is referred to."""
+    assert isinstance(kind, types.StructType)
+    written[kind.cls] = path.strip("[]")
+    name = f"`[{path}]`: " if path else ""
+    path = path.strip("[]")
+    rows = [f"{name}{_summary(kind)}\n", "| key | accepts | default | meaning |", "|---|---|---|---|"]
+    inner_tables = []
+    for field in kind.fields:
+        inner, description = _plain(field.type)
+        child = f"{path}.{field.encode_name}" if path else field.encode_name
+        accepts = None
+        if isinstance(inner, types.ListType):
+            inner, child, accepts = inner.item_type, f"[{child}]", "array of tables"
+        if isinstance(inner, types.StructType):
+            before = written.get(inner.cls)
+            description = description or (f"As `[{before}]`." if before else _summary(inner))
+            accepts = accepts or "table"
+            if not before:
+                inner_tables += _tables(inner, child, written)
+        rows.append(f"| `{field.encode_name}` | {accepts or _accepts(inner)} | {_default(field)} | {description} |")
+    return [*rows, "", *inner_tables]
+
+
+def _summary(kind: types.StructType) -> str:
+    return (kind.cls.__doc__ or "").strip().splitlines()[0]
+
+
+def _plain(kind: types.Type) -> tuple[types.Type, str]:
+    description = ""
+    while isinstance(kind, types.Metadata | types.UnionType):
+        if isinstance(kind, types.Metadata):
+            description = (kind.extra_json_schema or {}).get("description", description)
+            kind = kind.type
+        else:
+            kind = next(t for t in kind.types if not isinstance(t, types.NoneType))
+    return kind, description.replace("|", "\\|")
+
+
+def _accepts(kind: types.Type) -> str:
+    match kind:
+        case types.FloatType() | types.IntType():
+            word = "number" if isinstance(kind, types.FloatType) else "whole number"
+            low = (
+                f"from {kind.ge:.12g}"
+                if kind.ge is not None
+                else f"above {kind.gt:.12g}"
+                if kind.gt is not None
+                else ""
+            )
+            high = (
+                f"to {kind.le:.12g}" if kind.le is not None else f"below {kind.lt:.12g}" if kind.lt is not None else ""
+            )
+            return " ".join(filter(None, [word, low, high]))
+        case types.LiteralType():
+            return ", ".join(f'`"{value}"`' for value in kind.values)
+        case types.StrType():
+            return "text"
+        case types.BoolType():
+            return "`true`, `false`"
+        case types.TupleType():
+            return f"[{', '.join(_accepts(_plain(t)[0]) for t in kind.item_types)}]"
+    raise NotImplementedError(kind)
+
+
+def _default(field: types.Field) -> str:
+    if field.required:
+        return "required"
+    value = field.default
+    if isinstance(value, bool):
+        return f"`{str(value).lower()}`"
+    if isinstance(value, str):
+        return f'`"{value}"`'
+    if isinstance(value, tuple):
+        return f"`[{', '.join(map(str, value))}]`"
+    return f"`{value:g}`" if isinstance(value, int | float) else ""
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")

@@ -1,0 +1,89 @@
+"""The README and the docs say what the program does: output, errors, figures and keys are made again and compared."""
+
+import re
+import sys
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from tablegen.certificate import certify
+from tablegen.cli import cli
+from tablegen.config.load import load
+from tablegen.plan import make_plan
+from tablegen.problems import Rejected
+
+ROOT = Path(__file__).parent.parent
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def block(command: str) -> str:
+    """The text block of the README that starts with a command, without that command."""
+    found = re.search(r"```text\n\$ " + re.escape(command) + r"\n(.*?)```", README, re.DOTALL)
+    assert found, f"the README shows no {command!r}"
+    return found[1]
+
+
+def example(folder: Path, edit: dict[str, str]) -> Path:
+    text = (ROOT / "examples" / "annexin_200nm.toml").read_text(encoding="utf-8")
+    for old, new in edit.items():
+        assert re.search(old, text), old
+        text = re.sub(old, new, text)
+    (folder / "scanner.toml").write_bytes((ROOT / "examples" / "scanner.toml").read_bytes())
+    path = folder / "scan.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_the_build_prints_what_the_readme_shows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    monkeypatch.chdir(tmp_path)
+    result = CliRunner().invoke(cli, ["build", "examples/annexin_200nm.toml", "-o", "build/demo"])
+    assert result.stdout == block("tablegen build examples/annexin_200nm.toml -o build/demo")
+
+
+def test_the_errors_are_what_the_readme_shows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    wrong = {
+        r"(?m)^bits = 16\ncoding": "bits = 30\ncoding",
+        r"\[x\]\nsize_nm": "[x]\nsize",
+        "turn = 0.95": "turn = 1.5",
+    }
+    too_large = {r"\[x\]\nsize_nm = 200.0": "[x]\nsize_nm = 1350.0"}
+    for name, edit in (("scan", wrong), ("large", too_large)):
+        example(tmp_path, edit).replace(tmp_path / f"{name}.toml")
+        with pytest.raises(Rejected) as caught:
+            make_plan(load(f"{name}.toml"))
+        assert [str(p) for p in caught.value.problems] == block(f"tablegen check {name}.toml").splitlines()
+
+
+def test_the_accuracy_table_is_measured(tmp_path: Path) -> None:
+    rows = re.findall(
+        r"^\| (\d+) \| (\d+) words of (\d+) bits[^|]*\|([^|]*)\|([^|]*)\|([^|]*)\|([^|]*)\|$", README, re.M
+    )
+    assert len(rows) == 5
+    for dac, length, bits, x_error, y_error, x_scaling, y_scaling in rows:
+        edit = {
+            r"(?m)^bits = 16\ncoding": f"bits = {dac}\ncoding",
+            r"length = 2048.*\nbits = 16": f"length = {length}\nbits = {bits}",
+        }
+        certificates = certify(make_plan(load(example(tmp_path, edit))))
+        for axis, error, scaling in (("x", x_error, x_scaling), ("y", y_error, y_scaling)):
+            c = certificates[axis]
+            assert error.strip() == f"{c.max_error_lsb:.3f}, {c.rms_error_lsb:.3f}", (dac, axis)
+            assert scaling.strip() == f"{c.scaling['forward'].total:.3f}", (dac, axis)
+
+
+def test_the_configuration_page_is_the_schema() -> None:
+    sys.path.insert(0, str(ROOT / "docs"))
+    try:
+        from make_configuration import page
+    finally:
+        sys.path.pop(0)
+    assert (ROOT / "docs" / "configuration.md").read_text(encoding="utf-8") == page()
+
+
+@pytest.mark.parametrize("page", sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")]), ids=lambda p: p.name)
+def test_links_lead_somewhere(page: Path) -> None:
+    for target in re.findall(r"\[[^\]\n]+\]\(([^)#\s]+\.[a-z]+)\)", page.read_text(encoding="utf-8")):
+        assert (page.parent / target).exists(), target
