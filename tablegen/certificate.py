@@ -5,14 +5,14 @@ peak over the imaging window. Of float waveforms the slope is the analytic one; 
 line, since the slope between neighbouring codes means nothing.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from math import log10
+from math import ceil, floor, log10, sqrt
 
 import numpy as np
 
 from tablegen.compensation.dynamics import capped_inverse
 from tablegen.compensation.hysteresis import BranchShape
+from tablegen.fixedpoint.runs import Runs, runs_of
 from tablegen.numerics.arrays import Floats, Ints
 from tablegen.plan import LinePlan, Plan
 from tablegen.problems import Document, Problem
@@ -20,12 +20,8 @@ from tablegen.waveform.sampler import Sampler
 from tablegen.waveform.series import FourierSeries
 
 CHORD = 0.05  # of the line, about one lattice constant of the paper's images
-_CHUNK = 1 << 15
 _POINTS_PER_HARMONIC = 16  # over the window, for analytic slopes
-_KEPT = 1 << 24  # errors kept for the chords; longer frames keep every so-manieth, all else sees every tick
 _SPECTRUM = 1 << 22  # longest period whose spectrum is taken
-
-Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)
@@ -74,9 +70,9 @@ class Certificate:
         return max((error.size for error in self.scaling.values()), key=abs)
 
 
-def certify(plan: Plan, progress: Progress | None = None) -> dict[str, Certificate]:
-    """Certificates of both axes; ``progress`` is told an axis and the share done, for frames of many ticks."""
-    return {line.axis: _certify(line, progress) for line in plan.lines}
+def certify(plan: Plan) -> dict[str, Certificate]:
+    """Certificates of both axes."""
+    return {line.axis: _certify(line) for line in plan.lines}
 
 
 def broken_limits(plan: Plan, certificates: dict[str, Certificate], file: Document) -> list[Problem]:
@@ -109,64 +105,87 @@ def _remedy(axis: str, parts: ScalingError) -> str:
     return f"most of it is quantisation: more dac.bits, or an amplifier whose range fits the {axis} scan"
 
 
-def _certify(line: LinePlan, progress: Progress | None) -> Certificate:
-    program, output = line.program, line.program.output
-    stride = -(-program.ticks // _KEPT)
-    kept: list[Floats] = []
-    worst = total = square = code_sum = code_square = 0.0
-    lowest, highest, largest_step = 1 << 30, -1, 0
-    previous = int(line.codes(program.ticks - 1, program.ticks)[0])
-    first_skip = 0
-    reference = Sampler(line.series, program.phase.ticks)
-    held = line.float_codes(reference.samples(0, program.phase.ticks)) if program.hold > 1 else None
-    for start in range(0, program.ticks, _CHUNK):
-        stop = min(start + _CHUNK, program.ticks)
-        codes = line.codes(start, stop)
-        asked = (
-            line.float_codes(reference.samples(start, stop))
-            if held is None
-            else held[np.arange(start, stop) // program.hold]
-        )
-        error = codes - asked
-        worst = max(worst, float(np.max(np.abs(error))))
-        total += float(np.sum(error))
-        square += float(np.sum(error * error))
-        centred = codes - float(output.offset_code)
-        code_sum += float(np.sum(centred))
-        code_square += float(np.sum(centred * centred))
-        lowest, highest = min(lowest, int(codes.min())), max(highest, int(codes.max()))
-        largest_step = max(largest_step, abs(int(codes[0]) - previous), _largest_step(codes))
-        previous = int(codes[-1])
-        kept.append(error[first_skip::stride])
-        first_skip = (first_skip - (stop - start)) % stride
-        if progress is not None and stop < program.ticks:
-            progress(line.axis, stop / program.ticks)
-    ticks = program.ticks
-    variance = max(square / ticks - (total / ticks) ** 2, 1e-30)
-    power = max(code_square / ticks - (code_sum / ticks) ** 2, 1e-30)
-    errors = np.concatenate(kept)
+def _certify(line: LinePlan) -> Certificate:
+    played, output = _Played(line), line.program.output
+    codes, lengths, ticks = played.runs.codes, played.runs.lengths, line.program.ticks
+    mean, square = played.error_moments()
+    offset = float(output.offset_code)
+    code_mean = float(np.sum(lengths * (codes - offset))) / ticks
+    power = max(float(np.sum(lengths * (codes - offset - code_mean) ** 2)) / ticks, 1e-30)
     directions = {"forward": line.drive.shape.forward}
     if line.band_limit.directions == "both":
         directions["backward"] = line.drive.shape.backward
     return Certificate(
         ticks=ticks,
-        max_error_lsb=worst,
-        rms_error_lsb=float(np.sqrt(square / ticks)),
-        scaling={side: _scaling(line, side, branch, errors, stride) for side, branch in directions.items()},
-        lowest_code=lowest,
-        highest_code=highest,
-        headroom_low=lowest - output.code_min,
-        headroom_high=output.code_max - highest,
-        largest_step=largest_step,
+        max_error_lsb=played.largest_error(),
+        rms_error_lsb=sqrt(square),
+        scaling={side: _scaling(line, played, side, branch) for side, branch in directions.items()},
+        lowest_code=int(codes.min()),
+        highest_code=int(codes.max()),
+        headroom_low=int(codes.min()) - output.code_min,
+        headroom_high=output.code_max - int(codes.max()),
+        largest_step=int(np.max(np.abs(codes - np.roll(codes, 1)))),
         max_step=output.max_step,
         peak_slew_v_per_s=line.drive.v_amplitude * line.series.peak_slope() * float(line.rate),
-        beyond_cutoff_db=10.0 * log10(variance / power),
-        at_resonance_db=_at_resonance(line, power),
+        beyond_cutoff_db=10.0 * log10(max(square - mean * mean, 1e-30) / power),
+        at_resonance_db=_at_resonance(line, played.runs, power),
     )
 
 
-def _largest_step(codes: Ints) -> int:
-    return int(np.max(np.abs(np.diff(codes)))) if len(codes) > 1 else 0
+class _Played:
+    """The emitted period beside the float one, at any tick."""
+
+    def __init__(self, line: LinePlan) -> None:
+        self._line = line
+        self._hold = line.program.hold
+        self._reference = Sampler(line.series, line.program.phase.ticks)
+        # Between its extremes the float waveform is monotonic, so that errors are largest where runs begin and end.
+        self.runs = runs_of(line.program).split_at(self._extremes())
+        self._first = self.runs.codes - self._asked(self.runs.starts)
+        self._last = self.runs.codes - self._asked(self.runs.lasts)
+
+    def _extremes(self) -> Ints:
+        points = 64 * self._line.series.harmonics
+        w = self._line.series.on_grid(points)
+        turning = (w - np.roll(w, 1)) * (np.roll(w, -1) - w) <= 0.0
+        t = np.flatnonzero(turning) / points
+        for _ in range(3):  # Newton on the slope; where it is flat any tick is as good
+            bend = self._line.series.value(t, 2)
+            step = self._line.series.value(t, 1) / np.where(bend == 0.0, np.inf, bend)
+            t = t - np.clip(step, -1.0 / points, 1.0 / points)
+        ticks = self._line.program.ticks
+        return np.unique(np.floor(t * ticks).astype(np.int64) % ticks)
+
+    def _asked(self, k: Ints) -> Floats:
+        return self._line.float_codes(self._reference.at(k // self._hold))
+
+    def errors(self, k: Ints) -> Floats:
+        """Emitted code less the code asked for, unrounded, at ticks k."""
+        return self.runs.at(k) - self._asked(k)
+
+    def largest_error(self) -> float:
+        """max |error| over every tick."""
+        return max(float(np.max(np.abs(self._first))), float(np.max(np.abs(self._last))))
+
+    def error_moments(self) -> tuple[float, float]:
+        """Mean and mean square of the error over every tick; along a run it is the parabola of three of its ticks."""
+        first, last, n = self._first, self._last, self.runs.lengths
+        steps = np.maximum(n - 1, 1)  # the parabola is 4 i (steps - i) / steps^2 at tick i, on a straight line
+        halfway = n // 2
+        straight = first + (last - first) * (halfway / steps)
+        height = np.where(n > 2, 4.0 * halfway * (steps - halfway) / steps**2, 1.0)
+        bend = np.where(n > 2, self.runs.codes - self._asked(self.runs.starts + halfway % n) - straight, 0.0) / height
+        arch, arch_square = 2.0 / 3.0 * (1.0 - 1.0 / steps), 8.0 / 15.0 * (1.0 - 1.0 / steps) * (1.0 + 1.0 / steps**2)
+        mean = 0.5 * (first + last)
+        square = mean * mean + (last - first) ** 2 * (n + 1) / (12.0 * steps)
+        square = square + bend * (2.0 * arch * mean + arch_square * bend)
+        ticks = self.runs.ticks
+        return float(np.sum(n * (mean + arch * bend))) / ticks, float(np.sum(n * square)) / ticks
+
+    def corners(self, first: int, stop: int) -> Ints:
+        """Ticks in [first, stop) at which a run begins or ends."""
+        both = np.union1d(self.runs.starts, self.runs.lasts)
+        return both[(both >= first) & (both < stop)]
 
 
 def _times(line: LinePlan, side: str, position: Floats) -> Floats:
@@ -175,7 +194,7 @@ def _times(line: LinePlan, side: str, position: Floats) -> Floats:
     return turn * position if side == "forward" else turn + (1.0 - turn) * (1.0 - position)
 
 
-def _scaling(line: LinePlan, side: str, branch: BranchShape, errors: Floats, stride: int) -> ScalingError:
+def _scaling(line: LinePlan, played: _Played, side: str, branch: BranchShape) -> ScalingError:
     low, high = line.band_limit.window
     position = np.linspace(low, high, _POINTS_PER_HARMONIC * line.target.harmonics + 513)
     times = _times(line, side, position)
@@ -187,7 +206,7 @@ def _scaling(line: LinePlan, side: str, branch: BranchShape, errors: Floats, str
     sweep = position if side == "forward" else 1.0 - position
     steepness = branch.slope(sweep)
     deviation = (reached.value(times) - line.drive.shape.value(times)) / steepness
-    chords, noise = _chords(line, side, position, deviation, steepness, errors, stride)
+    chords, noise = _chords(line, played, side, position, deviation, steepness)
     # A triangle leaves the piezo at the inverse of the branch, whose slope is 1 / u'.
     triangle = 1.0 / branch.slope(branch.inverse(sweep))
     middle = float(1.0 / branch.slope(branch.inverse(0.5)))
@@ -219,34 +238,36 @@ def _reached(line: LinePlan) -> FourierSeries:
 
 
 def _chords(
-    line: LinePlan,
-    side: str,
-    position: Floats,
-    deviation: Floats,
-    steepness: Floats,
-    errors: Floats,
-    stride: int,
+    line: LinePlan, played: _Played, side: str, position: Floats, deviation: Floats, steepness: Floats
 ) -> tuple[Floats, Floats]:
     """Slope errors (1 is 100 %) of the chords inside the window: of the emitted integers, and of quantisation alone.
 
-    Every tick of the window that was kept begins a chord. ``deviation`` and ``steepness`` stand at ``position``.
+    Of all chords those count that begin or end where a run does: between those the error of a chord is a straight
+    line. ``deviation`` and ``steepness`` of the waveform stand at ``position``.
     """
     ticks, turn = line.program.ticks, line.drive.turn
     share = turn if side == "forward" else 1.0 - turn
-    ends = sorted(float(t) * ticks / stride for t in _times(line, side, position[[0, -1]]))
-    k = np.arange(int(np.ceil(ends[0])), min(int(np.floor(ends[1])) + 1, len(errors)))
-    if len(k) < 2:
+    ends = sorted(float(t) * ticks for t in _times(line, side, position[[0, -1]]))
+    first, stop = ceil(ends[0]), floor(ends[1]) + 1
+    baseline = max(1, min(round(CHORD * share * ticks), stop - first - 1))
+    if stop - first < 2:
         return np.zeros(1), np.zeros(1)
-    baseline = max(1, min(round(CHORD * share * ticks / stride), len(k) - 1))
-    t = k * (stride / ticks)
-    where = t / turn if side == "forward" else (1.0 - t) / share
-    noise = errors[k] / line.codes_per_unit / np.interp(where, position, steepness)
-    total = noise + np.interp(where, position, deviation)
-    run = where[baseline:] - where[:-baseline]
-    return (total[baseline:] - total[:-baseline]) / run, (noise[baseline:] - noise[:-baseline]) / run
+    begin = np.union1d(played.corners(first, stop - baseline), played.corners(first + baseline, stop) - baseline)
+    if not len(begin):
+        begin = np.array([first])
+
+    def noise_and_total(k: Ints) -> tuple[Floats, Floats, Floats]:
+        t = k / ticks
+        where = t / turn if side == "forward" else (1.0 - t) / share
+        noise = played.errors(k) / line.codes_per_unit / np.interp(where, position, steepness)
+        return where, noise, noise + np.interp(where, position, deviation)
+
+    x0, noise0, total0 = noise_and_total(begin)
+    x1, noise1, total1 = noise_and_total(begin + baseline)
+    return (total1 - total0) / (x1 - x0), (noise1 - noise0) / (x1 - x0)
 
 
-def _at_resonance(line: LinePlan, power: float) -> float | None:
+def _at_resonance(line: LinePlan, runs: Runs, power: float) -> float | None:
     """Power of the emitted codes inside the resonance, at least its nearest harmonic, relative to the scan's."""
     response, ticks = line.drive.response, line.program.ticks
     if response is None or ticks > _SPECTRUM:
@@ -257,6 +278,7 @@ def _at_resonance(line: LinePlan, power: float) -> float | None:
     if round(centre) > last:
         return None
     first, stop = max(1, round(centre - half)), min(last, round(centre + half)) + 1
-    spectrum = np.abs(np.fft.rfft(line.codes(0, ticks) - float(line.program.output.offset_code))) / ticks
+    codes = np.repeat(runs.codes, runs.lengths) - float(line.program.output.offset_code)
+    spectrum = np.abs(np.fft.rfft(codes)) / ticks
     inside = 2.0 * float(np.sum(spectrum[first:stop] ** 2))
     return 10.0 * log10(max(inside, 1e-30) / power)

@@ -46,7 +46,7 @@ def test_window_is_straight_inside_and_gentle_outside(harmonics: int, percent: f
     fitted = band_limited(SECTION_8, BandLimit(method="window"), harmonics)
     truncated = band_limited(SECTION_8, BandLimit(method="truncate"), harmonics)
     assert worst(SECTION_8, fitted) <= percent
-    w = Sampler(fitted, 20000).samples(0, 20000)
+    w = Sampler(fitted, 20000).at(np.arange(20000))
     assert float(w.min()) >= 0.0
     assert float(w.max()) <= 1.0
     assert fitted.peak_acceleration() <= truncated.peak_acceleration()
@@ -79,7 +79,7 @@ def test_forward_only_leaves_the_way_back_free() -> None:
 def test_the_range_is_held_where_the_free_fit_would_leave_it() -> None:
     """turn 0.5, forward only: the free turnaround would swing to 1.1; held, it stays inside and loses little."""
     series = band_limited(SECTION_8, BandLimit(directions="forward"), 16)
-    w = Sampler(series, 20000).samples(0, 20000)
+    w = Sampler(series, 20000).at(np.arange(20000))
     assert float(w.min()) >= 0.0
     assert float(w.max()) <= 1.0
     assert scaling_error(SECTION_8, series, 0.1, 0.9, True) < 0.05
@@ -100,7 +100,7 @@ def test_the_fit_minimises_what_it_says(turn: float, low: float, harmonics: int,
         series = band_limited(shape, limit, harmonics)
     except Unphysical:
         return
-    w = Sampler(series, 4096).samples(0, 4096)
+    w = Sampler(series, 4096).at(np.arange(4096))
     if w.min() < 0.0011 or w.max() > 0.9989:
         return
     count = 4 * harmonics + 32
@@ -130,5 +130,5 @@ def test_sampler_is_the_series(count: int) -> None:
     sampler = Sampler(series, count)
     start, stop = count // 7, count // 7 + min(400, count // 3)
     exact = series.value(np.arange(start, stop) / count)
-    assert sampler.samples(start, stop) == pytest.approx(exact, abs=2e-12)
-    assert sampler.samples(0, count)[[0, -1]] == pytest.approx(series.value([0.0, (count - 1) / count]), abs=2e-12)
+    assert sampler.at(np.arange(start, stop)) == pytest.approx(exact, abs=2e-12)
+    assert sampler.at(np.array([0, count - 1])) == pytest.approx(series.value([0.0, (count - 1) / count]), abs=2e-12)

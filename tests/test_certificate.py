@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from variants import plan_of, setup_of
 
-from tablegen import certificate as module
 from tablegen.certificate import broken_limits, certify
 from tablegen.compensation.hysteresis import BranchShape
+from tablegen.fixedpoint import runs as runs_module
+from tablegen.fixedpoint.runs import runs_of
 from tablegen.plan import LinePlan, Plan, make_plan
 
 FREE = {"limits.max_error_lsb": "", "limits.max_scaling_error_percent": ""}
@@ -139,25 +140,21 @@ def test_coarse_converter_shows_in_quantisation(tmp_path: Path) -> None:
     assert coarse == pytest.approx(16 * fine, rel=0.4)
 
 
-@pytest.mark.parametrize("chunk", [1000, 77777])
-def test_long_frames_in_pieces_measure_the_same(example: Plan, monkeypatch: pytest.MonkeyPatch, chunk: int) -> None:
-    whole = certify(example)["y"]
-    monkeypatch.setattr(module, "_CHUNK", chunk)
-    pieces = certify(example)["y"]
-    for name in ("max_error_lsb", "rms_error_lsb", "lowest_code", "largest_step", "beyond_cutoff_db"):
-        assert getattr(pieces, name) == pytest.approx(getattr(whole, name), rel=1e-9)
-    assert pieces.scaling["forward"].total == pytest.approx(whole.scaling["forward"].total, rel=1e-9)
-    monkeypatch.setattr(module, "_KEPT", 30000)  # every 9th error kept for the chords
-    thinned = certify(example)["y"]
-    assert thinned.max_error_lsb == pytest.approx(whole.max_error_lsb, rel=1e-9)
-    assert thinned.scaling["forward"].total == pytest.approx(whole.scaling["forward"].total, rel=0.1)
-
-
-def test_progress_is_told_for_long_frames(example: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
-    told: list[tuple[str, float]] = []
-    monkeypatch.setattr(module, "_CHUNK", 50000)
-    certify(example, lambda axis, share: told.append((axis, share)))
-    assert told == [("y", 0.2), ("y", 0.4), ("y", 0.6), ("y", 0.8)]
+def test_runs_and_ticks_measure_the_same(example: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Long frames are measured by runs of one code. Forced to single ticks, every figure has to come out again."""
+    by_runs = certify(example)["y"]
+    assert len(runs_of(example.y.program).starts) < 0.2 * example.y.program.ticks
+    monkeypatch.setattr(runs_module, "_TICKS_AT_LEAST", 10**9)
+    assert len(runs_of(example.y.program).starts) == example.y.program.ticks
+    by_ticks = certify(example)["y"]
+    exact = ("max_error_lsb", "lowest_code", "highest_code", "largest_step", "headroom_low")
+    for name in exact:
+        assert getattr(by_runs, name) == pytest.approx(getattr(by_ticks, name), rel=1e-9), name
+    assert by_runs.rms_error_lsb == pytest.approx(by_ticks.rms_error_lsb, rel=1e-5)
+    assert by_runs.beyond_cutoff_db == pytest.approx(by_ticks.beyond_cutoff_db, abs=1e-3)
+    for part in ("total", "quantisation", "band_limit", "size"):
+        runs, ticks = (getattr(c.scaling["forward"], part) for c in (by_runs, by_ticks))
+        assert runs == pytest.approx(ticks, rel=1e-6), part
 
 
 def test_a_resonance_inside_the_band_is_seen(tmp_path: Path) -> None:

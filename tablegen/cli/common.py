@@ -1,7 +1,6 @@
 """What several commands share: the way from a path to a certified plan, and how its failures are told."""
 
 import os
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
@@ -49,26 +48,7 @@ def planned(scan: Path) -> "tuple[Plan, dict[str, Certificate]]":
         plan = make_plan(setup)
     except Rejected as rejected:
         fail(rejected.problems, Status.WRONG_INPUT)
-    progress = _Progress()
-    certificates = certify(plan, progress.tell)
-    progress.clear()
+    certificates = certify(plan)
     if broken := broken_limits(plan, certificates, setup.scan_file):
         fail(broken, Status.BROKEN_LIMIT)
     return plan, certificates
-
-
-class _Progress:
-    """A line on the terminal while a long frame is measured; nothing where stderr is no terminal."""
-
-    def __init__(self) -> None:
-        self._shown = -1
-
-    def tell(self, axis: str, share: float) -> None:
-        percent = int(100 * share)
-        if sys.stderr.isatty() and percent > self._shown:
-            click.echo(f"\rmeasuring every tick of the {axis} period: {percent:3d} %", err=True, nl=False)
-            self._shown = percent
-
-    def clear(self) -> None:
-        if self._shown >= 0:
-            click.echo("\r" + " " * 60 + "\r", err=True, nl=False)

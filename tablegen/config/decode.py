@@ -1,7 +1,9 @@
 """Plain TOML values to the frozen types of the schema, with every fault found on the way."""
 
 import math
-from typing import Any, TypeVar
+from collections.abc import Callable
+from datetime import date, time
+from typing import Any, TypeAlias, TypeVar
 
 import msgspec.inspect as types
 from msgspec import Struct
@@ -11,20 +13,27 @@ from tablegen.problems import Document, Problems
 
 T = TypeVar("T", bound=Struct)
 
+# Called for every table with its type, its key, what was written in it, and what was built of it or None.
+Check: TypeAlias = Callable[[type, str, dict[str, Any], Any], None]
+
 _WRONG = object()  # the value of a key that was reported already
 _UNITS = ("_nm", "_v", "_hz", "_s", "_nm_per_v", "_v_per_s", "_db", "_lsb", "_percent")
 
 
-def decode(kind: type[T], values: dict[str, Any], document: Document, problems: Problems) -> T | None:
-    """Build ``kind`` from a table of TOML values; None, and at least one problem, where that cannot be."""
-    built = _Decoder(document, problems).struct(types.type_info(kind), values, "")
+def decode(kind: type[T], values: dict[str, Any], document: Document, problems: Problems, check: Check) -> T | None:
+    """Build ``kind`` from a table of TOML values; None, and at least one problem, where that cannot be.
+
+    ``check`` adds what keys of the same table say about each other.
+    """
+    built = _Decoder(document, problems, check).struct(types.type_info(kind), values, "")
     return built if isinstance(built, kind) else None
 
 
 class _Decoder:
-    def __init__(self, document: Document, problems: Problems) -> None:
+    def __init__(self, document: Document, problems: Problems, check: Check) -> None:
         self._document = document
         self._problems = problems
+        self._check = check
 
     def _wrong(self, key: str, why: str) -> object:
         self._problems.add(self._document, key, why)
@@ -73,10 +82,12 @@ class _Decoder:
                 good = good and built[name] is not _WRONG
             elif field.required:
                 good = False
-                if not any(name in _meant(other, known) for other in unknown):
+                if not any(name in meant(other, known) for other in unknown):
                     kind_of = "table" if isinstance(field.type, types.StructType) else "key"
                     self._wrong(join_key(key, name), f"missing; this {kind_of} is required")
-        return kind.cls(**built) if good else _WRONG
+        made = kind.cls(**built) if good else None
+        self._check(kind.cls, key, value, made)
+        return made if good else _WRONG
 
     def _list(self, kind: types.ListType, value: Any, key: str) -> Any:
         if not isinstance(value, list):
@@ -135,7 +146,7 @@ class _Decoder:
         return value
 
 
-def _meant(name: str, known: Any) -> list[str]:
+def meant(name: str, known: Any) -> list[str]:
     """The known keys that an unknown one was probably meant to be: with its unit, or without a typing error."""
     with_unit = [k for k in known if any(k == name + unit for unit in _UNITS)]
     stem = name.rsplit("_", 1)[0]
@@ -148,7 +159,7 @@ def _meant(name: str, known: Any) -> list[str]:
 
 
 def _suggestion(name: str, known: list[str]) -> str:
-    meant = _meant(name, known)
+    meant = meant(name, known)
     if not meant:
         return f"; known here: {', '.join(sorted(known))}" if known else ""
     unit = " (units are part of the name)" if any(m == name + unit for m in meant for unit in _UNITS) else ""
@@ -165,6 +176,9 @@ def _shown(value: Any) -> str:
     if isinstance(value, int) and value.bit_length() > 1000:  # Python refuses to print the longest ones
         return f"a whole number of {value.bit_length()} bits"
     if isinstance(value, float):
-        return f"{value:.12g}"
+        short = f"{value:.12g}"
+        return short if float(short) == value else repr(value)
+    if isinstance(value, date | time):
+        return f"the date or time {value}"
     shown = repr(value)
     return shown if len(shown) <= 60 else shown[:57] + "..."

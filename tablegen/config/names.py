@@ -395,14 +395,11 @@ _RESERVED = frozenset(
         "xor_eq",
     ]
 )
-_MAXIMUM_LENGTH = 48
 
 
 def why_not_a_name(name: str) -> str | None:
     """What makes a name unusable as an identifier of some target language, or None."""
     accepted = "a letter, then letters, digits and single underscores"
-    if len(name) > _MAXIMUM_LENGTH:
-        return f"{len(name)} characters are too many; at most {_MAXIMUM_LENGTH} leave room for what is appended"
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
         return f"{name!r} is no identifier; accepted is {accepted}"
     if "__" in name or name.endswith("_"):

@@ -8,6 +8,8 @@ from typing import Annotated, Literal
 from msgspec import Meta, Struct
 
 Name = Annotated[str, Meta(min_length=1, max_length=64)]
+# Short enough to leave room for what is appended; reserved words are refused beside it, see ``why_not_a_name``.
+Identifier = Annotated[str, Meta(min_length=1, max_length=48, pattern="^[A-Za-z](_?[A-Za-z0-9])*$")]
 FileName = Annotated[str, Meta(min_length=1, max_length=1024)]
 Volts = Annotated[float, Meta(ge=-1e5, le=1e5)]
 PositiveVolts = Annotated[float, Meta(ge=1e-3, le=1e5)]
@@ -141,7 +143,7 @@ class Emit(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class Scan(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One scan."""
 
-    name: Annotated[Name, Meta(description="prefix of every emitted file and identifier")]
+    name: Annotated[Identifier, Meta(description="prefix of every emitted file and identifier")]
     scanner: Annotated[FileName, Meta(description="scanner file, relative to this one")]
     dac: Dac
     amplifier: Amplifier

@@ -4,7 +4,6 @@ The standard library parses and validates; it does not say where things stand, s
 the (by then known to be valid) text notes the line of each key.
 """
 
-import os
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ from tablegen.problems import Document, Problem, Rejected
 _BARE_KEY = frozenset("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_")
 _ESCAPES = {"b": "\b", "t": "\t", "n": "\n", "f": "\f", "r": "\r", '"': '"', "\\": "\\"}
 _MAXIMUM_BYTES = 4 << 20
+_MAXIMUM_DIGITS = 4300  # of a decimal number: what Python converts
 
 
 def read_toml(path: Path, name: str) -> tuple[dict[str, Any], Document]:
@@ -22,15 +22,20 @@ def read_toml(path: Path, name: str) -> tuple[dict[str, Any], Document]:
     ``name`` is what messages call the file. Raises ``Rejected`` where it cannot be read or is not TOML.
     """
     try:
-        size = os.stat(path).st_size
-        if size > _MAXIMUM_BYTES:
-            raise Rejected([Problem(name, 0, "", f"{size} bytes; a configuration has at most {_MAXIMUM_BYTES}")])
-        text = path.read_bytes().decode("utf-8")
+        with path.open("rb") as file:
+            content = file.read(_MAXIMUM_BYTES + 1)  # and no more: it may be a device without end
+        if len(content) > _MAXIMUM_BYTES:
+            why = f"above {_MAXIMUM_BYTES} bytes, more than any configuration has"
+            raise Rejected([Problem(name, 0, "", why)])
+        text = content.decode("utf-8")
     except OSError as error:
         raise Rejected([Problem(name, 0, "", f"cannot be read: {error.strerror or error}")]) from None
     except UnicodeDecodeError as error:
         line = error.object.count(b"\n", 0, error.start) + 1
         raise Rejected([Problem(name, line, "", f"byte 0x{error.object[error.start]:02x} is not UTF-8")]) from None
+    if text.startswith("\ufeff"):
+        why = "begins with a byte order mark, which TOML does not have; save it as UTF-8 without one"
+        raise Rejected([Problem(name, 1, "", why)])
     text = text.replace("\r\n", "\n")
     try:
         values = tomllib.loads(text)
@@ -39,8 +44,9 @@ def read_toml(path: Path, name: str) -> tuple[dict[str, Any], Document]:
         raise Rejected([_syntax_problem(name, text, str(error))]) from None
     except RecursionError:
         raise Rejected([Problem(name, 0, "", "nested too deeply for a configuration")]) from None
-    except ValueError as error:  # a number beyond what the parser converts
-        raise Rejected([Problem(name, 0, "", f"not TOML: {error}")]) from None
+    except ValueError:  # the parser does not convert the longest decimal numbers, and does not say where they are
+        line, digits = _long_number(text)
+        raise Rejected([Problem(name, line, "", f"a number of {digits} digits is too long")]) from None
 
 
 def _syntax_problem(name: str, text: str, message: str) -> Problem:
@@ -50,13 +56,33 @@ def _syntax_problem(name: str, text: str, message: str) -> Problem:
     if place.startswith("line "):
         line = int(place[5:].split(",")[0])
         return Problem(name, line, "", f"not TOML: {head}, column {place.split('column ')[1].rstrip(')')}")
+    if head == 'Expected "\'"':  # the parser looked for the closing quote to the end: the last quote is the opening one
+        line = text.count("\n", 0, text.rindex("'")) + 1
+        return Problem(name, line, "", "not TOML: a text in single quotes is not closed")
     return Problem(name, max(text.rstrip("\n").count("\n") + 1, 1), "", f"not TOML: {head} at the end of the file")
+
+
+def _long_number(text: str) -> tuple[int, int]:
+    """Line and digits of the first decimal number that is too long to convert; all that stands before it is valid."""
+    try:
+        _KeyLines(text).locate()
+    except _LongNumber as found:
+        return found.line, found.digits
+    raise AssertionError("no other value is refused by its size")  # pragma: no cover
 
 
 def join_key(prefix: str, key: str) -> str:
     """``x`` and ``table`` give ``x.table``; a key that is not bare is quoted."""
-    shown = key if key and _BARE_KEY.issuperset(key) else '"' + key.encode("unicode_escape").decode() + '"'
+    shown = key
+    if not key or not _BARE_KEY.issuperset(key):
+        shown = '"' + key.encode("unicode_escape").decode().replace('"', '\\"') + '"'
     return f"{prefix}.{shown}" if prefix else shown
+
+
+class _LongNumber(Exception):
+    def __init__(self, line: int, digits: int) -> None:
+        self.line, self.digits = line, digits
+        super().__init__()
 
 
 class _KeyLines:
@@ -68,6 +94,7 @@ class _KeyLines:
         self._line = 1
         self._lines: dict[str, int] = {}
         self._elements: dict[str, int] = {}  # elements seen so far of each array of tables
+        self._too_long: tuple[int, int] | None = None  # line and digits of the first number that is
 
     def locate(self) -> dict[str, int]:
         table = ""
@@ -94,6 +121,7 @@ class _KeyLines:
             if path in self._elements:
                 path += f"[{self._elements[path] - 1}]"
             self._lines.setdefault(path, self._line)
+        self._lines[path] = self._line  # though a header of a sub-table may have named it before
         self._skip(" \t")
         self._advance(brackets)
         return path
@@ -134,8 +162,12 @@ class _KeyLines:
         elif opening == "{":
             self._inline_table(path)
         else:
+            start = self._at
             while self._at < len(self._text) and self._text[self._at] not in ",]}#\n":
                 self._at += 1
+            number = self._text[start : self._at].strip("+- \t").replace("_", "")
+            if len(number) > _MAXIMUM_DIGITS and number.isdigit():
+                raise _LongNumber(self._line, len(number))
 
     def _array(self, path: str) -> None:
         self._advance(1)

@@ -1,4 +1,4 @@
-"""Fast evaluation of a waveform at every tick of a period of any length, for the certificate and plots.
+"""Fast evaluation of a waveform at any tick of a period of any length, for the certificate and plots.
 
 Nothing that is emitted comes from here: the transform's last bits differ between processors.
 """
@@ -7,7 +7,7 @@ from math import factorial, tau
 
 import numpy as np
 
-from tablegen.numerics.arrays import Floats
+from tablegen.numerics.arrays import Floats, Ints
 from tablegen.waveform.series import FourierSeries
 
 _ORDER = 6
@@ -16,7 +16,7 @@ _BLOCKS_PER_HARMONIC = 64
 
 
 class Sampler:
-    """w(k / count) for any stretch of k in [0, count); error below 1e-12.
+    """w(k / count) for any k in [0, count); error below 1e-12.
 
     Long periods are expanded into Taylor series about the centres of blocks: a few multiplications a tick, however
     many harmonics there are.
@@ -34,15 +34,14 @@ class Sampler:
         rate = 1j * tau * np.arange(series.harmonics + 1)
         self._terms = [np.fft.irfft(spectrum * rate**m, blocks) * (blocks / factorial(m)) for m in range(_ORDER + 1)]
 
-    def samples(self, start: int, stop: int) -> Floats:
-        """Shape (stop - start,)."""
+    def at(self, k: Ints) -> Floats:
+        """w(k / count) for any k in [0, count)."""
         if not self._blocks:
-            return self._samples[start:stop]
-        k = np.arange(start, stop)
+            return self._samples[k]
         block = (k * self._blocks + self._count // 2) // self._count
         h = (k * self._blocks - block * self._count) * (1.0 / (self._count * float(self._blocks)))
-        block &= self._blocks - 1
-        total = self._terms[-1][block]
+        block = block & (self._blocks - 1)
+        total: Floats = self._terms[-1][block]
         for term in reversed(self._terms[:-1]):
             total = total * h + term[block]
         return total

@@ -1,0 +1,87 @@
+"""A whole period as runs of one code: every tick accounted for, however many millions there are."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tablegen.fixedpoint.interpolation import FRACTION_BITS, between
+from tablegen.fixedpoint.phase import PHASE_BITS
+from tablegen.fixedpoint.program import Program
+from tablegen.numerics.arrays import Ints
+
+_TICKS_AT_LEAST = 4  # a run, on average, for runs to be cheaper than ticks
+
+
+@dataclass(frozen=True, eq=False)
+class Runs:
+    """Run i plays ``codes[i]`` on the ticks [starts[i], starts[i + 1]), the last up to ``ticks``; none is empty."""
+
+    starts: Ints
+    codes: Ints
+    ticks: int
+
+    @property
+    def lengths(self) -> Ints:
+        """Ticks of each run."""
+        return np.diff(self.starts, append=self.ticks)
+
+    @property
+    def lasts(self) -> Ints:
+        """The last tick of each run."""
+        return self.starts + self.lengths - 1
+
+    def at(self, k: Ints) -> Ints:
+        """The codes at ticks k."""
+        if len(self.starts) == self.ticks:
+            return self.codes[k]
+        return self.codes[np.searchsorted(self.starts, k, side="right") - 1]
+
+    def split_at(self, k: Ints) -> "Runs":
+        """The same playback with runs that begin at ticks k as well."""
+        starts = np.union1d(self.starts, k)
+        return Runs(starts, self.at(starts), self.ticks)
+
+
+def runs_of(program: Program) -> Runs:
+    """The period of a program as runs."""
+    ticks = program.ticks
+    if program.hold == 1 and program.mode == "interpolated":
+        runs = _between_words(program)
+        if runs is not None:
+            return runs
+    starts = np.arange(program.phase.ticks, dtype=np.int64) * program.hold
+    return Runs(starts, program.codes(starts), ticks)
+
+
+def _between_words(program: Program) -> Runs | None:
+    """Runs between the words of a table, where codes rise or fall one by one; None where ticks are fewer.
+
+    Along a segment the code is monotonic in the fraction, so that the fraction at which each code is first
+    reached is found by bisection of the very arithmetic that plays it.
+    """
+    words, guard = program.words, program.guard
+    here, there = words, np.roll(words, -1)
+    last = np.full_like(words, (1 << FRACTION_BITS) - 1)
+    first_code = program.output.code(between(here, there, np.zeros_like(words), guard))
+    last_code = program.output.code(between(here, there, last, guard))
+    changes = np.abs(last_code - first_code)
+    if (int(changes.sum()) + len(words)) * _TICKS_AT_LEAST > program.ticks:
+        return None
+
+    segment = np.repeat(np.arange(len(words)), changes + 1)
+    order = np.arange(len(segment)) - np.repeat(np.cumsum(changes + 1) - (changes + 1), changes + 1)
+    direction = np.sign(last_code - first_code)[segment]
+    codes = first_code[segment] + direction * order
+    low, high = np.zeros_like(segment), last[segment]  # the code is reached at ``high``, and at ``low`` or later
+    from_here, to_there = here[segment], there[segment]
+    for _ in range(FRACTION_BITS):
+        middle = (low + high) >> 1
+        reached = direction * (program.output.code(between(from_here, to_there, middle, guard)) - codes) >= 0
+        low, high = np.where(reached, low, middle + 1), np.where(reached, middle, high)
+
+    # The first tick whose phase reaches that fraction: ceil(phase ticks / 2^32), below 2^63.
+    index_bits = len(words).bit_length() - 1
+    phase = ((segment << FRACTION_BITS) | high) << (PHASE_BITS - FRACTION_BITS - index_bits)
+    starts = (phase * program.ticks + ((1 << PHASE_BITS) - 1)) >> PHASE_BITS
+    taken = np.append(np.diff(starts) > 0, starts[-1] < program.ticks)
+    return Runs(starts[taken], codes[taken], program.ticks)

@@ -1,0 +1,82 @@
+"""Runs of one code against the codes of every single tick."""
+
+from dataclasses import replace
+from math import floor
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tablegen.fixedpoint import runs as module
+from tablegen.fixedpoint.interpolation import guard_bits
+from tablegen.fixedpoint.output import Output
+from tablegen.fixedpoint.phase import RationalPhase
+from tablegen.fixedpoint.program import Program
+from tablegen.fixedpoint.rounding import signed_limits
+from tablegen.fixedpoint.runs import runs_of
+
+
+@st.composite
+def programs(draw: st.DrawFn) -> Program:
+    bits, dac = draw(st.integers(8, 20)), draw(st.integers(8, 14))
+    gain_q = 16 + bits + guard_bits(bits) - dac
+    offset = draw(st.floats(0.0, 1.0)) * (1 << dac)
+    limits = sorted(draw(st.tuples(st.integers(0, (1 << dac) - 1), st.integers(0, (1 << dac) - 1))))
+    output = Output(
+        gain_word=draw(st.integers(-(2**17), 2**17 - 1)),
+        gain_q=gain_q,
+        offset_word=floor(offset * (1 << gain_q)),
+        code_min=limits[0],
+        code_max=limits[1],
+        max_step=1,
+        park_code=limits[0],
+        dac_bits=dac,
+        coding="offset-binary",
+        align="right",
+        word_bits=dac,
+    )
+    length = 1 << draw(st.integers(2, 6))
+    word = st.integers(*signed_limits(bits))
+    words = np.array(draw(st.lists(word, min_size=length, max_size=length)), dtype=np.int64)
+    return Program(RationalPhase(draw(st.integers(3, 20000))), 1, "interpolated", bits, words, output)
+
+
+@settings(max_examples=150, deadline=None)
+@given(programs())
+def test_every_tick_is_in_its_run(program: Program) -> None:
+    ticks = np.arange(program.ticks)
+    codes = program.codes(ticks)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "_TICKS_AT_LEAST", 0)  # runs even where ticks are cheaper: more of them, shorter, skipped
+        runs = runs_of(program)
+    assert int(runs.lengths.min()) >= 1
+    assert int(runs.lengths.sum()) == program.ticks
+    assert np.array_equal(np.repeat(runs.codes, runs.lengths), codes)
+    assert np.array_equal(runs.at(ticks), codes)
+    k = ticks[:: max(1, program.ticks // 7)]
+    split = runs.split_at(k)
+    assert np.isin(k, split.starts).all()
+    assert np.array_equal(np.repeat(split.codes, split.lengths), codes)
+
+
+@settings(max_examples=30, deadline=None)
+@given(programs(), st.integers(2, 50))
+def test_held_and_direct_programs(program: Program, hold: int) -> None:
+    held = replace(program, hold=hold)
+    direct = replace(program, mode="direct", words=np.resize(program.words, program.phase.ticks))
+    for one in (held, direct):
+        runs = runs_of(one)
+        assert np.array_equal(np.repeat(runs.codes, runs.lengths), one.codes(np.arange(one.ticks)))
+
+
+def test_a_frame_of_minutes_takes_no_more_than_its_codes() -> None:
+    """2^31 - 1 ticks: the ends of every run are checked against the arithmetic, without playing the rest."""
+    words = np.rint(20000 * np.sin(2 * np.pi * np.arange(256) / 256)).astype(np.int64)
+    output = Output(50000, 20, 32768 << 20, 0, 65535, 1, 0, 16, "offset-binary", "right", 16)
+    program = Program(RationalPhase(2**31 - 1), 1, "interpolated", 16, words, output)
+    runs = runs_of(program)
+    assert len(runs.starts) < 70000
+    assert int(runs.lengths.sum()) == 2**31 - 1
+    assert np.array_equal(program.codes(runs.starts), runs.codes)
+    assert np.array_equal(program.codes(runs.lasts), runs.codes)
