@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from decimal import ROUND_CEILING, Context, Decimal
 from typing import Any
 
 from tablegen.certificate import Certificate
@@ -30,11 +31,17 @@ def certificate_record(certificate: Certificate) -> dict[str, Any]:
     record: dict[str, Any] = {
         name: _figure(getattr(certificate, name)) for name in certificate.__dataclass_fields__ if name != "scaling"
     }
+    record["max_error_lsb"] = _bound(certificate.max_error_lsb)
     record["scaling_error_percent"] = {
         side: {part: _figure(getattr(error, part)) for part in error.__dataclass_fields__}
         for side, error in certificate.scaling.items()
     }
     return record
+
+
+def _bound(value: float) -> float:
+    """Six significant digits, rounded up: what is printed as a maximum has to be one."""
+    return float(Context(prec=6, rounding=ROUND_CEILING).create_decimal(Decimal(value)))
 
 
 def _figure(value: float | int | None) -> float | int | None:
@@ -118,6 +125,8 @@ def _axis(line: LinePlan) -> dict[str, Any]:
             "code_max": output.code_max,
             "max_step": output.max_step,
             "park_code": output.park_code,
+            "v_zero": line.converter.v_zero,
+            "v_per_code": line.converter.v_per_code,
             "dac_bits": output.dac_bits,
             "coding": output.coding,
             "align": output.align,

@@ -23,6 +23,9 @@ def guard_bits(word_bits: int) -> int:
 def interpolate(table: Ints, phase: Ints, guard: int) -> Ints:
     """Samples at phases in [0, 2^32), from a table of 2^P words, P <= 17.
 
+    The top P bits of a phase are the index of word t0, the next 15 the fraction on the way to the word after it, t1;
+    the rest is dropped.
+
     sample = t0 2^G + round((t1 - t0) fraction / 2^(15 - G)), ties up; the word after the last is the first.
     |t1 - t0| < 2^24 and fraction < 2^15, hence the product stays below 2^39.
     """
@@ -40,5 +43,5 @@ def between(here: Ints, there: Ints, fraction: Ints, guard: int) -> Ints:
 
 
 def direct(table: Ints, k: Ints, guard: int) -> Ints:
-    """Samples of a table with one word a tick: word k 2^G."""
+    """Samples of a table with one word an advance: word k times 2^G."""
     return np.asarray(table[k] << guard)

@@ -12,9 +12,9 @@ MAXIMUM_TICKS = (1 << 31) - 1
 
 @dataclass(frozen=True, slots=True)
 class RationalPhase:
-    """Phase of a period of ``ticks`` ticks, 1 <= ticks <= 2^31 - 1.
+    """Phase of a period of ``ticks`` advances, 1 <= ticks <= 2^31 - 1: ticks, or lines where an axis steps once a line.
 
-    The device adds ``step`` every tick, and 1 more whenever the remainder, which grows by ``remainder``
+    The device adds ``step`` at every advance, and 1 more whenever the remainder, which grows by ``remainder``
     modulo ``ticks``, wraps. After ``ticks`` ticks both are back at 0: no drift, for ever.
     """
 

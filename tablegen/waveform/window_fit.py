@@ -98,7 +98,8 @@ def _normal_equations(
     rate = tau * order
     right = np.concatenate([value_c - rate * slope_s, (value_s + rate * slope_c)[1:]])
 
-    energy = 0.5 * SMOOTHNESS * rate**4
+    square = rate * rate  # not rate**4: the power function's last bit is the processor's
+    energy = 0.5 * SMOOTHNESS * square * square
     diagonal = np.arange(2 * harmonics + 1)
     normal[diagonal, diagonal] += np.concatenate([energy, energy[1:]])
     return normal, right

@@ -1,0 +1,216 @@
+"""Emitted C against real compilers, and against the integer model.
+
+Every configuration has to compile without a warning with gcc and clang in three dialects, ``examples/c/play.c`` built
+on it has to print the codes of ``play_line``, tick for tick, and a header that was damaged must not compile.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from building import NAME, REPOSITORY, VARIANTS, Build, build, build_stressed, constants, run, run_clean
+
+from tablegen.numerics.arrays import Ints
+from tablegen.sequencer import DualProgram, play_line
+
+PLAYER = REPOSITORY / "examples" / "c" / "play.c"
+WARNINGS = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wsign-conversion", "-Wdouble-promotion", "-Werror"]
+SANITIZERS = ["-fsanitize=undefined,address", "-fno-sanitize-recover=all", "-g"]
+DIALECTS = {
+    "gcc-c99": ["gcc", "-std=c99"],
+    "gcc-c11": ["gcc", "-std=c11"],
+    "gcc-c++17": ["g++", "-std=c++17", "-x", "c++"],
+    "clang-c99": ["clang", "-std=c99"],
+    "clang-c11": ["clang", "-std=c11"],
+    "clang-c++17": ["clang++", "-std=c++17", "-x", "c++"],
+}
+# Noise over the whole range of the words and the largest gains: bits of a word, gain word.
+STRESS = [(8, 131071), (16, -131072), (21, 131071), (24, -131072), (24, 131071)]
+
+
+@pytest.fixture(scope="module", params=VARIANTS)
+def built(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Build:
+    return build(tmp_path_factory.mktemp("variant"), VARIANTS[request.param])
+
+
+def sources(built: Build) -> list[Path]:
+    """What has to be compiled beside a program that includes the header."""
+    return [built.folder / name for name in built.files if name.endswith(".c")]
+
+
+def compile_player(built: Build, options: list[str]) -> Path:
+    program = built.folder / "play"
+    run_clean([*options, *WARNINGS, f"-I{built.folder}", PLAYER, *sources(built), "-o", program])
+    return program
+
+
+def played(program: Path, lines: int) -> Ints:
+    """Columns: x code, y code, x word, y word."""
+    return np.array(run_clean([program, str(lines)]).split(), dtype=np.int64).reshape(-1, 4)
+
+
+def model(built: Build, lines: int) -> Ints:
+    """The same columns from the integer model; lines past the frame begin it again."""
+    program = DualProgram.of(built.plan)
+    ticks = [play_line(program, line % built.plan.schedule.lines) for line in range(lines)]
+    x, y = (np.concatenate([getattr(line, axis) for line in ticks]) for axis in "xy")
+    x_word, y_word = (
+        np.array([axis.output.word(code) for code in codes.tolist()], dtype=np.int64)
+        for axis, codes in ((program.x, x), (program.y, y))
+    )
+    return np.stack([x, y, x_word, y_word], axis=1)
+
+
+def two_units(built: Build) -> list[Path]:
+    """A program of two units that both include the header, the first of them twice."""
+    include, shown = f'#include "{NAME}.h"\n', f"{NAME}_x_table[1]"
+    first, second = built.folder / "first.c", built.folder / "second.c"
+    first.write_text(f"{include}{include}long second(void);\nint main(void) {{ return second() != {shown}; }}\n")
+    second.write_text(f"{include}long second(void);\nlong second(void) {{ return {shown}; }}\n")
+    return [first, second, *sources(built)]
+
+
+@pytest.mark.parametrize("dialect", DIALECTS)
+def test_compiles_without_a_warning(built: Build, dialect: str) -> None:
+    run_clean([*DIALECTS[dialect], *WARNINGS, "-fsyntax-only", f"-I{built.folder}", PLAYER, *two_units(built)])
+
+
+@pytest.mark.parametrize("name", ["example", "header_only"])
+@pytest.mark.parametrize("dialect", DIALECTS)
+def test_two_units_that_include_the_header_link(tmp_path: Path, name: str, dialect: str) -> None:
+    built = build(tmp_path, VARIANTS[name])
+    program = built.folder / "units"
+    run_clean([*DIALECTS[dialect], f"-I{built.folder}", *two_units(built), "-o", program])
+    run_clean([program])
+
+
+def test_constants_and_tables_equal_the_manifest(built: Build) -> None:
+    """Every macro and every array element, printed by a program."""
+    manifest, names = built.manifest, constants(built.manifest)
+    print_constants = "".join(f'    printf("%lld\\n", (long long){NAME.upper()}_{name});\n' for name in names)
+    print_arrays = "".join(
+        f"    for (size_t i = 0; i < sizeof {array} / sizeof {array}[0]; i++)\n"
+        f'        printf("%lld\\n", (long long){array}[i]);\n'
+        for array in (f"{NAME}_{axis}_{kind}" for axis in manifest["axes"] for kind in ("table", "fourier"))
+    )
+    source = built.folder / "print.c"
+    source.write_text(
+        f'#include <stdio.h>\n#include "{NAME}.h"\nint main(void)\n{{\n    puts({NAME.upper()}_HASH);\n'
+        f"{print_constants}{print_arrays}    return 0;\n}}\n"
+    )
+    program = built.folder / "print"
+    run_clean(["gcc", "-std=c99", "-Wall", "-Werror", f"-I{built.folder}", source, *sources(built), "-o", program])
+    digest, *numbers = run_clean([program]).split()
+    expected = list(names.values())
+    for axis in manifest["axes"].values():
+        fourier = axis["fourier"]
+        expected += [*axis["table"]["words"], fourier["a0_word"], *fourier["a_words"], *fourier["b_words"]]
+    assert digest == manifest["hash"]
+    assert list(map(int, numbers)) == expected
+
+
+def test_the_header_defines_what_the_manifest_knows_and_no_more(built: Build) -> None:
+    """Nothing in the header escapes the comparison above."""
+    prefix = f"#define {NAME.upper()}_"
+    header = built.files[f"{NAME}.h"].decode("ascii")
+    defined = {line[len(prefix) :].split()[0] for line in header.splitlines() if line.startswith(prefix)}
+    assert {name for name in defined if "(" not in name} == {*constants(built.manifest), "HASH", "H"}
+
+
+def test_player_equals_the_model_over_a_whole_frame_and_into_the_next(built: Build) -> None:
+    lines = built.plan.schedule.lines + 2
+    assert np.array_equal(played(compile_player(built, ["gcc", "-std=c99", "-O1"]), lines), model(built, lines))
+
+
+@pytest.mark.parametrize(("bits", "gain_word"), STRESS)
+@pytest.mark.parametrize("compiler", [["gcc", "-std=c99"], ["clang", "-std=c11"]], ids=["gcc", "clang"])
+def test_player_is_defined_at_the_ends_of_the_arithmetic(
+    tmp_path: Path, compiler: list[str], bits: int, gain_word: int
+) -> None:
+    """With the sanitizers: no overflow, no shift out of range, nothing read outside a table."""
+    stressed = build_stressed(tmp_path, bits, gain_word)
+    lines = stressed.plan.schedule.lines + 1
+    expected = model(stressed, lines)
+    output = stressed.plan.x.program.output
+    assert {output.code_min, output.code_max} <= set(expected[:, 0].tolist()), "the limits are meant to be reached"
+    assert np.array_equal(played(compile_player(stressed, [*compiler, *SANITIZERS]), lines), expected)
+
+
+@pytest.mark.parametrize("name", ["example", "direct_steps", "left_aligned", "bits_24", "prime_line"])
+@pytest.mark.parametrize("dialect", ["gcc-c++17", "clang-c99"])
+def test_player_is_defined_and_the_same_in_other_dialects(tmp_path: Path, name: str, dialect: str) -> None:
+    built = build(tmp_path, VARIANTS[name])
+    program = compile_player(built, [*DIALECTS[dialect], *SANITIZERS])
+    assert np.array_equal(played(program, 4), model(built, 4))
+
+
+@pytest.mark.parametrize("options", [["-O0"], ["-O3"], ["-Os"], ["-O3", "-march=native"]], ids=" ".join)
+def test_player_does_not_depend_on_optimisation(tmp_path: Path, options: list[str]) -> None:
+    built = build(tmp_path, VARIANTS["bits_18"])
+    assert np.array_equal(played(compile_player(built, ["gcc", "-std=c99", *options]), 3), model(built, 3))
+
+
+def defined_as(name: str, change: Callable[[int], int]) -> Callable[[str], str]:
+    """A header in which a macro has another value."""
+
+    def damage(header: str) -> str:
+        start = header.index(f"#define {NAME.upper()}_{name} ")
+        stop = header.index("\n", start)
+        text = header[start:stop].split()[-1]
+        value = int(text.removeprefix("INT32_C(").removeprefix("INT64_C(").strip("()"))
+        return f"{header[:start]}#define {NAME.upper()}_{name} ({change(value)}){header[stop:]}"
+
+    return damage
+
+
+def without_a_word(array: str) -> Callable[[str], str]:
+    """A header (or source) in which an array lost its first word."""
+
+    def damage(text: str) -> str:
+        start = text.index("{", text.index(f"{NAME}_{array}[")) + 1
+        return text[:start] + text[text.index(",", start) + 1 :]
+
+    return damage
+
+
+DAMAGES: dict[str, tuple[str, Callable[[str], str]]] = {
+    "a word is lost": ("x_table_length", without_a_word("x_table")),
+    "a Fourier word is lost": ("y_fourier_length", without_a_word("y_fourier")),
+    "harmonics": ("x_harmonics", defined_as("X_HARMONICS", lambda harmonics: harmonics - 1)),
+    "length": ("x_table_length", defined_as("X_TABLE_LENGTH", lambda length: 2 * length)),
+    "index bits": ("x_length_is_power_of_two", defined_as("X_INDEX_BITS", lambda bits: bits + 1)),
+    "word bits": ("x_words_fit", defined_as("X_TABLE_BITS", lambda bits: 17)),
+    "phase step": ("y_phase_is_coherent", defined_as("Y_PHASE_STEP", lambda step: step + 1)),
+    "phase remainder": ("x_phase_is_coherent", defined_as("X_PHASE_REMAINDER", lambda rest: rest - 1)),
+    "period": ("y_period", defined_as("Y_HOLD_TICKS", lambda hold: 2)),
+    "line": ("x_period", defined_as("LINE_TICKS", lambda ticks: ticks + 1)),
+    "gain above": ("x_gain_word", defined_as("X_GAIN_WORD", lambda gain: 1 << 17)),
+    "gain below": ("y_gain_word", defined_as("Y_GAIN_WORD", lambda gain: -(1 << 17) - 1)),
+    "park below": ("x_park_code", defined_as("X_CODE_MIN", lambda code: 40000)),
+    "park above": ("y_park_code", defined_as("Y_PARK_CODE", lambda code: 65536)),
+    "code": ("x_codes", defined_as("X_CODE_MAX", lambda code: 65536)),
+    "no step": ("x_codes", defined_as("X_MAX_STEP", lambda step: 0)),
+    "forward": ("forward_window_inside_line", defined_as("FORWARD_TICKS", lambda ticks: 1250)),
+    "backward": ("backward_window_inside_line", defined_as("BACKWARD_FIRST_TICK", lambda tick: 1200)),
+    "up": ("up_window_inside_frame", defined_as("UP_LINES", lambda lines: 400)),
+}
+
+
+@pytest.fixture(scope="module")
+def header_only(tmp_path_factory: pytest.TempPathFactory) -> Build:
+    return build(tmp_path_factory.mktemp("damaged"), VARIANTS["header_only"])
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_damaged_header_does_not_compile(header_only: Build, tmp_path: Path, damage: str) -> None:
+    """Negative controls of the static asserts: each is named by every compiler in every dialect."""
+    name, change = DAMAGES[damage]
+    header = header_only.files[f"{NAME}.h"].decode("ascii")
+    (tmp_path / f"{NAME}.h").write_text(change(header), "ascii")
+    unit = tmp_path / "unit.c"
+    unit.write_text(f'#include "{NAME}.h"\n')
+    for compiler in DIALECTS.values():
+        result = run([*compiler, "-fsyntax-only", unit])
+        assert result.returncode != 0, f"{' '.join(compiler)} accepts a header in which {damage} is wrong"
+        assert name in result.stderr

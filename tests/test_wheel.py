@@ -1,0 +1,97 @@
+"""The wheel against the source tree: what is inside, and that it builds the same bytes as the tree does.
+
+The tree is copied before it is packed, since setuptools works inside the folder that it packs. What ``pip install``
+would fetch is already there: nothing here needs a network.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+from building import EXAMPLE, REPOSITORY
+
+PARTS = ("tablegen", "examples", "firmware_templates")
+
+
+def python(folder: Path, *arguments: str | Path, path: Path | None = None) -> str:
+    """Run this interpreter in a folder, with a folder of packages before its own."""
+    environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+    if path is not None:
+        environment["PYTHONPATH"] = str(path)
+    command = [sys.executable, *map(str, arguments)]
+    result = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+    assert result.returncode == 0, f"{' '.join(command)}\n{result.stdout}{result.stderr}"
+    return result.stdout
+
+
+def pip(folder: Path, *arguments: str | Path) -> None:
+    options = ("--no-deps", "--no-index", "--disable-pip-version-check", "--quiet")
+    python(folder, "-m", "pip", arguments[0], *options, *arguments[1:])
+
+
+def shipped_files() -> set[str]:
+    """What the tree says should be inside: all modules, and what lies beside them and is no module."""
+    found = {path.relative_to(REPOSITORY).as_posix() for path in REPOSITORY.glob("tablegen/**/*.py")}
+    found |= {"tablegen/py.typed", "tablegen/examples/__init__.py", "tablegen/firmware_templates/__init__.py"}
+    found |= {f"tablegen/examples/{path.name}" for path in REPOSITORY.glob("examples/*.toml")}
+    for language in (REPOSITORY / "firmware_templates").iterdir():
+        if language.is_dir() and language.name != "__pycache__":
+            found |= {f"tablegen/firmware_templates/{language.name}/{path.name}" for path in language.iterdir()}
+    return found
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("wheel")
+    source = folder / "source"
+    source.mkdir()
+    for part in PARTS:
+        shutil.copytree(REPOSITORY / part, source / part, ignore=shutil.ignore_patterns("__pycache__"))
+    for file in ("pyproject.toml", "LICENSE", "README.md"):
+        if (REPOSITORY / file).exists():
+            shutil.copy(REPOSITORY / file, source)
+    pip(folder, "wheel", "--no-build-isolation", "--wheel-dir", folder, source)
+    (built,) = folder.glob("*.whl")
+    return built
+
+
+@pytest.fixture(scope="module")
+def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("installed")
+    pip(folder, "install", "--target", folder / "packages", wheel)
+    return folder / "packages"
+
+
+def test_wheel_holds_the_package_and_nothing_else(wheel: Path) -> None:
+    """A folder of modules, or of templates, that pyproject.toml does not name is missing here."""
+    inside = {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
+    assert inside == shipped_files()
+
+
+def test_wheel_is_for_every_machine_and_carries_its_licence(wheel: Path) -> None:
+    assert wheel.name.endswith("-py3-none-any.whl")
+    metadata = [name.split(".dist-info/")[1] for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" in name]
+    assert any(name.endswith("LICENSE") for name in metadata)
+    assert "entry_points.txt" in metadata
+
+
+def test_installed_wheel_builds_what_the_tree_builds(installed: Path, tmp_path: Path) -> None:
+    """From a folder outside the repository, from the examples that it brings along."""
+    where = python(tmp_path, "-c", "import tablegen; print(tablegen.__file__)", path=installed)
+    assert Path(where.strip()).is_relative_to(installed)
+    python(tmp_path, "-m", "tablegen", "init", "scan", path=installed)
+    python(tmp_path, "-m", "tablegen", "build", f"scan/{EXAMPLE.name}", "-o", "wheel", path=installed)
+    python(tmp_path, "-m", "tablegen", "build", EXAMPLE, "-o", "tree")
+    wheel, tree = ({path.name: path.read_bytes() for path in (tmp_path / name).iterdir()} for name in ("wheel", "tree"))
+    assert wheel == tree
+    assert (tmp_path / "scan" / EXAMPLE.name).read_bytes() == EXAMPLE.read_bytes()
+
+
+def test_installed_command_is_the_module(installed: Path, tmp_path: Path) -> None:
+    script = installed / "bin" / "tablegen"
+    shown = python(tmp_path, script, "--version", path=installed)
+    assert shown == python(tmp_path, "-m", "tablegen", "--version", path=installed)
