@@ -13,7 +13,7 @@ import numpy as np
 from tablegen.compensation.dynamics import capped_inverse
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.fixedpoint.runs import Runs, runs_of
-from tablegen.numerics.arrays import Floats, Ints
+from tablegen.numerics.arrays import Floats, Ints, merged
 from tablegen.plan import LinePlan
 from tablegen.waveform.sampler import Sampler
 from tablegen.waveform.series import FourierSeries
@@ -92,7 +92,7 @@ class Played:
 
     def corners(self, first: int, stop: int) -> Ints:
         """Ticks in [first, stop) at which a run begins or ends."""
-        both = np.union1d(self.runs.starts, self.runs.lasts)
+        both = merged(self.runs.starts, self.runs.lasts)
         return both[(both >= first) & (both < stop)]
 
 
@@ -160,7 +160,7 @@ def _chords(
     baseline = max(1, min(round(CHORD * share * ticks), stop - first - 1))
     if stop - first < 2:
         return np.zeros(1), np.zeros(1)
-    begin = np.union1d(played.corners(first, stop - baseline), played.corners(first + baseline, stop) - baseline)
+    begin = merged(played.corners(first, stop - baseline), played.corners(first + baseline, stop) - baseline)
     if not len(begin):
         begin = np.array([first])
 

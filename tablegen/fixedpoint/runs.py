@@ -7,7 +7,7 @@ import numpy as np
 from tablegen.fixedpoint.interpolation import FRACTION_BITS, between
 from tablegen.fixedpoint.phase import PHASE_BITS
 from tablegen.fixedpoint.program import Program
-from tablegen.numerics.arrays import Ints
+from tablegen.numerics.arrays import Ints, merged
 
 _TICKS_AT_LEAST = 4  # a run, on average, for runs to be cheaper than ticks
 
@@ -37,8 +37,8 @@ class Runs:
         return self.codes[np.searchsorted(self.starts, k, side="right") - 1]
 
     def split_at(self, k: Ints) -> "Runs":
-        """The same playback with runs that begin at ticks k as well."""
-        starts = np.union1d(self.starts, k)
+        """The same playback with runs that begin at ascending ticks k as well."""
+        starts = merged(self.starts, k)
         return Runs(starts, self.at(starts), self.ticks)
 
 

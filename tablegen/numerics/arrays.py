@@ -27,3 +27,10 @@ def tree_sum(values: Floats) -> Floats:
         size //= 2
         padded = padded[..., :size] + padded[..., size : 2 * size]
     return padded[..., 0]
+
+
+def merged(*ascending: Ints) -> Ints:
+    """The values of ascending arrays, each once, ascending. numpy hashes for its union, which is far slower here."""
+    values = np.concatenate(ascending)
+    values.sort(kind="stable")
+    return values[np.append(True, values[1:] != values[:-1])] if len(values) else values
