@@ -4,12 +4,16 @@ Each is reported at its key, with by how much and with what would fit.
 """
 
 from fractions import Fraction
-from math import ceil, floor
+from math import ceil, copysign, floor
 
-from tablegen.compensation.drive import Drive
+import numpy as np
+
+from tablegen.compensation.drive import Drive, outside_driver
+from tablegen.config.figures import at_least, at_most
 from tablegen.config.load import Setup
-from tablegen.config.schema import FastAxis
+from tablegen.config.schema import Amplifier, Dac, FastAxis
 from tablegen.fixedpoint.converter import Converter
+from tablegen.fixedpoint.interpolation import guard_bits
 from tablegen.problems import Problems
 from tablegen.waveform.series import FourierSeries
 
@@ -17,6 +21,7 @@ DEFAULT_HARMONICS = 32
 MAXIMUM_HARMONICS = 512
 DEFAULT_LENGTH = 2048
 MAXIMUM_DIRECT_WORDS = 1 << 20
+ACCUMULATOR_LIMIT = 4  # of the synthesis, in units of the table's full scale
 
 
 class Feasibility:
@@ -45,18 +50,26 @@ class Feasibility:
                 self._add(
                     key,
                     f"{limit.cutoff_hz:g} Hz passes {harmonics} harmonics of {low:g} Hz; "
-                    f"{low:g} to {high:g} Hz pass 1 to {MAXIMUM_HARMONICS}",
+                    f"{at_least(low, 6)} to {at_most(high, 6)} Hz pass 1 to {MAXIMUM_HARMONICS}",
                 )
                 return 1
-        if harmonics > (period - 1) // 2:
+        carried = (period - 1) // 2
+        if harmonics > carried:
             unit = "lines" if self._steps else "ticks"
-            self._add(
-                key, f"{harmonics} harmonics are too many; a period of {period} {unit} carries {(period - 1) // 2}"
-            )
+            fits = self._carried(carried, rate) if carried else "; take more timing.lines"
+            self._add(key, f"{harmonics} harmonics are too many; a period of {period} {unit} carries {carried}{fits}")
         length = self._scan.table.length or DEFAULT_LENGTH
-        if self._scan.table.mode == "interpolated" and harmonics > length // 2 - 1:
-            self._add(key, f"{harmonics} harmonics are too many; a table of {length} words carries {length // 2 - 1}")
+        carried = length // 2 - 1
+        if self._scan.table.mode == "interpolated" and harmonics > carried:
+            fits = self._carried(carried, rate)
+            self._add(key, f"{harmonics} harmonics are too many; a table of {length} words carries {carried}{fits}")
         return harmonics
+
+    def _carried(self, harmonics: int, rate: Fraction) -> str:
+        """Which cutoff passes so many, where one was asked for."""
+        if self._scan.band_limit.cutoff_hz is None:
+            return ""
+        return f", which {at_most(float((harmonics + 1) * rate) * (1 - 1e-9), 6)} Hz pass"
 
     def table_length(self, period: int) -> int:
         """Words of the table."""
@@ -66,7 +79,8 @@ class Feasibility:
         if table.length not in (None, period):
             self._add(
                 f"{self._axis}.table.length",
-                f"{table.length} is not the {period} words, one a tick, that mode = 'direct' takes; leave it out",
+                f"{table.length} is not the {period} words, one a {'line' if self._steps else 'tick'}, "
+                f"that mode = 'direct' takes; leave it out",
             )
         if period > MAXIMUM_DIRECT_WORDS:
             self._add(
@@ -77,23 +91,15 @@ class Feasibility:
 
     def check_range(self, drive: Drive, converter: Converter, low: float, high: float) -> None:
         """The drive, for w from ``low`` to ``high``, has to stay inside the driver and inside the converter."""
-        if self._scan.park_v is not None and not 0.0 <= self._scan.park_v <= drive.v_max:
-            self._add(f"{self._axis}.park_v", f"{self._scan.park_v:g} V is outside the driver's 0..{drive.v_max:g} V")
+        self._check_park(drive.v_max, converter)
         down, up = drive.v_amplitude * (0.5 - low), drive.v_amplitude * (high - 0.5)
         bottom, top = drive.v_offset - down, drive.v_offset + up
         outside = max(-bottom, top - drive.v_max)
         if outside > 1e-9 * drive.v_max:
-            key = f"{self._axis}.{'size_v' if self._scan.size_v is not None else 'size_nm'}"
-            share = min(drive.v_offset / down, (drive.v_max - drive.v_offset) / up)
-            size = drive.size_law.size_nm(drive.v_scan_normalised * share)
-            if down + up <= drive.v_max:
-                fits = f"an offset of {down:.4f} to {drive.v_max - up:.4f} V fits"
-            else:
-                fits = f"no offset fits, since it takes {down + up:.4g} V"
             self._add(
-                key,
-                f"the drive spans {bottom:.4f}..{top:.4f} V, {outside:.4f} V outside the driver's "
-                f"0..{drive.v_max:g} V; {fits}, or at this offset a line of about {size:.4g} nm",
+                self._size_key,
+                f"the drive spans {bottom:.4f}..{top:.4f} V, {outside:.4g} V outside the driver's "
+                f"0..{drive.v_max:g} V; {_offsets_that_fit(drive, low, high)}, {self._size_that_fits(drive, down, up)}",
             )
             return
         ends = sorted((converter.code(bottom), converter.code(top)))
@@ -107,38 +113,155 @@ class Feasibility:
                 "amplifier.gain",
                 f"the {self._axis} drive of {bottom:.4f}..{top:.4f} V needs {volts[0]:.4f}..{volts[1]:.4f} V of the "
                 f"converter, {beyond:.4g} V beyond its {dac.v_min:g}..{highest:.6g} V; "
-                f"change gain or bias_v, or scan less",
+                f"{_amplifier_that_fits(dac, amplifier, bottom, top)} would carry it, or scan less",
             )
         if abs(ends[1] - ends[0]) < 2.0:
             self._add(
-                f"{self._axis}.{'size_v' if self._scan.size_v is not None else 'size_nm'}",
+                self._size_key,
                 f"the drive of {down + up:.4g} V is {ends[1] - ends[0]:.3g} codes of the converter, which cannot "
                 f"draw a line; scan more, or use more dac.bits or less amplifier.gain",
             )
 
+    @property
+    def _size_key(self) -> str:
+        return f"{self._axis}.{'size_v' if self._scan.size_v is not None else 'size_nm'}"
+
+    def _check_park(self, v_max: float, converter: Converter) -> None:
+        """The park voltage has to be one that the driver and the converter reach."""
+        park_v, key = self._scan.park_v, f"{self._axis}.park_v"
+        if park_v is None:
+            return
+        if not 0.0 <= park_v <= v_max:
+            self._add(key, outside_driver(park_v, v_max))
+            return
+        last = (1 << converter.bits) - 1
+        if not -0.5 <= converter.code(park_v) < last + 0.5:
+            reach = sorted(converter.v_zero + converter.v_per_code * code for code in (0, last))
+            self._add(key, f"{park_v:.6g} V is outside the {reach[0]:.6g}..{reach[1]:.6g} V that the converter reaches")
+
+    def _size_that_fits(self, drive: Drive, down: float, up: float) -> str:
+        """The largest scan at this offset, as its key counts it."""
+        share = min(drive.v_offset / down, (drive.v_max - drive.v_offset) / up)
+        if share < 1e-3:
+            return "at this one nothing"
+        v = 0.99 * share * drive.v_scan_normalised  # a smaller line has another shape, and overshoots a little more
+        line_nm = drive.size_law.size_nm(v)
+        if self._scan.size_v is not None:
+            return f"or at this offset about {at_most(v * drive.v_max, 3)} V"
+        if self._scan.size_of == "window":
+            return f"or at this offset a window of about {at_most(line_nm * drive.window_nm / drive.size_nm, 3)} nm"
+        return f"or at this offset a line of about {at_most(line_nm, 3)} nm"
+
     def max_step(self, drive: Drive, converter: Converter, series: FourierSeries, rate_hz: float, period: int) -> int:
         """The slew guard in codes a tick: the amplifier's slew rate, or twice the steepest step of the line."""
+        size = self._largest(series)
+        self._check_words(series, size)
         slope = drive.v_amplitude * series.peak_slope()
-        # Rounding can add one code, and the chord of a step is never steeper than the steepest slope.
-        steepest = ceil(slope / abs(converter.v_per_code) / period) + 1
+        v_per_code = abs(converter.v_per_code)
+        # The chord of a step is never steeper than the steepest slope; rounding adds to it.
+        words = self._word_codes(drive, converter, size, period)
+        steepest = ceil(slope / v_per_code / period + words) + 1
         last = (1 << converter.bits) - 1
-        amplifier, timing = self._setup.scan.amplifier, self._setup.scan.timing
-        slew = amplifier.max_slew_v_per_s
+        slew = self._setup.scan.amplifier.max_slew_v_per_s
         if slew is None:
             return min(2 * steepest, last)
-        allowed = min(floor(slew / self._setup.scan.dac.update_rate_hz / abs(converter.v_per_code)), last)
+        update_rate = self._setup.scan.dac.update_rate_hz
+        allowed = min(floor(slew / update_rate / v_per_code), last)
         asked = slope * rate_hz
-        if not self._steps and asked > slew:
-            times = asked / slew
+        if steepest <= allowed and (self._steps or asked <= slew):
+            return allowed
+        finer = "" if words < 0.5 else f", more {self._axis}.table.bits"
+        if self._steps:
             self._add(
-                "timing.line_rate_hz",
-                f"the {self._axis} drive slews at {asked:.4g} V/s, {times:.3g} times the amplifier's {slew:.4g} V/s; "
-                f"about {timing.line_rate_hz / times:.4g} Hz or {drive.size_nm / times:.4g} nm would fit",
+                "y.motion",
+                f"the y axis steps by up to {steepest} codes in one tick, {slew:.6g} V/s allow {allowed}; "
+                f"use motion = 'ramp'",
             )
-        elif steepest > allowed:
+        elif allowed <= 1.0 + words and asked < 0.9 * slew:
+            # Room to round both sides, and for the line rate, which moves a little with it.
+            fits = at_most(0.95 * (slew - asked) / ((3.0 + words) * v_per_code))
             self._add(
-                "y.motion" if self._steps else "amplifier.max_slew_v_per_s",
-                f"the {self._axis} axis steps by up to {steepest} codes in one tick, {slew:.4g} V/s allow {allowed}; "
-                + ("use motion = 'ramp'" if self._steps else "raise update_rate_hz, or scan less or slower"),
+                "amplifier.max_slew_v_per_s",
+                f"{slew:.6g} V/s are {slew / update_rate / v_per_code:.3g} codes of the {self._axis} axis in a tick, "
+                f"and a line needs {floor(words) + 2}; "
+                f"an update_rate_hz of about {fits}{finer} or more dac.bits would fit",
             )
+        else:
+            usable = (allowed - 1.0 - words) * v_per_code * update_rate if allowed > 1.0 + words else 0.5 * slew
+            times = asked / min(slew, usable)
+            line_nm = drive.size_law.size_nm(drive.v_scan_normalised / times)
+            what = (
+                f"slews at {asked:.6g} V/s, {asked / slew:.4g} times the amplifier's {slew:.6g} V/s"
+                if asked > slew
+                else f"steps by up to {steepest} codes a tick with rounding, {slew:.6g} V/s allow {allowed}"
+            )
+            key, slower = self._slower(times)
+            fits = f"about {slower}{finer} or a line of {at_most(line_nm)} nm would fit"
+            self._add(key, f"the {self._axis} drive {what}; {fits}")
         return max(allowed, 1)
+
+    @staticmethod
+    def _largest(series: FourierSeries) -> float:
+        """The largest |2 w - 1|, at least 1: to a percent, never too high. A table is scaled to it."""
+        return max(1.0, float(np.max(np.abs(2.0 * series.on_grid(16 * series.harmonics) - 1.0))))
+
+    def _word_codes(self, drive: Drive, converter: Converter, largest: float, period: int) -> float:
+        """Codes that a step can be off since the words of the table are rounded."""
+        table = self._scan.table
+        full_scale = 0.51 * drive.v_amplitude / abs(converter.v_per_code) * largest + 2.0 ** (converter.bits - 17)
+        share = 1.0 if table.mode == "direct" else min(1.0, (table.length or DEFAULT_LENGTH) / period)
+        return full_scale * 2.0 ** (1 - table.bits) * (share + 2.0 ** -guard_bits(table.bits))
+
+    def _check_words(self, series: FourierSeries, largest: float) -> None:
+        """The accumulator of the device has to hold the sum of all Fourier words, whatever their signs."""
+        sums = abs(2.0 * series.a0 - 1.0) + 2.0 * np.cumsum(np.abs(series.a) + np.abs(series.b))
+        if sums[-1] >= 0.999 * ACCUMULATOR_LIMIT * largest:
+            fits = int(np.searchsorted(sums, 0.99 * ACCUMULATOR_LIMIT * largest))
+            self._add(
+                f"{self._axis}.band_limit.harmonics",
+                f"the {series.harmonics} harmonics sum to {sums[-1] / largest:.4g} of the scan, the accumulator of the "
+                f"device holds {ACCUMULATOR_LIMIT}; about {fits} harmonics, or method = 'lanczos', fit",
+            )
+
+    def _slower(self, times: float) -> tuple[str, str]:
+        """The key that sets the line rate, and what it would be for a rate lower by a factor."""
+        timing = self._setup.scan.timing
+        if timing.ticks_per_line is not None:
+            return "timing.ticks_per_line", f"{ceil(times * timing.ticks_per_line)} ticks_per_line"
+        if timing.ticks_per_pixel is not None:
+            return "timing.ticks_per_pixel", f"{ceil(times * timing.ticks_per_pixel)} ticks_per_pixel"
+        return "timing.line_rate_hz", f"{at_most(timing.line_rate_hz / times, 5)} Hz"
+
+
+def _amplifier_that_fits(dac: Dac, amplifier: Amplifier, bottom: float, top: float) -> str:
+    """The amplifier that spreads the converter over a drive, and no further."""
+    highest = dac.v_max - (dac.v_max - dac.v_min) / float(1 << dac.bits)
+    gain = copysign(float(at_least(1.0001 * (top - bottom) / (highest - dac.v_min))), amplifier.gain)
+    bias_v = 0.5 * (bottom + top) - gain * 0.5 * (dac.v_min + highest)
+    return f"a gain of {gain:g} with a bias_v of {bias_v:.6g} V"
+
+
+def _offsets_that_fit(drive: Drive, low: float, high: float) -> str:
+    """At which offsets the drive stays inside the driver; its amplitude changes with the offset by (1)."""
+
+    def fits(v_offset: float) -> bool:
+        amplitude = drive.v_amplitude_at(v_offset)
+        return amplitude * (0.5 - low) <= v_offset <= drive.v_max - amplitude * (high - 0.5)
+
+    grid = [drive.v_max * i / 1000 for i in range(1001)]
+    good = [v for v in grid if fits(v)]
+    if not good:
+        least = min(drive.v_amplitude_at(v) for v in grid) * (high - low)
+        return (
+            f"it takes at least {at_least(least)} V, so that no offset fits"
+            if least > drive.v_max
+            else "no offset fits"
+        )
+    # The nearest stretch of the grid without a gap.
+    nearest = min(range(1001), key=lambda i: (not fits(grid[i]), abs(grid[i] - drive.v_offset)))
+    first = last = nearest
+    while first > 0 and fits(grid[first - 1]):
+        first -= 1
+    while last < 1000 and fits(grid[last + 1]):
+        last += 1
+    return f"an offset of {at_least(grid[first])} to {at_most(grid[last])} V fits"

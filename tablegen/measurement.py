@@ -156,7 +156,7 @@ def _chords(
     ticks, turn = line.program.ticks, line.drive.turn
     share = turn if side == "forward" else 1.0 - turn
     ends = sorted(float(t) * ticks for t in _times(line, side, position[[0, -1]]))
-    first, stop = ceil(ends[0]), floor(ends[1]) + 1
+    first, stop = ceil(ends[0]), min(floor(ends[1]) + 1, ticks)  # a window may reach the end of the period
     baseline = max(1, min(round(CHORD * share * ticks), stop - first - 1))
     if stop - first < 2:
         return np.zeros(1), np.zeros(1)

@@ -6,10 +6,11 @@ All of it is decided in exact fractions: a window edge at 0.1 of the line is 1/1
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
-from math import ceil, floor
+from math import ceil, floor, gcd
 
+from tablegen.config.figures import at_least, at_most
 from tablegen.config.load import Setup
-from tablegen.config.schema import FastAxis
+from tablegen.config.schema import FastAxis, Timing
 from tablegen.fixedpoint.phase import MAXIMUM_TICKS
 from tablegen.problems import Problems
 
@@ -93,23 +94,31 @@ def make_schedule(setup: Setup, problems: Problems) -> Schedule | None:
         share = _width(scan.x) * exact(scan.x.turn)
         wanted = timing.pixels * timing.ticks_per_pixel / share
         ticks = round(wanted)
-        if wanted.denominator != 1:
+        if wanted.denominator != 1 and ticks <= MAXIMUM_LINE_TICKS:
+            # Whole are the multiples of the numerator of the share, less what the ticks of a pixel have of it.
+            step = share.numerator // gcd(share.numerator, timing.ticks_per_pixel)
+            pixels = step * max(1, round(Fraction(timing.pixels, step)))
             problems.add(
                 file,
                 key,
                 f"{timing.pixels} pixels of {timing.ticks_per_pixel} ticks in {float(share):g} of the line make "
-                f"{float(wanted):.6g} ticks a line, which is not whole; change pixels, x.turn or the window",
+                f"{float(wanted):.7g} ticks a line, which is not whole; "
+                + (f"{pixels} pixels make it so, or change" if pixels <= 65536 else "change")
+                + " x.turn or the window",
             )
     else:
         ticks = floor(rate / exact(timing.line_rate_hz) + Fraction(1, 2))
     if not 8 <= ticks <= MAXIMUM_LINE_TICKS:
-        low, high = float(rate / MAXIMUM_LINE_TICKS), float(rate / 8)
-        problems.add(
-            file,
-            key,
-            f"a line of {ticks} ticks is outside 8..{MAXIMUM_LINE_TICKS}; at {float(rate):g} updates a second "
-            f"the line rate can be {low:.4g} to {high:.6g} Hz",
-        )
+        shown = str(ticks) if ticks < 1 << 64 else "more than 2^64"
+        if key == "timing.line_rate_hz":
+            low, high = float(rate / MAXIMUM_LINE_TICKS), float(rate / 8)
+            fits = (
+                f"at {float(rate):g} updates a second the line rate can be {at_least(low, 6)} to {at_most(high, 6)} Hz"
+            )
+        else:
+            most = floor(MAXIMUM_LINE_TICKS * share / timing.pixels)
+            fits = "take more of them" if ticks < 8 else f"at most {most} fit" if most else "take fewer pixels"
+        problems.add(file, key, f"a line of {shown} ticks is outside 8..{MAXIMUM_LINE_TICKS}; {fits}")
     elif ticks * timing.lines > MAXIMUM_TICKS:
         problems.add(
             file,
@@ -122,22 +131,33 @@ def make_schedule(setup: Setup, problems: Problems) -> Schedule | None:
 
     forward, backward = _windows(scan.x, ticks, ceil, ceil)
     up, down = _windows(scan.y, timing.lines, ceil, floor)
-    if forward.count < timing.pixels:
-        problems.add(
-            file,
-            "timing.pixels",
-            f"{timing.pixels} pixels do not fit the {forward.count} ticks of the imaging window; take at most "
-            f"{forward.count}, or a line rate up to {float(rate / ticks) * forward.count / timing.pixels:.6g} Hz",
-        )
-    if scan.x.band_limit.directions == "both" and backward.count < timing.pixels:
-        problems.add(
-            file,
-            "timing.pixels",
-            f"{timing.pixels} pixels do not fit the {backward.count} ticks of the backward imaging window; "
-            f"take at most {backward.count}, or directions = 'forward'",
-        )
+    both = scan.x.band_limit.directions == "both"
+    for side, window, share, other in (
+        ("forward", forward, exact(scan.x.turn), "a larger x.turn"),
+        ("backward", backward, 1 - exact(scan.x.turn), "directions = 'forward'"),
+    ):
+        if window.count < timing.pixels and (side == "forward" or both):
+            needed = ceil(timing.pixels / (_width(scan.x) * share))  # a window of so many ticks has a tick a pixel
+            problems.add(
+                file,
+                "timing.pixels",
+                f"{timing.pixels} pixels do not fit the {window.count} ticks of the {side} imaging window; "
+                f"{_longer_line(timing, rate, ticks, needed)}"
+                + (f", or at most {window.count} pixels" if window.count else f", or {other}"),
+            )
     if up.count < 1:
-        problems.add(file, "y.band_limit.window", f"not one of the {timing.lines} lines lies inside it; widen it")
+        problems.add(
+            file,
+            "y.band_limit.window",
+            f"not one of the {timing.lines} lines lies inside it; widen it or take more timing.lines",
+        )
+    elif scan.y.band_limit.directions == "both" and down.count < 1:
+        problems.add(
+            file,
+            "y.band_limit.directions",
+            f"not one of the {timing.lines} lines lies inside the backward window; "
+            f"take more timing.lines, a lower y.turn or 'forward'",
+        )
     if len(problems.found) > before:
         return None
     return Schedule(
@@ -154,6 +174,17 @@ def make_schedule(setup: Setup, problems: Problems) -> Schedule | None:
         up=up,
         down=down,
     )
+
+
+def _longer_line(timing: Timing, rate: Fraction, ticks: int, needed: int) -> str:
+    """How to ask for a line of at least ``needed`` ticks in place of ``ticks``."""
+    if needed > MAXIMUM_LINE_TICKS:
+        return "no line is long enough for so many"
+    if timing.ticks_per_line is not None:
+        return f"take at least {needed} ticks_per_line"
+    if timing.ticks_per_pixel is not None:
+        return f"take at least {ceil(Fraction(timing.ticks_per_pixel * needed, ticks))} ticks_per_pixel"
+    return f"take a line rate of at most {at_most(float(rate / needed), 6)} Hz"
 
 
 def _width(axis: FastAxis) -> Fraction:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from editing import SCAN, edited, write_pair
 
 from tablegen.certificate import certify
 from tablegen.cli import cli
@@ -24,17 +25,6 @@ def block(command: str) -> str:
     return found[1]
 
 
-def example(folder: Path, edit: dict[str, str]) -> Path:
-    text = (ROOT / "examples" / "annexin_200nm.toml").read_text(encoding="utf-8")
-    for old, new in edit.items():
-        assert re.search(old, text), old
-        text = re.sub(old, new, text)
-    (folder / "scanner.toml").write_bytes((ROOT / "examples" / "scanner.toml").read_bytes())
-    path = folder / "scan.toml"
-    path.write_text(text, encoding="utf-8")
-    return path
-
-
 def test_the_build_prints_what_the_readme_shows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     monkeypatch.chdir(tmp_path)
@@ -44,14 +34,10 @@ def test_the_build_prints_what_the_readme_shows(tmp_path: Path, monkeypatch: pyt
 
 def test_the_errors_are_what_the_readme_shows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    wrong = {
-        r"(?m)^bits = 16\ncoding": "bits = 30\ncoding",
-        r"\[x\]\nsize_nm": "[x]\nsize",
-        "turn = 0.95": "turn = 1.5",
-    }
-    too_large = {r"\[x\]\nsize_nm = 200.0": "[x]\nsize_nm = 1350.0"}
-    for name, edit in (("scan", wrong), ("large", too_large)):
-        example(tmp_path, edit).replace(tmp_path / f"{name}.toml")
+    wrong = edited(SCAN, "- x.size_nm", "x.size = 200.0", "dac.bits = 30", "y.turn = 1.5")
+    too_large = edited(SCAN, "x.size_nm = 1350.0")
+    for name, text in (("scan", wrong), ("large", too_large)):
+        write_pair(tmp_path, text).replace(tmp_path / f"{name}.toml")
         with pytest.raises(Rejected) as caught:
             make_plan(load(f"{name}.toml"))
         assert [str(p) for p in caught.value.problems] == block(f"tablegen check {name}.toml").splitlines()
@@ -63,11 +49,9 @@ def test_the_accuracy_table_is_measured(tmp_path: Path) -> None:
     )
     assert len(rows) == 5
     for dac, length, bits, x_error, y_error, x_scaling, y_scaling in rows:
-        edit = {
-            r"(?m)^bits = 16\ncoding": f"bits = {dac}\ncoding",
-            r"length = 2048.*\nbits = 16": f"length = {length}\nbits = {bits}",
-        }
-        certificates = certify(make_plan(load(example(tmp_path, edit))))
+        tables = [f"{axis}.table.{key}" for axis in "xy" for key in (f"length = {length}", f"bits = {bits}")]
+        path = write_pair(tmp_path, edited(SCAN, f"dac.bits = {dac}", *tables))
+        certificates = certify(make_plan(load(path)))
         for axis, error, scaling in (("x", x_error, x_scaling), ("y", y_error, y_scaling)):
             c = certificates[axis]
             assert error.strip() == f"{c.max_error_lsb:.3f}, {c.rms_error_lsb:.3f}", (dac, axis)

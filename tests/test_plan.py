@@ -90,7 +90,7 @@ def test_branches_are_interpolated_between_calibrated_turns(tmp_path: Path) -> N
     setup_of(tmp_path, {"x.turn": "0.6"})
     path = tmp_path / "scanner.toml"
     path.write_text(path.read_text().replace("\n[x.frequency]", text + "\n[x.frequency]"))
-    drive = make_plan(load(tmp_path / "annexin_200nm.toml")).x.drive
+    drive = make_plan(load(tmp_path / "scan.toml")).x.drive
     v = drive.v_scan_normalised
     assert drive.forward.u_peak == pytest.approx(0.38)
     assert drive.forward.beta == pytest.approx(0.039 * (1 - exp(-3.5 * v)) / (1 - exp(-3.5)))

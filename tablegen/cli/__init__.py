@@ -4,6 +4,7 @@ Commands import what they need when they run, so that ``--version`` and ``--help
 """
 
 import sys
+from io import TextIOWrapper
 
 import click
 
@@ -48,9 +49,13 @@ def main() -> None:
 
 
 def _run() -> int:
+    if isinstance(sys.stdout, TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")  # a name that the terminal cannot show is no reason to fail
+    stdout = sys.stdout
     try:
         result = cli.main(standalone_mode=False)
-        sys.stdout.flush()
+        if sys.stdout is not None:  # it is None where the caller closed it
+            sys.stdout.flush()
         return int(result or 0)
     except Failure as failure:
         failure.show()
@@ -62,6 +67,17 @@ def _run() -> int:
         click.echo("interrupted; the output directory was left as it was", err=True)
         return Status.INTERRUPTED
     except BrokenPipeError:
-        # The reader of a pipe went away: nothing is left to say, and Python's own flush at exit must not complain.
+        return _reader_left()
+    except SystemExit as end:
+        # Click ends so after a broken pipe, having replaced stdout, and after completing for a shell.
+        return _reader_left() if sys.stdout is not stdout else int(end.code or 0)
+    except OSError as error:
         sys.stdout = None
-        return Status.OK
+        click.echo(f"cannot write what is printed: {error.strerror or error}", err=True)
+        return Status.CANNOT_WRITE
+
+
+def _reader_left() -> int:
+    """The reader of a pipe went away: nothing is left to say, and Python's own flush at exit must not complain."""
+    sys.stdout = None
+    return Status.OK

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from tablegen.cli.common import fail, planned, scan_argument
+from tablegen.cli.common import fail, planned, scan_argument, written
 from tablegen.cli.status import Status
 
 
@@ -32,7 +32,7 @@ def build(scan: Path, output: Path, only_check: bool, quiet: bool) -> int:
       tablegen build annexin_200nm.toml -o build --check     in CI: is what was committed up to date?
     """
     plan, certificates = planned(scan)
-    from tablegen.emit import CannotWrite, render, write_files
+    from tablegen.emit import render
 
     files = render(plan, certificates)
     if only_check:
@@ -43,14 +43,11 @@ def build(scan: Path, output: Path, only_check: bool, quiet: bool) -> int:
             return Status.OK
         click.echo("\n".join(found))
         fail([f"{output} is stale; run: tablegen build {scan} -o {output}"], Status.STALE)
-    try:
-        written = write_files(output, files)
-    except CannotWrite as error:
-        fail([error], Status.CANNOT_WRITE)
+    changed = written(output, files)
     if not quiet:
         from tablegen.cli.report import certificate_table
 
         click.echo("\n".join(certificate_table(plan, certificates)))
-        state = f"{len(written)} of {len(files)} files written" if written else f"{len(files)} files up to date"
+        state = f"{len(changed)} of {len(files)} files written" if changed else f"{len(files)} files up to date"
         click.echo(f"\n{output}: {state}")
     return Status.OK

@@ -1,7 +1,10 @@
 """What several commands share: the way from a path to a certified plan, and how its failures are told."""
 
 import os
+import signal
+import threading
 from pathlib import Path
+from types import FrameType
 from typing import TYPE_CHECKING, NoReturn
 
 import click
@@ -9,7 +12,7 @@ import click
 from tablegen.cli.status import Status
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from tablegen.certificate import Certificate
     from tablegen.plan import Plan
@@ -52,3 +55,34 @@ def planned(scan: Path) -> "tuple[Plan, dict[str, Certificate]]":
     if broken := broken_limits(plan, certificates, setup.scan_file):
         fail(broken, Status.BROKEN_LIMIT)
     return plan, certificates
+
+
+def written(folder: Path, files: "Mapping[str, bytes]") -> list[str]:
+    """Write files and return the names of those that changed; a failure or an interruption ends the command.
+
+    An interruption waits until all files are in place, so that none is left half renamed; a second one does not wait.
+    """
+    from tablegen.emit.write import CannotWrite, write_files
+
+    held = []
+
+    def hold(_number: int, _frame: FrameType | None) -> None:
+        held.append(True)
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+    heard = signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    waits = heard and threading.current_thread() is threading.main_thread()
+    if waits:
+        signal.signal(signal.SIGINT, hold)
+    try:
+        names = write_files(folder, files)
+    except CannotWrite as error:
+        fail([error], Status.CANNOT_WRITE)
+    except OSError as error:
+        fail([f"{folder}: {error.strerror or error}"], Status.CANNOT_WRITE)
+    finally:
+        if waits:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+    if held:
+        fail([f"interrupted, after the files of {folder} had been written"], Status.INTERRUPTED)
+    return names

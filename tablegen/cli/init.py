@@ -1,10 +1,11 @@
 """``tablegen init``: a commented scanner and scan to start from."""
 
+import os
 from pathlib import Path
 
 import click
 
-from tablegen.cli.common import fail
+from tablegen.cli.common import fail, written
 from tablegen.cli.status import Status
 
 _FILES = ("scanner.toml", "annexin_200nm.toml")
@@ -15,17 +16,13 @@ _FILES = ("scanner.toml", "annexin_200nm.toml")
 @click.option("--force", is_flag=True, help="Overwrite what is there.")
 def init(folder: Path, force: bool) -> int:
     """Write scanner.toml and annexin_200nm.toml, the commented example pair, into DIR (default: here)."""
-    from tablegen.emit.write import CannotWrite, write_files
     from tablegen.resources import resource_folder
 
-    there = [folder / name for name in _FILES if (folder / name).exists()]
+    there = [folder / name for name in _FILES if os.path.lexists(folder / name)]
     if there and not force:
         fail([f"{path} exists; --force overwrites it" for path in there], Status.WRONG_INPUT)
     source = resource_folder("examples")
-    try:
-        write_files(folder, {name: (source / name).read_bytes() for name in _FILES})
-    except CannotWrite as error:
-        fail([error], Status.CANNOT_WRITE)
+    written(folder, {name: (source / name).read_bytes() for name in _FILES})
     for name in _FILES:
         click.echo(folder / name)
     return Status.OK

@@ -9,7 +9,8 @@ def schema(kind: str) -> None:
     """Print the JSON Schema (2020-12) of a scan file, or of a scanner file.
 
     \b
-    Editors that know TOML take it, for instance taplo and Even Better TOML with this as the first line:
+    Editors that know TOML take it, for instance taplo and Even Better TOML
+    with this as the first line:
       #:schema ./scan.schema.json
     """
     import json

@@ -5,10 +5,11 @@ from pathlib import Path
 
 from tablegen.compensation.dynamics import Response, SecondOrder
 from tablegen.compensation.frequency import frequency_gain
-from tablegen.compensation.hysteresis import BranchShape, LineShape, beta_at
+from tablegen.compensation.hysteresis import HIGHEST_PEAK, LOWEST_PEAK, BranchShape, LineShape, beta_at
 from tablegen.compensation.offset import OffsetLaw, normalised_offset
 from tablegen.compensation.response_file import read_response
 from tablegen.compensation.size import SizeLaw
+from tablegen.config.figures import at_least, at_most
 from tablegen.config.load import Setup
 from tablegen.config.schema import Branch, FastAxis, Hysteresis, Offset, Resonance, ScannerAxis
 from tablegen.problems import Problems, Unphysical
@@ -48,6 +49,7 @@ class Drive:
     turn: float
     forward: AppliedBranch
     backward: AppliedBranch
+    offset_law: OffsetLaw
     size_law: SizeLaw
     shape: LineShape
     response: Response | None
@@ -57,6 +59,10 @@ class Drive:
     def v_amplitude(self) -> float:
         """m g V_scan: volts peak to peak at the piezo for w from 0 to 1."""
         return self.m * self.g * self.v_scan
+
+    def v_amplitude_at(self, v_offset: float) -> float:
+        """What ``v_amplitude`` would be at another offset voltage."""
+        return self.offset_law.factor(normalised_offset(v_offset, self.v_max)) * self.g * self.v_scan
 
 
 def compensate(setup: Setup, axis: str, rate_hz: float, problems: Problems) -> Drive | None:
@@ -69,7 +75,8 @@ def compensate(setup: Setup, axis: str, rate_hz: float, problems: Problems) -> D
 
     offset_law = OffsetLaw()
     if scanner.offset is not None:
-        with problems.at(scanner_file, f"{axis}.offset"):
+        _check_points(setup, axis, problems)
+        with problems.at(scanner_file, f"{axis}.offset{'.points' if scanner.offset.points is not None else ''}"):
             offset_law = _offset_law(scanner.offset, v_max)
     size_law = None
     with problems.at(scanner_file, f"{axis}.size.base_nm"):
@@ -81,7 +88,7 @@ def compensate(setup: Setup, axis: str, rate_hz: float, problems: Problems) -> D
         v_offset = scan.offset_v
         with problems.at(scan_file, f"{axis}.offset_v"):
             if not 0.0 <= v_offset <= v_max:
-                raise Unphysical(f"{v_offset:g} V is outside the driver's 0..{v_max:g} V")
+                raise Unphysical(outside_driver(v_offset, v_max))
     elif scan.offset_nm is not None:
         with problems.at(scan_file, f"{axis}.offset_nm"):
             v_offset = offset_law.voltage_at(scan.offset_nm, v_max, scanner.size.k_nm_per_v)
@@ -91,13 +98,19 @@ def compensate(setup: Setup, axis: str, rate_hz: float, problems: Problems) -> D
     if size_law is not None and scan.size_nm is not None:
         with problems.at(scan_file, f"{axis}.size_nm"):
             size_nm = scan.size_nm / (high - low) if scan.size_of == "window" else scan.size_nm
-            v = size_law.voltage(size_nm)
+            try:
+                v = size_law.voltage(size_nm)
+            except Unphysical as reason:
+                if scan.size_of == "line":
+                    raise
+                window_nm = at_most(size_law.size_nm(1.0) * (high - low), 6)
+                raise Unphysical(f"its line of {reason}, a window of {window_nm} nm") from None
     elif size_law is not None and scan.size_v is not None:
-        v = scan.size_v / v_max
-        size_nm = size_law.size_nm(v)
         with problems.at(scan_file, f"{axis}.size_v"):
-            if v > 1.0:
+            if scan.size_v > v_max:
                 raise Unphysical(f"{scan.size_v:g} V is above v_max = {v_max:g} V")
+            v = scan.size_v / v_max
+            size_nm = size_law.size_nm(v)
 
     g = 1.0
     if scanner.frequency is not None:
@@ -107,7 +120,8 @@ def compensate(setup: Setup, axis: str, rate_hz: float, problems: Problems) -> D
     branches = _branches(setup, axis, v, problems)
     response = None
     if scanner.resonance is not None:
-        with problems.at(scanner_file, f"{axis}.resonance"):
+        key = f"{axis}.resonance.response" if scanner.resonance.response is not None else f"{axis}.resonance"
+        with problems.at(scanner_file, key):
             response = _response(scanner.resonance, setup.scanner_folder)
     if len(problems.found) > before or branches is None or size_law is None:
         return None
@@ -128,11 +142,28 @@ def compensate(setup: Setup, axis: str, rate_hz: float, problems: Problems) -> D
         turn=scan.turn,
         forward=applied[0],
         backward=applied[1],
+        offset_law=offset_law,
         size_law=size_law,
         shape=shape,
         response=response,
         max_boost_db=scanner.resonance.max_boost_db if scanner.resonance is not None else 0.0,
     )
+
+
+def outside_driver(volts: float, v_max: float) -> str:
+    """That a voltage is outside the driver's range, and by how much."""
+    by = max(-volts, volts - v_max)
+    return f"{volts:.6g} V is outside the driver's 0..{v_max:g} V, by {by:.4g} V"
+
+
+def _check_points(setup: Setup, axis: str, problems: Problems) -> None:
+    """No point can have been measured where the driver does not reach."""
+    v_max = setup.scanner.v_max
+    offset: Offset = getattr(setup.scanner, axis).offset
+    for i, point in enumerate(offset.points or []):
+        if not 0.0 <= point.offset_v <= v_max:
+            key = f"{axis}.offset.points[{i}].offset_v"
+            problems.add(setup.scanner_file, key, outside_driver(point.offset_v, v_max))
 
 
 def _offset_law(offset: Offset, v_max: float) -> OffsetLaw:
@@ -158,11 +189,13 @@ def _branches(
     turns = [entry.turn for _, entry in entries]
     if not turns[0] - TURN_REACH - 1e-9 <= turn <= turns[-1] + TURN_REACH + 1e-9:
         nearest = min(turns, key=lambda t: abs(t - turn))
+        low = at_least(max(turns[0] - TURN_REACH - 1e-10, 0.0), 6)
+        high = at_most(min(turns[-1] + TURN_REACH + 1e-10, 1.0), 6)
         problems.add(
             setup.scan_file,
             f"{axis}.turn",
-            f"{turn:g} is {abs(turn - nearest):.3g} from the nearest calibrated branch (turn = {nearest:g}); "
-            f"{max(turns[0] - TURN_REACH, 0.0):g} to {min(turns[-1] + TURN_REACH, 1.0):g} can be served, "
+            f"{turn:.9g} is {abs(turn - nearest):.9g} from the nearest calibrated branch (turn = {nearest:g}); "
+            f"{low} to {high} can be served, "
             f"or calibrate one in {setup.scanner_file.name}",
         )
         return None
@@ -174,19 +207,41 @@ def _branches(
     for side in ("forward", "backward"):
         one: Branch = getattr(entries[left][1], side)
         other: Branch = getattr(entries[right][1], side)
+        beta_max = _between(one.beta_max, other.beta_max, share)
+        beta = beta_at(v, beta_max, _between(one.rho, other.rho, share))
+        peak = _between(one.u_peak or 0.5, other.u_peak or 0.5, share) if hysteresis.model == "harmonic" else None
         key = f"{axis}.hysteresis.branches[{entries[left if share < 0.5 else right][0]}].{side}"
-        beta = beta_at(v, _between(one.beta_max, other.beta_max, share), _between(one.rho, other.rho, share))
-        with problems.at(setup.scanner_file, f"{key}.u_peak" if hysteresis.model == "harmonic" else f"{key}.beta_max"):
-            if hysteresis.model == "harmonic":
-                u_peak = _between(one.u_peak or 0.5, other.u_peak or 0.5, share)
-                shapes.append(BranchShape.harmonic(beta, u_peak))
-            else:
-                u_peak = 0.5 + beta  # (16)
-                shapes.append(BranchShape.sinusoidal(beta))
-            applied.append(AppliedBranch(beta, u_peak))
+        # Outside the poles of (20) it is the peak that is wrong, elsewhere the residual.
+        beyond = peak is not None and not LOWEST_PEAK < peak - beta < HIGHEST_PEAK
+        with problems.at(setup.scanner_file, f"{key}.{'u_peak' if beyond else 'beta_max'}"):
+            shapes.append(_shape(beta, beta_max, peak))
+            applied.append(AppliedBranch(beta, 0.5 + beta if peak is None else peak))  # (16)
     if len(shapes) < 2:
         return None
     return (applied[0], applied[1]), LineShape(turn, shapes[0], shapes[1])
+
+
+def _shape(beta: float, beta_max: float, u_peak: float | None) -> BranchShape:
+    """A branch of the harmonic model, or of the sinusoidal one where there is no u_peak."""
+
+    def build(share: float) -> BranchShape:
+        return BranchShape.sinusoidal(share * beta) if u_peak is None else BranchShape.harmonic(share * beta, u_peak)
+
+    try:
+        return build(1.0)
+    except Unphysical as reason:
+        text, found = str(reason).partition("; lower it")[:2]
+        fits, fails = 0.0, 1.0
+        for _ in range(40 if found else 0):
+            middle = 0.5 * (fits + fails)
+            try:
+                build(middle)
+                fits = middle
+            except Unphysical:
+                fails = middle
+        if not fits:
+            raise
+        raise Unphysical(f"{text}; a beta_max up to {at_most(fits * beta_max)} fits, or a smaller scan") from None
 
 
 def _between(left: float, right: float, share: float) -> float:

@@ -75,7 +75,7 @@ class _Decoder:
         unknown = [name for name in value if name not in known]
         for name in unknown:
             good = False
-            self._wrong(join_key(key, name), f"unknown key{_suggestion(name, [k for k in known if k not in value])}")
+            self._wrong(join_key(key, name), f"unknown key; {_suggestion(name, list(known), value)}")
         for name, field in known.items():
             if name in value:
                 built[name] = self._any(field.type, value[name], join_key(key, name))
@@ -119,7 +119,10 @@ class _Decoder:
 
     def _integer(self, kind: types.IntType, value: Any, key: str) -> Any:
         if isinstance(value, bool) or not isinstance(value, int):
-            return self._wrong(key, f"{_shown(value)} is not a whole number")
+            whole = isinstance(value, float) and value.is_integer() and abs(value) < 1e15
+            return self._wrong(
+                key, f"{value!r} has to be written {value:.0f}" if whole else f"{_shown(value)} is not a whole number"
+            )
         return value if self._in_range(kind, value, key) else _WRONG
 
     def _in_range(self, kind: types.FloatType | types.IntType, value: float, key: str) -> bool:
@@ -158,12 +161,14 @@ def meant(name: str, known: Any) -> list[str]:
     return get_close_matches(name, list(known), n=1, cutoff=0.6)
 
 
-def _suggestion(name: str, known: list[str]) -> str:
-    meant = meant(name, known)
-    if not meant:
-        return f"; known here: {', '.join(sorted(known))}" if known else ""
-    unit = " (units are part of the name)" if any(m == name + unit for m in meant for unit in _UNITS) else ""
-    return f"; did you mean {' or '.join(meant)}?{unit}"
+def _suggestion(name: str, known: list[str], given: dict[str, Any]) -> str:
+    likely = meant(name, known)
+    if not likely:
+        return f"known here: {', '.join(sorted(known))}"
+    if present := [key for key in likely if key in given]:
+        return f"{present[0]} is given as well"
+    unit = " (units are part of the name)" if any(m == name + unit for m in likely for unit in _UNITS) else ""
+    return f"did you mean {' or '.join(likely)}?{unit}"
 
 
 def _shown(value: Any) -> str:

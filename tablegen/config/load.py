@@ -10,8 +10,11 @@ from typing import Any
 from msgspec import Struct
 
 from tablegen.config.decode import decode, meant
+from tablegen.config.figures import shown_path
 from tablegen.config.names import why_not_a_name
 from tablegen.config.schema import (
+    MAXIMUM_FILE_NAME,
+    MAXIMUM_NAME,
     Amplifier,
     BandLimit,
     Dac,
@@ -49,15 +52,17 @@ def load(path: str | Path) -> Setup:
     problems = Problems()
     scan = decode(Scan, values, scan_file, problems, partial(_check, scan_file, problems))
     name = values.get("name")
-    if isinstance(name, str) and name and (why := why_not_a_name(name)):
+    if isinstance(name, str) and 0 < len(name) <= MAXIMUM_NAME and (why := why_not_a_name(name)):
         problems.add(scan_file, "name", why)
 
     named = values.get("scanner")
-    if not isinstance(named, str) or not named:
+    if not isinstance(named, str) or not 0 < len(named) <= MAXIMUM_FILE_NAME:
         raise Rejected(problems.found)
     scanner_path = path.parent / named
     if not os.path.isfile(scanner_path):  # unlike the method of Path it never raises
-        problems.add(scan_file, "scanner", f"{_shown(scanner_path)} is not a file; the path is relative to this file")
+        problems.add(
+            scan_file, "scanner", f"{shown_path(scanner_path)} is not a file; the path is relative to this file"
+        )
         raise Rejected(problems.found)
     try:
         scanner_values, scanner_file = read_toml(scanner_path, str(scanner_path))
@@ -68,12 +73,6 @@ def load(path: str | Path) -> Setup:
     assert scan is not None
     assert scanner is not None
     return Setup(scan, scanner, scan_file, scanner_file, scanner_path.parent)
-
-
-def _shown(path: Path) -> str:
-    shown = str(path)
-    shown = shown if shown.isprintable() else ascii(shown)
-    return shown if len(shown) <= 200 else f"{shown[:100]}...{shown[-97:]}"
 
 
 def _check(file: Document, problems: Problems, kind: type, key: str, written: Mapping[str, Any], built: Any) -> None:

@@ -9,8 +9,10 @@ from msgspec import Meta, Struct
 
 Name = Annotated[str, Meta(min_length=1, max_length=64)]
 # Short enough to leave room for what is appended; reserved words are refused beside it, see ``why_not_a_name``.
-Identifier = Annotated[str, Meta(min_length=1, max_length=48, pattern="^[A-Za-z](_?[A-Za-z0-9])*$")]
-FileName = Annotated[str, Meta(min_length=1, max_length=1024)]
+MAXIMUM_NAME = 48
+Identifier = Annotated[str, Meta(min_length=1, max_length=MAXIMUM_NAME, pattern="^[A-Za-z](_?[A-Za-z0-9])*$")]
+MAXIMUM_FILE_NAME = 1024
+FileName = Annotated[str, Meta(min_length=1, max_length=MAXIMUM_FILE_NAME)]
 Volts = Annotated[float, Meta(ge=-1e5, le=1e5)]
 PositiveVolts = Annotated[float, Meta(ge=1e-3, le=1e5)]
 Nanometres = Annotated[float, Meta(ge=1e-6, le=1e9)]

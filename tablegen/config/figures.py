@@ -1,0 +1,25 @@
+"""Figures and paths in messages: figures are rounded to the side on which what they promise still holds."""
+
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context
+from pathlib import Path
+
+
+def at_most(value: float, digits: int = 4) -> str:
+    """A value in so many significant digits, never above it."""
+    return _rounded(value, digits, ROUND_FLOOR)
+
+
+def at_least(value: float, digits: int = 4) -> str:
+    """A value in so many significant digits, never below it."""
+    return _rounded(value, digits, ROUND_CEILING)
+
+
+def _rounded(value: float, digits: int, rounding: str) -> str:
+    return f"{float(Context(prec=digits, rounding=rounding).create_decimal(repr(value))):.{digits}g}"
+
+
+def shown_path(path: Path) -> str:
+    """A path on one line, and not the whole of a very long one."""
+    shown = str(path)
+    shown = shown if shown.isprintable() else ascii(shown)
+    return shown if len(shown) <= 200 else f"{shown[:100]}...{shown[-97:]}"
