@@ -56,7 +56,8 @@ def broken_limits(plan: Plan, certificates: dict[str, Certificate], file: Docume
         limit = plan.limits.max_error_lsb
         if limit is not None and certificate.max_error_lsb > limit:
             why = f"the {axis} axis errs by up to {certificate.max_error_lsb:.4g} LSB, above {limit:g}; "
-            problems.append(file.problem("limits.max_error_lsb", why + f"lengthen or widen {axis}.table"))
+            remedy = f"lengthen or widen {axis}.table" if limit > 0.5 else "a code alone is rounded by up to 0.5"
+            problems.append(file.problem("limits.max_error_lsb", why + remedy))
         limit = plan.limits.max_scaling_error_percent
         if limit is None:
             continue
@@ -64,18 +65,21 @@ def broken_limits(plan: Plan, certificates: dict[str, Certificate], file: Docume
         if worst > limit or abs(size) > limit:
             what = f"scaling error of {worst:.4g} %" if worst > limit else f"size error of {size:+.4g} %"
             parts = max(certificate.scaling.values(), key=lambda error: max(error.total, error.band_limit))
-            remedy = _remedy(axis, parts)
+            remedy = _remedy(plan.x if axis == "x" else plan.y, parts)
             why = f"the {axis} axis has a {what}, above {limit:g} %; {remedy}"
             problems.append(file.problem("limits.max_scaling_error_percent", why))
     return problems
 
 
-def _remedy(axis: str, parts: ScalingError) -> str:
+def _remedy(line: LinePlan, parts: ScalingError) -> str:
+    axis = line.axis
     largest = max(parts.band_limit, parts.quantisation, parts.model)
     if largest == parts.band_limit:
         return f"most of it is the band limit: more {axis}.band_limit.harmonics, a narrower window or method = 'window'"
     if largest == parts.model:
         return "most of it is dynamics that max_boost_db leaves: fewer harmonics or a lower line rate"
+    if abs(line.codes_per_unit) * line.scale > 2.0**line.program.bits:  # a word of the table is more than a code
+        return f"most of it is quantisation: more {axis}.table.bits"
     return f"most of it is quantisation: more dac.bits, or an amplifier whose range fits the {axis} scan"
 
 

@@ -154,12 +154,10 @@ class Feasibility:
 
     def max_step(self, drive: Drive, converter: Converter, series: FourierSeries, rate_hz: float, period: int) -> int:
         """The slew guard in codes a tick: the amplifier's slew rate, or twice the steepest step of the line."""
-        size = self._largest(series)
-        self._check_words(series, size)
         slope = drive.v_amplitude * series.peak_slope()
         v_per_code = abs(converter.v_per_code)
         # The chord of a step is never steeper than the steepest slope; rounding adds to it.
-        words = self._word_codes(drive, converter, size, period)
+        words = self._word_codes(drive, converter, self._largest(series), period)
         steepest = ceil(slope / v_per_code / period + words) + 1
         last = (1 << converter.bits) - 1
         slew = self._setup.scan.amplifier.max_slew_v_per_s
@@ -212,8 +210,9 @@ class Feasibility:
         share = 1.0 if table.mode == "direct" else min(1.0, (table.length or DEFAULT_LENGTH) / period)
         return full_scale * 2.0 ** (1 - table.bits) * (share + 2.0 ** -guard_bits(table.bits))
 
-    def _check_words(self, series: FourierSeries, largest: float) -> None:
+    def check_words(self, series: FourierSeries) -> None:
         """The accumulator of the device has to hold the sum of all Fourier words, whatever their signs."""
+        largest = self._largest(series)
         sums = abs(2.0 * series.a0 - 1.0) + 2.0 * np.cumsum(np.abs(series.a) + np.abs(series.b))
         if sums[-1] >= 0.999 * ACCUMULATOR_LIMIT * largest:
             fits = int(np.searchsorted(sums, 0.99 * ACCUMULATOR_LIMIT * largest))

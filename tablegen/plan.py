@@ -136,12 +136,13 @@ def _line_plan(setup: Setup, axis: Literal["x", "y"], schedule: Schedule, proble
     series: FourierSeries = target
     held: tuple[int, ...] = ()
     if drive.response is not None:
-        with problems.at(setup.scanner_file, f"{axis}.resonance"):
+        with problems.at(setup.scanner_file, f"{axis}.resonance.response"):
             series, held = _through_inverse(target, drive, float(rate))
 
     converter = Converter.of(setup.scan.dac, setup.scan.amplifier)
     w = series.on_grid(32 * harmonics)
     low, high = float(np.min(w)), float(np.max(w))
+    feasible.check_words(series)
     feasible.check_range(drive, converter, low, high)
     max_step = feasible.max_step(drive, converter, series, float(rate), period)
     if len(problems.found) > before:

@@ -27,7 +27,7 @@ class Rejected(Exception):
     """The input was refused; ``problems`` holds every fault found, in the order of the files."""
 
     def __init__(self, problems: list[Problem]) -> None:
-        self.problems = sorted(set(problems), key=lambda p: (p.file, p.line))
+        self.problems = sorted(dict.fromkeys(problems), key=lambda p: (p.file, p.line))
         super().__init__("\n".join(map(str, self.problems)))
 
 

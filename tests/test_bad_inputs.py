@@ -738,7 +738,7 @@ DRIVE = [
         scanner=("x.frequency.alpha = 0.5", "x.frequency.reference_hz = 1.0"),
         says=(
             "scanner.toml:24: x.frequency.alpha: at 400 Hz equation (23) leaves -0.301 of the amplitude; it "
-            "was fitted to a few percent a decade and holds down to 0.5"
+            "was fitted to a few percent a decade and serves down to 0.5, that is up to 10 Hz"
         ),
     ),
 ]
@@ -918,7 +918,10 @@ RESPONSE = [
     ),
     case(
         response="hz,gain,phase_deg\n10,1,0\n1000,1,0\n",
-        says=("scanner.toml:27: x.resonance: the response is measured up to 1000 Hz; the scan plays up to 12800 Hz"),
+        says=(
+            "scanner.toml:28: x.resonance.response: the response is measured up to 1000 Hz; "
+            "the scan plays up to 12800 Hz"
+        ),
     ),
     case(
         scanner=measured("'absent.csv'"),

@@ -169,6 +169,14 @@ def test_a_resonance_inside_the_band_is_seen(tmp_path: Path) -> None:
     assert loud > quiet + 10.0
 
 
+def test_a_coarse_table_is_told_from_a_coarse_converter(tmp_path: Path) -> None:
+    for edits, remedy in (({"x.table.bits": "8"}, "more x.table.bits"), ({"dac.bits": "12"}, "more dac.bits, or an")):
+        setup = setup_of(tmp_path, {**edits, "limits.max_error_lsb": ""})
+        plan = make_plan(setup)
+        text = str(broken_limits(plan, certify(plan), setup.scan_file)[0])
+        assert f"most of it is quantisation: {remedy}" in text
+
+
 def test_broken_limits_name_the_part_and_the_remedy(tmp_path: Path) -> None:
     edits = {"x.band_limit.method": '"truncate"', "limits.max_error_lsb": "0.7"}
     setup = setup_of(tmp_path, edits)

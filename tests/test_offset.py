@@ -54,6 +54,7 @@ def test_a_fit_of_many_points_is_least_squares() -> None:
     ("p", "y", "why"),
     [
         ([0.1, 0.1, 0.5], [1.0, 1.0, 1.0], "2 different offsets"),
+        ([0.0, 1e-4, 9e-4], [1.0, 1.1, 1.2], r"the offsets span 0\.00045 of v_max; at least 0\.0005"),
         ([0.0, 0.5, 1.0], [-1.0, 0.5, 3.0], "at the centre"),
         ([-1.0, 0.0, 1.0], [0.1, 1.0, -0.1], "falls to"),
     ],

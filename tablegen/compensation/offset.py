@@ -4,10 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tablegen.config.figures import at_most
 from tablegen.numerics.arrays import tree_sum
 from tablegen.numerics.linear import Cholesky
 from tablegen.problems import Unphysical
 
+_LEAST_SPAN = 1e-3  # of p, which runs from -1 to 1; a parabola through points closer than that is noise
 _PANELS = 1024  # of Simpson's rule; the integrand is smooth and the error below 1e-13
 
 
@@ -38,6 +40,11 @@ class OffsetLaw:
         """
         if len(set(p)) < 3:
             raise Unphysical(f"{len(set(p))} different offsets do not determine a parabola; at least 3 are needed")
+        if max(p) - min(p) < _LEAST_SPAN:
+            raise Unphysical(
+                f"the offsets span {0.5 * (max(p) - min(p)):.2g} of v_max; at least {0.5 * _LEAST_SPAN:g} of it is "
+                f"needed, better most of it"
+            )
         x, y = np.asarray(p), np.asarray(apparent)
         # Orthogonal to the constant first: the normal equations of three close offsets stay accurate.
         middle = float(tree_sum(x)) / len(x)
@@ -76,7 +83,7 @@ class OffsetLaw:
         """The offset voltage that gives a position; the inverse of ``position_nm``."""
         reach = self.position_nm(v_max, v_max, k_nm_per_v)
         if not 0.0 <= position_nm <= reach:
-            raise Unphysical(f"{position_nm:g} nm is outside the 0..{reach:.6g} nm that 0..{v_max:g} V reach")
+            raise Unphysical(f"{position_nm:g} nm is outside the 0..{at_most(reach, 6)} nm that 0..{v_max:g} V reach")
         v = v_max * position_nm / reach
         for _ in range(60):  # Newton on a smooth, increasing function; a bound, not a hope
             error = self.position_nm(v, v_max, k_nm_per_v) - position_nm

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from math import sqrt
 
+from tablegen.config.figures import at_most
 from tablegen.problems import Unphysical
 
 
@@ -27,7 +28,7 @@ class SizeLaw:
         v_base = base_nm / (k_nm_per_v * v_max)
         if v_base > 1.0:
             reach = k_nm_per_v * v_max
-            raise Unphysical(f"{base_nm:g} nm needs {v_base:.4g} of v_max; calibrate at {reach:.6g} nm or less")
+            raise Unphysical(f"{base_nm:g} nm needs {v_base:.4g} of v_max; calibrate at {at_most(reach, 6)} nm or less")
         unit = cls(1.0, beta, v_threshold)
         return cls(base_nm / unit.size_nm(v_base), beta, v_threshold)
 
@@ -49,5 +50,5 @@ class SizeLaw:
             bend = self.alpha_nm * self.beta * threshold * threshold
             v = (size_nm + bend) / (self.alpha_nm * (1.0 + 2.0 * self.beta * threshold))
         if v > 1.0:
-            raise Unphysical(f"{size_nm:g} nm needs {v:.4g} of v_max; at most {self.size_nm(1.0):.6g} nm fit")
+            raise Unphysical(f"{size_nm:g} nm needs {v:.4g} of v_max; at most {at_most(self.size_nm(1.0), 6)} nm fit")
         return v

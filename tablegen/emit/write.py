@@ -19,7 +19,10 @@ def write_files(folder: Path, files: Mapping[str, bytes]) -> list[str]:
     changed = [name for name in files if _read(folder / name) != files[name]]
     if not changed:
         return []
-    made = not folder.exists()
+    made = [path for path in (folder, *folder.parents) if not os.path.exists(path)]
+    for name in changed:
+        if os.path.isdir(folder / name):
+            raise CannotWrite(f"{folder / name}: is a directory where a file has to go")
     staged: dict[str, Path] = {}
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -38,8 +41,10 @@ def write_files(folder: Path, files: Mapping[str, bytes]) -> list[str]:
     finally:
         for temporary_path in staged.values():
             temporary_path.unlink(missing_ok=True)
-        if made and folder.is_dir() and not any(folder.iterdir()):
-            folder.rmdir()
+        for path in made:  # the innermost first; what holds something stays
+            if not os.path.isdir(path) or any(path.iterdir()):
+                break
+            path.rmdir()
     return changed
 
 
