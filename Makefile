@@ -16,7 +16,7 @@ demo: $(VENV)/installed
 	$(BIN)/tablegen build examples/annexin_200nm.toml -o build/demo
 
 test: $(VENV)/installed-test
-	@.ci/system-packages gcc g++ clang iverilog ghdl
+	@.ci/system-packages gcc g++ clang libclang-rt-dev iverilog ghdl
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
