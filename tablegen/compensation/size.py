@@ -49,6 +49,6 @@ class SizeLaw:
         else:
             bend = self.alpha_nm * self.beta * threshold * threshold
             v = (size_nm + bend) / (self.alpha_nm * (1.0 + 2.0 * self.beta * threshold))
-        if v > 1.0:
+        if v > 1.0 + 1e-12:  # full scale itself may come back a last place above 1
             raise Unphysical(f"{size_nm:g} nm needs {v:.4g} of v_max; at most {at_most(self.size_nm(1.0), 6)} nm fit")
-        return v
+        return min(v, 1.0)
