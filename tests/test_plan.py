@@ -106,6 +106,12 @@ def test_measured_offsets_serve_as_calibration(tmp_path: Path) -> None:
     assert drive.m == pytest.approx(float(np.polyval(parabola, 0.5)))
 
 
+def test_a_plan_cannot_be_changed(example: Plan) -> None:
+    for array in (example.x.program.words, example.x.series.a, example.x.target.b, example.y.fourier.a):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 1
+
+
 def test_each_harmonic_is_divided_by_the_dynamics(example: Plan) -> None:
     line = example.x
     n = np.arange(1, 33)

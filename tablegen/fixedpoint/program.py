@@ -6,7 +6,7 @@ from typing import Literal
 from tablegen.fixedpoint.interpolation import direct, guard_bits, interpolate
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.phase import RationalPhase
-from tablegen.numerics.arrays import Ints
+from tablegen.numerics.arrays import Ints, freeze
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,6 +23,9 @@ class Program:
     bits: int
     words: Ints
     output: Output
+
+    def __post_init__(self) -> None:
+        freeze(self.words)
 
     @property
     def ticks(self) -> int:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tablegen.fixedpoint.rounding import round_half_up, round_number, saturate, shift_round, signed_limits
-from tablegen.numerics.arrays import Floats, Ints
+from tablegen.numerics.arrays import Floats, Ints, freeze
 from tablegen.numerics.turns import sine
 from tablegen.waveform.series import FourierSeries
 
@@ -22,6 +22,9 @@ class FourierWords:
     a0: int
     a: Ints
     b: Ints
+
+    def __post_init__(self) -> None:
+        freeze(self.a, self.b)
 
     @property
     def harmonics(self) -> int:

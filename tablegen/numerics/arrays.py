@@ -12,10 +12,10 @@ Bools: TypeAlias = npt.NDArray[np.bool_]
 FloatsLike: TypeAlias = float | Sequence[float] | npt.NDArray[np.floating] | Ints
 
 
-def frozen(array: npt.NDArray[np.generic]) -> npt.NDArray[np.generic]:
-    """The same array, read-only from here on."""
-    array.setflags(write=False)
-    return array
+def freeze(*arrays: npt.NDArray[np.generic]) -> None:
+    """Make arrays read-only: what a plan holds cannot change any more."""
+    for array in arrays:
+        array.setflags(write=False)
 
 
 def tree_sum(values: Floats) -> Floats:

@@ -5,7 +5,7 @@ from math import tau
 
 import numpy as np
 
-from tablegen.numerics.arrays import Floats, FloatsLike
+from tablegen.numerics.arrays import Floats, FloatsLike, freeze
 from tablegen.numerics.turns import sine_and_cosine
 
 
@@ -16,6 +16,9 @@ class FourierSeries:
     a0: float
     a: Floats
     b: Floats
+
+    def __post_init__(self) -> None:
+        freeze(self.a, self.b)
 
     @property
     def harmonics(self) -> int:
