@@ -169,6 +169,16 @@ def test_a_resonance_inside_the_band_is_seen(tmp_path: Path) -> None:
     assert loud > quiet + 10.0
 
 
+def test_a_line_that_touches_its_own_guard_is_refused(tmp_path: Path) -> None:
+    setup = setup_of(tmp_path)
+    plan = make_plan(setup)
+    output = replace(plan.x.program.output, max_step=20)
+    tight = replace(plan, x=replace(plan.x, program=replace(plan.x.program, output=output)))
+    text = [str(p) for p in broken_limits(tight, certify(tight), setup.scan_file)]
+    assert len(text) == 1
+    assert "amplifier.max_slew_v_per_s: the x axis steps by 24 codes, above its guard of 20" in text[0]
+
+
 def test_a_coarse_table_is_told_from_a_coarse_converter(tmp_path: Path) -> None:
     for edits, remedy in (({"x.table.bits": "8"}, "more x.table.bits"), ({"dac.bits": "12"}, "more dac.bits, or an")):
         setup = setup_of(tmp_path, {**edits, "limits.max_error_lsb": ""})

@@ -12,7 +12,6 @@ FRACTION_BITS = 15
 # The sample keeps up to 4 bits below the word's LSB, and is never wider than the 25-bit port of a DSP block.
 _GUARD_BITS = 4
 MAXIMUM_SAMPLE_BITS = 25
-MAXIMUM_INDEX_BITS = PHASE_BITS - FRACTION_BITS
 
 
 def guard_bits(word_bits: int) -> int:
