@@ -12,6 +12,7 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
 import pytest
 from building import EXAMPLE, REMOVED, REPOSITORY, VARIANTS, Variant, write_variant
 
@@ -22,8 +23,10 @@ from pathlib import Path
 from tablegen.cli import cli
 for scan in sys.argv[1:]:
     cli.main(["build", scan, "-o", str(Path(scan).parent / "out"), "--quiet"], standalone_mode=False)
-from numpy._core._multiarray_umath import __cpu_features__
-print(" ".join(feature for feature, usable in __cpu_features__.items() if usable))
+import numpy
+core = getattr(numpy, "_core", None) or numpy.core  # numpy 1 has it in the open
+features = core._multiarray_umath.__cpu_features__
+print(" ".join(feature for feature, usable in features.items() if usable))
 """
 
 NO_LIMITS: dict[str, object] = {"limits": {}}
@@ -115,9 +118,8 @@ def reference(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
 
 def dispatched_features() -> list[str]:
     """What numpy chooses kernels by on this processor, under the names that this numpy gives them."""
-    from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
-
-    return [feature for feature in __cpu_dispatch__ if __cpu_features__[feature]]
+    kernels = (getattr(np, "_core", None) or np.core)._multiarray_umath
+    return [feature for feature in kernels.__cpu_dispatch__ if kernels.__cpu_features__[feature]]
 
 
 ENVIRONMENTS: dict[str, dict[str, str]] = {
