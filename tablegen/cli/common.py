@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 import click
 
+from tablegen.cli.progress import Progress
 from tablegen.cli.status import Status
 
 if TYPE_CHECKING:
@@ -47,11 +48,14 @@ def planned(scan: Path) -> "tuple[Plan, dict[str, Certificate]]":
     from tablegen.problems import Rejected
 
     try:
-        setup = load(scan)
-        plan = make_plan(setup)
+        with Progress() as progress:
+            progress.now("shaping the waveforms")
+            setup = load(scan)
+            plan = make_plan(setup)
+            progress.now("measuring every tick of a line and a frame")
+            certificates = certify(plan)
     except Rejected as rejected:
         fail(rejected.problems, Status.WRONG_INPUT)
-    certificates = certify(plan)
     if broken := broken_limits(plan, certificates, setup.scan_file):
         fail(broken, Status.BROKEN_LIMIT)
     return plan, certificates

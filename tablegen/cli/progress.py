@@ -1,0 +1,49 @@
+"""What is being done, on a terminal, while it takes longer than a moment."""
+
+import sys
+import threading
+import time
+from types import TracebackType
+
+import click
+
+_PATIENCE_S = 1.0
+_WIDTH = 60
+
+
+class Progress:
+    """A line on stderr that says what is being done and for how long; nothing where stderr is no terminal.
+
+    Most builds end before it appears. It runs beside the work, which need not know of it.
+    """
+
+    def __init__(self) -> None:
+        self._what = ""
+        self._done = threading.Event()
+        self._thread = threading.Thread(target=self._tell, daemon=True) if sys.stderr.isatty() else None
+
+    def now(self, what: str) -> None:
+        """Name what is being done from here on."""
+        self._what = what
+
+    def __enter__(self) -> "Progress":
+        if self._thread is not None:
+            self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._done.set()
+        if self._thread is not None:
+            self._thread.join()
+
+    def _tell(self) -> None:
+        start = time.monotonic()
+        shown = False
+        while not self._done.wait(_PATIENCE_S):
+            text = f"{self._what} ({time.monotonic() - start:.0f} s)"
+            click.echo(f"\r{text:<{_WIDTH}}", err=True, nl=False)
+            shown = True
+        if shown:
+            click.echo("\r" + " " * _WIDTH + "\r", err=True, nl=False)
