@@ -127,6 +127,7 @@ class Sequencer:
 
     def __post_init__(self) -> None:
         self._endless = True
+        self._armed_frames = 0
         self._x, self._y = self.playing.x.output.park_code, self.playing.y.output.park_code
         self._line_ticks: LineTicks | None = None
         self._clamped: Bools = np.zeros(0, dtype=np.bool_)
@@ -143,14 +144,15 @@ class Sequencer:
     def arm(self, frames: int = 0) -> None:
         """Let the next trigger start so many frames; 0 is without end."""
         self.armed = True
-        self._endless = frames == 0
-        self.frames_left = frames
+        self._armed_frames = frames  # a scan that plays keeps its own count
 
     def trigger(self) -> bool:
         """Start at line 0 on the next tick; ignored unless armed and parked. Tells whether it was taken."""
         if not self.armed or self.state is not State.PARKED:
             return False
         self.armed = False
+        self._endless = self._armed_frames == 0
+        self.frames_left = self._armed_frames
         self.state = State.RUNNING
         self._begin()
         return True

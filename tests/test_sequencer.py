@@ -172,6 +172,19 @@ def test_frames_are_counted_and_then_parked(programs: list[DualProgram]) -> None
     assert sequencer.state is State.PARKED
 
 
+@pytest.mark.parametrize("next_frames", [0, 1, 5])
+def test_arming_the_next_scan_leaves_the_count_of_this_one(programs: list[DualProgram], next_frames: int) -> None:
+    """A counted scan that forgot to end would go on over a sample that nobody watches."""
+    program = programs[2]
+    sequencer = started(program, frames=2)
+    run(sequencer, program.schedule.ticks)
+    sequencer.arm(next_frames)
+    played = run(sequencer, 2 * program.schedule.frame_ticks - program.schedule.ticks)
+    assert sum(tick.frame for tick in played) == 1
+    assert sequencer.state is State.PARKING
+    assert sequencer.armed
+
+
 def test_trigger_needs_arming_and_parking(programs: list[DualProgram]) -> None:
     sequencer = Sequencer(programs[0])
     assert not sequencer.trigger()
