@@ -152,12 +152,14 @@ class Feasibility:
             return f"or at this offset a window of about {at_most(line_nm * drive.window_nm / drive.size_nm, 3)} nm"
         return f"or at this offset a line of about {at_most(line_nm, 3)} nm"
 
-    def max_step(self, drive: Drive, converter: Converter, series: FourierSeries, rate_hz: float, period: int) -> int:
+    def max_step(
+        self, drive: Drive, converter: Converter, series: FourierSeries, largest: float, rate_hz: float, period: int
+    ) -> int:
         """The slew guard in codes a tick: the amplifier's slew rate, or twice the steepest step of the line."""
         slope = drive.v_amplitude * series.peak_slope()
         v_per_code = abs(converter.v_per_code)
         # The chord of a step is never steeper than the steepest slope; rounding adds to it.
-        words = self._word_codes(drive, converter, self._largest(series), period)
+        words = self._word_codes(drive, converter, largest, period)
         steepest = ceil(slope / v_per_code / period + words) + 1
         last = (1 << converter.bits) - 1
         slew = self._setup.scan.amplifier.max_slew_v_per_s
@@ -198,11 +200,6 @@ class Feasibility:
             self._add(key, f"the {self._axis} drive {what}; {fits}")
         return max(allowed, 1)
 
-    @staticmethod
-    def _largest(series: FourierSeries) -> float:
-        """The largest |2 w - 1|, at least 1: to a percent, never too high. A table is scaled to it."""
-        return max(1.0, float(np.max(np.abs(2.0 * series.on_grid(16 * series.harmonics) - 1.0))))
-
     def _word_codes(self, drive: Drive, converter: Converter, largest: float, period: int) -> float:
         """Codes that a step can be off since the words of the table are rounded."""
         table = self._scan.table
@@ -210,9 +207,11 @@ class Feasibility:
         share = 1.0 if table.mode == "direct" else min(1.0, (table.length or DEFAULT_LENGTH) / period)
         return full_scale * 2.0 ** (1 - table.bits) * (share + 2.0 ** -guard_bits(table.bits))
 
-    def check_words(self, series: FourierSeries) -> None:
-        """The accumulator of the device has to hold the sum of all Fourier words, whatever their signs."""
-        largest = self._largest(series)
+    def check_words(self, series: FourierSeries, largest: float) -> None:
+        """The accumulator of the device has to hold the sum of all Fourier words, whatever their signs.
+
+        ``largest`` is the largest |2 w - 1|, at least 1: the table is scaled to it.
+        """
         sums = abs(2.0 * series.a0 - 1.0) + 2.0 * np.cumsum(np.abs(series.a) + np.abs(series.b))
         if sums[-1] >= 0.999 * ACCUMULATOR_LIMIT * largest:
             fits = int(np.searchsorted(sums, 0.99 * ACCUMULATOR_LIMIT * largest))

@@ -70,7 +70,6 @@ class Plan:
     schedule: Schedule
     x: LinePlan
     y: LinePlan
-    update_rate_hz: float
     limits: Limits
     header_only: bool
 
@@ -106,7 +105,6 @@ def make_plan(setup: Setup) -> Plan:
         schedule,
         x,
         y,
-        scan.dac.update_rate_hz,
         scan.limits,
         scan.emit.header_only,
     )
@@ -142,14 +140,15 @@ def _line_plan(setup: Setup, axis: Literal["x", "y"], schedule: Schedule, proble
     converter = Converter.of(setup.scan.dac, setup.scan.amplifier)
     w = series.on_grid(32 * harmonics)
     low, high = float(np.min(w)), float(np.max(w))
-    feasible.check_words(series)
+    largest = max(1.0, abs(2.0 * low - 1.0), abs(2.0 * high - 1.0))
+    feasible.check_words(series, largest)
     feasible.check_range(drive, converter, low, high)
-    max_step = feasible.max_step(drive, converter, series, float(rate), period)
+    max_step = feasible.max_step(drive, converter, series, largest, float(rate), period)
     if len(problems.found) > before:
         return None
 
     bits = scan.table.bits
-    peak = max(1.0, ceil(max(abs(2.0 * low - 1.0), abs(2.0 * high - 1.0)) * _PEAK_GRID) / _PEAK_GRID)
+    peak = ceil(largest * _PEAK_GRID) / _PEAK_GRID
     amplitude = 0.5 * drive.v_amplitude / converter.v_per_code  # codes for 2 w - 1 = 1
     gain_word, scale = fit_gain(amplitude, peak, bits, converter.bits)
     park_v = drive.v_offset if scan.park_v is None else scan.park_v

@@ -55,6 +55,11 @@ class Schedule:
     down: Window
 
     @property
+    def update_rate_millihz(self) -> int:
+        """Ticks in a thousand seconds, to the nearest, ties up: what an integer can say of the update rate."""
+        return floor(self.update_rate_hz * 1000 + Fraction(1, 2))
+
+    @property
     def frame_ticks(self) -> int:
         """Ticks of a frame."""
         return self.ticks * self.lines

@@ -94,7 +94,6 @@ class _KeyLines:
         self._line = 1
         self._lines: dict[str, int] = {}
         self._elements: dict[str, int] = {}  # elements seen so far of each array of tables
-        self._too_long: tuple[int, int] | None = None  # line and digits of the first number that is
 
     def locate(self) -> dict[str, int]:
         table = ""

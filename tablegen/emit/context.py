@@ -2,13 +2,12 @@
 
 from typing import Any
 
-import numpy as np
-
 from tablegen import __version__
 from tablegen.certificate import Certificate
 from tablegen.fixedpoint.output import GAIN_BITS
 from tablegen.fixedpoint.phase import PHASE_BITS
-from tablegen.fixedpoint.synthesis import FRACTION_BITS, WORD_BITS
+from tablegen.fixedpoint.rounding import signed_limits
+from tablegen.fixedpoint.synthesis import FRACTION_BITS
 from tablegen.numerics.arrays import Ints
 from tablegen.plan import LinePlan, Plan
 from tablegen.summary import summary
@@ -20,7 +19,7 @@ def template_context(plan: Plan, certificates: dict[str, Certificate], digest: s
     """The context of every template."""
     schedule = plan.schedule
     sequence = {
-        "UPDATE_RATE_MILLIHZ": round(schedule.update_rate_hz * 1000),
+        "UPDATE_RATE_MILLIHZ": schedule.update_rate_millihz,
         "LINE_TICKS": schedule.ticks,
         "FRAME_LINES": schedule.lines,
         "PIXELS": schedule.pixels,
@@ -45,7 +44,8 @@ def template_context(plan: Plan, certificates: dict[str, Certificate], digest: s
         "summary": [comment_safe(line) for line in summary(plan, certificates)],
         "sequence": {key: _Number(value) for key, value in sequence.items()},
         "phase_bits": PHASE_BITS,
-        "gain_bits": GAIN_BITS,
+        "least_gain": _Number(signed_limits(GAIN_BITS)[0]),
+        "greatest_gain": _Number(signed_limits(GAIN_BITS)[1]),
         "axes": [_axis(plan, line) for line in plan.lines],
     }
 
@@ -89,11 +89,11 @@ def _axis(plan: Plan, line: LinePlan) -> dict[str, Any]:
     constants = {
         "TABLE_LENGTH": len(program.words),
         "TABLE_BITS": program.bits,
-        "INDEX_BITS": len(program.words).bit_length() - 1 if interpolated else 0,
+        "INDEX_BITS": program.index_bits,
         "INTERPOLATED": int(interpolated),
         "GUARD_BITS": program.guard,
         "HARMONICS": line.fourier.harmonics,
-        "FOURIER_LENGTH": 2 * line.fourier.harmonics + 1,
+        "FOURIER_LENGTH": len(line.fourier.in_order),
         "FOURIER_FRACTION_BITS": FRACTION_BITS,
         "HOLD_TICKS": program.hold,
         "PHASE_PERIOD": program.phase.ticks,
@@ -119,17 +119,12 @@ def _axis(plan: Plan, line: LinePlan) -> dict[str, Any]:
         "constants": {key: _Number(value) for key, value in constants.items()},
         "word_type": _word_type(program.bits),
         "table_rows": _rows(program.words),
-        "fourier_rows": _rows(fourier_order(line)),
+        "fourier_rows": _rows(line.fourier.in_order),
         "interpolated": interpolated,
         "table_memory": f"{prefix}.mem",
         "fourier_memory": f"{prefix}_fourier.mem",
-        "fourier_bits": WORD_BITS,
+        "lines_per_period": "1" if line.axis == "x" else f"{plan.name.upper()}_FRAME_LINES",
     }
-
-
-def fourier_order(line: LinePlan) -> Ints:
-    """Fourier words in the order in which devices hold them: a0, a1..aH, b1..bH."""
-    return np.concatenate([[line.fourier.a0], line.fourier.a, line.fourier.b])
 
 
 def _word_type(bits: int) -> str:

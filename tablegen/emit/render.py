@@ -6,7 +6,7 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from tablegen.certificate import Certificate
-from tablegen.emit.context import fourier_order, template_context
+from tablegen.emit.context import template_context
 from tablegen.emit.manifest import MANIFEST, manifest_file
 from tablegen.emit.memory import memory_file
 from tablegen.fixedpoint.synthesis import WORD_BITS
@@ -26,7 +26,7 @@ def render(plan: Plan, certificates: dict[str, Certificate]) -> dict[str, bytes]
     files[f"{plan.name}.vh"] = _template("verilog/tables.vh.j2", context)
     for line, names in zip(plan.lines, context["axes"], strict=True):
         files[names["table_memory"]] = memory_file(line.program.words, line.program.bits)
-        files[names["fourier_memory"]] = memory_file(fourier_order(line), WORD_BITS)
+        files[names["fourier_memory"]] = memory_file(line.fourier.in_order, WORD_BITS)
     files[MANIFEST] = manifest_file(record, digest, certificates, files)
     return files
 

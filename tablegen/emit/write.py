@@ -31,7 +31,6 @@ def write_files(folder: Path, files: Mapping[str, bytes]) -> list[str]:
             staged[name] = Path(temporary)
             with os.fdopen(handle, "wb") as file:
                 file.write(files[name])
-                file.flush()
             os.chmod(temporary, 0o666 & ~_umask())
         for name in sorted(changed, key=lambda name: name == "manifest.json"):
             os.replace(staged[name], folder / name)

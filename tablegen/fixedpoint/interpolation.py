@@ -19,6 +19,11 @@ def guard_bits(word_bits: int) -> int:
     return min(_GUARD_BITS, MAXIMUM_SAMPLE_BITS - word_bits)
 
 
+def index_bits_of(length: int) -> int:
+    """P of a table of 2^P words."""
+    return length.bit_length() - 1
+
+
 def interpolate(table: Ints, phase: Ints, guard: int) -> Ints:
     """Samples at phases in [0, 2^32), from a table of 2^P words, P <= 17.
 
@@ -28,7 +33,7 @@ def interpolate(table: Ints, phase: Ints, guard: int) -> Ints:
     sample = t0 2^G + round((t1 - t0) fraction / 2^(15 - G)), ties up; the word after the last is the first.
     |t1 - t0| < 2^24 and fraction < 2^15, hence the product stays below 2^39.
     """
-    index_bits = len(table).bit_length() - 1
+    index_bits = index_bits_of(len(table))
     index = phase >> (PHASE_BITS - index_bits)
     fraction = (phase >> (PHASE_BITS - index_bits - FRACTION_BITS)) & ((1 << FRACTION_BITS) - 1)
     here: Ints = table[index]

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from tablegen.fixedpoint.interpolation import direct, guard_bits, interpolate
+from tablegen.fixedpoint.interpolation import direct, guard_bits, index_bits_of, interpolate
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.phase import RationalPhase
 from tablegen.numerics.arrays import Ints, freeze
@@ -36,6 +36,11 @@ class Program:
     def guard(self) -> int:
         """Bits of a sample below the LSB of a word."""
         return guard_bits(self.bits)
+
+    @property
+    def index_bits(self) -> int:
+        """Bits of the phase that index the table; 0 in ``direct`` mode, which has no phase."""
+        return index_bits_of(len(self.words)) if self.mode == "interpolated" else 0
 
     def samples(self, k: Ints) -> Ints:
         """Samples at ticks k in [0, ticks), with ``guard`` bits below the word's LSB."""

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tablegen.fixedpoint.interpolation import FRACTION_BITS, between
+from tablegen.fixedpoint.interpolation import FRACTION_BITS, between, index_bits_of
 from tablegen.fixedpoint.phase import PHASE_BITS
 from tablegen.fixedpoint.program import Program
 from tablegen.numerics.arrays import Ints, merged
@@ -80,7 +80,7 @@ def _between_words(program: Program) -> Runs | None:
         low, high = np.where(reached, low, middle + 1), np.where(reached, middle, high)
 
     # The first tick whose phase reaches that fraction: ceil(phase ticks / 2^32), below 2^63.
-    index_bits = len(words).bit_length() - 1
+    index_bits = index_bits_of(len(words))
     phase = ((segment << FRACTION_BITS) | high) << (PHASE_BITS - FRACTION_BITS - index_bits)
     starts = (phase * program.ticks + ((1 << PHASE_BITS) - 1)) >> PHASE_BITS
     taken = np.append(np.diff(starts) > 0, starts[-1] < program.ticks)

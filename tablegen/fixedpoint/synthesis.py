@@ -31,6 +31,11 @@ class FourierWords:
         """H, the highest harmonic."""
         return len(self.a)
 
+    @property
+    def in_order(self) -> Ints:
+        """All 2 H + 1 words in the order in which devices hold them: a0, a1..aH, b1..bH."""
+        return np.concatenate([[self.a0], self.a, self.b])
+
 
 def encode(series: FourierSeries, scale: float) -> FourierWords:
     """The words of a waveform, (2 w - 1) / scale, rounded to nearest, ties up."""
