@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from tablegen.compensation.hysteresis import BranchShape, LineShape
 from tablegen.config.schema import BandLimit
 from tablegen.problems import Unphysical
+from tablegen.waveform import window_fit
 from tablegen.waveform.band_limit import band_limited
 from tablegen.waveform.closed_form import fourier_series
 from tablegen.waveform.sampler import Sampler
@@ -65,6 +66,22 @@ def test_truncate_keeps_the_coefficients_and_lanczos_damps_them() -> None:
     assert truncated.a.tolist() == series.a.tolist()
     assert damped.b == pytest.approx(series.b * np.sinc(np.arange(1, 11) / 11))
     assert damped.a0 == series.a0
+
+
+@pytest.mark.parametrize(("harmonics", "times"), [(16, 1.6), (21, 1.8), (32, 2.5)])
+def test_chebyshev_nodes_are_what_levels_the_error(
+    monkeypatch: pytest.MonkeyPatch, harmonics: int, times: float
+) -> None:
+    """The control: the same fit at evenly spaced nodes lets the error pile up at the edges of the window."""
+    levelled = worst(SECTION_8, band_limited(SECTION_8, BandLimit(), harmonics))
+
+    def even(turn: float, harmonics: int, window: tuple[float, float], both: bool) -> np.ndarray:
+        x = window[0] + (window[1] - window[0]) * (np.arange(4 * harmonics) + 0.5) / (4 * harmonics)
+        return np.concatenate([turn * x, turn + (1.0 - turn) * (1.0 - x)])
+
+    monkeypatch.setattr(window_fit, "_nodes", even)
+    piled_up = worst(SECTION_8, band_limited(SECTION_8, BandLimit(), harmonics))
+    assert piled_up > times * levelled
 
 
 def test_forward_only_leaves_the_way_back_free() -> None:

@@ -40,7 +40,7 @@ def fail(lines: "Sequence[object]", status: Status) -> NoReturn:
 
 def planned(scan: Path) -> "tuple[Plan, dict[str, Certificate]]":
     """Load, plan and certify a scan; every failure ends the command with its status."""
-    # No linear algebra library is used, and its threads would only spin: a third of the cost of importing numpy.
+    # No linear algebra library is used, and its threads would only spin: a good part of what importing numpy costs.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from tablegen.certificate import broken_limits, certify
     from tablegen.config.load import load
