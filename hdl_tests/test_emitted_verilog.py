@@ -13,6 +13,7 @@ from building import (
     REPOSITORY,
     VARIANTS,
     Build,
+    Variant,
     build,
     build_stressed,
     constants,
@@ -164,3 +165,12 @@ def test_a_flipped_bit_in_a_memory_is_heard(tmp_path: Path) -> None:
     differs = np.flatnonzero(simulated_codes(built, 1250)[:, 0] != model_codes(built, 1)[:, 0])
     assert set(differs.tolist()) <= {k for k in range(1250) if (k * 2048 // 1250) in (999, 1000)}
     assert len(differs) >= 1
+
+
+@pytest.mark.parametrize(
+    "name", ["two\nlines", "back\\slash\\", '`include "x"', "*/ /* */", "\u00b5-Scanner"], ids=ascii
+)
+def test_no_scanner_s_name_leaves_its_comment(tmp_path: Path, name: str) -> None:
+    """The name of a scanner is free text, and the only free text that reaches an emitted file."""
+    built = build(tmp_path, Variant({**VARIANTS["short_frame"].scan}, {"name": name}))
+    compile_verilog(built, PLAYER)

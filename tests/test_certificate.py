@@ -11,6 +11,7 @@ from tablegen.certificate import broken_limits, certify
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.fixedpoint import runs as runs_module
 from tablegen.fixedpoint.runs import runs_of
+from tablegen.measurement import Played
 from tablegen.plan import LinePlan, Plan, make_plan
 
 FREE = {"limits.max_error_lsb": "", "limits.max_scaling_error_percent": ""}
@@ -155,6 +156,19 @@ def test_runs_and_ticks_measure_the_same(example: Plan, monkeypatch: pytest.Monk
     for part in ("total", "quantisation", "band_limit", "size"):
         runs, ticks = (getattr(c.scaling["forward"], part) for c in (by_runs, by_ticks))
         assert runs == pytest.approx(ticks, rel=1e-6), part
+
+
+@pytest.mark.parametrize("size", [20.0, 47.0, 80.0, 113.0, 150.0, 200.0])
+def test_the_largest_error_may_stand_at_a_turnaround(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, size: float
+) -> None:
+    """A slow line on a coarse converter: at its extremes one code lasts, and the waveform turns in the middle of it."""
+    edits = {**FREE, "x.size_nm": repr(size), "dac.bits": "10", "timing.line_rate_hz": "5.0", "timing.lines": "20"}
+    line = plan_of(tmp_path, edits).x
+    ticks = np.arange(line.program.ticks)
+    error = line.program.codes(ticks) - line.float_codes(line.series.on_grid(line.program.ticks))
+    monkeypatch.setattr(runs_module, "_TICKS_AT_LEAST", 0)
+    assert Played(line).largest_error() == pytest.approx(float(np.max(np.abs(error))), abs=1e-6)
 
 
 def test_a_resonance_inside_the_band_is_seen(tmp_path: Path) -> None:

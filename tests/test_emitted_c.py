@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from building import NAME, REPOSITORY, VARIANTS, Build, build, build_stressed, constants, run, run_clean
+from building import NAME, REPOSITORY, VARIANTS, Build, Variant, build, build_stressed, constants, run, run_clean
 
 from tablegen.numerics.arrays import Ints
 from tablegen.sequencer import DualProgram, play_line
@@ -214,3 +214,16 @@ def test_a_damaged_header_does_not_compile(header_only: Build, tmp_path: Path, d
         result = run([*compiler, "-fsyntax-only", unit])
         assert result.returncode != 0, f"{' '.join(compiler)} accepts a header in which {damage} is wrong"
         assert name in result.stderr
+
+
+HOSTILE = ["*/ int broken; /*", "two\nlines", "back\\slash\\", "trigraph ??/", "/* /* */ */", "\u00b5-Scanner \u202e"]
+
+
+@pytest.mark.parametrize("dialect", DIALECTS)
+@pytest.mark.parametrize("name", HOSTILE, ids=ascii)
+def test_no_scanner_s_name_leaves_its_comment(tmp_path: Path, name: str, dialect: str) -> None:
+    """The name of a scanner is free text, and the only free text that reaches an emitted file."""
+    built = build(tmp_path, Variant({**VARIANTS["short_frame"].scan}, {"name": name}))
+    header = built.files[f"{NAME}.h"].decode("ascii")
+    assert " * Scanner: " in header
+    compile_player(built, DIALECTS[dialect])

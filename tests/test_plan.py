@@ -179,6 +179,22 @@ def test_a_code_is_the_voltage_of_an_ideal_converter(example: Plan) -> None:
     assert example.x.program.output.offset_code == 32768
 
 
+def test_park_is_where_it_was_asked_to_be(tmp_path: Path, example: Plan) -> None:
+    assert example.x.program.output.park_code == example.x.program.output.offset_code
+    output = plan_of(tmp_path, {"x.park_v": "10.0", "y.park_v": "0.0"})
+    assert output.x.program.output.park_code == round(0.1 * 65536)
+    assert output.y.program.output.park_code == 0
+
+
+def test_an_offset_between_two_codes_is_kept(tmp_path: Path) -> None:
+    """Half a code beside code 32768: rounded to a code by itself it would cost half an LSB on every sample."""
+    line = plan_of(tmp_path, {"x.offset_v": repr(50.0 + 0.5 * 100.0 / 65536)}).x
+    codes = line.codes(0, line.program.ticks)
+    asked = line.float_codes(line.series.value(np.arange(1250) / 1250))
+    assert float(np.max(np.abs(codes - asked))) < 0.62
+    assert abs(float(np.mean(codes - asked))) < 0.03
+
+
 def test_the_step_guard_is_the_amplifiers_slew_rate(example: Plan, tmp_path: Path) -> None:
     assert example.x.program.output.max_step == int(2e6 / 500e3 / (100.0 / 65536))
     free = plan_of(tmp_path, {"amplifier.max_slew_v_per_s": ""}).x.program

@@ -212,6 +212,18 @@ def test_park_and_reset_ramp_from_wherever_they_come(programs: list[DualProgram]
     assert sequencer.state is State.PARKED
 
 
+def test_reset_forgets_faults_and_what_waits(programs: list[DualProgram]) -> None:
+    sequencer = started(programs[0])
+    sequencer.faults, sequencer.fault_counts = Fault.SLEW, {Fault.SLEW: 3, Fault.CLAMP: 0}
+    run(sequencer, 5)
+    sequencer.commit(programs[1])
+    sequencer.reset()
+    assert sequencer.faults is Fault.NONE
+    assert sequencer.fault_counts == {Fault.SLEW: 0, Fault.CLAMP: 0}
+    assert not any(tick.swapped for tick in run(sequencer, 200))
+    assert sequencer.playing is programs[0]
+
+
 def test_a_commit_while_parked_is_taken_at_once(programs: list[DualProgram]) -> None:
     sequencer = Sequencer(programs[0])
     sequencer.commit(programs[1])

@@ -41,7 +41,8 @@ def template_context(plan: Plan, certificates: dict[str, Certificate], digest: s
         "NAME": plan.name.upper(),
         "hash": digest,
         "header_only": plan.header_only,
-        "summary": [comment_safe(line) for line in summary(plan, certificates)],
+        "scanner": comment_safe(plan.scanner),
+        "summary": summary(plan, certificates),
         "sequence": {key: _Number(value) for key, value in sequence.items()},
         "phase_bits": PHASE_BITS,
         "least_gain": _Number(signed_limits(GAIN_BITS)[0]),
@@ -51,9 +52,9 @@ def template_context(plan: Plan, certificates: dict[str, Certificate], digest: s
 
 
 def comment_safe(text: str) -> str:
-    """Text that cannot end a comment, continue a line, or leave ASCII."""
-    plain = text.encode("ascii", "backslashreplace").decode("ascii")
-    return plain.replace("*/", "* /").replace("\\", "/").rstrip()
+    """Text on one line of ASCII that can neither begin nor end a comment, nor continue a line."""
+    plain = text.encode("unicode_escape").decode("ascii").replace("\\", "/")
+    return plain.replace("*/", "* /").replace("/*", "/ *").replace("?", ".").rstrip()  # ??/ is a backslash in C99
 
 
 class _Number:
