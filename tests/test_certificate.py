@@ -158,17 +158,15 @@ def test_runs_and_ticks_measure_the_same(example: Plan, monkeypatch: pytest.Monk
         assert runs == pytest.approx(ticks, rel=1e-6), part
 
 
-@pytest.mark.parametrize("size", [20.0, 47.0, 80.0, 113.0, 150.0, 200.0])
-def test_the_largest_error_may_stand_at_a_turnaround(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, size: float
-) -> None:
-    """A slow line on a coarse converter: at its extremes one code lasts, and the waveform turns in the middle of it."""
-    edits = {**FREE, "x.size_nm": repr(size), "dac.bits": "10", "timing.line_rate_hz": "5.0", "timing.lines": "20"}
-    line = plan_of(tmp_path, edits).x
+def test_the_largest_error_may_stand_in_the_middle_of_a_run(example: Plan) -> None:
+    """Held by the clamp, the code rests while the waveform turns above it: the error peaks between the run's ends."""
+    top = int(example.y.codes(0, example.y.program.ticks).max())
+    output = replace(example.y.program.output, code_max=top - 300)
+    line = replace(example.y, program=replace(example.y.program, output=output))
     ticks = np.arange(line.program.ticks)
     error = line.program.codes(ticks) - line.float_codes(line.series.on_grid(line.program.ticks))
-    monkeypatch.setattr(runs_module, "_TICKS_AT_LEAST", 0)
     assert Played(line).largest_error() == pytest.approx(float(np.max(np.abs(error))), abs=1e-6)
+    assert Played(line).largest_error() > 299.0
 
 
 def test_a_resonance_inside_the_band_is_seen(tmp_path: Path) -> None:
