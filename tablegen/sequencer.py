@@ -47,7 +47,7 @@ class DualProgram:
 
 @dataclass(frozen=True, slots=True)
 class Tick:
-    """What leaves the sequencer on one tick: two codes, markers, and whether a bank was taken."""
+    """What leaves the sequencer on one tick: two codes, markers, what it did, and the faults so far."""
 
     x: int
     y: int
@@ -57,6 +57,9 @@ class Tick:
     backward: bool = False
     valid: bool = False
     swapped: bool = False
+    playing: bool = False
+    parked: bool = False
+    faults: Fault = Fault.NONE
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,12 +113,15 @@ class Sequencer:
 
     ``commit`` fills the idle bank; it is taken at the next line start, or on the next tick while no line plays.
     ``arm`` and ``trigger`` start ``frames`` frames (0: without end) from line 0; ``park`` ends them at once. Parked
-    and parking outputs follow the park code under the slew guard of the bank that plays.
+    and parking outputs follow the park code under the slew guard of the bank that plays. A device without a program
+    (``playing`` is None) holds its ``codes`` and ignores triggers.
     """
 
-    playing: DualProgram
+    playing: DualProgram | None
+    codes: tuple[int, int] = (0, 0)  # at the converters now; with a program, its park codes
     idle: DualProgram | None = None
-    state: State = State.PARKED
+    running: bool = False
+    parked: bool = False
     armed: bool = False
     faults: Fault = Fault.NONE
     fault_counts: dict[Fault, int] = field(default_factory=lambda: {Fault.SLEW: 0, Fault.CLAMP: 0})
@@ -128,18 +134,24 @@ class Sequencer:
     def __post_init__(self) -> None:
         self._endless = True
         self._armed_frames = 0
-        self._x, self._y = self.playing.x.output.park_code, self.playing.y.output.park_code
+        if self.playing is not None:
+            self.codes = self.playing.x.output.park_code, self.playing.y.output.park_code
+            self.parked = True
         self._line_ticks: LineTicks | None = None
         self._clamped: Bools = np.zeros(0, dtype=np.bool_)
 
     @property
-    def codes(self) -> tuple[int, int]:
-        """The codes at the converters now."""
-        return self._x, self._y
+    def state(self) -> State:
+        """What the last tick and the requests since have made of it."""
+        return State.RUNNING if self.running else State.PARKED if self.parked else State.PARKING
 
     def commit(self, program: DualProgram) -> None:
         """Put a program into the idle bank, complete and checked, to be taken at the next line start."""
         self.idle = program
+
+    def withdraw(self) -> None:
+        """A committed program that was not taken yet is not to be played."""
+        self.idle = None
 
     def arm(self, frames: int = 0) -> None:
         """Let the next trigger start so many frames; 0 is without end."""
@@ -147,27 +159,28 @@ class Sequencer:
         self._armed_frames = frames  # a scan that plays keeps its own count
 
     def trigger(self) -> bool:
-        """Start at line 0 on the next tick; ignored unless armed and parked. Tells whether it was taken."""
-        if not self.armed or self.state is not State.PARKED:
+        """Start at line 0 on the next tick; ignored unless armed, not running, and with a program to play.
+
+        The codes need not have parked: in a pipeline nobody knows yet, and the slew guard holds anyway.
+        """
+        if not self.armed or self.running or self.playing is None:
             return False
-        self.armed = False
+        self.armed = self.parked = False
         self._endless = self._armed_frames == 0
         self.frames_left = self._armed_frames
-        self.state = State.RUNNING
-        self._begin()
+        self.running = True
+        self._begin(self.playing)
         return True
 
     def park(self) -> None:
         """Ramp to the park codes from the next tick on, and hold them."""
-        self.armed = False
-        if self.state is State.RUNNING:
-            self.state = State.PARKING
+        self.armed = self.running = False
 
     def reset(self) -> None:
-        """As at power-up, but for the codes: they ramp to the park codes, since a reset must not be a jump."""
+        """As at power-up, but for program and codes: they ramp to the park codes, since a reset must not jump."""
         self.park()
-        self.idle = None
-        self.state = State.PARKING
+        self.parked = False
+        self.withdraw()
         self.clear_faults()
 
     def clear_faults(self) -> None:
@@ -178,21 +191,21 @@ class Sequencer:
     def step(self) -> Tick:
         """Play one tick and return what leaves."""
         swapped = False
-        if self.idle is not None and (self.state is not State.RUNNING or self.tick == 0):
+        if self.idle is not None and (not self.running or self.tick == 0):
             self.playing, self.idle = self.idle, None
             swapped = True
-            if self.state is State.RUNNING:
-                self._begin()
-        if self.state is not State.RUNNING:
+            if self.running:
+                self._begin(self.playing)
+        if not self.running or self.playing is None:
             return self._rest(swapped)
 
         if self.tick == 0:
             self._line_ticks = play_line(self.playing, self.line)
-            self._clamped = self._outside(self.line)
+            self._clamped = self._outside(self.playing, self.line)
         line = self._line_ticks
         assert line is not None
         k = self.tick
-        reached = self._approach(int(line.x[k]), int(line.y[k]))
+        reached = self._approach(self.playing, int(line.x[k]), int(line.y[k]))
         if self._clamped[k]:
             self._fault(Fault.CLAMP)
         if reached:
@@ -200,26 +213,26 @@ class Sequencer:
         elif not self.catching_up:
             self._fault(Fault.SLEW)
         out = Tick(
-            x=self._x,
-            y=self._y,
+            *self.codes,
             line=bool(line.line[k]),
             frame=bool(line.frame[k]),
             pixel=bool(line.pixel[k]),
             backward=bool(line.backward[k]),
-            valid=bool(line.valid[k]) and reached and self.settle_left == 0,
+            valid=bool(line.valid[k]) and reached and self.settle_left == 0 and not self.faults,
             swapped=swapped,
+            playing=True,
+            faults=self.faults,
         )
-        self._advance()
+        self._advance(self.playing.schedule)
         return out
 
-    def _begin(self) -> None:
+    def _begin(self, program: DualProgram) -> None:
         """A program starts at its own line 0, unsettled, and away from where the output is."""
         self.tick = self.line = 0
-        self.settle_left = self.playing.schedule.settle_lines
+        self.settle_left = program.schedule.settle_lines
         self.catching_up = True
 
-    def _advance(self) -> None:
-        schedule = self.playing.schedule
+    def _advance(self, schedule: Schedule) -> None:
         self.tick += 1
         if self.tick < schedule.ticks:
             return
@@ -232,26 +245,33 @@ class Sequencer:
         if not self._endless:
             self.frames_left -= 1
             if self.frames_left == 0:
-                self.state = State.PARKING
+                self.running = False
 
     def _rest(self, swapped: bool) -> Tick:
-        reached = self._approach(self.playing.x.output.park_code, self.playing.y.output.park_code)
-        if reached:
-            self.state = State.PARKED
-        return Tick(x=self._x, y=self._y, swapped=swapped)
+        program = self.playing
+        if program is not None:
+            self.parked = self._approach(program, program.x.output.park_code, program.y.output.park_code)
+        else:
+            self.parked = True
+        return Tick(*self.codes, swapped=swapped, parked=self.parked, faults=self.faults)
 
-    def _approach(self, x: int, y: int) -> bool:
+    def _approach(self, program: DualProgram, x: int, y: int) -> bool:
         """Move both codes towards their targets, by at most max_step each; whether both arrived."""
-        x_step, y_step = self.playing.x.output.max_step, self.playing.y.output.max_step
-        self._x += min(max(x - self._x, -x_step), x_step)
-        self._y += min(max(y - self._y, -y_step), y_step)
-        return (self._x, self._y) == (x, y)
+        x_step, y_step = program.x.output.max_step, program.y.output.max_step
+        x_now, y_now = self.codes
+        self.codes = (
+            x_now + min(max(x - x_now, -x_step), x_step),
+            y_now + min(max(y - y_now, -y_step), y_step),
+        )
+        return self.codes == (x, y)
 
-    def _outside(self, line: int) -> Bools:
+    @staticmethod
+    def _outside(playing: DualProgram, line: int) -> Bools:
         """Ticks of a line on which the clamp changes a code of either axis."""
-        schedule, out = self.playing.schedule, np.zeros(self.playing.schedule.ticks, dtype=np.bool_)
+        schedule = playing.schedule
+        out = np.zeros(schedule.ticks, dtype=np.bool_)
         k = np.arange(schedule.ticks, dtype=np.int64)
-        for program, at in ((self.playing.x, k), (self.playing.y, line * schedule.ticks + k)):
+        for program, at in ((playing.x, k), (playing.y, line * schedule.ticks + k)):
             code = program.output.unclamped(program.samples(at))
             out |= (code < program.output.code_min) | (code > program.output.code_max)
         return out
