@@ -1,26 +1,47 @@
-# make demo    set up, build the example, print its certificate
-# make test    set up, check and run every test
-# make bench   what a build costs, against importing numpy
-# make figures the pictures of the README and the docs
-# make clean   remove what these made
+# make demo      set up, build the example, print its certificate
+# make test      set up, check and run every test but the slow ones
+# make test-hdl  only those of the Verilog: simulation, mutants, proofs, lint, synthesis
+# make test-slow a hundred thousand random swaps
+# make resources what the Verilog takes on FPGAs, into docs/resources.md
+# make bench     what a build costs, against importing numpy
+# make figures   the pictures of the README and the docs
+# make clean     remove what these made
 
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 
-.PHONY: demo test bench figures clean
+# What the tests compile, simulate, prove and synthesise with.
+HDL_TOOLS := make g++ iverilog yosys nextpnr-ice40 z3
+TOOLS := gcc clang libclang-rt-dev ghdl $(HDL_TOOLS)
+# A file of tests goes to one process: what its tests share is made once.
+PYTEST := $(BIN)/python -m pytest --numprocesses auto --dist loadfile
+
+.PHONY: demo test test-hdl test-slow resources bench figures clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/installed
 	$(BIN)/tablegen build examples/annexin_200nm.toml -o build/demo
 
 test: $(VENV)/installed-test
-	@.ci/system-packages gcc g++ clang libclang-rt-dev iverilog ghdl
+	@.ci/system-packages $(TOOLS)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/python -m pytest
+	$(PYTEST)
+
+test-hdl: $(VENV)/installed-test
+	@.ci/system-packages $(HDL_TOOLS)
+	$(PYTEST) hdl_tests
+
+test-slow: $(VENV)/installed-test
+	@.ci/system-packages $(HDL_TOOLS)
+	$(BIN)/python -m pytest -m slow
+
+resources: $(VENV)/installed-test
+	@.ci/system-packages $(HDL_TOOLS)
+	$(BIN)/python benchmarks/resources.py --write
 
 bench: $(VENV)/installed
 	$(BIN)/python benchmarks/build_cost.py

@@ -92,6 +92,9 @@ def test_constants_equal_the_manifest(built: Build) -> None:
     defined = [line.split("=")[0].split()[-1] for line in header.splitlines() if line.startswith("localparam")]
     prefix = f"{NAME.upper()}_"
     files = {f"{prefix}{axis}_{kind}_FILE" for axis in "XY" for kind in ("TABLE", "FOURIER")}
+    files |= {prefix + "PROGRAM_FILE"}
+    if any(axis["table"]["mode"] == "interpolated" for axis in manifest["axes"].values()):
+        files |= {prefix + "SINE_FILE"}
     assert set(defined) == {prefix + name for name in names} | files | {prefix + "HASH"}
     assert len(defined) == len(set(defined))
 

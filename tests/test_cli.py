@@ -15,22 +15,27 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from building import REPOSITORY
 from editing import SCAN, SCANNER, edited, run, write_pair
 from jsonschema import Draft202012Validator
 
 from tablegen import __version__
 
-COMMANDS = ("build", "check", "show", "init", "schema")
-FILES = [
+COMMANDS = ("build", "check", "show", "verify", "init", "schema")
+OWN_FILES = [
     "annexin_200nm.c",
     "annexin_200nm.h",
     "annexin_200nm.vh",
+    "annexin_200nm_program.mem",
+    "annexin_200nm_sine.mem",
     "annexin_200nm_x.mem",
     "annexin_200nm_x_fourier.mem",
     "annexin_200nm_y.mem",
     "annexin_200nm_y_fourier.mem",
     "manifest.json",
 ]
+RUNTIME = [path.name for path in (REPOSITORY / "firmware_templates" / "verilog").glob("dac_*.v")]
+FILES = sorted(OWN_FILES + RUNTIME)
 
 
 def tablegen(
@@ -77,7 +82,8 @@ def test_help_names_every_command_and_every_exit_status() -> None:
     shown = run("--help").out
     for command in COMMANDS:
         assert re.search(rf"^  {command} +\S.*\.$", shown, re.MULTILINE), command
-    for status in ("0 done", "1 output is stale", "2 wrong input", "3 a limit", "4 cannot write", "130 interrupted"):
+    statuses = "0 done|1 output is stale|2 wrong input|3 a limit|4 cannot write|5 a build|6 a simulator|130 interrupted"
+    for status in statuses.split("|"):
         assert status in shown
     assert run("-h").out == shown
 
@@ -88,6 +94,10 @@ def test_help_names_every_command_and_every_exit_status() -> None:
         ("build", ("SCAN.TOML", "--output DIR", "--check", "--quiet", "[default: build]", "tablegen build annexin")),
         ("check", ("SCAN.TOML", "file:line: key: why")),
         ("show", ("SCAN.TOML", "--json", "--plot / --no-plot", "> and <")),
+        (
+            "verify",
+            ("DIR", "--sim [icarus|verilator]", "--ticks N", "--junit FILE", "--keep DIR", "tablegen verify build"),
+        ),
         ("init", ("[DIR]", "--force", "scanner.toml and annexin_200nm.toml")),
         ("schema", ("scan|scanner", "#:schema")),
     ],
@@ -102,7 +112,7 @@ def test_help_of_each_command_teaches_it(command: str, taught: tuple[str, ...]) 
 
 def test_the_version_is_printed_without_numpy() -> None:
     code = "import sys; sys.argv = ['tablegen', '--version']; from tablegen.cli import _run; s = _run()"
-    heavy = "sorted({'numpy', 'jinja2', 'msgspec', 'tomllib', 'decimal'} & set(sys.modules))"
+    heavy = "sorted({'numpy', 'jinja2', 'msgspec', 'tomllib', 'decimal', 'cocotb', 'cocotb_tools'} & set(sys.modules))"
     done = subprocess.run(
         [sys.executable, "-c", f"{code}; print(s, {heavy})"], capture_output=True, text=True, check=True
     )
@@ -141,7 +151,7 @@ def test_a_build_writes_its_files_and_says_what_they_promise(scan: Path) -> None
     lines = done.stdout.decode("ascii").splitlines()
     assert lines[0].startswith("annexin_200nm on 'hs-afm': 400 Hz lines of 1250 ticks")
     assert [line[0] for line in lines if re.match("[xy] ", line)] == ["x", "y"]
-    assert lines[-1] == f"some/where: {len(FILES)} of {len(FILES)} files written"
+    assert lines[-1] == f"some/where: {len(OWN_FILES)} of {len(OWN_FILES)} files and the runtime dac_*.v written"
     out = scan.parent / "some" / "where"
     assert sorted(contents(out)) == FILES
     assert {path.stat().st_mode & 0o777 for path in out.iterdir()} == {0o666 & ~_umask()}
@@ -160,7 +170,7 @@ def test_a_second_build_touches_nothing(scan: Path) -> None:
     run("build", scan, "-o", out)
     before = stamps(out)
     outcome = run("build", scan, "-o", out)
-    assert outcome.out.splitlines()[-1] == f"{out}: {len(FILES)} files up to date"
+    assert outcome.out.splitlines()[-1] == f"{out}: {len(OWN_FILES)} files and the runtime dac_*.v up to date"
     assert stamps(out) == before
 
 
@@ -173,10 +183,31 @@ def test_a_build_rewrites_only_what_changed_and_keeps_what_is_not_its_own(scan: 
     (out / "annexin_200nm_y.mem").unlink()
     (out / "notes.txt").write_text("mine\n", encoding="ascii")
     outcome = run("build", scan, "-o", out)
-    assert outcome.out.splitlines()[-1] == f"{out}: 2 of {len(FILES)} files written"
+    assert outcome.out.splitlines()[-1] == f"{out}: 2 of {len(OWN_FILES)} files written"
     assert contents(out) == {**fresh, "notes.txt": b"mine\n"}
     after = stamps(out)
     assert {name for name in before if after[name] != before[name]} == {"annexin_200nm.h", "annexin_200nm_y.mem"}
+
+
+def test_a_build_with_another_runtime_rewrites_the_runtime(scan: Path) -> None:
+    """As after an update of tablegen; an old one is stale like any other file."""
+    out = scan.parent / "out"
+    run("build", scan, "-o", out)
+    fresh = contents(out)
+    (out / "dac_slew.v").write_text("// older\n", encoding="ascii")
+    assert run("build", scan, "-o", out, "--check").status == 1
+    outcome = run("build", scan, "-o", out)
+    assert outcome.out.splitlines()[-1] == f"{out}: the runtime dac_*.v written"
+    assert contents(out) == fresh
+
+
+def test_the_runtime_is_copied_byte_for_byte(scan: Path) -> None:
+    out = scan.parent / "out"
+    run("build", scan, "-o", out)
+    assert len(RUNTIME) > 20
+    assert not [name for name in OWN_FILES if name.endswith(".v")], "no name of a scan can meet a module's"
+    for name in RUNTIME:
+        assert (out / name).read_bytes() == (REPOSITORY / "firmware_templates" / "verilog" / name).read_bytes()
 
 
 def test_a_quiet_build_prints_nothing(scan: Path) -> None:

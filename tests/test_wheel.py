@@ -17,7 +17,7 @@ from building import EXAMPLE, REPOSITORY
 PARTS = ("tablegen", "examples", "firmware_templates")
 
 
-def python(folder: Path, *arguments: str | Path, path: Path | None = None) -> str:
+def python(folder: Path, *arguments: str | Path | int, path: Path | None = None) -> str:
     """Run this interpreter in a folder, with a folder of packages before its own."""
     environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
     if path is not None:
@@ -38,6 +38,7 @@ def shipped_files() -> set[str]:
     found = {path.relative_to(REPOSITORY).as_posix() for path in REPOSITORY.glob("tablegen/**/*.py")}
     found |= {"tablegen/py.typed", "tablegen/examples/__init__.py", "tablegen/firmware_templates/__init__.py"}
     found |= {f"tablegen/examples/{path.name}" for path in REPOSITORY.glob("examples/*.toml")}
+    found |= {f"tablegen/verify/{path.name}" for path in REPOSITORY.glob("tablegen/verify/*.v")}
     for language in (REPOSITORY / "firmware_templates").iterdir():
         if language.is_dir() and language.name != "__pycache__":
             found |= {f"tablegen/firmware_templates/{language.name}/{path.name}" for path in language.iterdir()}
@@ -89,6 +90,20 @@ def test_installed_wheel_builds_what_the_tree_builds(installed: Path, tmp_path: 
     wheel, tree = ({path.name: path.read_bytes() for path in (tmp_path / name).iterdir()} for name in ("wheel", "tree"))
     assert wheel == tree
     assert (tmp_path / "scan" / EXAMPLE.name).read_bytes() == EXAMPLE.read_bytes()
+
+
+def test_installed_wheel_verifies_a_build(installed: Path, tmp_path: Path) -> None:
+    """Outside the repository: command, simulation and the cocotb side inside the simulator are those of the wheel."""
+    python(tmp_path, "-m", "tablegen", "init", "scan", path=installed)
+    python(tmp_path, "-m", "tablegen", "build", f"scan/{EXAMPLE.name}", "-o", "out", path=installed)
+    shown = python(tmp_path, "-m", "tablegen", "verify", "out", "--ticks", 3000, path=installed)
+    assert shown.splitlines()[-1].startswith("out: verified, ")
+    # Negative control: without its cocotb side the copy fails, so that nothing came from the tree.
+    copy = tmp_path / "copy"
+    shutil.copytree(installed, copy)
+    (copy / "tablegen" / "verify" / "cocotb_stream.py").unlink()
+    with pytest.raises(AssertionError, match="simulation: "):
+        python(tmp_path, "-m", "tablegen", "verify", "out", "--ticks", 3000, path=copy)
 
 
 def test_installed_command_is_the_module(installed: Path, tmp_path: Path) -> None:

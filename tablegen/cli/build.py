@@ -22,7 +22,7 @@ from tablegen.cli.status import Status
 @click.option("--check", "only_check", is_flag=True, help="Write nothing; exit 1 with a diff if DIR is stale.")
 @click.option("-q", "--quiet", is_flag=True, help="Print no certificate.")
 def build(scan: Path, output: Path, only_check: bool, quiet: bool) -> int:
-    """Build a scan: NAME.h, NAME.c, NAME.vh, .mem files and manifest.json.
+    """Build a scan: NAME.h, NAME.c, NAME.vh, .mem files, the Verilog sequencer dac_*.v, and manifest.json.
 
     The same input gives the same bytes on every machine. Files that are already right are not touched, and
     if anything is wrong nothing is written.
@@ -30,6 +30,7 @@ def build(scan: Path, output: Path, only_check: bool, quiet: bool) -> int:
     \b
       tablegen build annexin_200nm.toml -o build
       tablegen build annexin_200nm.toml -o build --check     in CI: is what was committed up to date?
+      tablegen verify build                                  does the sequencer play it, bit for bit?
     """
     plan, certificates = planned(scan)
     from tablegen.emit import render
@@ -48,6 +49,18 @@ def build(scan: Path, output: Path, only_check: bool, quiet: bool) -> int:
         from tablegen.cli.report import certificate_table
 
         click.echo("\n".join(certificate_table(plan, certificates)))
-        state = f"{len(changed)} of {len(files)} files written" if changed else f"{len(files)} files up to date"
-        click.echo(f"\n{output}: {state}")
+        click.echo(f"\n{output}: {_state(files, changed)}")
     return Status.OK
+
+
+def _state(files: dict[str, bytes], changed: list[str]) -> str:
+    """What was written; the runtime, which changes with tablegen only, is many files and one thing."""
+    from tablegen.emit import runtime_files
+
+    runtime = runtime_files()
+    own, count = sum(name not in runtime for name in changed), len(files) - len(runtime)
+    if not changed:
+        return f"{count} files and the runtime dac_*.v up to date"
+    parts = [f"{own} of {count} files"] if own else []
+    parts += ["the runtime dac_*.v"] if own < len(changed) else []
+    return " and ".join(parts) + " written"

@@ -3,6 +3,7 @@
 import sys
 import threading
 import time
+from collections.abc import Callable
 from types import TracebackType
 
 import click
@@ -18,12 +19,12 @@ class Progress:
     """
 
     def __init__(self) -> None:
-        self._what = ""
+        self._what: str | Callable[[], str] = ""
         self._done = threading.Event()
         self._thread = threading.Thread(target=self._tell, daemon=True) if sys.stderr.isatty() else None
 
-    def now(self, what: str) -> None:
-        """Name what is being done from here on."""
+    def now(self, what: str | Callable[[], str]) -> None:
+        """Name what is being done from here on; a function is asked whenever the line is shown."""
         self._what = what
 
     def __enter__(self) -> "Progress":
@@ -42,7 +43,8 @@ class Progress:
         start = time.monotonic()
         shown = False
         while not self._done.wait(_PATIENCE_S):
-            text = f"{self._what} ({time.monotonic() - start:.0f} s)"
+            what = self._what if isinstance(self._what, str) else self._what()
+            text = f"{what} ({time.monotonic() - start:.0f} s)"
             click.echo(f"\r{text:<{_WIDTH}}", err=True, nl=False)
             shown = True
         if shown:

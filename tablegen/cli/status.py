@@ -11,4 +11,6 @@ class Status(IntEnum):
     WRONG_INPUT = 2
     BROKEN_LIMIT = 3
     CANNOT_WRITE = 4
+    MISMATCH = 5
+    TOOL_MISSING = 6
     INTERRUPTED = 130

@@ -47,6 +47,9 @@ def template_context(plan: Plan, certificates: dict[str, Certificate], digest: s
         "phase_bits": PHASE_BITS,
         "least_gain": _Number(signed_limits(GAIN_BITS)[0]),
         "greatest_gain": _Number(signed_limits(GAIN_BITS)[1]),
+        "program_memory": f"{plan.name}_program.mem",
+        "sine_memory": f"{plan.name}_sine.mem",
+        "has_sine": any(line.program.index_bits for line in plan.lines),
         "axes": [_axis(plan, line) for line in plan.lines],
     }
 

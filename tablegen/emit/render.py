@@ -8,15 +8,15 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from tablegen.certificate import Certificate
 from tablegen.emit.context import template_context
 from tablegen.emit.manifest import MANIFEST, manifest_file
-from tablegen.emit.memory import memory_file
+from tablegen.emit.memory import memory_file, program_file, sine_file
 from tablegen.fixedpoint.synthesis import WORD_BITS
 from tablegen.plan import Plan
 from tablegen.record import content_hash, plan_record
-from tablegen.resources import resource_folder
+from tablegen.resources import resource_folder, verilog_runtime
 
 
 def render(plan: Plan, certificates: dict[str, Certificate]) -> dict[str, bytes]:
-    """Every file of a build, the manifest last."""
+    """Every file of a build: what is its own, the runtime, and the manifest last."""
     record = plan_record(plan)
     digest = content_hash(record)
     context = template_context(plan, certificates, digest)
@@ -27,8 +27,19 @@ def render(plan: Plan, certificates: dict[str, Certificate]) -> dict[str, bytes]
     for line, names in zip(plan.lines, context["axes"], strict=True):
         files[names["table_memory"]] = memory_file(line.program.words, line.program.bits)
         files[names["fourier_memory"]] = memory_file(line.fourier.in_order, WORD_BITS)
+    files[context["program_memory"]] = program_file(plan)
+    sines = sine_file(plan)
+    if sines is not None:
+        files[context["sine_memory"]] = sines
+    files |= runtime_files()
     files[MANIFEST] = manifest_file(record, digest, certificates, files)
     return files
+
+
+@cache
+def runtime_files() -> dict[str, bytes]:
+    """The static Verilog, the same in every build."""
+    return {path.name: path.read_bytes() for path in verilog_runtime()}
 
 
 @cache

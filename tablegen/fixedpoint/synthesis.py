@@ -69,6 +69,15 @@ def sine_table(length: int) -> Ints:
     return np.where(value < 0.0, -round_half_up(magnitude), round_half_up(magnitude))
 
 
+def sine_quarter(index_bits: int) -> Ints:
+    """The sine words that a device holds for tables of up to 2^index_bits words, index_bits >= 3: the first quarter.
+
+    sin(pi/2) is not among them: it is 2^30, the only word that does not fit 30 bits. The sine table of a shorter length
+    is every 2^n-th word of a longer one.
+    """
+    return sine_table(1 << index_bits)[: 1 << (index_bits - 2)]
+
+
 def synthesize(words: FourierWords, length: int, bits: int) -> Ints:
     """Table words k = 0..length-1: saturate(round(2^(bits-1) s(k / length))), ties up, int64 of shape (length,).
 

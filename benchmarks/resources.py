@@ -1,0 +1,188 @@
+"""What the Verilog modules take: cells, memories, multipliers and clock rates, as a table for docs/resources.md.
+
+``python benchmarks/resources.py`` prints the table, ``--write`` puts it into the page. It needs yosys and
+nextpnr-ice40; other versions of them give other numbers. iCE40 is placed and routed (HX8K) once a seed, and the slowest
+stands in the table: a rate that one lucky seed reaches is no rate to build on. The others are synthesised only.
+"""
+
+import json
+import math
+import re
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+HERE = Path(__file__).parent
+MODULES = HERE.parent / "firmware_templates" / "verilog"
+PAGE = HERE.parent / "docs" / "resources.md"
+SEEDS = (1, 2, 3)
+BEGIN, END = "<!-- measured -->\n", "<!-- /measured -->\n"
+
+SYNTHESIS = {
+    "HX8K": "synth_ice40 -abc9 -device hx -top {top} -json {netlist}",
+    "ECP5": "synth_ecp5 -abc9 -top {top}",
+    "7-series": "synth_xilinx -family xc7 -flatten -noiopad -top {top}",
+}
+# What counts as what, by the names of the primitives.
+PRIMITIVES = {
+    "LUT": r"SB_LUT4|LUT[1-6]",
+    "FF": r"SB_DFF\w*|TRELLIS_FF|FD[RSCP]E(_1)?",
+    "carry": r"SB_CARRY|CCU2C|CARRY4",
+    "RAM": r"SB_RAM40_4K\w*|DP16KD|PDPW16KD|RAMB18E1|RAMB36E1",
+    "multipliers": r"MULT18X18D|DSP48E1|SB_MAC16",
+}
+
+
+@dataclass(frozen=True)
+class Case:
+    """A module with parameters on a family, and the requirement it has to meet, if there is one."""
+
+    what: str
+    top: str
+    family: str
+    parameters: Mapping[str, int] = field(default_factory=dict)
+    most_cells: int | None = None
+    least_mhz: float | None = None
+    most_multipliers: int | None = None
+
+
+@dataclass(frozen=True)
+class Result:
+    """``cells`` and ``mhz`` are of placement: cells the most, mhz the least of the seeds."""
+
+    counts: Mapping[str, int]
+    cells: int | None = None
+    mhz: float | None = None
+
+
+_AXIS = {"INDEX_BITS": 10, "PERIOD_BITS": 25}
+_TOP = {"X_INDEX_BITS": 10, "Y_INDEX_BITS": 10}
+CASES = {
+    "axis": Case("one axis, a sample a clock", "dac_axis", "HX8K", _AXIS, most_cells=2500, least_mhz=120),
+    "axis_serial": Case("one axis, low area", "dac_axis_serial", "HX8K", _AXIS, most_cells=900),
+    "sequencer": Case("two axes, a sample a clock", "dac_sequencer", "HX8K", _TOP),
+    "sequencer_low_area": Case("two axes, low area", "dac_sequencer", "HX8K", {**_TOP, "LOW_AREA": 1}),
+    "sequencer_low_area_fourier": Case(
+        "two axes, low area, Fourier words", "dac_sequencer", "HX8K", {**_TOP, "LOW_AREA": 1, "FOURIER": 1}
+    ),
+    "spi": Case("SPI, two converters in parallel", "dac_spi", "HX8K"),
+    "axi": Case("AXI-Stream", "dac_axi_stream", "HX8K"),
+    **{
+        f"axis_{family}_{name}": Case(
+            f"one axis, {words}-bit words, {converter}-bit codes",
+            "dac_axis",
+            family,
+            {**_AXIS, "PLAIN_MULTIPLIER": 1, "WORD_BITS": words, "DAC_BITS": converter},
+            most_multipliers=2,
+        )
+        for family in ("ECP5", "7-series")
+        for name, words, converter in (("16", 16, 16), ("18_20", 18, 20), ("24", 24, 24))
+    },
+    **{
+        f"axis_serial_{family}": Case("one axis, low area", "dac_axis_serial", family, _AXIS, most_multipliers=0)
+        for family in ("ECP5", "7-series")
+    },
+    **{
+        f"sequencer_{family}": Case(
+            "two axes, a sample a clock", "dac_sequencer", family, {**_TOP, "PLAIN_MULTIPLIER": 1}, most_multipliers=4
+        )
+        for family in ("ECP5", "7-series")
+    },
+}
+
+
+def measure(case: Case, seeds: Sequence[int] = SEEDS) -> Result:
+    """Synthesise a case, and for the HX8K place and route it once a seed."""
+    with tempfile.TemporaryDirectory() as folder:
+        netlist, statistics = Path(folder, "netlist.json"), Path(folder, "statistics")
+        parameters = " ".join(f"-chparam {name} {value}" for name, value in case.parameters.items())
+        if case.parameters.get("FOURIER"):  # without contents the memory would be synthesised away
+            index_bits = max(value for name, value in case.parameters.items() if "INDEX" in name)
+            Path(folder, "sine.mem").write_text(_quarter_sine(index_bits), "utf-8")
+        for path in MODULES.glob("dac_*.v"):
+            text = path.read_text("utf-8")
+            Path(folder, path.name).write_text(text.replace('SINE_FILE = ""', 'SINE_FILE = "sine.mem"'), "utf-8")
+        script = (
+            f"read_verilog -defer dac_*.v; hierarchy -check -top {case.top} {parameters}; "
+            f"{SYNTHESIS[case.family].format(top=case.top, netlist=netlist)}; tee -q -o {statistics} stat"
+        )
+        _run("yosys", "-q", "-p", script, folder=folder)
+        counts = _counts(statistics.read_text("utf-8"))
+        if case.family != "HX8K":
+            return Result(counts)
+        placed = [_place(netlist, Path(folder, "report.json"), seed) for seed in seeds]
+        return Result(counts, max(cells for cells, _ in placed), min(mhz for _, mhz in placed))
+
+
+def _counts(statistics: str) -> dict[str, int]:
+    whole = statistics[statistics.rfind("=== ") :]
+    found = [(name, int(count)) for name, count in re.findall(r"^ +(\w+) +(\d+)$", whole, re.MULTILINE)]
+    return {
+        kind: sum(count for name, count in found if re.fullmatch(pattern, name)) for kind, pattern in PRIMITIVES.items()
+    }
+
+
+def _place(netlist: Path, report: Path, seed: int) -> tuple[int, float]:
+    """Logic cells and MHz. Pins are where nextpnr puts them: paths to them are no part of the rate."""
+    _run(
+        *("nextpnr-ice40", "-q", "--hx8k", "--package", "ct256", "--json", str(netlist), "--pcf-allow-unconstrained"),
+        *("--freq", "135", "--timing-allow-fail", "--seed", str(seed), "--report", str(report)),
+    )
+    answer = json.loads(report.read_text("utf-8"))
+    (clock,) = answer["fmax"].values()
+    return answer["utilization"]["ICESTORM_LC"]["used"], clock["achieved"]
+
+
+def _quarter_sine(index_bits: int) -> str:
+    """Words like those that the build writes."""
+    length = 1 << index_bits
+    return "".join(f"{round(2**30 * math.sin(2 * math.pi * j / length)):08x}\n" for j in range(length // 4))
+
+
+def _run(*command: str, folder: str | None = None) -> str:
+    done = subprocess.run(command, capture_output=True, text=True, cwd=folder)
+    if done.returncode:
+        raise RuntimeError(f"{command[0]}: {done.stderr[-2000:]}")
+    return done.stdout
+
+
+def row(case: Case, result: Result) -> str:
+    """A line of the table."""
+    counts = result.counts
+    cells = [
+        case.what,
+        f"`{case.top}`",
+        " ".join(f"`{name}={value}`" for name, value in case.parameters.items()) or "as they come",
+        case.family,
+        "" if result.cells is None else str(result.cells),
+        *(str(counts[kind]) for kind in ("LUT", "FF", "RAM", "multipliers")),
+        "" if result.mhz is None else f"{result.mhz:.0f}",
+    ]
+    return "| " + " | ".join(cells) + " |"
+
+
+def table() -> str:
+    """The table of all cases; says on standard error what it is at."""
+    lines = [
+        "| what | module | parameters | part | cells | LUT | FF | RAM | multipliers | MHz |",
+        "|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    for name, case in CASES.items():
+        print(name, file=sys.stderr)
+        lines.append(row(case, measure(case)))
+    return "\n".join(lines) + "\n"
+
+
+def main() -> None:
+    measured = table()
+    print(measured, end="")
+    if "--write" in sys.argv[1:]:
+        before, _, rest = PAGE.read_text("utf-8").partition(BEGIN)
+        PAGE.write_text(before + BEGIN + measured + END + rest.partition(END)[2], "utf-8")
+
+
+if __name__ == "__main__":
+    main()

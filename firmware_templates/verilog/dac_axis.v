@@ -1,0 +1,113 @@
+// One axis, a sample a clock: phase, table, interpolation, gain and offset, limits, slew guard.
+//
+// A tick comes in with its flags on one clock; the code is there LATENCY clocks later. The next tick may come on the next
+// clock. A new program comes in with the tick that has `load`, and travels down the pipeline with that tick: its phase,
+// its bank of the table, its gain and its limits each change just before it, so that no sample is of two programs.
+
+`default_nettype none
+
+module dac_axis #(
+    parameter INTERPOLATED = 1,     // 0: a table word an advance
+    parameter INDEX_BITS = 11,      // a bank of the table holds 2^INDEX_BITS words
+    parameter WORD_BITS = 16,
+    parameter DAC_BITS = 16,
+    parameter PERIOD_BITS = 31,
+    parameter PLAIN_MULTIPLIER = 0,  // 1: multiplier blocks; 0: look-up tables
+    parameter [63:0] POWER_UP_CODE = 0,
+    parameter LATENCY = PLAIN_MULTIPLIER ? 22 : 34  // follows from the others
+) (
+    input  wire                  clock,
+    // to the idle program: a register, or a word of the table
+    input  wire                  write,
+    input  wire [3:0]            write_address,
+    input  wire [31:0]           write_data,
+    input  wire                  table_write,
+    input  wire [INDEX_BITS-1:0] table_address,
+    input  wire [WORD_BITS-1:0]  table_data,
+    input  wire                  take,      // the tick of the next clock is the first one of a new program
+    // a tick; flag i of a vector is that of the tick i clocks ago
+    input  wire [LATENCY-4:0]    ticks,
+    input  wire [LATENCY-4:0]    loads,     // a new program begins
+    input  wire [LATENCY-4:0]    runnings,  // a scan plays; otherwise to the park code
+    input  wire                  bank,      // that plays
+    input  wire                  restart,   // advance 0 of a period
+    input  wire                  advance,   // the next advance
+    output wire [DAC_BITS-1:0]   code,
+    output wire                  reached,   // the code is at its target
+    output wire                  clamped    // a limit has changed the target
+);
+    localparam GUARD_BITS = WORD_BITS > 21 ? 25 - WORD_BITS : 4;
+    localparam SAMPLE_BITS = WORD_BITS + GUARD_BITS;
+    localparam SAMPLE_AT = PLAIN_MULTIPLIER ? 10 : 15;  // clocks from the tick to its sample
+    localparam TARGET_AT = LATENCY - 4;                 // and to its target
+
+    wire signed [SAMPLE_BITS-1:0] sample;
+    wire unused_flags = &{loads, ticks, runnings, take};
+
+    generate
+        if (INTERPOLATED) begin : interpolated
+            localparam FRACTION_AT = 17 - INDEX_BITS;
+
+            wire [31:0] phase;
+            wire read_bank;
+            wire signed [WORD_BITS-1:0] here, there;
+            wire [14:0] fraction;
+            wire unused = &phase;  // its bits below the fraction
+
+            dac_phase #(.PERIOD_BITS(PERIOD_BITS)) position (
+                .clock(clock), .write(write), .write_address(write_address), .write_data(write_data),
+                .take(take), .load(loads[0]), .tick(ticks[0]), .restart(restart), .advance(advance), .phase(phase)
+            );
+            dac_delay #(.BITS(1), .CLOCKS(2)) with_phase (.clock(clock), .in(bank), .out(read_bank));
+            dac_table #(.WORD_BITS(WORD_BITS), .INDEX_BITS(INDEX_BITS)) words (
+                .clock(clock), .write(table_write), .write_bank(!bank), .write_index(table_address),
+                .write_data(table_data), .read_bank(read_bank), .index(phase[31 -: INDEX_BITS]),
+                .here(here), .there(there)
+            );
+            dac_delay #(.BITS(15), .CLOCKS(3)) with_words (
+                .clock(clock), .in(phase[FRACTION_AT +: 15]), .out(fraction)
+            );
+            dac_interpolator #(
+                .WORD_BITS(WORD_BITS), .GUARD_BITS(GUARD_BITS), .PLAIN_MULTIPLIER(PLAIN_MULTIPLIER)
+            ) between (.clock(clock), .here(here), .there(there), .fraction(fraction), .sample(sample));
+        end else begin : direct
+            // Only two clocks of work: the flags wait, since a flag is narrower than a sample.
+            localparam WAIT = SAMPLE_AT - 3;
+            wire restarts, advances, read_bank;
+            reg [INDEX_BITS-1:0] index;
+            initial index = 0;
+            dac_delay #(.BITS(2), .CLOCKS(WAIT)) flags (
+                .clock(clock), .in({restart, advance}), .out({restarts, advances})
+            );
+            dac_delay #(.BITS(1), .CLOCKS(WAIT + 1)) with_index (.clock(clock), .in(bank), .out(read_bank));
+            always @(posedge clock)
+                if (ticks[WAIT]) index <= restarts ? {INDEX_BITS{1'b0}} : index + {{INDEX_BITS-1{1'b0}}, advances};
+            wire signed [WORD_BITS-1:0] word;
+            dac_direct_table #(.WORD_BITS(WORD_BITS), .INDEX_BITS(INDEX_BITS)) words (
+                .clock(clock), .write(table_write), .write_bank(!bank), .write_index(table_address),
+                .write_data(table_data), .read_bank(read_bank), .index(index), .word(word)
+            );
+            assign sample = {word, {GUARD_BITS{1'b0}}};
+        end
+    endgenerate
+
+    wire [DAC_BITS-1:0] target, max_step, step_inverse;
+    wire target_clamped;
+
+    dac_output #(
+        .SAMPLE_BITS(SAMPLE_BITS), .DAC_BITS(DAC_BITS), .PLAIN_MULTIPLIER(PLAIN_MULTIPLIER),
+        .POWER_UP_CODE(POWER_UP_CODE)
+    ) out (
+        .clock(clock), .write(write), .write_address(write_address), .write_data(write_data),
+        .loads(loads[TARGET_AT:SAMPLE_AT-1]), .sample(sample), .running(runnings[TARGET_AT-2]),
+        .target(target), .max_step(max_step), .step_inverse(step_inverse),
+        .clamped(target_clamped)
+    );
+    dac_slew #(.BITS(DAC_BITS), .POWER_UP(POWER_UP_CODE)) guard (
+        .clock(clock), .valid(ticks[TARGET_AT]), .target(target), .max_step(max_step),
+        .step_inverse(step_inverse), .code(code), .reached(reached)
+    );
+    dac_delay #(.BITS(1), .CLOCKS(4)) with_code (.clock(clock), .in(target_clamped), .out(clamped));
+endmodule
+
+`default_nettype wire

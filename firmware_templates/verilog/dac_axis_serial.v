@@ -1,0 +1,253 @@
+// One axis in little area: the arithmetic of dac_axis, one step a clock, with one adder for the sample and none to spare.
+//
+// A tick starts it; CLOCKS later the code is there, and not before that may the next tick come. The program of both banks
+// is in a block RAM, and read word by word as it is needed. Multiplication is Booth's, two bits a clock: a and m hold sum
+// and factor, q the other factor, whose place the low half of the product takes.
+
+`default_nettype none
+
+module dac_axis_serial #(
+    parameter INTERPOLATED = 1,     // 0: a table word an advance
+    parameter INDEX_BITS = 11,      // a bank of the table holds 2^INDEX_BITS words
+    parameter WORD_BITS = 16,
+    parameter DAC_BITS = 16,
+    parameter PERIOD_BITS = 31,
+    parameter [63:0] POWER_UP_CODE = 0
+) (
+    input  wire                  clock,
+    // to the idle program: a register, or a word of the table
+    input  wire                  write,
+    input  wire [3:0]            write_address,
+    input  wire [31:0]           write_data,
+    input  wire                  table_write,
+    input  wire [INDEX_BITS-1:0] table_address,
+    input  wire [WORD_BITS-1:0]  table_data,
+    input  wire                  bank,      // that plays; with the tick, and until the code is there
+    input  wire                  loaded,    // it holds a program
+    input  wire                  tick,
+    input  wire                  restart,   // with the tick: advance 0 of a period
+    input  wire                  advance,   // with the tick: the next advance
+    input  wire                  running,   // with the tick, and until the code is there: a scan plays
+    output reg                   done,      // the code is there
+    output reg  [DAC_BITS-1:0]   code,
+    output reg                   reached,   // the code is at its target
+    output reg                   clamped    // a limit has changed the target
+);
+    localparam [3:0] PHASE_STEP = 4'd0, PHASE_REMAINDER = 4'd1, PHASE_PERIOD = 4'd2, GAIN = 4'd3;
+    localparam [3:0] OFFSET_LOW = 4'd4, OFFSET_HIGH = 4'd5, CODE_MIN = 4'd6, CODE_MAX = 4'd7, MAX_STEP = 4'd8;
+    localparam [3:0] PARK_CODE = 4'd9;
+
+    localparam GUARD_BITS = WORD_BITS > 21 ? 25 - WORD_BITS : 4;
+    localparam SAMPLE_BITS = WORD_BITS + GUARD_BITS;
+    localparam GAIN_Q = 16 + SAMPLE_BITS - DAC_BITS;
+    localparam WIDEST_1 = SAMPLE_BITS > DAC_BITS ? SAMPLE_BITS : DAC_BITS;
+    localparam WIDEST_2 = GAIN_Q > 20 ? GAIN_Q : 20;
+    localparam BITS = (WIDEST_1 > WIDEST_2 ? WIDEST_1 : WIDEST_2) + 3;  // of the sum: every value, its sign, and twice it
+
+    // The words of both programs. The half that makes a floor a rounding goes into the low word of the offset where it has
+    // such a bit, or beside it, above its 18 bits. The period is kept inverted, since it is subtracted.
+    localparam LOW_HALF = GAIN_Q < 19 ? 1 << (GAIN_Q - 1) : 0;
+    localparam [BITS-1:0] HIGH_HALF = GAIN_Q < 19 ? 0 : {{BITS-1{1'b0}}, 1'b1} << (GAIN_Q - 1);
+    reg [31:0] words [0:31];
+    reg [31:0] word;
+    reg [3:0] address;
+    always @(posedge clock) begin
+        if (write)
+            words[{!bank, write_address}] <= write_address == OFFSET_LOW ? write_data + LOW_HALF :
+                                             write_address == PHASE_PERIOD ? ~write_data : write_data;
+        word <= words[{bank, address}];
+    end
+
+    reg [WORD_BITS-1:0] table_words [0:(2<<INDEX_BITS)-1];
+    reg signed [WORD_BITS-1:0] table_word;
+    wire [INDEX_BITS-1:0] index;
+    always @(posedge clock) begin
+        if (table_write) table_words[{!bank, table_address}] <= table_data;
+        table_word <= table_words[{bank, index}];
+    end
+
+    // The steps: what happens in the clock of each. A word that is used in a step was asked for in the one before.
+    localparam [5:0] WAIT = 6'd0, REST = 6'd1, WRAP = 6'd2, PHASE = 6'd3, HERE = 6'd5, THERE = 6'd6, DIFFERENCE = 6'd7;
+    localparam [5:0] INTERPOLATE = 6'd8, BACK = 6'd16, FROM_HERE = 6'd17, SAMPLE = 6'd18, FACTOR = 6'd19, MULTIPLY = 6'd20;
+    localparam [5:0] HIGH = 6'd29, SUM = 6'd30, ROUND = 6'd31, LOW_LIMIT = 6'd32, HIGH_LIMIT = 6'd33, TARGET = 6'd34;
+    localparam [5:0] UPPER = 6'd35, HOLD_UPPER = 6'd36, HOLD_LOWER = 6'd37, DONE = 6'd38;
+    reg [5:0] step;
+    reg advances;
+    initial begin
+        step = WAIT;
+        advances = 1'b0;
+    end
+    wire [5:0] next = step == WAIT ? (tick ? REST : WAIT) : step == DONE ? WAIT : step + 1;
+    // Decided a clock ahead, since the sum waits for them.
+    reg wrapping, shifts, interpolates, subtracts, compares_above, compares_below;
+    initial begin
+        wrapping = 1'b0;
+        shifts = 1'b0;
+        interpolates = 1'b0;
+        subtracts = 1'b0;
+        compares_above = 1'b0;
+        compares_below = 1'b0;
+    end
+    always @(posedge clock) begin
+        step <= next;
+        wrapping <= next == WRAP;
+        interpolates <= INTERPOLATED != 0 && next >= INTERPOLATE && next < BACK;
+        shifts <= (INTERPOLATED != 0 && next >= INTERPOLATE && next < BACK) || (next >= MULTIPLY && next < HIGH);
+        subtracts <= next == DIFFERENCE || next == LOW_LIMIT || next == HOLD_LOWER;
+        compares_above <= next == HIGH_LIMIT || next == HOLD_UPPER;  // a - m - 1 is not negative
+        compares_below <= next == LOW_LIMIT || next == HOLD_LOWER;   // a - m is negative
+        if (step == WAIT) advances <= advance && !restart;
+    end
+
+    always @* begin
+        case (step)
+            WAIT: address = PHASE_REMAINDER;
+            REST: address = PHASE_PERIOD;
+            WRAP: address = PHASE_STEP;
+            FROM_HERE: address = OFFSET_LOW;
+            SAMPLE: address = GAIN;
+            SUM: address = CODE_MIN;
+            ROUND: address = CODE_MAX;
+            HIGH_LIMIT: address = PARK_CODE;
+            TARGET, UPPER: address = MAX_STEP;
+            default: address = OFFSET_HIGH;
+        endcase
+    end
+
+    generate
+        if (INTERPOLATED) begin : interpolated
+            // phase = floor(k 2^32 / N), as dac_phase makes it, over three clocks.
+            reg [31:0] phase;
+            reg [PERIOD_BITS:0] rest;
+            reg wraps;
+            wire [PERIOD_BITS:0] sum = rest + {wrapping, word[PERIOD_BITS-1:0]} + {{PERIOD_BITS{1'b0}}, wrapping};
+            always @(posedge clock)
+                if (step == WAIT) begin
+                    if (tick && restart) begin
+                        phase <= 32'd0;
+                        rest <= 0;
+                    end
+                end else if (advances) begin
+                    if (step == REST || (wrapping && !sum[PERIOD_BITS])) rest <= sum;
+                    if (wrapping) wraps <= !sum[PERIOD_BITS];
+                    if (step == PHASE) phase <= phase + word + {31'd0, wraps};
+                end
+            assign index = phase[31 -: INDEX_BITS] + {{INDEX_BITS-1{1'b0}}, step == HERE};
+        end else begin : direct
+            reg [INDEX_BITS-1:0] count;
+            always @(posedge clock)
+                if (step == WAIT) begin
+                    if (tick && restart) count <= 0;
+                end else if (advances && step == PHASE)
+                    count <= count + 1;
+            assign index = count;
+        end
+    endgenerate
+
+    // sum = a + term, where the term is 0, m or 2 m, or less that.
+    reg signed [BITS-1:0] a, m;
+    reg [18:0] q;  // and below it the bit that went last
+    reg limited, is_low, is_high;
+    // Interpolation has here - there for a factor, and so subtracts it.
+    wire once = !shifts || q[1] != q[0];
+    wire twice = shifts && q[2] != q[1] && q[1] == q[0];
+    wire less = shifts ? q[2] ^ interpolates : subtracts || compares_above;
+    wire carry = shifts ? q[2] ^ interpolates : subtracts;
+    wire [BITS-1:0] size = (once ? m : {BITS{1'b0}}) | (twice ? {m[BITS-2:0], 1'b0} : {BITS{1'b0}});
+    wire signed [BITS-1:0] sum = a + (size ^ {BITS{less}}) + {{BITS-1{1'b0}}, carry};
+    wire beyond = compares_above ? !sum[BITS-1] : compares_below && sum[BITS-1];
+
+    wire [BITS+17:0] whole = {a, q[18:1]};
+    wire [BITS-1:0] table_wide = {{BITS-WORD_BITS{table_word[WORD_BITS-1]}}, table_word};
+    wire [31:0] word_sign = {32{word[25]}};
+    wire [BITS+31:0] word_wider = {{BITS{word[25]}}, word_sign[31:26], word[25:0]};
+    wire [BITS-1:0] word_wide = word_wider[BITS-1:0];
+    wire [BITS-1:0] step_word = {{BITS-DAC_BITS{1'b0}}, word[DAC_BITS-1:0]};
+    wire [SAMPLE_BITS-1:0] sample;
+    wire [14:0] fraction;
+    wire [BITS+17:0] rounded = $signed(whole) >>> GAIN_Q;
+    wire unused = &{wrapping, word, word_wider, word_sign, rounded};
+
+    always @(posedge clock) begin
+        case (step)
+            WAIT: begin
+                is_low <= 1'b0;
+                is_high <= 1'b0;
+                limited <= 1'b0;
+            end
+            HERE: a <= table_wide;
+            THERE: m <= table_wide;
+            DIFFERENCE: begin
+                m <= {sum[BITS-2:0], 1'b0};
+                a <= {{BITS-1{1'b0}}, 1'b1} << (15 - GUARD_BITS);
+                q <= {3'd0, fraction, 1'b0};
+            end
+            BACK: m <= table_wide;
+            FROM_HERE: a <= sum;
+            SAMPLE: begin
+                m <= {{BITS-SAMPLE_BITS{sample[SAMPLE_BITS-1]}}, sample};
+                a <= HIGH_HALF | {{BITS-19{1'b0}}, word[18:0]};
+            end
+            FACTOR: q <= {word[17:0], 1'b0};
+            HIGH: m <= word_wide;
+            SUM: a <= sum;
+            ROUND: begin
+                a <= rounded[BITS-1:0];
+                m <= word_wide;
+            end
+            LOW_LIMIT: begin
+                if (beyond) a <= m;
+                is_low <= beyond;
+                m <= word_wide;
+            end
+            HIGH_LIMIT: begin
+                if (beyond) a <= m;
+                is_high <= beyond;
+            end
+            TARGET: if (!running) a <= word_wide;
+            UPPER: m <= {{BITS-DAC_BITS{1'b0}}, code} + step_word;
+            HOLD_UPPER: begin
+                if (beyond) a <= m;
+                limited <= beyond;
+                m <= {{BITS-DAC_BITS{1'b0}}, code} - step_word;
+            end
+            HOLD_LOWER: begin
+                if (beyond) a <= m;
+                limited <= limited || beyond;
+            end
+            default: if (shifts) begin
+                a <= sum >>> 2;
+                q <= {sum[1:0], q[18:2]};
+            end
+        endcase
+    end
+
+    initial begin
+        done = 1'b0;
+        code = POWER_UP_CODE[DAC_BITS-1:0];
+        reached = 1'b0;
+        clamped = 1'b0;
+    end
+
+    always @(posedge clock) begin
+        done <= step == DONE;
+        if (step == DONE) begin
+            if (loaded) code <= a[DAC_BITS-1:0];
+            reached <= !loaded || !limited;
+            clamped <= running && (is_low || is_high);
+        end
+    end
+
+    generate
+        if (INTERPOLATED) begin : between
+            assign fraction = interpolated.phase[17-INDEX_BITS +: 15];
+            // a counts words, and the highest bits of q are what lies below.
+            assign sample = {a[WORD_BITS-1:0], q[18 -: GUARD_BITS]};
+        end else begin : exact
+            assign fraction = 15'd0;
+            assign sample = {table_word, {GUARD_BITS{1'b0}}};
+        end
+    endgenerate
+endmodule
+
+`default_nettype wire

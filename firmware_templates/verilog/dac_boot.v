@@ -1,0 +1,108 @@
+// Loads a program at power-up, from the memory files of a build; after that the host's writes pass through.
+//
+// With FOURIER = 0 X_FILE and Y_FILE are the tables, <name>_x.mem and <name>_y.mem; with FOURIER = 1 the Fourier words,
+// <name>_x_fourier.mem and <name>_y_fourier.mem, which take a few hundred bits of memory instead of many thousand, and which a
+// sequencer with FOURIER = 1 renders. PROGRAM_FILE is <name>_program.mem either way. It ends with a commit: arm and trigger are
+// the user's.
+
+`default_nettype none
+
+module dac_boot #(
+    parameter PROGRAM_FILE = "",
+    parameter X_FILE = "",
+    parameter Y_FILE = "",
+    parameter FOURIER = 0,
+    parameter X_WORDS = 2048,     // of X_FILE
+    parameter Y_WORDS = 2048,
+    parameter X_WORD_BITS = 16,   // of a word of X_FILE; 32 with FOURIER
+    parameter Y_WORD_BITS = 16,
+    parameter X_HARMONICS = 0,    // with FOURIER
+    parameter Y_HARMONICS = 0
+) (
+    input  wire        clock,
+    input  wire        reset,           // begins again
+    input  wire        host_write,
+    input  wire [2:0]  host_region,
+    input  wire [15:0] host_address,
+    input  wire [31:0] host_data,
+    input  wire        host_commit,
+    input  wire        writable,        // of the sequencer
+    output wire        write,
+    output wire [2:0]  write_region,
+    output wire [15:0] write_address,
+    output wire [31:0] write_data,
+    output wire        commit,
+    output reg         booting          // host writes are lost
+);
+    localparam PROGRAM_WORDS = 48;
+    localparam [31:0] LAST_PROGRAM = PROGRAM_WORDS - 1, LAST_X = X_WORDS - 1, LAST_Y = Y_WORDS - 1;
+    localparam [5:0] X_HARMONICS_AT = 6'd26, Y_HARMONICS_AT = 6'd42;
+    localparam [31:0] X_H = X_HARMONICS, Y_H = Y_HARMONICS;
+    localparam [1:0] PROGRAM = 2'd0, X = 2'd1, COMMIT = 2'd3;  // and 2 for y
+    localparam X_ADDRESS_BITS = X_WORDS > 1 ? $clog2(X_WORDS) : 1;
+    localparam Y_ADDRESS_BITS = Y_WORDS > 1 ? $clog2(Y_WORDS) : 1;
+
+    reg [31:0] program_words [0:PROGRAM_WORDS-1];
+    reg [X_WORD_BITS-1:0] x_words [0:X_WORDS-1];
+    reg [Y_WORD_BITS-1:0] y_words [0:Y_WORDS-1];
+    initial begin
+        if (PROGRAM_FILE != "") $readmemh(PROGRAM_FILE, program_words);
+        if (X_FILE != "") $readmemh(X_FILE, x_words);
+        if (Y_FILE != "") $readmemh(Y_FILE, y_words);
+    end
+
+    // A word is read on one clock and written on the next.
+    reg [1:0] reads, writes;
+    reg [16:0] read_at;
+    reg [15:0] write_at;
+    reg reading, writing;
+    reg [31:0] program_word;
+    reg [X_WORD_BITS-1:0] x_word;
+    reg [Y_WORD_BITS-1:0] y_word;
+    wire last = {15'd0, read_at} == (reads == PROGRAM ? LAST_PROGRAM : reads == X ? LAST_X : LAST_Y);
+
+    initial begin
+        reads = PROGRAM;
+        writes = PROGRAM;
+        read_at = 17'd0;
+        write_at = 16'd0;
+        reading = 1'b1;
+        writing = 1'b0;
+        booting = 1'b1;
+    end
+
+    always @(posedge clock) begin
+        program_word <= program_words[read_at[5:0]];
+        x_word <= x_words[read_at[X_ADDRESS_BITS-1:0]];
+        y_word <= y_words[read_at[Y_ADDRESS_BITS-1:0]];
+        writing <= reading && writable;
+        writes <= reads;
+        write_at <= read_at[15:0];
+        if (reset) begin
+            reads <= PROGRAM;
+            read_at <= 17'd0;
+            reading <= 1'b1;
+            writing <= 1'b0;
+            booting <= 1'b1;
+        end else if (reading && writable) begin
+            read_at <= last ? 17'd0 : read_at + 1;
+            if (last) reads <= reads + 1;
+            if (reads == COMMIT) reading <= 1'b0;
+        end else if (!reading && !writing)
+            booting <= 1'b0;
+    end
+
+    wire [X_WORD_BITS+31:0] x_wide = {{32{x_word[X_WORD_BITS-1]}}, x_word};
+    wire [Y_WORD_BITS+31:0] y_wide = {{32{y_word[Y_WORD_BITS-1]}}, y_word};
+    wire [31:0] program_data = FOURIER != 0 && write_at[5:0] == X_HARMONICS_AT ? X_H :
+                               FOURIER != 0 && write_at[5:0] == Y_HARMONICS_AT ? Y_H : program_word;
+    wire unused = &{read_at, x_wide, y_wide};
+
+    assign write = booting ? writing && writes != COMMIT : host_write;
+    assign write_region = !booting ? host_region : writes == PROGRAM ? 3'd0 : {1'b0, writes} + (FOURIER ? 3'd2 : 3'd0);
+    assign write_address = booting ? write_at : host_address;
+    assign write_data = !booting ? host_data : writes == PROGRAM ? program_data : writes == X ? x_wide[31:0] : y_wide[31:0];
+    assign commit = booting ? writing && writes == COMMIT : host_commit;
+endmodule
+
+`default_nettype wire

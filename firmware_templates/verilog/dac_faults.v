@@ -1,0 +1,33 @@
+// Sticky faults and their counters, which saturate. A fault on the clock of a clear stays.
+
+`default_nettype none
+
+module dac_faults #(
+    parameter FAULTS = 4,
+    parameter COUNT_BITS = 16
+) (
+    input  wire                         clock,
+    input  wire                         clear,
+    input  wire [FAULTS-1:0]            happens,
+    output reg  [FAULTS-1:0]            faults,
+    output reg  [FAULTS*COUNT_BITS-1:0] counts   // that of fault 0 lowest
+);
+    initial faults = 0;
+
+    always @(posedge clock) faults <= (clear ? {FAULTS{1'b0}} : faults) | happens;
+
+    genvar i;
+    generate
+        for (i = 0; i < FAULTS; i = i + 1) begin : counter
+            wire [COUNT_BITS-1:0] count = counts[i*COUNT_BITS +: COUNT_BITS];
+            initial counts[i*COUNT_BITS +: COUNT_BITS] = 0;
+            always @(posedge clock)
+                if (clear)
+                    counts[i*COUNT_BITS +: COUNT_BITS] <= {{COUNT_BITS-1{1'b0}}, happens[i]};
+                else if (happens[i] && count != {COUNT_BITS{1'b1}})
+                    counts[i*COUNT_BITS +: COUNT_BITS] <= count + 1;
+        end
+    endgenerate
+endmodule
+
+`default_nettype wire

@@ -1,0 +1,167 @@
+// The markers of a tick, three clocks after it: line, frame, pixel, direction, and whether it images.
+//
+// The outputs hold from tick to tick. Windows of x are in ticks of a line, those of y in lines of a frame.
+
+`default_nettype none
+
+module dac_markers #(
+    parameter TICK_BITS = 24,
+    parameter LINE_BITS = 16
+) (
+    input  wire                 clock,
+    input  wire                 write,
+    input  wire [3:0]           write_address,
+    input  wire [31:0]          write_data,
+    input  wire                 take,    // the tick of the next clock is the first one of a new program
+    input  wire                 load,    // that of this clock is
+    input  wire                 tick,
+    input  wire                 runs,
+    input  wire                 begins,
+    input  wire                 line,
+    input  wire                 frame,
+    input  wire [TICK_BITS-1:0] tick_number,
+    input  wire [LINE_BITS-1:0] line_number,
+    output reg                  line_marker,
+    output reg                  frame_marker,
+    output wire                 pixel_marker,
+    output reg                  backward_marker,
+    output reg                  images           // inside the windows, and settled
+);
+    localparam [3:0] SETTLE_LINES = 4'd2, TURN_TICK = 4'd3, FORWARD_FIRST = 4'd4, FORWARD_COUNT = 4'd5;
+    localparam [3:0] BACKWARD_FIRST = 4'd6, BACKWARD_COUNT = 4'd7, UP_FIRST = 4'd8, UP_COUNT = 4'd9;
+    localparam [3:0] DOWN_FIRST = 4'd10, DOWN_COUNT = 4'd11, PIXELS = 4'd12;
+
+    // Clock 1: equalities. Clock 2: states. Clock 3: pixels and outputs.
+    reg tick_1, tick_2, load_1;
+    initial begin
+        tick_1 = 0;
+        tick_2 = 0;
+        load_1 = 0;
+    end
+    reg runs_1, begins_1, line_1, frame_1, turn_1;
+    initial begin
+        runs_1 = 0;
+        begins_1 = 0;
+        line_1 = 0;
+        frame_1 = 0;
+        turn_1 = 0;
+    end
+    reg line_2, frame_2, runs_2, backward_2, settled_2;
+    initial begin
+        line_2 = 0;
+        frame_2 = 0;
+        runs_2 = 0;
+        backward_2 = 0;
+        settled_2 = 0;
+    end
+    always @(posedge clock) begin
+        tick_1 <= tick;
+        tick_2 <= tick_1;
+        load_1 <= load;
+    end
+
+    wire forward_opens, forward_imaging, backward_opens, backward_imaging, up_imaging, down_imaging;
+    wire unused_up, unused_down;
+    wire [LINE_BITS:0] unused_up_count, unused_down_count;
+    dac_window #(.BITS(TICK_BITS)) forward (
+        .clock(clock), .write_first(write && write_address == FORWARD_FIRST),
+        .write_count(write && write_address == FORWARD_COUNT), .data(write_data[TICK_BITS:0]), .load(take),
+        .valid(tick), .restart(line), .position(tick_number), .opens(forward_opens), .imaging(forward_imaging),
+        .idle_count(forward_count)
+    );
+    dac_window #(.BITS(TICK_BITS)) backward (
+        .clock(clock), .write_first(write && write_address == BACKWARD_FIRST),
+        .write_count(write && write_address == BACKWARD_COUNT), .data(write_data[TICK_BITS:0]), .load(take),
+        .valid(tick), .restart(line), .position(tick_number), .opens(backward_opens), .imaging(backward_imaging),
+        .idle_count(backward_count)
+    );
+    dac_window #(.BITS(LINE_BITS)) up (
+        .clock(clock), .write_first(write && write_address == UP_FIRST),
+        .write_count(write && write_address == UP_COUNT), .data(write_data[LINE_BITS:0]), .load(take),
+        .valid(tick && line), .restart(frame), .position(line_number), .opens(unused_up), .imaging(up_imaging),
+        .idle_count(unused_up_count)
+    );
+    dac_window #(.BITS(LINE_BITS)) down (
+        .clock(clock), .write_first(write && write_address == DOWN_FIRST),
+        .write_count(write && write_address == DOWN_COUNT), .data(write_data[LINE_BITS:0]), .load(take),
+        .valid(tick && line), .restart(frame), .position(line_number), .opens(unused_down), .imaging(down_imaging),
+        .idle_count(unused_down_count)
+    );
+
+    wire [TICK_BITS:0] turn_tick;
+    wire [7:0] settle_lines;
+    dac_register #(.BITS(TICK_BITS + 1)) turn_tick_word (
+        .clock(clock), .write(write && write_address == TURN_TICK), .data(write_data[TICK_BITS:0]), .load(take),
+        .value(turn_tick)
+    );
+    dac_register #(.BITS(8)) settle_lines_word (
+        .clock(clock), .write(write && write_address == SETTLE_LINES), .data(write_data[7:0]), .load(load),
+        .value(settle_lines)
+    );
+    wire [TICK_BITS:0] forward_count, backward_count;  // of the idle program
+    reg [TICK_BITS:0] idle_pixels, pixels;
+    initial begin
+        idle_pixels = 0;
+        pixels = 0;
+    end
+    reg signed [TICK_BITS+1:0] forward_less, backward_less;  // pixels less ticks of a window
+    initial begin
+        forward_less = 0;
+        backward_less = 0;
+    end
+    always @(posedge clock) begin
+        if (write && write_address == PIXELS) idle_pixels <= write_data[TICK_BITS:0];
+        if (load_1) begin
+            pixels <= idle_pixels;
+            forward_less <= $signed({1'b0, idle_pixels}) - $signed({1'b0, forward_count});
+            backward_less <= $signed({1'b0, idle_pixels}) - $signed({1'b0, backward_count});
+        end
+    end
+    dac_pixels #(.BITS(TICK_BITS)) pixel_starts (
+        .clock(clock), .tick(tick_2), .opens(forward_opens || backward_opens),
+        .imaging(runs_2 && (forward_imaging || backward_imaging)), .pixels(pixels),
+        .pixels_less_count(forward_imaging ? forward_less : backward_less), .pixel(pixel_marker)
+    );
+
+    reg [7:0] settle_left;  // lines to go, this one included
+    initial settle_left = 0;
+
+    initial begin
+        line_marker = 1'b0;
+        frame_marker = 1'b0;
+        backward_marker = 1'b0;
+        images = 1'b0;
+    end
+
+    always @(posedge clock) begin
+        if (tick) begin
+            runs_1 <= runs;
+            begins_1 <= begins;
+            line_1 <= line;
+            frame_1 <= frame;
+            turn_1 <= {1'b0, tick_number} == turn_tick;
+        end
+        if (tick_1) begin
+            runs_2 <= runs_1;
+            line_2 <= line_1;
+            frame_2 <= frame_1;
+            backward_2 <= turn_1 || (backward_2 && !line_1);
+            if (begins_1) begin
+                settle_left <= settle_lines;
+                settled_2 <= settle_lines == 0;
+            end else if (line_1) begin
+                settle_left <= settle_left == 0 ? 8'd0 : settle_left - 1;
+                settled_2 <= settle_left <= 1;
+            end
+        end
+        if (tick_2) begin
+            line_marker <= line_2;
+            frame_marker <= frame_2;
+            backward_marker <= runs_2 && backward_2;
+            images <= runs_2 && settled_2 && (forward_imaging || backward_imaging) && (up_imaging || down_imaging);
+        end
+    end
+    wire unused = &{unused_up, unused_down, unused_up_count, unused_down_count, write_data};
+endmodule
+
+`default_nettype wire

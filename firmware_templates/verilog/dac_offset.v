@@ -1,0 +1,40 @@
+// The offset of the output stage: a program register of two words, that plays less code_min and with a half added.
+//
+// Its low part is wanted with the product, its high part after it; each has a load of its own.
+
+`default_nettype none
+
+module dac_offset #(
+    parameter BITS = 38,       // of the sum, signed; 20 .. 44
+    parameter LOW_BITS = 20,
+    parameter GAIN_Q = 20,     // fraction bits
+    parameter CODE_BITS = 16
+) (
+    input  wire                     clock,
+    input  wire                     write_low,   // bits 17..0
+    input  wire                     write_high,  // the rest
+    input  wire [25:0]              data,
+    input  wire [CODE_BITS:0]       minus_min,   // -code_min of the idle program, signed
+    input  wire                     load_low,
+    input  wire                     load_high,
+    output reg  [LOW_BITS-1:0]      low,
+    output reg  [BITS-LOW_BITS-1:0] high
+);
+    wire unused = &data;
+    reg [BITS-1:0] idle;
+    wire [BITS-1:0] playing = idle + {{BITS-GAIN_Q-CODE_BITS-1{minus_min[CODE_BITS]}}, minus_min, 1'b1, {GAIN_Q-1{1'b0}}};
+
+    initial begin
+        low = 0;
+        high = 0;
+    end
+
+    always @(posedge clock) begin
+        if (write_low) idle[17:0] <= data[17:0];
+        if (write_high) idle[BITS-1:18] <= data[BITS-19:0];
+        if (load_low) low <= playing[LOW_BITS-1:0];
+        if (load_high) high <= playing[BITS-1:LOW_BITS];
+    end
+endmodule
+
+`default_nettype wire

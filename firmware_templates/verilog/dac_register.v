@@ -1,0 +1,29 @@
+// A program register: what the host writes waits in the idle word until `load` makes it the playing one.
+//
+// The two are separate flip-flops, so that all registers of a program change on the clock of their own `load`: in a
+// pipeline the load travels with the first sample of the new program, and every stage changes exactly with it.
+
+`default_nettype none
+
+module dac_register #(
+    parameter BITS = 32,
+    parameter [63:0] POWER_UP = 0  // the playing value before the first program
+) (
+    input  wire            clock,
+    input  wire            write,
+    input  wire [BITS-1:0] data,
+    input  wire            load,
+    output reg  [BITS-1:0] value
+);
+    reg [BITS-1:0] idle;
+    initial idle = 0;
+
+    initial value = POWER_UP[BITS-1:0];
+
+    always @(posedge clock) begin
+        if (write) idle <= data;
+        if (load) value <= idle;
+    end
+endmodule
+
+`default_nettype wire

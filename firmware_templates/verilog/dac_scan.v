@@ -1,0 +1,160 @@
+// The scan: one counter for both axes. It decides what the next tick is, and when a committed program is taken.
+//
+// Requests are pulses of one clock, and act after a tick of the same clock; where several come together the later in this
+// list has the last word: arm, trigger, park, reset. All outputs belong to the tick that `tick_out` announces, one clock
+// after `tick`. A line has at least 8 ticks.
+
+`default_nettype none
+
+module dac_scan #(
+    parameter TICK_BITS = 24,   // a line has at most 2^TICK_BITS ticks
+    parameter LINE_BITS = 16,   // a frame has at most 2^LINE_BITS lines
+    parameter FRAME_BITS = 16   // frames that can be counted
+) (
+    input  wire                  clock,
+    input  wire                  reset,
+    input  wire                  write,
+    input  wire [3:0]            write_address,
+    input  wire [31:0]           write_data,
+    input  wire                  tick,
+    input  wire                  arm,
+    input  wire [FRAME_BITS-1:0] arm_frames,  // with arm; 0 is without end
+    input  wire                  trigger,
+    input  wire                  park,
+    input  wire                  committed,   // a program waits to be taken
+    input  wire                  loaded,      // there is a program to play
+    output wire                  take,        // it is taken by the tick of this clock
+    output reg                   armed,
+    output reg                   running,     // the next tick will play
+    // of the tick that was
+    output reg                   tick_out,
+    output reg                   load,        // the first one of a new program
+    output reg                   runs,        // a scan plays
+    output reg                   begins,      // a scan or a program begins with it
+    output reg                   line,        // the first tick of a line
+    output reg                   frame,       // and of a frame
+    output reg                   y_advance,   // y goes on by one advance
+    output reg [TICK_BITS-1:0]   tick_number,
+    output reg [LINE_BITS-1:0]   line_number
+);
+    localparam [3:0] LINE_TICKS = 4'd0, FRAME_LINES = 4'd1, Y_STEPS = 4'd13;
+
+    // The program. Numbers of ticks and lines are kept as what the counters are compared with.
+    reg [TICK_BITS:0] idle_ticks;
+    initial idle_ticks = 0;
+    reg [LINE_BITS:0] idle_lines;
+    initial idle_lines = 0;
+    reg [TICK_BITS-1:0] next_to_last_tick;
+    initial next_to_last_tick = 0;
+    reg [LINE_BITS-1:0] last_line_number;
+    initial last_line_number = 0;
+    wire [TICK_BITS:0] less_two = idle_ticks - 2;
+    wire [LINE_BITS:0] less_one = idle_lines - 1;
+    wire unused = &{less_two[TICK_BITS], less_one[LINE_BITS], write_data};
+    wire y_steps;
+    dac_register #(.BITS(1)) y_steps_word (
+        .clock(clock), .write(write && write_address == Y_STEPS), .data(write_data[0]), .load(take), .value(y_steps)
+    );
+    always @(posedge clock) begin
+        if (write && write_address == LINE_TICKS) idle_ticks <= write_data[TICK_BITS:0];
+        if (write && write_address == FRAME_LINES) idle_lines <= write_data[LINE_BITS:0];
+        if (take) begin
+            next_to_last_tick <= less_two[TICK_BITS-1:0];
+            last_line_number <= less_one[LINE_BITS-1:0];
+        end
+    end
+
+    // The tick to come.
+    reg [TICK_BITS-1:0] at_tick;
+    initial at_tick = 0;
+    reg [LINE_BITS-1:0] at_line;
+    initial at_line = 0;
+    reg first, last;              // of its line
+    initial begin
+        first = 1;
+        last = 0;
+    end
+    reg top;                          // its line is the first of the frame
+    initial top = 1;
+    reg bottom, last_frame;            // its line, its frame is the last one; known soon after a line begins
+    initial begin
+        bottom = 0;
+        last_frame = 0;
+    end
+    reg starts;                       // a trigger was taken
+    initial starts = 0;
+    reg endless;
+    initial endless = 0;
+    reg [FRAME_BITS-1:0] frames_left, armed_frames;
+    initial begin
+        frames_left = 0;
+        armed_frames = 0;
+    end
+
+    assign take = tick && committed && (!running || first);
+    wire plays = tick && running;
+    wire fresh = starts || take;
+    wire frame_ends = plays && last && bottom && !fresh;
+    wire still_running = running && !(frame_ends && last_frame);
+    wire go = trigger && (armed || arm) && (loaded || take) && !still_running;
+
+    initial begin
+        armed = 1'b0;
+        running = 1'b0;
+        tick_out = 1'b0;
+        load = 1'b0;
+        runs = 1'b0;
+    end
+
+    always @(posedge clock) begin
+        tick_out <= tick;
+        load <= take;
+        runs <= plays;
+        begins <= plays && fresh;
+        line <= plays && first;
+        frame <= plays && first && (fresh || top);
+        tick_number <= at_tick;
+        line_number <= fresh ? {LINE_BITS{1'b0}} : at_line;
+
+        if (plays) begin
+            starts <= 1'b0;
+            first <= last;
+            last <= at_tick == next_to_last_tick;
+            at_tick <= last ? {TICK_BITS{1'b0}} : at_tick + 1;
+            if (fresh) begin
+                at_line <= 0;
+                top <= 1'b1;
+            end else if (last) begin
+                at_line <= bottom ? {LINE_BITS{1'b0}} : at_line + 1;
+                top <= bottom;
+            end
+            if (frame_ends) frames_left <= frames_left - 1;
+        end
+        bottom <= at_line == last_line_number;
+        last_frame <= frames_left == 1 && !endless;
+
+        // Requests.
+        if (arm) begin
+            armed <= 1'b1;
+            armed_frames <= arm_frames;
+        end
+        if (go) begin
+            armed <= 1'b0;
+            frames_left <= arm ? arm_frames : armed_frames;
+            endless <= arm ? arm_frames == 0 : armed_frames == 0;
+            at_tick <= 0;
+            at_line <= 0;
+            first <= 1'b1;
+            last <= 1'b0;
+            starts <= 1'b1;
+        end
+        if (park || reset) armed <= 1'b0;
+        running <= (still_running || go) && !park && !reset;
+    end
+
+    always @(posedge clock)
+        // Where y steps it goes on with a new line; otherwise with every tick.
+        y_advance <= plays && (first || !y_steps);
+endmodule
+
+`default_nettype wire

@@ -1,0 +1,296 @@
+// The two-axis DAC sequencer: plays compensated scan lines, changes programs at line starts, and says what it did.
+//
+//   host    writes the idle program (`write`, while `writable`), then `commit`: it is taken on both axes by the first tick of a
+//           line, or by the next tick while nothing plays. docs/verilog.md has the map of the words.
+//   scan    `arm` and `trigger` start frames, `park` and `reset` end them; codes always move under the slew guard.
+//   tick    one clock long, at the converter's update rate. Codes and markers of a tick leave together, with `strobe`,
+//           LATENCY clocks after it (LOW_AREA: as soon as they are ready; `busy` until then).
+//
+// What happens on which tick, and every bit of every code, is docs/sequencer.md. All inputs belong to `clock`; those that do
+// not must be synchronised outside. The design relies on power-up values of its registers, as FPGAs have them: a reset
+// must not move a code.
+
+`default_nettype none
+
+module dac_sequencer #(
+    parameter DAC_BITS = 16,
+    parameter X_INTERPOLATED = 1,    // 0: a table word an advance
+    parameter X_INDEX_BITS = 11,     // a bank holds 2^X_INDEX_BITS words; an interpolated table has exactly so many
+    parameter X_WORD_BITS = 16,
+    parameter Y_INTERPOLATED = 1,
+    parameter Y_INDEX_BITS = 11,
+    parameter Y_WORD_BITS = 16,
+    parameter TICK_BITS = 24,        // a line has at most 2^TICK_BITS ticks
+    parameter LINE_BITS = 16,        // a frame has at most 2^LINE_BITS lines
+    parameter PERIOD_BITS = 31,      // a period has less than 2^PERIOD_BITS advances
+    parameter COUNT_BITS = 16,       // of a fault counter
+    parameter PLAIN_MULTIPLIER = 0,  // 1: `*`, for multiplier blocks; 0: look-up tables
+    parameter LOW_AREA = 0,          // 1: some 50 clocks a sample, in a third of the area
+    parameter FOURIER = 0,           // 1: renders tables from Fourier words
+    parameter HARMONICS = 64,        // at most, with FOURIER
+    parameter SINE_FILE = "",        // with FOURIER: quarter sine of the longer table
+    parameter [63:0] X_POWER_UP_CODE = 0,  // what the converters put out before the first program
+    parameter [63:0] Y_POWER_UP_CODE = 0
+) (
+    input  wire                    clock,
+    input  wire                    reset,
+    // the idle program
+    input  wire                    write,
+    input  wire [2:0]              write_region,   // 0 program, 1 x table, 2 y table, 3 x Fourier words, 4 y Fourier words
+    input  wire [15:0]             write_address,
+    input  wire [31:0]             write_data,
+    output wire                    writable,       // otherwise a write is refused
+    output reg                     refused,        // a write was; until the faults are cleared
+    input  wire                    commit,
+    input  wire                    withdraw,
+    output wire                    committed,
+    // requests
+    input  wire                    arm,
+    input  wire [15:0]             arm_frames,     // 0: without end
+    input  wire                    trigger,
+    input  wire                    park,
+    input  wire                    clear_faults,
+    output wire                    armed,
+    output wire                    running,        // the next tick will play
+    // samples
+    input  wire                    tick,
+    input  wire                    underrun,       // an output could not take a sample in time: counts as a fault
+    output wire                    busy,
+    output wire                    strobe,
+    output wire [DAC_BITS-1:0]     x_code,
+    output wire [DAC_BITS-1:0]     y_code,
+    output wire                    line_marker,
+    output wire                    frame_marker,
+    output wire                    pixel_marker,
+    output wire                    backward_marker,
+    output wire                    valid_marker,
+    output wire                    swapped_marker,
+    output wire                    playing,
+    output wire                    parked,
+    output wire [3:0]              faults,         // slew, clamp, overrun, underrun
+    output wire [4*COUNT_BITS-1:0] fault_counts
+);
+    localparam [2:0] PROGRAM = 3'd0, X_TABLE = 3'd1, Y_TABLE = 3'd2, X_FOURIER = 3'd3, Y_FOURIER = 3'd4;
+    localparam [3:0] AXIS_HARMONICS = 4'd10;
+    localparam [11:0] SCAN_PAGE = 12'd0, X_PAGE = 12'd1, Y_PAGE = 12'd2;
+    localparam LATENCY = PLAIN_MULTIPLIER ? 22 : 34;
+    localparam MARKERS_AT = 3;
+    localparam X_PERIOD_BITS = TICK_BITS + 1;  // a line
+
+    // Writes, a clock late and only into the idle bank; a commit is as late, so that it never overtakes one.
+    wire idle_writable, rendered, rendering;
+    reg host_write, host_commit;
+    initial begin
+        host_write = 0;
+        host_commit = 0;
+    end
+    reg [2:0] region;
+    initial region = 0;
+    reg [15:0] address;
+    initial address = 0;
+    reg [31:0] data;
+    initial data = 0;
+    assign writable = idle_writable && !rendering && !host_commit;
+    initial refused = 1'b0;
+    always @(posedge clock) begin
+        host_write <= write && writable;
+        host_commit <= commit && writable && !withdraw && !reset;
+        region <= write_region;
+        address <= write_address;
+        data <= write_data;
+        if (write && !writable)
+            refused <= 1'b1;
+        else if (clear_faults || reset)
+            refused <= 1'b0;
+    end
+    wire scan_write = host_write && region == PROGRAM && address[15:4] == SCAN_PAGE;
+    wire x_write = host_write && region == PROGRAM && address[15:4] == X_PAGE;
+    wire y_write = host_write && region == PROGRAM && address[15:4] == Y_PAGE;
+    wire x_table_write, y_table_write;
+    wire [15:0] table_address;
+    wire [23:0] table_data;
+    wire unused_bits = &{table_address, table_data};  // a table has as many words, of as many bits, as it has
+
+    wire bank, loaded, take, drained;
+    dac_bank banks (
+        .clock(clock), .reset(reset), .commit(rendered), .withdraw(withdraw), .take(take), .drained(drained),
+        .bank(bank), .committed(committed), .loaded(loaded), .writable(idle_writable)
+    );
+
+    wire accepted_tick = tick && !busy;
+    wire tick_0, load_0, runs_0, begins_0, line_0, frame_0, y_advance_0;
+    wire [TICK_BITS-1:0] tick_number;
+    wire [LINE_BITS-1:0] line_number;
+    dac_scan #(.TICK_BITS(TICK_BITS), .LINE_BITS(LINE_BITS), .FRAME_BITS(16)) scan (
+        .clock(clock), .reset(reset), .write(scan_write), .write_address(address[3:0]), .write_data(data),
+        .tick(accepted_tick), .arm(arm), .arm_frames(arm_frames), .trigger(trigger), .park(park),
+        .committed(committed), .loaded(loaded), .take(take), .armed(armed), .running(running),
+        .tick_out(tick_0), .load(load_0), .runs(runs_0), .begins(begins_0), .line(line_0), .frame(frame_0),
+        .y_advance(y_advance_0), .tick_number(tick_number), .line_number(line_number)
+    );
+
+    // The request to clear faults goes with the next tick, as everything that decides about a tick does.
+    reg clear_waits, clears_0;
+    initial begin
+        clear_waits = 0;
+        clears_0 = 0;
+    end
+    always @(posedge clock) begin
+        clear_waits <= clear_faults || reset || (clear_waits && !accepted_tick);
+        if (accepted_tick) clears_0 <= clear_waits;
+    end
+
+    wire line_3, frame_3, pixel_3, backward_3, images_3;
+    dac_markers #(.TICK_BITS(TICK_BITS), .LINE_BITS(LINE_BITS)) markers (
+        .clock(clock), .write(scan_write), .write_address(address[3:0]), .write_data(data), .take(take), .load(load_0),
+        .tick(tick_0), .runs(runs_0), .begins(begins_0), .line(line_0), .frame(frame_0), .tick_number(tick_number),
+        .line_number(line_number), .line_marker(line_3), .frame_marker(frame_3), .pixel_marker(pixel_3),
+        .backward_marker(backward_3), .images(images_3)
+    );
+
+    wire done, x_reached, y_reached, x_clamped, y_clamped, overrun;
+    wire runs_done, begins_done, swapped_done, clears_done;
+    wire line_done, frame_done, pixel_done, backward_done, images_done;
+    wire [DAC_BITS-1:0] x, y;
+
+    generate
+        if (LOW_AREA) begin : low_area
+            wire x_done, y_done;
+            reg works;
+            initial works = 1'b0;
+            always @(posedge clock) works <= accepted_tick || (works && !done);
+            assign busy = works;
+            assign overrun = tick && busy;
+            assign done = x_done;  // y takes as many clocks
+            assign drained = done;
+            // These hold until the next tick.
+            reg runs, begins, swapped;
+            always @(posedge clock)
+                if (tick_0) begin
+                    runs <= runs_0;
+                    begins <= begins_0;
+                    swapped <= load_0;
+                end
+            assign runs_done = runs;
+            assign begins_done = begins;
+            assign swapped_done = swapped;
+            assign clears_done = clears_0;
+            assign {line_done, frame_done, pixel_done, backward_done, images_done} =
+                {line_3, frame_3, pixel_3, backward_3, images_3};
+            wire unused = &{y_done};
+
+            dac_axis_serial #(
+                .INTERPOLATED(X_INTERPOLATED), .INDEX_BITS(X_INDEX_BITS), .WORD_BITS(X_WORD_BITS), .DAC_BITS(DAC_BITS),
+                .PERIOD_BITS(X_PERIOD_BITS), .POWER_UP_CODE(X_POWER_UP_CODE)
+            ) x_axis (
+                .clock(clock), .write(x_write), .write_address(address[3:0]), .write_data(data),
+                .table_write(x_table_write), .table_address(table_address[X_INDEX_BITS-1:0]),
+                .table_data(table_data[X_WORD_BITS-1:0]), .bank(bank), .loaded(loaded), .tick(tick_0), .restart(line_0),
+                .advance(runs_0), .running(runs), .done(x_done), .code(x), .reached(x_reached), .clamped(x_clamped)
+            );
+            dac_axis_serial #(
+                .INTERPOLATED(Y_INTERPOLATED), .INDEX_BITS(Y_INDEX_BITS), .WORD_BITS(Y_WORD_BITS), .DAC_BITS(DAC_BITS),
+                .PERIOD_BITS(PERIOD_BITS), .POWER_UP_CODE(Y_POWER_UP_CODE)
+            ) y_axis (
+                .clock(clock), .write(y_write), .write_address(address[3:0]), .write_data(data),
+                .table_write(y_table_write), .table_address(table_address[Y_INDEX_BITS-1:0]),
+                .table_data(table_data[Y_WORD_BITS-1:0]), .bank(bank), .loaded(loaded), .tick(tick_0), .restart(frame_0),
+                .advance(y_advance_0), .running(runs), .done(y_done), .code(y), .reached(y_reached), .clamped(y_clamped)
+            );
+        end else begin : pipelined
+            // Flag i is that of the tick i clocks ago.
+            reg [LATENCY-1:0] ticks, loads, runnings;
+            initial begin
+                ticks = 0;
+                loads = 0;
+                runnings = 0;
+            end
+            wire [LATENCY:0] ticks_now = {ticks, tick_0};
+            wire [LATENCY:0] loads_now = {loads, load_0};
+            wire [LATENCY:0] runnings_now = {runnings, runs_0};
+            always @(posedge clock) begin
+                ticks <= ticks_now[LATENCY-1:0];
+                loads <= loads_now[LATENCY-1:0];
+                runnings <= runnings_now[LATENCY-1:0];
+            end
+            assign busy = 1'b0;
+            assign overrun = 1'b0;
+            assign done = ticks_now[LATENCY];
+            assign runs_done = runnings_now[LATENCY];
+            assign swapped_done = loads_now[LATENCY];
+            assign drained = loads_now[LATENCY];
+
+            dac_delay #(.BITS(2), .CLOCKS(LATENCY)) with_tick (
+                .clock(clock), .in({begins_0, clears_0}), .out({begins_done, clears_done})
+            );
+            dac_delay #(.BITS(5), .CLOCKS(LATENCY - MARKERS_AT)) with_markers (
+                .clock(clock), .in({line_3, frame_3, pixel_3, backward_3, images_3}),
+                .out({line_done, frame_done, pixel_done, backward_done, images_done})
+            );
+            dac_axis #(
+                .INTERPOLATED(X_INTERPOLATED), .INDEX_BITS(X_INDEX_BITS), .WORD_BITS(X_WORD_BITS), .DAC_BITS(DAC_BITS),
+                .PERIOD_BITS(X_PERIOD_BITS), .PLAIN_MULTIPLIER(PLAIN_MULTIPLIER), .POWER_UP_CODE(X_POWER_UP_CODE)
+            ) x_axis (
+                .clock(clock), .write(x_write), .write_address(address[3:0]), .table_write(x_table_write),
+                .table_address(table_address[X_INDEX_BITS-1:0]), .write_data(data), .table_data(table_data[X_WORD_BITS-1:0]),
+                .take(take), .ticks(ticks_now[LATENCY-4:0]), .loads(loads_now[LATENCY-4:0]), .runnings(runnings_now[LATENCY-4:0]),
+                .bank(bank), .restart(line_0), .advance(runs_0), .code(x), .reached(x_reached), .clamped(x_clamped)
+            );
+            dac_axis #(
+                .INTERPOLATED(Y_INTERPOLATED), .INDEX_BITS(Y_INDEX_BITS), .WORD_BITS(Y_WORD_BITS), .DAC_BITS(DAC_BITS),
+                .PERIOD_BITS(PERIOD_BITS), .PLAIN_MULTIPLIER(PLAIN_MULTIPLIER), .POWER_UP_CODE(Y_POWER_UP_CODE)
+            ) y_axis (
+                .clock(clock), .write(y_write), .write_address(address[3:0]), .table_write(y_table_write),
+                .table_address(table_address[Y_INDEX_BITS-1:0]), .write_data(data), .table_data(table_data[Y_WORD_BITS-1:0]),
+                .take(take), .ticks(ticks_now[LATENCY-4:0]), .loads(loads_now[LATENCY-4:0]), .runnings(runnings_now[LATENCY-4:0]),
+                .bank(bank), .restart(frame_0), .advance(y_advance_0), .code(y), .reached(y_reached), .clamped(y_clamped)
+            );
+        end
+    endgenerate
+
+    dac_verdict #(
+        .DAC_BITS(DAC_BITS), .COUNT_BITS(COUNT_BITS), .X_POWER_UP_CODE(X_POWER_UP_CODE), .Y_POWER_UP_CODE(Y_POWER_UP_CODE)
+    ) verdict (
+        .clock(clock), .tick(done), .runs(runs_done), .begins(begins_done), .swapped(swapped_done), .clears(clears_done),
+        .line(line_done), .frame(frame_done), .pixel(pixel_done), .backward(backward_done), .images(images_done),
+        .x(x), .y(y), .reached(x_reached && y_reached), .clamped(x_clamped || y_clamped), .overrun(overrun),
+        .underrun(underrun), .strobe(strobe), .x_code(x_code), .y_code(y_code), .line_marker(line_marker),
+        .frame_marker(frame_marker), .pixel_marker(pixel_marker), .backward_marker(backward_marker),
+        .valid_marker(valid_marker), .swapped_marker(swapped_marker), .playing(playing), .parked(parked), .faults(faults),
+        .fault_counts(fault_counts)
+    );
+
+    generate
+        if (FOURIER) begin : fourier
+            wire x_rendered, y_rendered;
+            wire [15:0] rendered_address;
+            wire [23:0] rendered_data;
+            dac_render #(
+                .X_INDEX_BITS(X_INDEX_BITS), .Y_INDEX_BITS(Y_INDEX_BITS), .X_WORD_BITS(X_WORD_BITS),
+                .Y_WORD_BITS(Y_WORD_BITS), .HARMONICS(HARMONICS), .SINE_FILE(SINE_FILE), .MULTIPLIER(PLAIN_MULTIPLIER)
+            ) render (
+                .clock(clock), .cancel(reset || withdraw),
+                .write_x_harmonics(x_write && address[3:0] == AXIS_HARMONICS),
+                .write_y_harmonics(y_write && address[3:0] == AXIS_HARMONICS),
+                .write_x_word(host_write && region == X_FOURIER), .write_y_word(host_write && region == Y_FOURIER),
+                .write_address(address[10:0]), .write_data(data), .commit(host_commit), .rendered(rendered),
+                .rendering(rendering), .x_write(x_rendered), .y_write(y_rendered), .address(rendered_address),
+                .data(rendered_data)
+            );
+            assign x_table_write = x_rendered || (host_write && region == X_TABLE);
+            assign y_table_write = y_rendered || (host_write && region == Y_TABLE);
+            assign table_address = rendering ? rendered_address : address;
+            assign table_data = rendering ? rendered_data : data[23:0];
+        end else begin : uploaded
+            assign rendered = host_commit;
+            assign rendering = 1'b0;
+            assign x_table_write = host_write && region == X_TABLE;
+            assign y_table_write = host_write && region == Y_TABLE;
+            assign table_address = address;
+            assign table_data = data[23:0];
+            wire unused_parameters = &{X_FOURIER, Y_FOURIER, AXIS_HARMONICS, HARMONICS[0], SINE_FILE};
+        end
+    endgenerate
+endmodule
+
+`default_nettype wire

@@ -1,0 +1,53 @@
+// The two-bank table memory of an axis: the bank that plays is read, the other one is written.
+//
+// Even and odd words are in memories of their own, so that two neighbouring words are read on one clock from block RAM
+// with one read port. `here` is word `index`, `there` the one after it, and after the last the first; both are there
+// three clocks after `index`.
+
+`default_nettype none
+
+module dac_table #(
+    parameter WORD_BITS = 16,
+    parameter INDEX_BITS = 11  // a bank holds 2^INDEX_BITS words; at least 2
+) (
+    input  wire                         clock,
+    input  wire                         write,
+    input  wire                         write_bank,
+    input  wire [INDEX_BITS-1:0]        write_index,
+    input  wire [WORD_BITS-1:0]         write_data,
+    input  wire                         read_bank,
+    input  wire [INDEX_BITS-1:0]        index,
+    output reg  signed [WORD_BITS-1:0]  here,
+    output reg  signed [WORD_BITS-1:0]  there
+);
+    localparam ROW_BITS = INDEX_BITS - 1;
+
+    reg [WORD_BITS-1:0] even_words [0:(1<<INDEX_BITS)-1];
+    reg [WORD_BITS-1:0] odd_words [0:(1<<INDEX_BITS)-1];
+
+    reg [ROW_BITS:0] even_row, odd_row;
+    reg [WORD_BITS-1:0] even_word, odd_word;
+    reg odd_at_row, odd_at_word;
+
+    wire [ROW_BITS-1:0] next_row = index[INDEX_BITS-1:1] + {{ROW_BITS-1{1'b0}}, index[0]};
+
+    always @(posedge clock) begin
+        if (write && !write_index[0]) even_words[{write_bank, write_index[INDEX_BITS-1:1]}] <= write_data;
+        if (write && write_index[0]) odd_words[{write_bank, write_index[INDEX_BITS-1:1]}] <= write_data;
+    end
+
+    always @(posedge clock) begin
+        even_row <= {read_bank, next_row};
+        odd_row <= {read_bank, index[INDEX_BITS-1:1]};
+        odd_at_row <= index[0];
+
+        even_word <= even_words[even_row];
+        odd_word <= odd_words[odd_row];
+        odd_at_word <= odd_at_row;
+
+        here <= odd_at_word ? odd_word : even_word;
+        there <= odd_at_word ? even_word : odd_word;
+    end
+endmodule
+
+`default_nettype wire

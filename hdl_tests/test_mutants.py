@@ -1,0 +1,27 @@
+"""Tests of the tests: every mutant of the Verilog is found by the bench that plays it; the Verilog itself is not."""
+
+from pathlib import Path
+
+import pytest
+from stream_mutants import BENCHES, MUTANTS, Mutant, Verdict, bench_of, judge_all, script_of
+
+
+@pytest.fixture(scope="module")
+def verdicts(tmp_path_factory: pytest.TempPathFactory) -> dict[Mutant, Verdict]:
+    return dict(judge_all(tmp_path_factory.mktemp("mutants")))
+
+
+@pytest.mark.parametrize("name", BENCHES)
+def test_the_verilog_as_it_is_passes(name: str, tmp_path: Path) -> None:
+    played = bench_of(name, tmp_path).play(script_of(name))
+    assert played.equal, played
+
+
+def test_no_mutant_is_listed_twice() -> None:
+    assert len({(mutant.module, mutant.old, mutant.new, mutant.bench) for mutant in MUTANTS}) == len(MUTANTS) > 100
+
+
+@pytest.mark.parametrize("mutant", MUTANTS, ids=lambda mutant: f"{mutant.module}: {mutant.breaks}")
+def test_every_mutant_is_found(mutant: Mutant, verdicts: dict[Mutant, Verdict]) -> None:
+    assert mutant.source != ""
+    assert verdicts[mutant].killed

@@ -1,0 +1,135 @@
+"""Synthesis: no latch, no net with two drivers, and the areas and rates that docs/resources.md gives.
+
+What is placed and routed takes long, so every run measures the two axes at one seed and the multipliers of each family;
+``-m slow`` measures the whole page again. The page is held against the requirements every time.
+"""
+
+import re
+import subprocess
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+sys.path.insert(0, str(ROOT / "benchmarks"))
+import resources  # noqa: E402
+
+MODULES = resources.MODULES
+CHECKED: dict[str, tuple[str, Mapping[str, int]]] = {
+    "as_it_comes": ("dac_sequencer", {}),
+    "multiplier_blocks": ("dac_sequencer", {"PLAIN_MULTIPLIER": 1}),
+    "direct": ("dac_sequencer", {"X_INTERPOLATED": 0, "Y_INTERPOLATED": 0}),
+    "low_area": ("dac_sequencer", {"LOW_AREA": 1, "X_POWER_UP_CODE": 32768}),
+    "low_area_direct": ("dac_sequencer", {"LOW_AREA": 1, "X_INTERPOLATED": 0}),
+    "fourier": ("dac_sequencer", {"FOURIER": 1}),
+    "low_area_fourier": ("dac_sequencer", {"LOW_AREA": 1, "FOURIER": 1}),
+    "narrow": ("dac_sequencer", {"DAC_BITS": 8, "X_WORD_BITS": 8, "Y_WORD_BITS": 8, "TICK_BITS": 8, "LINE_BITS": 4}),
+    "wide": ("dac_sequencer", {"DAC_BITS": 24, "X_WORD_BITS": 24, "Y_WORD_BITS": 24, "PLAIN_MULTIPLIER": 1}),
+    "wide_words": ("dac_sequencer", {"DAC_BITS": 8, "X_WORD_BITS": 24, "Y_WORD_BITS": 20}),
+    "wide_codes": ("dac_sequencer", {"DAC_BITS": 24, "X_WORD_BITS": 8, "Y_WORD_BITS": 12, "LOW_AREA": 1}),
+    "spi": ("dac_spi", {}),
+    "spi_chain": ("dac_spi", {"TOPOLOGY": 3, "FRAME_BITS": 24, "WORD_BITS": 20, "HALF_PERIOD": 3, "CPHA": 1}),
+    "spi_two_channels": ("dac_spi", {"TOPOLOGY": 1, "FRAME_BITS": 24, "LDAC_CLOCKS": 0}),
+    "axi_stream": ("dac_axi_stream", {"WORD_BITS": 20}),
+    "fourier_renderer": ("dac_fourier", {"MULTIPLIER": 1}),
+    "coding": ("dac_coding", {}),
+    "boot": ("dac_boot", {}),
+}
+
+
+def check(top: str, parameters: Mapping[str, int], folder: Path = MODULES) -> subprocess.CompletedProcess[str]:
+    values = " ".join(f"-chparam {name} {value}" for name, value in parameters.items())
+    script = (
+        f"read_verilog -defer {folder}/dac_*.v; hierarchy -check -top {top} {values}; proc; opt; check -assert; "
+        "select -assert-none t:$dlatch t:$adlatch t:$dlatchsr t:$sr t:$_DLATCH_* t:$_SR_*"
+    )
+    return subprocess.run(["yosys", "-q", "-p", script], capture_output=True, text=True)
+
+
+@pytest.mark.parametrize("name", CHECKED)
+def test_has_no_latch_and_no_conflict(name: str) -> None:
+    done = check(*CHECKED[name])
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize(
+    ("text", "instead"),
+    [
+        (
+            "assign writable = !committed && !draining;",
+            "reg w; assign writable = w; always @* if (take) w = committed;",
+        ),
+        ("assign writable = !committed && !draining;", "assign writable = !committed; assign writable = !draining;"),
+        ("assign writable = !committed && !draining;", "assign writable = !writable && !draining;"),
+    ],
+    ids=["latch", "two_drivers", "loop"],
+)
+def test_a_fault_would_be_seen(text: str, instead: str, tmp_path: Path) -> None:
+    for path in MODULES.glob("dac_*.v"):
+        (tmp_path / path.name).write_text(path.read_text("utf-8"), "utf-8")
+    bank = tmp_path / "dac_bank.v"
+    assert bank.read_text("utf-8").count(text) == 1
+    bank.write_text(bank.read_text("utf-8").replace(text, instead), "utf-8")
+    assert check("dac_sequencer", {}, tmp_path).returncode != 0
+
+
+# The page.
+def page() -> dict[str, list[str]]:
+    """The rows of docs/resources.md by the name of their case."""
+    text = resources.PAGE.read_text("utf-8").partition(resources.BEGIN)[2].partition(resources.END)[0]
+    rows = text.splitlines()[2:]
+    assert len(rows) == len(resources.CASES), "run `make resources`"
+    return {
+        name: [cell.strip() for cell in row.split("|")[1:-1]] for name, row in zip(resources.CASES, rows, strict=True)
+    }
+
+
+def holds(name: str, cells: int | None, mhz: float | None, multipliers: int) -> None:
+    case = resources.CASES[name]
+    if case.most_cells is not None:
+        assert cells is not None
+        assert cells <= case.most_cells
+    if case.least_mhz is not None:
+        assert mhz is not None
+        assert mhz >= case.least_mhz
+    if case.most_multipliers is not None:
+        assert multipliers <= case.most_multipliers
+
+
+@pytest.mark.parametrize("name", resources.CASES)
+def test_page_meets_the_requirements(name: str) -> None:
+    row = page()[name]
+    holds(name, int(row[4] or 0), float(row[9] or 0), int(row[8]))
+
+
+def pinned() -> bool:
+    """The tools are those of the page; with others, only the requirements hold."""
+    version = subprocess.run(["yosys", "-V"], capture_output=True, text=True, check=True).stdout
+    return re.match(r"Yosys 0\.23 ", version) is not None
+
+
+@pytest.mark.parametrize(
+    "name", ["axis", "axis_serial", "axis_ECP5_16", "axis_ECP5_24", "axis_7-series_16", "axis_7-series_24"]
+)
+def test_meets_the_requirements(name: str) -> None:
+    """At the first seed: the cells are near those of the page, the rate is at least that of its slowest seed."""
+    result = resources.measure(resources.CASES[name], resources.SEEDS[:1])
+    row = page()[name]
+    holds(name, result.cells, result.mhz, result.counts["multipliers"])
+    if pinned():
+        assert [str(result.counts[kind]) for kind in ("LUT", "FF", "RAM", "multipliers")] == row[5:9]
+    if pinned() and result.cells is not None and result.mhz is not None:
+        assert abs(result.cells - int(row[4])) <= 10  # packing depends on the seed
+        assert result.mhz >= int(row[9]) - 0.5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", resources.CASES)
+def test_page_is_what_is_measured(name: str) -> None:
+    case = resources.CASES[name]
+    result = resources.measure(case)
+    holds(name, result.cells, result.mhz, result.counts["multipliers"])
+    if pinned():
+        assert resources.row(case, result) in resources.PAGE.read_text("utf-8").splitlines()

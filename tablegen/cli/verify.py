@@ -1,0 +1,183 @@
+"""``tablegen verify``: the emitted sequencer in a simulator, against the manifest."""
+
+import os
+import signal
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING, Literal
+
+import click
+
+from tablegen.cli.common import fail
+from tablegen.cli.progress import Progress
+from tablegen.cli.status import Status
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from tablegen.verify.build import Report
+    from tablegen.verify.checks import Check
+
+_MOST_TICKS = {"icarus": 300_000, "verilator": 3_000_000}
+
+
+@click.command(short_help="Simulate a build's sequencer, and hold every sample against it.")
+@click.argument("folder", type=click.Path(path_type=Path, file_okay=False), metavar="DIR")
+@click.option(
+    "--sim",
+    "simulator",
+    type=click.Choice(sorted(_MOST_TICKS)),
+    default="icarus",
+    show_default=True,
+    help="The simulator; verilator compiles for some seconds and is then some forty times as fast.",
+)
+@click.option(
+    "--ticks",
+    type=click.IntRange(min=1000, max=1 << 28),
+    metavar="N",
+    help="Play at most N ticks.  [default: 300000; with verilator 3000000; serial a 41st]",
+)
+@click.option(
+    "--axis",
+    type=click.Choice(("pipelined", "blocks", "serial")),
+    default="pipelined",
+    show_default=True,
+    help="The axis that you place: a sample a clock in look-up tables (pipelined) or with multiplier blocks (blocks, "
+    "PLAIN_MULTIPLIER = 1), or in low area (serial, LOW_AREA = 1).",
+)
+@click.option(
+    "--fourier", is_flag=True, help="Load Fourier words, and let the device render its tables from them (FOURIER = 1)."
+)
+@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Of what is left to chance.")
+@click.option(
+    "--junit", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE", help="Write JUnit XML, a case a check."
+)
+@click.option(
+    "--keep",
+    type=click.Path(path_type=Path, file_okay=False),
+    metavar="DIR",
+    help="Simulate there, and leave script, record and logs. Without it nothing is left.",
+)
+def verify(
+    folder: Path,
+    simulator: str,
+    ticks: int | None,
+    axis: Literal["pipelined", "blocks", "serial"],
+    fourier: bool,
+    seed: int,
+    junit: Path | None,
+    keep: Path | None,
+) -> int:
+    """Verify the build in DIR: does its Verilog sequencer play what its manifest says, bit for bit?
+
+    Files are held against their SHA-256, the header's constants against the manifest. Then the dac_*.v of DIR
+    play the program and the tables of DIR's .mem files under cocotb: power-up, a frame and some lines, a swap in
+    mid-frame at a random tick, park. Every code, marker and fault has to equal the integer model, every code to be
+    as near to the float waveform as the certificate promises, every step and code inside its limits.
+
+    A frame that has more ticks than are played is played in part; a note says so. Needs tablegen[hdl] and Icarus
+    Verilog, or tablegen[verilator] and a C++ compiler.
+
+    \b
+      tablegen verify build
+      tablegen verify build --sim verilator --junit verify.xml     in CI
+    Exit status: 0 verified, 5 a check failed, 2 DIR holds no build, 6 the simulator is missing.
+    """
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    from tablegen.verify.build import NotABuild, verify_build
+    from tablegen.verify.placement import Placement
+    from tablegen.verify.simulate import ToolMissing
+
+    placement = Placement(axis, fourier)
+    try:
+        with _terminated_as_interrupted(), _work_folder(keep) as work, Progress() as progress:
+            most = _MOST_TICKS[simulator] // placement.tick_clocks if ticks is None else ticks
+            report = verify_build(folder, work, simulator, most, seed, placement, progress.now)
+    except NotABuild as error:
+        fail([error], Status.WRONG_INPUT)
+    except ToolMissing as error:
+        fail([error], Status.TOOL_MISSING)
+    click.echo("\n".join(_table(report.checks)))
+    for note in report.notes:
+        click.echo(f"note: {note}")
+    written = junit is None or _write(junit, report)
+    if report.failures:
+        lines = ["", *report.failures]
+        if report.difference is not None:
+            lines += ["", f"first difference: {report.difference}"]
+        count = len(report.failures)
+        fail(
+            [*lines, "", f"{folder}: {count} of {len(report.checks)} checks failed"],
+            Status.MISMATCH,
+        )
+    click.echo(f"\n{folder}: verified, {len(report.checks)} checks")
+    return Status.OK if written else Status.CANNOT_WRITE
+
+
+@contextmanager
+def _work_folder(keep: Path | None) -> Iterator[Path]:
+    """Where the simulation takes place: taken away again, whatever happens, unless it is to be kept."""
+    try:
+        if keep is not None:
+            keep.mkdir(parents=True, exist_ok=True)
+            yield keep.resolve()
+            return
+        with tempfile.TemporaryDirectory(prefix="tablegen-", ignore_cleanup_errors=True) as folder:
+            yield Path(folder).resolve()
+    except OSError as error:
+        fail(
+            [f"cannot simulate: {error.filename or keep or tempfile.gettempdir()}: {error.strerror or error}"],
+            Status.CANNOT_WRITE,
+        )
+
+
+@contextmanager
+def _terminated_as_interrupted() -> Iterator[None]:
+    """A runner that cancels a job with SIGTERM leaves no simulator behind either."""
+
+    def interrupt(_number: int, _frame: FrameType | None) -> None:
+        raise KeyboardInterrupt
+
+    try:
+        before = signal.signal(signal.SIGTERM, interrupt)
+    except ValueError:  # not in the main thread
+        yield
+        return
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _write(path: Path, report: "Report") -> bool:
+    from tablegen.verify.junit import junit
+
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(junit(report.name, report.checks), "utf-8")
+    except OSError as error:
+        click.echo(f"{path}: {error.strerror or error}", err=True)
+        return False
+    return True
+
+
+def _table(checks: "Sequence[Check]") -> list[str]:
+    head = ("", "against", "compared", "worst", "limit", "")
+    rows = [
+        (c.subject, c.against, c.compared, c.worst, c.limit, "ok" if c.failure is None else "FAILED") for c in checks
+    ]
+    widths = [max(len(row[i]) for row in [head, *rows]) for i in range(len(head))]
+    lines = []
+    for row in [head, *rows]:
+        cells = [
+            cell.rjust(width) if i in (3, 4) else cell.ljust(width)
+            for i, (cell, width) in enumerate(zip(row[:-1], widths[:-1], strict=True))
+        ]
+        verdict = row[-1]
+        if verdict == "FAILED":
+            verdict = click.style(verdict, bold=True)
+        lines.append(("  ".join([*cells, verdict])).rstrip())
+    return lines

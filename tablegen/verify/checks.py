@@ -1,0 +1,208 @@
+"""What a simulation recorded against the integer model, the float waveform, and the limits of the program."""
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from tablegen.numerics.arrays import Bools, Floats, Ints
+from tablegen.verify.recorded import Axis, Recorded
+from tablegen.verify.stream import FLAGS, Sample, Words
+
+_UNDEFINED = np.uint64((1 << 64) - 1)  # how a record is read where the simulator has an unknown bit
+_MASK = {"x": (0, 0xFFFFFF), "y": (24, 0xFFFFFF), "markers": (48, 0xFF), "faults": (56, 0xFF)}
+_TOLERANCE = 1e-9  # the last bits of two ways to evaluate the float waveform
+
+
+@dataclass(frozen=True)
+class Check:
+    """A row of the table: what was held against what, how much of it, the worst of it, its limit, and why it fails."""
+
+    subject: str
+    against: str
+    compared: str
+    worst: str = ""
+    limit: str = ""
+    failure: str | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """The words that left the device, those of the model, and where in its program the model was.
+
+    ``place`` is the tick of the frame, -1 where nothing plays; ``steady`` says where the output had caught up.
+    """
+
+    got: Words
+    wanted: Words
+    place: Ints
+    steady: Bools
+    lost: int  # ticks that the model has and the record has not, or the other way round
+
+    def part(self, subject: str, words: Words) -> Ints:
+        """A field of the words."""
+        shift, mask = _MASK[subject]
+        return (words >> np.uint64(shift) & np.uint64(mask)).astype(np.int64)
+
+
+def make_record(recorded: Recorded, expected: list[int], got: Words) -> Record:
+    """Line record and model up."""
+    wanted = np.array(expected, dtype=np.uint64)
+    flags = {name: (wanted >> np.uint64(48 + i) & np.uint64(1)).astype(np.bool_) for i, name in enumerate(FLAGS)}
+    index = np.arange(len(wanted))
+    frames = np.maximum.accumulate(np.where(flags["frame"], index, -1))
+    place = np.where(flags["playing"], index - frames, -1)
+    # A program begins where a frame does and the tick before was not the last of one.
+    frame_ticks = recorded.program.schedule.frame_ticks
+    begins = flags["frame"] & (np.concatenate([[-1], place[:-1]]) != frame_ticks - 1)
+    reached = place >= 0
+    for axis, program in (("x", recorded.program.x), ("y", recorded.program.y)):
+        shift, mask = _MASK[axis]
+        codes = (wanted >> np.uint64(shift) & np.uint64(mask)).astype(np.int64)
+        reached[reached] = program.codes(place[reached] % program.ticks) == codes[reached]
+    begun = np.maximum.accumulate(np.where(begins, index, 0))
+    # Caught up is for good: one right tick since the program began, this one included, is enough.
+    steady = (place >= 0) & (np.maximum.accumulate(np.where(reached, index, -1)) >= begun)
+    length = min(len(wanted), len(got))
+    return Record(got[:length], wanted[:length], place[:length], steady[:length], abs(len(wanted) - len(got)))
+
+
+def first_difference(record: Record, recorded: Recorded) -> str | None:
+    """The first tick at which anything differs, with all that was expected and got."""
+    differs = np.flatnonzero(record.got != record.wanted)
+    if not len(differs):
+        return f"{record.lost} ticks are lost or too many, at the end of the record" if record.lost else None
+    at = int(differs[0])
+    wanted, got = _sample(record.wanted[at]), _sample(record.got[at])
+    return f"{_where(record, recorded, at)}\n  expected  {wanted}\n  got       {got}"
+
+
+def check_record(record: Record, recorded: Recorded, status: dict[str, Any], counts: list[int]) -> list[Check]:
+    """Every check of what was played; ``status`` are the bench's counters, ``counts`` the faults of the model."""
+    checks = []
+    for axis, content in recorded.axes:
+        checks += [_model(record, recorded, axis), _float(record, recorded, axis, content)]
+        checks += _bounds(record, axis, content)
+    checks += [_model(record, recorded, "markers"), _faults(record, recorded, status, counts), _timing(record, status)]
+    return checks
+
+
+def _model(record: Record, recorded: Recorded, subject: str) -> Check:
+    got, wanted = record.part(subject, record.got), record.part(subject, record.wanted)
+    differs = np.flatnonzero(got != wanted)
+    failure = None
+    worst = "0"
+    if len(differs):
+        at = int(differs[0])
+        undefined = record.got[at] == _UNDEFINED
+        if subject == "markers":
+            expected, found = _markers(int(wanted[at])), _markers(int(got[at]))
+            worst = f"{len(differs)} differ"
+        else:
+            expected, found = str(wanted[at]), str(got[at])
+            known = record.got != _UNDEFINED
+            worst = str(int(np.max(np.abs(got - wanted)[known], initial=0)))
+        failure = (
+            f"{subject}: {len(differs)} of {len(got)} ticks differ from the model, the first at "
+            f"{_where(record, recorded, at)}: expected {expected}, got {'undefined' if undefined else found}"
+        )
+    elif record.lost:
+        failure = f"{subject}: {record.lost} ticks are lost or too many, at the end of the record"
+    unit = "ticks" if subject == "markers" else "codes"
+    return Check(subject, "integer model", f"{len(got)} {unit}", worst, "0", failure)
+
+
+def _float(record: Record, recorded: Recorded, axis: Literal["x", "y"], content: Axis) -> Check:
+    at = np.flatnonzero(record.steady & (record.got != _UNDEFINED))
+    period, limit = content.line.ticks, content.certificate.max_error_lsb
+    k = record.place[at] % period
+    covered = len(np.unique(k)) / period
+    name = "line" if axis == "x" else "frame"
+    # Rounded down: a frame of which a tick was not played is not whole.
+    compared = f"{len(at)} codes, {int(covered * 1000) / 10:g} % of the {name}"
+    if not len(at):
+        return Check(axis, "float waveform", "no code: it did not catch up", "", f"{limit:.3f} LSB")
+    error: Floats = record.part(axis, record.got)[at] - content.asked(k)
+    largest = int(np.argmax(np.abs(error)))
+    worst = float(np.abs(error[largest]))
+    failure = None
+    if worst > limit + _TOLERANCE:
+        failure = (
+            f"{axis}: {worst:.3f} LSB from the float waveform, the certificate promises {limit:.3f}; "
+            f"at {_where(record, recorded, int(at[largest]))}"
+        )
+    return Check(axis, "float waveform", compared, f"{worst:.3f} LSB", f"{limit:.3f} LSB", failure)
+
+
+def _bounds(record: Record, axis: str, content: Axis) -> list[Check]:
+    """Slew guard and clamp on every tick, whatever the state."""
+    output = content.output
+    codes = record.part(axis, record.got)[record.got != _UNDEFINED]
+    step = int(np.max(np.abs(np.diff(codes)), initial=0))
+    low, high = int(np.min(codes, initial=output.code_max)), int(np.max(codes, initial=output.code_min))
+    inside = output.code_min <= low and high <= output.code_max
+    return [
+        Check(
+            axis,
+            "slew guard",
+            f"{max(len(codes) - 1, 0)} steps",
+            str(step),
+            str(output.max_step),
+            None if step <= output.max_step else f"{axis}: steps by {step} codes a tick, above {output.max_step}",
+        ),
+        Check(
+            axis,
+            "clamp",
+            f"{len(codes)} codes",
+            f"{low}..{high}",
+            f"{output.code_min}..{output.code_max}",
+            None if inside else f"{axis}: codes {low}..{high} leave {output.code_min}..{output.code_max}",
+        ),
+    ]
+
+
+def _faults(record: Record, recorded: Recorded, status: dict[str, Any], counts: list[int]) -> Check:
+    """No fault is to be seen, and none to be counted."""
+    flags = record.part("faults", record.got)
+    wrong = np.flatnonzero(flags)
+    counted = [int(count) for count in status["counts"]]
+    failure = None
+    names = ("slew", "clamp", "overrun", "underrun")
+    if len(wrong):
+        at = int(wrong[0])
+        raised = " ".join(name for i, name in enumerate(names) if flags[at] >> i & 1)
+        failure = f"faults: {raised}, at {_where(record, recorded, at)}"
+    elif any(counted) or any(counts) or status["refused"]:
+        shown = ", ".join(f"{name} {count}" for name, count in zip(names, counted, strict=True))
+        failure = f"faults: counted are {shown}; writes were {'' if status['refused'] else 'not '}refused"
+    return Check("faults", "none to occur", f"{len(flags)} ticks", str(sum(counted)), "0", failure)
+
+
+def _timing(record: Record, status: dict[str, Any]) -> Check:
+    """A strobe for every tick, always as many clocks after it."""
+    jitter, ticks, strobes = (int(status[key]) for key in ("jitter", "ticks", "strobes"))
+    failure = None
+    if jitter or ticks != strobes or record.lost:
+        failure = (
+            f"timing: {ticks} ticks made {strobes} samples, {jitter} of them not {status['latency']} clocks after "
+            f"their tick"
+        )
+    compared = f"{strobes} samples, {status['latency']} clocks late"
+    return Check("timing", "constant delay", compared, f"{jitter} differ", "0", failure)
+
+
+def _where(record: Record, recorded: Recorded, at: int) -> str:
+    place, ticks = int(record.place[at]), recorded.program.schedule.ticks
+    where = f"line {place // ticks}, tick {place % ticks} of it" if place >= 0 else "while no line plays"
+    return f"tick {at} ({where})"
+
+
+def _markers(flags: int) -> str:
+    return " ".join(name for i, name in enumerate(FLAGS) if flags >> i & 1) or "none"
+
+
+def _sample(word: np.uint64) -> str:
+    if word == _UNDEFINED:
+        return "undefined"
+    sample = Sample.of(int(word))
+    return f"x {sample.x}, y {sample.y}, markers {' '.join(sample.flags) or 'none'}, faults {sample.faults:04b}"

@@ -1,0 +1,185 @@
+"""The files of a build against its manifest: their digests, the constants of the Verilog header, the memory files."""
+
+import re
+from collections.abc import Mapping
+from hashlib import sha256
+from pathlib import Path
+
+from tablegen.emit.memory import memory_file
+from tablegen.fixedpoint.program import Program
+from tablegen.fixedpoint.synthesis import FRACTION_BITS, WORD_BITS, sine_quarter
+from tablegen.registers import program_words
+from tablegen.verify.recorded import Axis, Recorded
+
+_LOCALPARAM = re.compile(r"^localparam\s[^=]*?(\w+)\s*=\s*(.*?)\s*;", re.MULTILINE)
+_NUMBER = re.compile(r"(-?)(?:\d+'s?([dh]))?([0-9a-fA-F]+)")
+_SHOWN = 5
+
+
+def wrong_files(folder: Path, recorded: Recorded) -> list[str]:
+    """What is wrong with the files that the manifest lists."""
+    wrong = []
+    for name, digest in recorded.manifest.files.items():
+        try:
+            content = (folder / name).read_bytes()
+        except OSError as error:
+            wrong.append(f"{name}: {'missing' if isinstance(error, FileNotFoundError) else error.strerror or error}")
+            continue
+        if sha256(content).hexdigest() != digest:
+            wrong.append(f"{name}: stale or edited: its SHA-256 is not that of the manifest")
+    return wrong
+
+
+def wrong_constants(folder: Path, recorded: Recorded) -> tuple[int, list[str]]:
+    """How many constants the Verilog header is to have, and those that it has not, or not so."""
+    name = f"{recorded.manifest.name}.vh"
+    wanted = expected_constants(recorded)
+    try:
+        text = (folder / name).read_text("utf-8", "replace")
+    except OSError as error:
+        return len(wanted), [f"{name}: cannot be read: {error.strerror or error}"]
+    found: dict[str, int | str] = {key: _value(value) for key, value in _LOCALPARAM.findall(text)}
+    wrong = []
+    for key, value in wanted.items():
+        if key not in found:
+            wrong.append(f"{name}: {key} is missing, it is {_shown(value)} in the manifest")
+        elif found[key] != value:
+            wrong.append(f"{name}: {key} is {_shown(found[key])}, it is {_shown(value)} in the manifest")
+    wrong += [f"{name}: {key} is not in the manifest" for key in found if key not in wanted]
+    return len(wanted), wrong
+
+
+def expected_constants(recorded: Recorded) -> dict[str, int | str]:
+    """Every localparam of the Verilog header: numbers, and names of files."""
+    manifest, schedule = recorded.manifest, recorded.program.schedule
+    numbers: dict[str, int | str] = {
+        "HASH": int(manifest.hash, 16),
+        "UPDATE_RATE_MILLIHZ": schedule.update_rate_millihz,
+        "LINE_TICKS": schedule.ticks,
+        "FRAME_LINES": schedule.lines,
+        "PIXELS": schedule.pixels,
+        "SETTLE_LINES": schedule.settle_lines,
+        "TURN_TICK": schedule.turn_tick,
+        "FORWARD_FIRST_TICK": schedule.forward.first,
+        "FORWARD_TICKS": schedule.forward.count,
+        "BACKWARD_FIRST_TICK": schedule.backward.first,
+        "BACKWARD_TICKS": schedule.backward.count,
+        "TURN_LINE": schedule.turn_line,
+        "UP_FIRST_LINE": schedule.up.first,
+        "UP_LINES": schedule.up.count,
+        "DOWN_FIRST_LINE": schedule.down.first,
+        "DOWN_LINES": schedule.down.count,
+        "PROGRAM_FILE": f"{manifest.name}_program.mem",
+    }
+    if any(axis.table.mode == "interpolated" for _, axis in recorded.axes):
+        numbers["SINE_FILE"] = f"{manifest.name}_sine.mem"
+    for name, axis in recorded.axes:
+        prefix = f"{manifest.name}_{name}"
+        own = {**_constants(axis), "TABLE_FILE": f"{prefix}.mem", "FOURIER_FILE": f"{prefix}_fourier.mem"}
+        numbers |= {f"{name.upper()}_{key}": value for key, value in own.items()}
+    return {f"{manifest.name.upper()}_{key}": value for key, value in numbers.items()}
+
+
+def _constants(axis: Axis) -> Mapping[str, int | str]:
+    table, output, line = axis.table, axis.output, axis.line
+    interpolated = table.mode == "interpolated"
+    return {
+        "TABLE_LENGTH": len(table.words),
+        "TABLE_BITS": table.bits,
+        "INDEX_BITS": len(table.words).bit_length() - 1 if interpolated else 0,
+        "INTERPOLATED": int(interpolated),
+        "GUARD_BITS": table.guard_bits,
+        "HARMONICS": axis.fourier.harmonics,
+        "FOURIER_LENGTH": 2 * axis.fourier.harmonics + 1,
+        "FOURIER_FRACTION_BITS": FRACTION_BITS,
+        "HOLD_TICKS": line.hold_ticks,
+        "PHASE_PERIOD": line.ticks // line.hold_ticks,
+        "PHASE_STEP": line.phase_step,
+        "PHASE_REMAINDER": line.phase_remainder,
+        "GAIN_WORD": output.gain_word,
+        "GAIN_Q": output.gain_q,
+        "OFFSET_WORD": output.offset_word,
+        "OFFSET_CODE": output.offset_code,
+        "CODE_MIN": output.code_min,
+        "CODE_MAX": output.code_max,
+        "MAX_STEP": output.max_step,
+        "PARK_CODE": output.park_code,
+        "DAC_BITS": output.dac_bits,
+        "DAC_WORD_BITS": output.word_bits,
+        "DAC_TWOS_COMPLEMENT": int(output.coding == "twos-complement"),
+        "DAC_LEFT_ALIGNED": int(output.align == "left"),
+    }
+
+
+def _value(text: str) -> int | str:
+    """A number, the content of a string, or what is neither as it stands."""
+    if len(text) > 1 and text[0] == text[-1] == '"':
+        return text[1:-1]
+    number = _NUMBER.fullmatch(text)
+    if number is None:
+        return text
+    sign, base, digits = number.groups()
+    try:
+        return int(digits, 16 if base == "h" else 10) * (-1 if sign else 1)
+    except ValueError:
+        return text
+
+
+def _shown(value: int | str) -> str:
+    return repr(value) if isinstance(value, str) else f"{value:x}" if abs(value) >= 1 << 64 else str(value)
+
+
+def expected_memories(recorded: Recorded) -> dict[str, bytes]:
+    """What the memory files have to hold, by name: made again from the manifest."""
+    name, program = recorded.manifest.name, recorded.program
+    words = program_words(program.schedule, program.x, program.y)
+    files = {f"{name}_program.mem": memory_file(words, WORD_BITS)}
+    for axis, content in recorded.axes:
+        played: Program = getattr(program, axis)
+        files[f"{name}_{axis}.mem"] = memory_file(played.words, played.bits)
+        files[f"{name}_{axis}_fourier.mem"] = memory_file(content.fourier_words, WORD_BITS)
+    index_bits = max(program.x.index_bits, program.y.index_bits)
+    if index_bits:
+        files[f"{name}_sine.mem"] = memory_file(sine_quarter(index_bits), WORD_BITS)
+    return files
+
+
+def wrong_memories(folder: Path, recorded: Recorded) -> tuple[int, list[str]]:
+    """How many words the memory files are to have, and in which of them the first wrong one stands."""
+    count, wrong = 0, []
+    for name, content in expected_memories(recorded).items():
+        wanted = content.decode("ascii").split()
+        count += len(wanted)
+        try:
+            found = (folder / name).read_text("ascii", "replace").split()
+        except OSError as error:
+            wrong.append(f"{name}: cannot be read: {error.strerror or error}")
+            continue
+        if len(found) != len(wanted):
+            wrong.append(f"{name}: has {len(found)} words, the manifest {len(wanted)}")
+        elif found != wanted:
+            at = next(i for i, (word, right) in enumerate(zip(found, wanted, strict=True)) if word != right)
+            wrong.append(f"{name}: word {at} is {found[at][:16]}, it is {wanted[at]} in the manifest")
+    return count, wrong
+
+
+def memory_words(path: Path, count: int) -> list[int]:
+    """The words of a memory file as a device gets them; ``ValueError`` says what is wrong with it."""
+    try:
+        lines = path.read_text("ascii").split()
+        words = [int(line, 16) for line in lines]
+    except FileNotFoundError:
+        raise ValueError(f"{path.name} is missing") from None
+    except OSError as error:
+        raise ValueError(f"{path.name} cannot be read: {error.strerror or error}") from None
+    except ValueError:
+        raise ValueError(f"{path.name} does not hold one hexadecimal word a line") from None
+    if len(words) != count:
+        raise ValueError(f"{path.name} has {len(words)} words in place of {count}")
+    return words
+
+
+def some(wrong: list[str]) -> str:
+    """A few of many."""
+    more = [f"... and {len(wrong) - _SHOWN} more"] if len(wrong) > _SHOWN else []
+    return "\n".join(wrong[:_SHOWN] + more)

@@ -1,0 +1,47 @@
+"""How a user places the sequencer: the kind of axis, and whether it renders its tables from Fourier words."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from tablegen.fixedpoint.program import Program
+
+AXES = ("pipelined", "blocks", "serial")
+_SERIAL_CLOCKS = 41  # of a sample
+
+
+@dataclass(frozen=True)
+class Placement:
+    """``axis``: a sample a clock in look-up tables or with multiplier blocks, or low area."""
+
+    axis: Literal["pipelined", "blocks", "serial"] = "pipelined"
+    fourier: bool = False
+
+    @property
+    def tick_clocks(self) -> int:
+        """The fewest clocks from tick to tick."""
+        return _SERIAL_CLOCKS if self.axis == "serial" else 1
+
+    def renders(self, program: Program) -> bool:
+        """Whether the device makes the table of this axis; a ``direct`` one is always uploaded."""
+        return self.fourier and program.mode == "interpolated"
+
+    def parameters(self, harmonics: int, sine_file: str) -> dict[str, int | str]:
+        """As the sequencer has them; ``harmonics`` is the greatest of both axes."""
+        chosen: dict[str, int | str] = {
+            "PLAIN_MULTIPLIER": int(self.axis == "blocks"),
+            "LOW_AREA": int(self.axis == "serial"),
+        }
+        if self.fourier:
+            chosen |= {"FOURIER": 1, "HARMONICS": harmonics, "SINE_FILE": sine_file}
+        return chosen
+
+    def commit_clocks(self, x: tuple[Program, int], y: tuple[Program, int]) -> int:
+        """Clocks from a commit to the committed bank, of programs and their harmonics (dac_fourier.v, dac_render.v)."""
+        if not self.fourier:
+            return 1
+        digits, latency = (2, 8) if self.axis == "blocks" else (16, 6)
+        return 4 + sum(
+            (len(program.words) // 2 + 1) * (digits * (2 * harmonics + 3) + 2) + latency + 1
+            for program, harmonics in (x, y)
+            if self.renders(program)
+        )
