@@ -1,5 +1,5 @@
-// Bench of examples/verilog/scanner.v: lets it boot, and from the first tick of its scan on writes the levels of its wires to
-// CAPTURE, two hexadecimal digits a clock: {3'd0, load_n}, {select_n, y_data, x_data, sclk}.
+// Bench of examples/verilog/scanner.v: lets it boot, and from the first tick of its scan on writes the levels of its
+// wires to CAPTURE, two hexadecimal digits a clock: {3'd0, load_n}, {select_n, y_data, x_data, sclk}.
 
 `timescale 1ns / 1ps
 `default_nettype none

@@ -35,7 +35,8 @@ from tablegen.verify.stream import Script
 WORKERS = 2
 HARMONICS = 4
 LEAST_PACE = 41
-Y_AXIS_AFTER_LOADS = """.runnings(runnings_now[LATENCY-4:0]),
+Y_AXIS_AFTER_LOADS = """
+                .runnings(runnings_now[LATENCY-4:0]),
                 .bank(bank), .restart(frame_0)"""
 
 _SHAPES = {
@@ -308,8 +309,8 @@ def _output() -> Iterator[Mutant]:
     yield Mutant(
         "the gain comes a clock late (blocks)",
         "dac_output",
-        ".load(loads[0]), .value(gain)",
-        ".load(loads[1]), .value(gain)",
+        ".load(loads[0]),\n                .value(gain)",
+        ".load(loads[1]),\n                .value(gain)",
         "plain",
     )
     yield Mutant(
@@ -379,8 +380,8 @@ def _scan() -> Iterator[Mutant]:
     yield Mutant(
         "y's registers miss the swap",
         "dac_sequencer",
-        f".loads(loads_now[LATENCY-4:0]), {Y_AXIS_AFTER_LOADS}",
-        f".loads({{LATENCY-3{{1'b0}}}}), {Y_AXIS_AFTER_LOADS}",
+        f".loads(loads_now[LATENCY-4:0]),{Y_AXIS_AFTER_LOADS}",
+        f".loads({{LATENCY-3{{1'b0}}}}),{Y_AXIS_AFTER_LOADS}",
     )
     yield Mutant("a line is a tick longer", "dac_scan", "idle_ticks - 2", "idle_ticks - 1")
     yield Mutant("a line is a tick shorter", "dac_scan", "idle_ticks - 2", "idle_ticks - 3")
@@ -409,7 +410,7 @@ def _scan() -> Iterator[Mutant]:
     yield Mutant(
         "a trigger is not taken on the clock of its arm", "dac_scan", "trigger && (armed || arm)", "trigger && armed"
     )
-    yield Mutant("a trigger is taken with nothing to play", "dac_scan", "(loaded || take) && ", "")
+    yield Mutant("a trigger is taken with nothing to play", "dac_scan", "(loaded || (tick && committed)) && ", "")
     yield Mutant("a trigger is taken while a scan plays", "dac_scan", " && !still_running;", ";")
     yield Mutant(
         "a trigger does not disarm",
@@ -451,7 +452,10 @@ def _scan() -> Iterator[Mutant]:
         "assign drained = loads_now[0];",
     )
     yield Mutant(
-        "refused writes have an effect", "dac_sequencer", "host_write <= write && writable", "host_write <= write"
+        "refused writes have an effect",
+        "dac_sequencer",
+        "accepted_write = write && writable;",
+        "accepted_write = write;",
     )
     yield Mutant("refused writes are not reported", "dac_sequencer", "if (write && !writable)", "if (1'b0)", "direct")
     yield Mutant(
@@ -564,7 +568,7 @@ def _verdict() -> Iterator[Mutant]:
     yield Mutant(
         "valid on the first faulty tick",
         "dac_verdict",
-        "happens != 4'd0 || (faults != 4'd0 && !clear)",
+        "underrun || overrun || clamp_fault || (faults != 4'd0 && !clear)",
         "faults != 4'd0 && !clear",
     )
     yield Mutant("not valid on the tick of a clear", "dac_verdict", "(faults != 4'd0 && !clear)", "faults != 4'd0")

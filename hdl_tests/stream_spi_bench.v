@@ -1,7 +1,8 @@
-// The stream bench with the wires of a converter behind it: every code through dac_coding and dac_spi, as it would be sent.
+// The stream bench with the wires of a converter behind it: every code through dac_coding and dac_spi, as it would be
+// sent.
 //
-// CAPTURE gets a hexadecimal digit a clock, the levels {ldac_n, cs_n, mosi_y, mosi_x, sclk} of two chips in parallel in
-// the order of two digits: {3'd0, ldac_n}, {cs_n, mosi_y, mosi_x, sclk}.
+// CAPTURE gets a hexadecimal digit a clock, the levels {ldac_n, cs_n, mosi_y, mosi_x, sclk} of two chips in parallel
+// in the order of two digits: {3'd0, ldac_n}, {cs_n, mosi_y, mosi_x, sclk}.
 
 `timescale 1ns / 1ps
 `default_nettype none

@@ -123,7 +123,9 @@ def test_is_not_vacuous(name: str, tmp_path: Path) -> None:
     assert "Reached cover statement" in answer, answer
 
 
-AT_Y = "[LATENCY-4:0]), .runnings(runnings_now[LATENCY-4:0]),\n                .bank(bank), .restart(frame_0)"
+AT_Y = """[LATENCY-4:0]),
+                .runnings(runnings_now[LATENCY-4:0]),
+                .bank(bank), .restart(frame_0)"""
 # Property, harness, module, text, and what stands there instead.
 MUTANTS = {
     # a. a swap takes a committed program, at the start of a line
@@ -143,7 +145,12 @@ MUTANTS = {
     # c. no write reaches what plays
     "writable_while_committed": ("sequencer", "dac_bank", "!committed && !draining", "!draining"),
     "writable_while_draining": ("sequencer", "dac_bank", "!committed && !draining", "!committed"),
-    "writes_not_gated": ("sequencer", "dac_sequencer", "host_write <= write && writable", "host_write <= write"),
+    "writes_not_gated": (
+        "sequencer",
+        "dac_sequencer",
+        "accepted_write = write && writable;",
+        "accepted_write = write;",
+    ),
     "writable_as_a_commit_comes": ("sequencer", "dac_sequencer", " && !host_commit;", ";"),
     "drained_too_early": ("sequencer", "dac_sequencer", "drained = loads_now[LATENCY]", "drained = loads_now[4]"),
     "low_area_takes_a_tick_too_early": ("writes_low_area", "dac_sequencer", "tick && !busy;", "tick;"),

@@ -41,7 +41,7 @@ SEQUENCERS: dict[str, Mapping[str, int | str]] = {
 
 
 def lint(top: str, parameters: Mapping[str, int | str], folder: Path = MODULES) -> str:
-    command = [ROOT / "bin" / "verilator", "--lint-only", "-Wall", "--language", "1364-2005", "-y", folder]
+    command = [ROOT / "bin" / "verilator_bin", "--lint-only", "-Wall", "--language", "1364-2005", "-y", folder]
     command += [f"-G{name}={value if isinstance(value, str) else int(value)}" for name, value in parameters.items()]
     command += ["--top-module", top, folder / f"{top}.v"]
     environment = {**os.environ, "VERILATOR_ROOT": str(ROOT)}
@@ -83,5 +83,5 @@ def test_form(path: Path) -> None:
     assert "`default_nettype none\n" in text
     assert text.endswith("`default_nettype wire\n")
     assert not re.search(r"lint_off|\btranslate_off\b", text)
-    assert max(map(len, text.splitlines())) <= 130
+    assert max(map(len, text.splitlines())) <= 120
     assert text.isascii()

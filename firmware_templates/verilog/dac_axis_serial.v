@@ -1,8 +1,9 @@
-// One axis in little area: the arithmetic of dac_axis, one step a clock, with one adder for the sample and none to spare.
+// One axis in little area: the arithmetic of dac_axis, one step a clock, with one adder for the sample and none to
+// spare.
 //
-// A tick starts it; CLOCKS later the code is there, and not before that may the next tick come. The program of both banks
-// is in a block RAM, and read word by word as it is needed. Multiplication is Booth's, two bits a clock: a and m hold sum
-// and factor, q the other factor, whose place the low half of the product takes.
+// A tick starts it; CLOCKS later the code is there, and not before that may the next tick come. The program of both
+// banks is in a block RAM, and read word by word as it is needed. Multiplication is Booth's, two bits a clock: a and
+// m hold sum and factor, q the other factor, whose place the low half of the product takes.
 
 `default_nettype none
 
@@ -42,10 +43,10 @@ module dac_axis_serial #(
     localparam GAIN_Q = 16 + SAMPLE_BITS - DAC_BITS;
     localparam WIDEST_1 = SAMPLE_BITS > DAC_BITS ? SAMPLE_BITS : DAC_BITS;
     localparam WIDEST_2 = GAIN_Q > 20 ? GAIN_Q : 20;
-    localparam BITS = (WIDEST_1 > WIDEST_2 ? WIDEST_1 : WIDEST_2) + 3;  // of the sum: every value, its sign, and twice it
+    localparam BITS = (WIDEST_1 > WIDEST_2 ? WIDEST_1 : WIDEST_2) + 3;  // every value, its sign, and twice it
 
-    // The words of both programs. The half that makes a floor a rounding goes into the low word of the offset where it has
-    // such a bit, or beside it, above its 18 bits. The period is kept inverted, since it is subtracted.
+    // The words of both programs. The half that makes a floor a rounding goes into the low word of the offset where
+    // it has such a bit, or beside it, above its 18 bits. The period is kept inverted, since it is subtracted.
     localparam LOW_HALF = GAIN_Q < 19 ? 1 << (GAIN_Q - 1) : 0;
     localparam [BITS-1:0] HIGH_HALF = GAIN_Q < 19 ? 0 : {{BITS-1{1'b0}}, 1'b1} << (GAIN_Q - 1);
     reg [31:0] words [0:31];
@@ -68,7 +69,8 @@ module dac_axis_serial #(
 
     // The steps: what happens in the clock of each. A word that is used in a step was asked for in the one before.
     localparam [5:0] WAIT = 6'd0, REST = 6'd1, WRAP = 6'd2, PHASE = 6'd3, HERE = 6'd5, THERE = 6'd6, DIFFERENCE = 6'd7;
-    localparam [5:0] INTERPOLATE = 6'd8, BACK = 6'd16, FROM_HERE = 6'd17, SAMPLE = 6'd18, FACTOR = 6'd19, MULTIPLY = 6'd20;
+    localparam [5:0] INTERPOLATE = 6'd8, BACK = 6'd16, FROM_HERE = 6'd17, SAMPLE = 6'd18, FACTOR = 6'd19;
+    localparam [5:0] MULTIPLY = 6'd20;
     localparam [5:0] HIGH = 6'd29, SUM = 6'd30, ROUND = 6'd31, LOW_LIMIT = 6'd32, HIGH_LIMIT = 6'd33, TARGET = 6'd34;
     localparam [5:0] UPPER = 6'd35, HOLD_UPPER = 6'd36, HOLD_LOWER = 6'd37, DONE = 6'd38;
     reg [5:0] step;

@@ -1,9 +1,9 @@
 // Loads a program at power-up, from the memory files of a build; after that the host's writes pass through.
 //
-// With FOURIER = 0 X_FILE and Y_FILE are the tables, <name>_x.mem and <name>_y.mem; with FOURIER = 1 the Fourier words,
-// <name>_x_fourier.mem and <name>_y_fourier.mem, which take a few hundred bits of memory instead of many thousand, and which a
-// sequencer with FOURIER = 1 renders. PROGRAM_FILE is <name>_program.mem either way. It ends with a commit: arm and trigger are
-// the user's.
+// With FOURIER = 0 X_FILE and Y_FILE are the tables, <name>_x.mem and <name>_y.mem; with FOURIER = 1 the Fourier
+// words, <name>_x_fourier.mem and <name>_y_fourier.mem, which take a few hundred bits of memory instead of many
+// thousand, and which a sequencer with FOURIER = 1 renders. PROGRAM_FILE is <name>_program.mem either way. It ends
+// with a commit: arm and trigger are the user's.
 
 `default_nettype none
 
@@ -101,7 +101,8 @@ module dac_boot #(
     assign write = booting ? writing && writes != COMMIT : host_write;
     assign write_region = !booting ? host_region : writes == PROGRAM ? 3'd0 : {1'b0, writes} + (FOURIER ? 3'd2 : 3'd0);
     assign write_address = booting ? write_at : host_address;
-    assign write_data = !booting ? host_data : writes == PROGRAM ? program_data : writes == X ? x_wide[31:0] : y_wide[31:0];
+    assign write_data = !booting ? host_data :
+                        writes == PROGRAM ? program_data : writes == X ? x_wide[31:0] : y_wide[31:0];
     assign commit = booting ? writing && writes == COMMIT : host_commit;
 endmodule
 

@@ -1,4 +1,5 @@
-// The two-bank memory of a table that has a word an advance: one read a sample. The word is there two clocks after `index`.
+// The two-bank memory of a table that has a word an advance: one read a sample. The word is there two clocks after
+// `index`.
 
 `default_nettype none
 

@@ -1,4 +1,5 @@
-// The sample between two table words: (here << GUARD_BITS) + round((there - here) fraction / 2^(15 - GUARD_BITS)), ties up.
+// The sample between two table words: (here << GUARD_BITS) + round((there - here) fraction / 2^(15 - GUARD_BITS)),
+// ties up.
 //
 // One a clock; LATENCY clocks after its input. GUARD_BITS is min(4, 25 - WORD_BITS).
 

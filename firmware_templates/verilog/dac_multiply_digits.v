@@ -1,9 +1,9 @@
 // result = floor((a b + low) / 2^DROP), exact, one a clock, in look-up tables: no multiplier block is needed.
 //
-// b is cut into digits of base 4, each of them -1, 0, 1 or 2, and stage i adds digit i times a. Adding 1 in every digit's
-// place, 01 01 .. 01 in binary, does the recoding: the digits of b + 0101..01 are those of b, plus 1. The least
-// significant digit comes first and what a stage has finished is shifted out, so that no adder is wider than a is. Such a
-// digit and two bits of a are the four inputs of a look-up table.
+// b is cut into digits of base 4, each of them -1, 0, 1 or 2, and stage i adds digit i times a. Adding 1 in every
+// digit's place, 01 01 .. 01 in binary, does the recoding: the digits of b + 0101..01 are those of b, plus 1. The
+// least significant digit comes first and what a stage has finished is shifted out, so that no adder is wider than a
+// is. Such a digit and two bits of a are the four inputs of a look-up table.
 //
 // Digit i is wanted i clocks after a, so that a constant b needs no delay line, and a new one can follow its first a.
 // The result is there DIGITS clocks after a.

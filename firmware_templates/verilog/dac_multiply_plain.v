@@ -1,7 +1,9 @@
-// result = floor((a b + low) / 2^DROP), exact, one a clock: a `*` between registers, for parts with multiplier blocks.
+// result = floor((a b + low) / 2^DROP), exact, one a clock: a `*` between registers, for parts with multiplier
+// blocks.
 //
-// a and b enter together, low one clock later; the result is there three clocks after a. What a has above BLOCK_BITS, the
-// width of a block's port, would take another block; its lowest bits, often two, are multiplied in look-up tables instead.
+// a and b enter together, low one clock later; the result is there three clocks after a. What a has above BLOCK_BITS,
+// the width of a block's port, would take another block; its lowest bits, often two, are multiplied in look-up tables
+// instead.
 
 `default_nettype none
 

@@ -22,7 +22,8 @@ module dac_offset #(
 );
     wire unused = &data;
     reg [BITS-1:0] idle;
-    wire [BITS-1:0] playing = idle + {{BITS-GAIN_Q-CODE_BITS-1{minus_min[CODE_BITS]}}, minus_min, 1'b1, {GAIN_Q-1{1'b0}}};
+    wire [BITS-1:0] playing =
+        idle + {{BITS-GAIN_Q-CODE_BITS-1{minus_min[CODE_BITS]}}, minus_min, 1'b1, {GAIN_Q-1{1'b0}}};
 
     initial begin
         low = 0;

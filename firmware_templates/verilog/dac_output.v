@@ -1,13 +1,14 @@
-// From sample to target: clamp(round((gain sample + offset) / 2^GAIN_Q), code_min, code_max), ties up; the park code where
-// no scan plays. Never a wrap.
+// From sample to target: clamp(round((gain sample + offset) / 2^GAIN_Q), code_min, code_max), ties up; the park code
+// where no scan plays. Never a wrap.
 //
-// The limits cost no comparison of two words. With code_min taken off the offset, the sign says what is below it; with that
-// taken off the span of the limits, the sign says what is above code_max; and that off code_max is the code. To subtract,
-// a value is kept inverted: -x is the inverse of x, and 1.
+// The limits cost no comparison of two words. With code_min taken off the offset, the sign says what is below it;
+// with that taken off the span of the limits, the sign says what is above code_max; and that off code_max is the
+// code. To subtract, a value is kept inverted: -x is the inverse of x, and 1.
 //
-// GAIN_Q is 16 + SAMPLE_BITS - DAC_BITS: a gain of 2^16 makes a full-scale table a full-scale output. One sample a clock,
-// the target LATENCY clocks after it. The registers of the program are in here: loads[i] is high in the clock before a new
-// program's first sample has been here for i clocks, and each register changes just before that sample meets it.
+// GAIN_Q is 16 + SAMPLE_BITS - DAC_BITS: a gain of 2^16 makes a full-scale table a full-scale output. One sample a
+// clock, the target LATENCY clocks after it. The registers of the program are in here: loads[i] is high in the clock
+// before a new program's first sample has been here for i clocks, and each register changes just before that sample
+// meets it.
 
 `default_nettype none
 
@@ -68,7 +69,8 @@ module dac_output #(
         if (PLAIN_MULTIPLIER) begin : plain
             wire signed [17:0] gain;
             dac_register #(.BITS(18)) gain_word (
-                .clock(clock), .write(write && write_address == GAIN), .data(write_data[17:0]), .load(loads[0]), .value(gain)
+                .clock(clock), .write(write && write_address == GAIN), .data(write_data[17:0]), .load(loads[0]),
+                .value(gain)
             );
             dac_multiply_plain #(
                 .A_BITS(SAMPLE_BITS), .B_BITS(18), .DROP(LOW_BITS), .RESULT_BITS(HIGH_BITS)

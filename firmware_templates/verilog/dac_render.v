@@ -1,8 +1,8 @@
 // Between a host's commit and that of the banks: renders the tables that came as Fourier words, x then y.
 //
-// The program's `harmonics` says how: 0, and the table was uploaded; H, and 2 H + 1 Fourier words were. The commit goes on
-// when the last table word is in its bank, so that a bank that waits to be taken is always complete. A reset or a
-// withdrawal ends a rendering; its commit never comes.
+// The program's `harmonics` says how: 0, and the table was uploaded; H, and 2 H + 1 Fourier words were. The commit
+// goes on when the last table word is in its bank, so that a bank that waits to be taken is always complete. A reset
+// or a withdrawal ends a rendering; its commit never comes.
 
 `default_nettype none
 

@@ -1,8 +1,8 @@
 // The scan: one counter for both axes. It decides what the next tick is, and when a committed program is taken.
 //
-// Requests are pulses of one clock, and act after a tick of the same clock; where several come together the later in this
-// list has the last word: arm, trigger, park, reset. All outputs belong to the tick that `tick_out` announces, one clock
-// after `tick`. A line has at least 8 ticks.
+// Requests are pulses of one clock, and act after a tick of the same clock; where several come together the later in
+// this list has the last word: arm, trigger, park, reset. All outputs belong to the tick that `tick_out` announces,
+// one clock after `tick`. A line has at least 8 ticks.
 
 `default_nettype none
 
@@ -94,9 +94,9 @@ module dac_scan #(
     assign take = tick && committed && (!running || first);
     wire plays = tick && running;
     wire fresh = starts || take;
-    wire frame_ends = plays && last && bottom && !fresh;
+    wire frame_ends = plays && last && bottom;  // a line that is fresh does not end with its first tick
     wire still_running = running && !(frame_ends && last_frame);
-    wire go = trigger && (armed || arm) && (loaded || take) && !still_running;
+    wire go = trigger && (armed || arm) && (loaded || (tick && committed)) && !still_running;
 
     initial begin
         armed = 1'b0;

@@ -1,14 +1,14 @@
 // The two-axis DAC sequencer: plays compensated scan lines, changes programs at line starts, and says what it did.
 //
-//   host    writes the idle program (`write`, while `writable`), then `commit`: it is taken on both axes by the first tick of a
-//           line, or by the next tick while nothing plays. docs/verilog.md has the map of the words.
+//   host    writes the idle program (`write`, while `writable`), then `commit`: it is taken on both axes by the first
+//           tick of a line, or by the next tick while nothing plays. docs/verilog.md has the map of the words.
 //   scan    `arm` and `trigger` start frames, `park` and `reset` end them; codes always move under the slew guard.
 //   tick    one clock long, at the converter's update rate. Codes and markers of a tick leave together, with `strobe`,
 //           LATENCY clocks after it (LOW_AREA: as soon as they are ready; `busy` until then).
 //
-// What happens on which tick, and every bit of every code, is docs/sequencer.md. All inputs belong to `clock`; those that do
-// not must be synchronised outside. The design relies on power-up values of its registers, as FPGAs have them: a reset
-// must not move a code.
+// What happens on which tick, and every bit of every code, is docs/sequencer.md. All inputs belong to `clock`; those
+// that do not must be synchronised outside. The design relies on power-up values of its registers, as FPGAs have
+// them: a reset must not move a code.
 
 `default_nettype none
 
@@ -36,7 +36,7 @@ module dac_sequencer #(
     input  wire                    reset,
     // the idle program
     input  wire                    write,
-    input  wire [2:0]              write_region,   // 0 program, 1 x table, 2 y table, 3 x Fourier words, 4 y Fourier words
+    input  wire [2:0]              write_region,   // 0 program, 1 x table, 2 y table, 3 x, 4 y Fourier words
     input  wire [15:0]             write_address,
     input  wire [31:0]             write_data,
     output wire                    writable,       // otherwise a write is refused
@@ -84,6 +84,13 @@ module dac_sequencer #(
         host_write = 0;
         host_commit = 0;
     end
+    wire accepted_write = write && writable;
+    reg scan_write, x_write, y_write;
+    initial begin
+        scan_write = 1'b0;
+        x_write = 1'b0;
+        y_write = 1'b0;
+    end
     reg [2:0] region;
     initial region = 0;
     reg [15:0] address;
@@ -93,7 +100,10 @@ module dac_sequencer #(
     assign writable = idle_writable && !rendering && !host_commit;
     initial refused = 1'b0;
     always @(posedge clock) begin
-        host_write <= write && writable;
+        host_write <= accepted_write;
+        scan_write <= accepted_write && write_region == PROGRAM && write_address[15:4] == SCAN_PAGE;
+        x_write <= accepted_write && write_region == PROGRAM && write_address[15:4] == X_PAGE;
+        y_write <= accepted_write && write_region == PROGRAM && write_address[15:4] == Y_PAGE;
         host_commit <= commit && writable && !withdraw && !reset;
         region <= write_region;
         address <= write_address;
@@ -103,9 +113,6 @@ module dac_sequencer #(
         else if (clear_faults || reset)
             refused <= 1'b0;
     end
-    wire scan_write = host_write && region == PROGRAM && address[15:4] == SCAN_PAGE;
-    wire x_write = host_write && region == PROGRAM && address[15:4] == X_PAGE;
-    wire y_write = host_write && region == PROGRAM && address[15:4] == Y_PAGE;
     wire x_table_write, y_table_write;
     wire [15:0] table_address;
     wire [23:0] table_data;
@@ -194,7 +201,8 @@ module dac_sequencer #(
             ) y_axis (
                 .clock(clock), .write(y_write), .write_address(address[3:0]), .write_data(data),
                 .table_write(y_table_write), .table_address(table_address[Y_INDEX_BITS-1:0]),
-                .table_data(table_data[Y_WORD_BITS-1:0]), .bank(bank), .loaded(loaded), .tick(tick_0), .restart(frame_0),
+                .table_data(table_data[Y_WORD_BITS-1:0]), .bank(bank), .loaded(loaded), .tick(tick_0),
+                .restart(frame_0),
                 .advance(y_advance_0), .running(runs), .done(y_done), .code(y), .reached(y_reached), .clamped(y_clamped)
             );
         end else begin : pipelined
@@ -232,8 +240,10 @@ module dac_sequencer #(
                 .PERIOD_BITS(X_PERIOD_BITS), .PLAIN_MULTIPLIER(PLAIN_MULTIPLIER), .POWER_UP_CODE(X_POWER_UP_CODE)
             ) x_axis (
                 .clock(clock), .write(x_write), .write_address(address[3:0]), .table_write(x_table_write),
-                .table_address(table_address[X_INDEX_BITS-1:0]), .write_data(data), .table_data(table_data[X_WORD_BITS-1:0]),
-                .take(take), .ticks(ticks_now[LATENCY-4:0]), .loads(loads_now[LATENCY-4:0]), .runnings(runnings_now[LATENCY-4:0]),
+                .table_address(table_address[X_INDEX_BITS-1:0]), .write_data(data),
+                .table_data(table_data[X_WORD_BITS-1:0]),
+                .take(take), .ticks(ticks_now[LATENCY-4:0]), .loads(loads_now[LATENCY-4:0]),
+                .runnings(runnings_now[LATENCY-4:0]),
                 .bank(bank), .restart(line_0), .advance(runs_0), .code(x), .reached(x_reached), .clamped(x_clamped)
             );
             dac_axis #(
@@ -241,22 +251,28 @@ module dac_sequencer #(
                 .PERIOD_BITS(PERIOD_BITS), .PLAIN_MULTIPLIER(PLAIN_MULTIPLIER), .POWER_UP_CODE(Y_POWER_UP_CODE)
             ) y_axis (
                 .clock(clock), .write(y_write), .write_address(address[3:0]), .table_write(y_table_write),
-                .table_address(table_address[Y_INDEX_BITS-1:0]), .write_data(data), .table_data(table_data[Y_WORD_BITS-1:0]),
-                .take(take), .ticks(ticks_now[LATENCY-4:0]), .loads(loads_now[LATENCY-4:0]), .runnings(runnings_now[LATENCY-4:0]),
-                .bank(bank), .restart(frame_0), .advance(y_advance_0), .code(y), .reached(y_reached), .clamped(y_clamped)
+                .table_address(table_address[Y_INDEX_BITS-1:0]), .write_data(data),
+                .table_data(table_data[Y_WORD_BITS-1:0]),
+                .take(take), .ticks(ticks_now[LATENCY-4:0]), .loads(loads_now[LATENCY-4:0]),
+                .runnings(runnings_now[LATENCY-4:0]),
+                .bank(bank), .restart(frame_0), .advance(y_advance_0), .code(y), .reached(y_reached),
+                .clamped(y_clamped)
             );
         end
     endgenerate
 
     dac_verdict #(
-        .DAC_BITS(DAC_BITS), .COUNT_BITS(COUNT_BITS), .X_POWER_UP_CODE(X_POWER_UP_CODE), .Y_POWER_UP_CODE(Y_POWER_UP_CODE)
+        .DAC_BITS(DAC_BITS), .COUNT_BITS(COUNT_BITS), .X_POWER_UP_CODE(X_POWER_UP_CODE),
+        .Y_POWER_UP_CODE(Y_POWER_UP_CODE)
     ) verdict (
-        .clock(clock), .tick(done), .runs(runs_done), .begins(begins_done), .swapped(swapped_done), .clears(clears_done),
+        .clock(clock), .tick(done), .runs(runs_done), .begins(begins_done), .swapped(swapped_done),
+        .clears(clears_done),
         .line(line_done), .frame(frame_done), .pixel(pixel_done), .backward(backward_done), .images(images_done),
         .x(x), .y(y), .reached(x_reached && y_reached), .clamped(x_clamped || y_clamped), .overrun(overrun),
         .underrun(underrun), .strobe(strobe), .x_code(x_code), .y_code(y_code), .line_marker(line_marker),
         .frame_marker(frame_marker), .pixel_marker(pixel_marker), .backward_marker(backward_marker),
-        .valid_marker(valid_marker), .swapped_marker(swapped_marker), .playing(playing), .parked(parked), .faults(faults),
+        .valid_marker(valid_marker), .swapped_marker(swapped_marker), .playing(playing), .parked(parked),
+        .faults(faults),
         .fault_counts(fault_counts)
     );
 

@@ -1,12 +1,12 @@
 // The slew guard: moves the code towards its target, by at most max_step a tick, whatever the target does.
 //
-// What counts is the distance still to go, behind = last target - code. With the way from target to target,
-// delta = target - last target, the next code is target - behind', where
+// What counts is the distance still to go, behind = last target - code. With the way from target to target, delta =
+// target - last target, the next code is target - behind', where
 //     behind' = behind + (delta - max_step)    where that is not negative: the code moves by +max_step
 //     behind' = behind + (delta + max_step)    where that is negative:     the code moves by -max_step
 //     behind' = 0                              otherwise:                  the code arrives
-// Only `behind` is fed back, through one addition and a choice, so that a sample a clock is possible. Code and `reached` are
-// there 4 clocks after the target. max_step belongs to its target, and may change with every one.
+// Only `behind` is fed back, through one addition and a choice, so that a sample a clock is possible. Code and
+// `reached` are there 4 clocks after the target. max_step belongs to its target, and may change with every one.
 //
 // Some values are kept inverted: -x is the inverse of x, and 1, and an inverted register costs nothing.
 

@@ -50,7 +50,8 @@ module dac_verdict #(
     wire clamp_fault = tick && runs && clamped;
     wire clear = tick && clears;
     wire [3:0] happens = {underrun, overrun, clamp_fault, slew_fault};
-    wire faulty = happens != 4'd0 || (faults != 4'd0 && !clear);
+    // A slew fault needs no mention: a code that was held back has not reached its target.
+    wire faulty = underrun || overrun || clamp_fault || (faults != 4'd0 && !clear);
 
     dac_faults #(.FAULTS(4), .COUNT_BITS(COUNT_BITS)) sticky (
         .clock(clock), .clear(clear), .happens(happens), .faults(faults), .counts(fault_counts)

@@ -1,4 +1,5 @@
-// An imaging window of a program, [first, first + count): whether a position is inside, for positions that count up from 0.
+// An imaging window of a program, [first, first + count): whether a position is inside, for positions that count up
+// from 0.
 //
 // Also for an empty window. `imaging` and `opens` are those of the position two clocks ago.
 

