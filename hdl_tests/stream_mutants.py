@@ -30,11 +30,12 @@ from tablegen.emit.memory import memory_file
 from tablegen.fixedpoint.synthesis import sine_quarter
 from tablegen.resources import verilog_runtime
 from tablegen.verify.bench import SequencerBench, Shape
+from tablegen.verify.placement import Placement
 from tablegen.verify.stream import Script
 
 WORKERS = 2
 HARMONICS = 4
-LEAST_PACE = 41
+LEAST_PACE = Placement("serial").tick_clocks
 Y_AXIS_AFTER_LOADS = """
                 .runnings(runnings_now[LATENCY-4:0]),
                 .bank(bank), .restart(frame_0)"""

@@ -13,6 +13,7 @@ from tablegen.registers import PAGE_WORDS, program_words
 from tablegen.schedule import Window
 from tablegen.sequencer import DualProgram
 from tablegen.verify.bench import Shape
+from tablegen.verify.placement import Placement
 from tablegen.verify.stream import FLAGS, PROGRAM, X_FOURIER, X_TABLE, Y_FOURIER, Y_TABLE, Script, Words
 
 FAULTS = ("slew", "clamp", "overrun", "underrun")
@@ -114,13 +115,10 @@ def random_play(
 
 
 def rendering_clocks(shape: Shape, x: FourierWords | None, y: FourierWords | None, multiplier: int) -> int:
-    """From a commit to the committed bank, as dac_fourier.v and dac_render.v say."""
-    digits, latency = (2, 8) if multiplier else (16, 6)
-    clocks = 4
-    for words, bits in ((x, shape.x_index_bits), (y, shape.y_index_bits)):
-        if words is not None:
-            clocks += ((1 << bits - 1) + 1) * (digits * (2 * words.harmonics + 3) + 2) + latency + 1
-    return clocks
+    """From a commit to the committed bank."""
+    return Placement("blocks" if multiplier else "pipelined", fourier=True).commit_clocks(
+        (1 << shape.x_index_bits, x.harmonics if x else 0), (1 << shape.y_index_bits, y.harmonics if y else 0)
+    )
 
 
 def random_renderings(
@@ -139,7 +137,7 @@ def random_renderings(
             y=rendered(program.y, y) if y else program.y,
         )
         clocks = rendering_clocks(shape, x, y, multiplier)
-        script.load_fourier(program, x, y)
+        script.load(program, x, y)
         script.request("commit", program=program, commit_clocks=clocks)
         if number % 5 == 1:
             script.wait(int(rng.integers(clocks)))

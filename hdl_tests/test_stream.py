@@ -38,6 +38,7 @@ from tablegen.plan import LinePlan, Plan, make_plan
 from tablegen.resources import verilog_runtime
 from tablegen.sequencer import DualProgram
 from tablegen.verify.bench import Played, SequencerBench, Shape
+from tablegen.verify.placement import Placement
 from tablegen.verify.stream import FLAGS, Script, Words
 
 HERE = Path(__file__).parent
@@ -234,7 +235,8 @@ class Configuration:
 
 PLAIN_MULTIPLIER = {"PLAIN_MULTIPLIER": 1}
 LOW_AREA = {"LOW_AREA": 1}
-LEAST_PACES = (LEAST_PACE := 41, 64)  # clocks from tick to tick, with LOW_AREA
+LEAST_PACE = Placement("serial").tick_clocks
+LEAST_PACES = (LEAST_PACE, 64)  # clocks from tick to tick, with LOW_AREA
 CONFIGURATIONS: dict[str, Configuration] = {
     "bits_16": Configuration(Shape(16, 1, 5, 16, 1, 4, 16), samples=12000),
     "bits_16_plain": Configuration(Shape(16, 1, 5, 16, 1, 4, 16), PLAIN_MULTIPLIER, samples=12000),
@@ -473,7 +475,7 @@ def test_a_plan_from_its_fourier_words(low_area: int, tmp_path: Path) -> None:
     script = Script()
     script.tick_every(pace)
     for frames in (1, 0):
-        script.load_fourier(program, x, y) if frames == 0 else script.load(program)
+        script.load(program, x, y) if frames == 0 else script.load(program)
         script.request("commit", program=program, commit_clocks=clocks if frames == 0 else 4)
         if frames:
             script.wait_ticks(50)

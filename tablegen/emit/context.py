@@ -4,10 +4,10 @@ from typing import Any
 
 from tablegen import __version__
 from tablegen.certificate import Certificate
+from tablegen.emit.constants import axis_constants, sequence_constants
 from tablegen.fixedpoint.output import GAIN_BITS
 from tablegen.fixedpoint.phase import PHASE_BITS
 from tablegen.fixedpoint.rounding import signed_limits
-from tablegen.fixedpoint.synthesis import FRACTION_BITS
 from tablegen.numerics.arrays import Ints
 from tablegen.plan import LinePlan, Plan
 from tablegen.summary import summary
@@ -17,24 +17,6 @@ _PER_ROW = 10
 
 def template_context(plan: Plan, certificates: dict[str, Certificate], digest: str) -> dict[str, Any]:
     """The context of every template."""
-    schedule = plan.schedule
-    sequence = {
-        "UPDATE_RATE_MILLIHZ": schedule.update_rate_millihz,
-        "LINE_TICKS": schedule.ticks,
-        "FRAME_LINES": schedule.lines,
-        "PIXELS": schedule.pixels,
-        "SETTLE_LINES": schedule.settle_lines,
-        "TURN_TICK": schedule.turn_tick,
-        "FORWARD_FIRST_TICK": schedule.forward.first,
-        "FORWARD_TICKS": schedule.forward.count,
-        "BACKWARD_FIRST_TICK": schedule.backward.first,
-        "BACKWARD_TICKS": schedule.backward.count,
-        "TURN_LINE": schedule.turn_line,
-        "UP_FIRST_LINE": schedule.up.first,
-        "UP_LINES": schedule.up.count,
-        "DOWN_FIRST_LINE": schedule.down.first,
-        "DOWN_LINES": schedule.down.count,
-    }
     return {
         "version": __version__,
         "name": plan.name,
@@ -43,7 +25,7 @@ def template_context(plan: Plan, certificates: dict[str, Certificate], digest: s
         "header_only": plan.header_only,
         "scanner": comment_safe(plan.scanner),
         "summary": summary(plan, certificates),
-        "sequence": {key: _Number(value) for key, value in sequence.items()},
+        "sequence": {key: _Number(value) for key, value in sequence_constants(plan.schedule).items()},
         "phase_bits": PHASE_BITS,
         "least_gain": _Number(signed_limits(GAIN_BITS)[0]),
         "greatest_gain": _Number(signed_limits(GAIN_BITS)[1]),
@@ -87,35 +69,9 @@ def _verilog_literal(value: int) -> str:
 
 
 def _axis(plan: Plan, line: LinePlan) -> dict[str, Any]:
-    program, output = line.program, line.program.output
+    program = line.program
     prefix = f"{plan.name}_{line.axis}"
-    interpolated = program.mode == "interpolated"
-    constants = {
-        "TABLE_LENGTH": len(program.words),
-        "TABLE_BITS": program.bits,
-        "INDEX_BITS": program.index_bits,
-        "INTERPOLATED": int(interpolated),
-        "GUARD_BITS": program.guard,
-        "HARMONICS": line.fourier.harmonics,
-        "FOURIER_LENGTH": len(line.fourier.in_order),
-        "FOURIER_FRACTION_BITS": FRACTION_BITS,
-        "HOLD_TICKS": program.hold,
-        "PHASE_PERIOD": program.phase.ticks,
-        "PHASE_STEP": program.phase.step,
-        "PHASE_REMAINDER": program.phase.remainder,
-        "GAIN_WORD": output.gain_word,
-        "GAIN_Q": output.gain_q,
-        "OFFSET_WORD": output.offset_word,
-        "OFFSET_CODE": output.offset_code,
-        "CODE_MIN": output.code_min,
-        "CODE_MAX": output.code_max,
-        "MAX_STEP": output.max_step,
-        "PARK_CODE": output.park_code,
-        "DAC_BITS": output.dac_bits,
-        "DAC_WORD_BITS": output.word_bits,
-        "DAC_TWOS_COMPLEMENT": int(output.coding == "twos-complement"),
-        "DAC_LEFT_ALIGNED": int(output.align == "left"),
-    }
+    constants = axis_constants(program, line.fourier.harmonics)
     return {
         "axis": line.axis,
         "prefix": prefix,
@@ -124,7 +80,7 @@ def _axis(plan: Plan, line: LinePlan) -> dict[str, Any]:
         "word_type": _word_type(program.bits),
         "table_rows": _rows(program.words),
         "fourier_rows": _rows(line.fourier.in_order),
-        "interpolated": interpolated,
+        "interpolated": program.mode == "interpolated",
         "table_memory": f"{prefix}.mem",
         "fourier_memory": f"{prefix}_fourier.mem",
         "lines_per_period": "1" if line.axis == "x" else f"{plan.name.upper()}_FRAME_LINES",

@@ -1,11 +1,13 @@
 """Memory files for ``$readmemh``: one full-width two's complement word a line, in hexadecimal."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from typing import Literal
 
+from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.synthesis import WORD_BITS, sine_quarter
 from tablegen.numerics.arrays import Ints
-from tablegen.plan import Plan
 from tablegen.registers import program_words
+from tablegen.schedule import Schedule
 
 
 def memory_file(words: Ints | Iterable[int], bits: int) -> bytes:
@@ -14,15 +16,21 @@ def memory_file(words: Ints | Iterable[int], bits: int) -> bytes:
     return "".join(f"{int(word) & mask:0{digits}x}\n" for word in words).encode("ascii")
 
 
-def program_file(plan: Plan) -> bytes:
-    """The registers of the Verilog sequencer, for tables that are uploaded.
+def memory_files(
+    name: str, schedule: Schedule, x: Program, y: Program, fourier: Mapping[Literal["x", "y"], Ints]
+) -> dict[str, bytes]:
+    """All memory files of a build by their names; ``fourier`` has the Fourier words of "x" and "y" in order.
 
-    A host that uploads Fourier words instead writes HARMONICS over the last register of their axis, which is 0 here.
+    The registers are those for uploaded tables: a host that uploads Fourier words instead writes HARMONICS over the
+    last register of their axis, which is 0 here. The quarter sine is that of the longest interpolated table, and serves
+    shorter ones too; where no table is interpolated there is none.
     """
-    return memory_file(program_words(plan.schedule, plan.x.program, plan.y.program), WORD_BITS)
-
-
-def sine_file(plan: Plan) -> bytes | None:
-    """The quarter sine of the longest interpolated table, which serves shorter ones too; None without one."""
-    index_bits = max(line.program.index_bits for line in plan.lines)
-    return memory_file(sine_quarter(index_bits), WORD_BITS) if index_bits else None
+    files = {}
+    programs: tuple[tuple[Literal["x", "y"], Program], ...] = (("x", x), ("y", y))
+    for axis, program in programs:
+        files[f"{name}_{axis}.mem"] = memory_file(program.words, program.bits)
+        files[f"{name}_{axis}_fourier.mem"] = memory_file(fourier[axis], WORD_BITS)
+    files[f"{name}_program.mem"] = memory_file(program_words(schedule, x, y), WORD_BITS)
+    if index_bits := max(x.index_bits, y.index_bits):
+        files[f"{name}_sine.mem"] = memory_file(sine_quarter(index_bits), WORD_BITS)
+    return files

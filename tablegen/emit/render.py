@@ -8,8 +8,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from tablegen.certificate import Certificate
 from tablegen.emit.context import template_context
 from tablegen.emit.manifest import MANIFEST, manifest_file
-from tablegen.emit.memory import memory_file, program_file, sine_file
-from tablegen.fixedpoint.synthesis import WORD_BITS
+from tablegen.emit.memory import memory_files
 from tablegen.plan import Plan
 from tablegen.record import content_hash, plan_record
 from tablegen.resources import resource_folder, verilog_runtime
@@ -24,13 +23,8 @@ def render(plan: Plan, certificates: dict[str, Certificate]) -> dict[str, bytes]
     if not plan.header_only:
         files[f"{plan.name}.c"] = _template("c/tables.c.j2", context)
     files[f"{plan.name}.vh"] = _template("verilog/tables.vh.j2", context)
-    for line, names in zip(plan.lines, context["axes"], strict=True):
-        files[names["table_memory"]] = memory_file(line.program.words, line.program.bits)
-        files[names["fourier_memory"]] = memory_file(line.fourier.in_order, WORD_BITS)
-    files[context["program_memory"]] = program_file(plan)
-    sines = sine_file(plan)
-    if sines is not None:
-        files[context["sine_memory"]] = sines
+    fourier = {line.axis: line.fourier.in_order for line in plan.lines}
+    files |= memory_files(plan.name, plan.schedule, plan.x.program, plan.y.program, fourier)
     files |= runtime_files()
     files[MANIFEST] = manifest_file(record, digest, certificates, files)
     return files

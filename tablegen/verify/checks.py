@@ -39,10 +39,11 @@ class Record:
     steady: Bools
     lost: int  # ticks that the model has and the record has not, or the other way round
 
-    def part(self, subject: str, words: Words) -> Ints:
-        """A field of the words."""
-        shift, mask = _MASK[subject]
-        return (words >> np.uint64(shift) & np.uint64(mask)).astype(np.int64)
+
+def _part(subject: str, words: Words) -> Ints:
+    """A field of recorded words."""
+    shift, mask = _MASK[subject]
+    return (words >> np.uint64(shift) & np.uint64(mask)).astype(np.int64)
 
 
 def make_record(recorded: Recorded, expected: list[int], got: Words) -> Record:
@@ -57,9 +58,7 @@ def make_record(recorded: Recorded, expected: list[int], got: Words) -> Record:
     begins = flags["frame"] & (np.concatenate([[-1], place[:-1]]) != frame_ticks - 1)
     reached = place >= 0
     for axis, program in (("x", recorded.program.x), ("y", recorded.program.y)):
-        shift, mask = _MASK[axis]
-        codes = (wanted >> np.uint64(shift) & np.uint64(mask)).astype(np.int64)
-        reached[reached] = program.codes(place[reached] % program.ticks) == codes[reached]
+        reached[reached] = program.codes(place[reached] % program.ticks) == _part(axis, wanted)[reached]
     begun = np.maximum.accumulate(np.where(begins, index, 0))
     # Caught up is for good: one right tick since the program began, this one included, is enough.
     steady = (place >= 0) & (np.maximum.accumulate(np.where(reached, index, -1)) >= begun)
@@ -88,7 +87,7 @@ def check_record(record: Record, recorded: Recorded, status: dict[str, Any], cou
 
 
 def _model(record: Record, recorded: Recorded, subject: str) -> Check:
-    got, wanted = record.part(subject, record.got), record.part(subject, record.wanted)
+    got, wanted = _part(subject, record.got), _part(subject, record.wanted)
     differs = np.flatnonzero(got != wanted)
     failure = None
     worst = "0"
@@ -121,8 +120,9 @@ def _float(record: Record, recorded: Recorded, axis: Literal["x", "y"], content:
     # Rounded down: a frame of which a tick was not played is not whole.
     compared = f"{len(at)} codes, {int(covered * 1000) / 10:g} % of the {name}"
     if not len(at):
-        return Check(axis, "float waveform", "no code: it did not catch up", "", f"{limit:.3f} LSB")
-    error: Floats = record.part(axis, record.got)[at] - content.asked(k)
+        why = f"{axis}: the output did not catch up with the waveform in {len(record.got)} ticks; play more --ticks"
+        return Check(axis, "float waveform", "no code", "", f"{limit:.3f} LSB", why)
+    error: Floats = _part(axis, record.got)[at] - content.asked(k)
     largest = int(np.argmax(np.abs(error)))
     worst = float(np.abs(error[largest]))
     failure = None
@@ -137,7 +137,7 @@ def _float(record: Record, recorded: Recorded, axis: Literal["x", "y"], content:
 def _bounds(record: Record, axis: str, content: Axis) -> list[Check]:
     """Slew guard and clamp on every tick, whatever the state."""
     output = content.output
-    codes = record.part(axis, record.got)[record.got != _UNDEFINED]
+    codes = _part(axis, record.got)[record.got != _UNDEFINED]
     step = int(np.max(np.abs(np.diff(codes)), initial=0))
     low, high = int(np.min(codes, initial=output.code_max)), int(np.max(codes, initial=output.code_min))
     inside = output.code_min <= low and high <= output.code_max
@@ -163,7 +163,7 @@ def _bounds(record: Record, axis: str, content: Axis) -> list[Check]:
 
 def _faults(record: Record, recorded: Recorded, status: dict[str, Any], counts: list[int]) -> Check:
     """No fault is to be seen, and none to be counted."""
-    flags = record.part("faults", record.got)
+    flags = _part("faults", record.got)
     wrong = np.flatnonzero(flags)
     counted = [int(count) for count in status["counts"]]
     failure = None

@@ -1,15 +1,12 @@
 """The files of a build against its manifest: their digests, the constants of the Verilog header, the memory files."""
 
 import re
-from collections.abc import Mapping
 from hashlib import sha256
 from pathlib import Path
 
-from tablegen.emit.memory import memory_file
-from tablegen.fixedpoint.program import Program
-from tablegen.fixedpoint.synthesis import FRACTION_BITS, WORD_BITS, sine_quarter
-from tablegen.registers import program_words
-from tablegen.verify.recorded import Axis, Recorded
+from tablegen.emit.constants import axis_constants, sequence_constants
+from tablegen.emit.memory import memory_files
+from tablegen.verify.recorded import Recorded
 
 _LOCALPARAM = re.compile(r"^localparam\s[^=]*?(\w+)\s*=\s*(.*?)\s*;", re.MULTILINE)
 _NUMBER = re.compile(r"(-?)(?:\d+'s?([dh]))?([0-9a-fA-F]+)")
@@ -51,64 +48,19 @@ def wrong_constants(folder: Path, recorded: Recorded) -> tuple[int, list[str]]:
 
 def expected_constants(recorded: Recorded) -> dict[str, int | str]:
     """Every localparam of the Verilog header: numbers, and names of files."""
-    manifest, schedule = recorded.manifest, recorded.program.schedule
-    numbers: dict[str, int | str] = {
-        "HASH": int(manifest.hash, 16),
-        "UPDATE_RATE_MILLIHZ": schedule.update_rate_millihz,
-        "LINE_TICKS": schedule.ticks,
-        "FRAME_LINES": schedule.lines,
-        "PIXELS": schedule.pixels,
-        "SETTLE_LINES": schedule.settle_lines,
-        "TURN_TICK": schedule.turn_tick,
-        "FORWARD_FIRST_TICK": schedule.forward.first,
-        "FORWARD_TICKS": schedule.forward.count,
-        "BACKWARD_FIRST_TICK": schedule.backward.first,
-        "BACKWARD_TICKS": schedule.backward.count,
-        "TURN_LINE": schedule.turn_line,
-        "UP_FIRST_LINE": schedule.up.first,
-        "UP_LINES": schedule.up.count,
-        "DOWN_FIRST_LINE": schedule.down.first,
-        "DOWN_LINES": schedule.down.count,
-        "PROGRAM_FILE": f"{manifest.name}_program.mem",
+    name, program = recorded.manifest.name, recorded.program
+    constants: dict[str, int | str] = {
+        "HASH": int(recorded.manifest.hash, 16),
+        **sequence_constants(program.schedule),
+        "PROGRAM_FILE": f"{name}_program.mem",
     }
-    if any(axis.table.mode == "interpolated" for _, axis in recorded.axes):
-        numbers["SINE_FILE"] = f"{manifest.name}_sine.mem"
-    for name, axis in recorded.axes:
-        prefix = f"{manifest.name}_{name}"
-        own = {**_constants(axis), "TABLE_FILE": f"{prefix}.mem", "FOURIER_FILE": f"{prefix}_fourier.mem"}
-        numbers |= {f"{name.upper()}_{key}": value for key, value in own.items()}
-    return {f"{manifest.name.upper()}_{key}": value for key, value in numbers.items()}
-
-
-def _constants(axis: Axis) -> Mapping[str, int | str]:
-    table, output, line = axis.table, axis.output, axis.line
-    interpolated = table.mode == "interpolated"
-    return {
-        "TABLE_LENGTH": len(table.words),
-        "TABLE_BITS": table.bits,
-        "INDEX_BITS": len(table.words).bit_length() - 1 if interpolated else 0,
-        "INTERPOLATED": int(interpolated),
-        "GUARD_BITS": table.guard_bits,
-        "HARMONICS": axis.fourier.harmonics,
-        "FOURIER_LENGTH": 2 * axis.fourier.harmonics + 1,
-        "FOURIER_FRACTION_BITS": FRACTION_BITS,
-        "HOLD_TICKS": line.hold_ticks,
-        "PHASE_PERIOD": line.ticks // line.hold_ticks,
-        "PHASE_STEP": line.phase_step,
-        "PHASE_REMAINDER": line.phase_remainder,
-        "GAIN_WORD": output.gain_word,
-        "GAIN_Q": output.gain_q,
-        "OFFSET_WORD": output.offset_word,
-        "OFFSET_CODE": output.offset_code,
-        "CODE_MIN": output.code_min,
-        "CODE_MAX": output.code_max,
-        "MAX_STEP": output.max_step,
-        "PARK_CODE": output.park_code,
-        "DAC_BITS": output.dac_bits,
-        "DAC_WORD_BITS": output.word_bits,
-        "DAC_TWOS_COMPLEMENT": int(output.coding == "twos-complement"),
-        "DAC_LEFT_ALIGNED": int(output.align == "left"),
-    }
+    if program.x.index_bits or program.y.index_bits:
+        constants["SINE_FILE"] = f"{name}_sine.mem"
+    for axis, content in recorded.axes:
+        files = {"TABLE_FILE": f"{name}_{axis}.mem", "FOURIER_FILE": f"{name}_{axis}_fourier.mem"}
+        own = axis_constants(getattr(program, axis), content.fourier.harmonics) | files
+        constants |= {f"{axis.upper()}_{key}": value for key, value in own.items()}
+    return {f"{name.upper()}_{key}": value for key, value in constants.items()}
 
 
 def _value(text: str) -> int | str:
@@ -131,17 +83,9 @@ def _shown(value: int | str) -> str:
 
 def expected_memories(recorded: Recorded) -> dict[str, bytes]:
     """What the memory files have to hold, by name: made again from the manifest."""
-    name, program = recorded.manifest.name, recorded.program
-    words = program_words(program.schedule, program.x, program.y)
-    files = {f"{name}_program.mem": memory_file(words, WORD_BITS)}
-    for axis, content in recorded.axes:
-        played: Program = getattr(program, axis)
-        files[f"{name}_{axis}.mem"] = memory_file(played.words, played.bits)
-        files[f"{name}_{axis}_fourier.mem"] = memory_file(content.fourier_words, WORD_BITS)
-    index_bits = max(program.x.index_bits, program.y.index_bits)
-    if index_bits:
-        files[f"{name}_sine.mem"] = memory_file(sine_quarter(index_bits), WORD_BITS)
-    return files
+    program = recorded.program
+    fourier = {axis: content.fourier_words for axis, content in recorded.axes}
+    return memory_files(recorded.manifest.name, program.schedule, program.x, program.y, fourier)
 
 
 def wrong_memories(folder: Path, recorded: Recorded) -> tuple[int, list[str]]:

@@ -5,7 +5,6 @@ from typing import Literal
 
 from tablegen.fixedpoint.program import Program
 
-AXES = ("pipelined", "blocks", "serial")
 _SERIAL_CLOCKS = 41  # of a sample
 
 
@@ -35,13 +34,16 @@ class Placement:
             chosen |= {"FOURIER": 1, "HARMONICS": harmonics, "SINE_FILE": sine_file}
         return chosen
 
-    def commit_clocks(self, x: tuple[Program, int], y: tuple[Program, int]) -> int:
-        """Clocks from a commit to the committed bank, of programs and their harmonics (dac_fourier.v, dac_render.v)."""
+    def commit_clocks(self, *tables: tuple[int, int]) -> int:
+        """Clocks from a commit to the committed bank, for the length of each table and its harmonics, 0 if uploaded.
+
+        As dac_fourier.v and dac_render.v state them.
+        """
         if not self.fourier:
             return 1
         digits, latency = (2, 8) if self.axis == "blocks" else (16, 6)
         return 4 + sum(
-            (len(program.words) // 2 + 1) * (digits * (2 * harmonics + 3) + 2) + latency + 1
-            for program, harmonics in (x, y)
-            if self.renders(program)
+            (length // 2 + 1) * (digits * (2 * harmonics + 3) + 2) + latency + 1
+            for length, harmonics in tables
+            if harmonics
         )

@@ -54,7 +54,9 @@ def make_session(program: DualProgram, memories: Memories, most: int, seed: int,
     """
     random, schedule = np.random.default_rng(seed), program.schedule
     parks = program.x.output.park_code, program.y.output.park_code
-    commit_clocks = placement.commit_clocks((program.x, memories.x_harmonics), (program.y, memories.y_harmonics))
+    commit_clocks = placement.commit_clocks(
+        (len(program.x.words), memories.x_harmonics), (len(program.y.words), memories.y_harmonics)
+    )
     script = Script(power_up=parks, drain=48 + placement.tick_clocks, commit_clocks=commit_clocks)
     pace = placement.tick_clocks
     most -= 1  # a script ends with a tick of its own

@@ -34,7 +34,6 @@ class Design:
     top: str
     parameters: Mapping[str, int | str] = field(default_factory=dict)
     includes: Sequence[Path] = ()
-    defines: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -95,7 +94,6 @@ def compile_design(simulator: str, design: Design, folder: Path) -> Compiled:
                 includes=[path.resolve() for path in design.includes],
                 hdl_toplevel=design.top,
                 parameters={name: _parameter(value) for name, value in design.parameters.items()},
-                defines=dict(design.defines),
                 build_args=_BUILD_ARGUMENTS[simulator],
                 build_dir=folder,
                 always=True,

@@ -97,22 +97,14 @@ class Script:
         self.write(region, words, first)
         self.refused = True
 
-    def load_fourier(self, program: DualProgram, x: FourierWords | None, y: FourierWords | None) -> None:
-        """Write a whole program, with Fourier words where there are some; a device renders its tables from them."""
+    def load(self, program: DualProgram, x: FourierWords | None = None, y: FourierWords | None = None) -> None:
+        """Write a whole program, once the idle bank can be written: tables, or Fourier words to render them from."""
         self.wait_writable()
         assert self.writable, "a program waits to be taken; withdraw it first"
         harmonics = (x.harmonics if x else 0, y.harmonics if y else 0)
         self.write(PROGRAM, program_words(program.schedule, program.x, program.y, harmonics))
         self.write(X_FOURIER, x.in_order) if x else self.write(X_TABLE, program.x.words)
         self.write(Y_FOURIER, y.in_order) if y else self.write(Y_TABLE, program.y.words)
-
-    def load(self, program: DualProgram) -> None:
-        """Write a whole program with its tables, once the idle bank can be written."""
-        self.wait_writable()
-        assert self.writable, "a program waits to be taken; withdraw it first"
-        self.write(PROGRAM, program_words(program.schedule, program.x, program.y))
-        self.write(X_TABLE, program.x.words)
-        self.write(Y_TABLE, program.y.words)
 
     def wait_writable(self) -> None:
         """Let clocks pass until the last swap is over, if it has come."""

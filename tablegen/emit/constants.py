@@ -1,0 +1,57 @@
+"""The constants of the emitted headers by name, the same in C and in Verilog."""
+
+from tablegen.fixedpoint.program import Program
+from tablegen.fixedpoint.synthesis import FRACTION_BITS
+from tablegen.schedule import Schedule
+
+
+def sequence_constants(schedule: Schedule) -> dict[str, int]:
+    """Those of the scan; ticks, lines and pixels."""
+    return {
+        "UPDATE_RATE_MILLIHZ": schedule.update_rate_millihz,
+        "LINE_TICKS": schedule.ticks,
+        "FRAME_LINES": schedule.lines,
+        "PIXELS": schedule.pixels,
+        "SETTLE_LINES": schedule.settle_lines,
+        "TURN_TICK": schedule.turn_tick,
+        "FORWARD_FIRST_TICK": schedule.forward.first,
+        "FORWARD_TICKS": schedule.forward.count,
+        "BACKWARD_FIRST_TICK": schedule.backward.first,
+        "BACKWARD_TICKS": schedule.backward.count,
+        "TURN_LINE": schedule.turn_line,
+        "UP_FIRST_LINE": schedule.up.first,
+        "UP_LINES": schedule.up.count,
+        "DOWN_FIRST_LINE": schedule.down.first,
+        "DOWN_LINES": schedule.down.count,
+    }
+
+
+def axis_constants(program: Program, harmonics: int) -> dict[str, int]:
+    """Those of an axis, whose table comes from so many harmonics."""
+    output = program.output
+    return {
+        "TABLE_LENGTH": len(program.words),
+        "TABLE_BITS": program.bits,
+        "INDEX_BITS": program.index_bits,
+        "INTERPOLATED": int(program.mode == "interpolated"),
+        "GUARD_BITS": program.guard,
+        "HARMONICS": harmonics,
+        "FOURIER_LENGTH": 2 * harmonics + 1,
+        "FOURIER_FRACTION_BITS": FRACTION_BITS,
+        "HOLD_TICKS": program.hold,
+        "PHASE_PERIOD": program.phase.ticks,
+        "PHASE_STEP": program.phase.step,
+        "PHASE_REMAINDER": program.phase.remainder,
+        "GAIN_WORD": output.gain_word,
+        "GAIN_Q": output.gain_q,
+        "OFFSET_WORD": output.offset_word,
+        "OFFSET_CODE": output.offset_code,
+        "CODE_MIN": output.code_min,
+        "CODE_MAX": output.code_max,
+        "MAX_STEP": output.max_step,
+        "PARK_CODE": output.park_code,
+        "DAC_BITS": output.dac_bits,
+        "DAC_WORD_BITS": output.word_bits,
+        "DAC_TWOS_COMPLEMENT": int(output.coding == "twos-complement"),
+        "DAC_LEFT_ALIGNED": int(output.align == "left"),
+    }
