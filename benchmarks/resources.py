@@ -68,7 +68,10 @@ CASES = {
     "sequencer_low_area_fourier": Case(
         "two axes, low area, Fourier words", "dac_sequencer", "HX8K", {**_TOP, "LOW_AREA": 1, "FOURIER": 1}
     ),
+    "renderer_63": Case("tables from Fourier words", "dac_fourier", "HX8K", {"HARMONICS": 63}),
+    "renderer_127": Case("tables from Fourier words", "dac_fourier", "HX8K", {"HARMONICS": 127}),
     "spi": Case("SPI, two converters in parallel", "dac_spi", "HX8K"),
+    "spi_20": Case("SPI, 20 bits in frames of 24", "dac_spi", "HX8K", {"WORD_BITS": 20, "FRAME_BITS": 24}),
     "axi": Case("AXI-Stream", "dac_axi_stream", "HX8K"),
     **{
         f"axis_{family}_{name}": Case(
@@ -86,6 +89,17 @@ CASES = {
         for family in ("ECP5", "7-series")
     },
     **{
+        f"renderer_{family}_{multiplier}": Case(
+            "tables from Fourier words",
+            "dac_fourier",
+            family,
+            {"HARMONICS": 127, "MULTIPLIER": multiplier},
+            most_multipliers=2 * multiplier,
+        )
+        for family in ("ECP5", "7-series")
+        for multiplier in (0, 1)
+    },
+    **{
         f"sequencer_{family}": Case(
             "two axes, a sample a clock", "dac_sequencer", family, {**_TOP, "PLAIN_MULTIPLIER": 1}, most_multipliers=4
         )
@@ -99,8 +113,9 @@ def measure(case: Case, seeds: Sequence[int] = SEEDS) -> Result:
     with tempfile.TemporaryDirectory() as folder:
         netlist, statistics = Path(folder, "netlist.json"), Path(folder, "statistics")
         parameters = " ".join(f"-chparam {name} {value}" for name, value in case.parameters.items())
-        if case.parameters.get("FOURIER"):  # without contents the memory would be synthesised away
-            index_bits = max(value for name, value in case.parameters.items() if "INDEX" in name)
+        if case.top == "dac_fourier" or case.parameters.get("FOURIER"):
+            # Without contents the memory would be synthesised away.
+            index_bits = max((value for name, value in case.parameters.items() if "INDEX" in name), default=11)
             Path(folder, "sine.mem").write_text(_quarter_sine(index_bits), "utf-8")
         for path in MODULES.glob("dac_*.v"):
             text = path.read_text("utf-8")

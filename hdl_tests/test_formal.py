@@ -207,6 +207,11 @@ SERIAL_MUTANTS = {
 }
 
 
+def test_the_documentation_counts_them() -> None:
+    page = MODULES.parents[1] / "docs" / "verilog.md"
+    assert f"{len(MUTANTS) + len(SERIAL_MUTANTS)} in all" in page.read_text("utf-8")
+
+
 @pytest.mark.parametrize("name", SERIAL_MUTANTS)
 def test_mutant_of_the_low_area_axis_is_not_proven(name: str, tmp_path: Path) -> None:
     text, instead = SERIAL_MUTANTS[name]

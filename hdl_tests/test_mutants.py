@@ -17,6 +17,11 @@ def test_the_verilog_as_it_is_passes(name: str, tmp_path: Path) -> None:
     assert played.equal, played
 
 
+def test_the_documentation_counts_them() -> None:
+    page = Path(__file__).parents[1] / "docs" / "verilog.md"
+    assert f"{len(MUTANTS)} faults put into the Verilog" in page.read_text("utf-8")
+
+
 def test_no_mutant_is_listed_twice() -> None:
     assert len({(mutant.module, mutant.old, mutant.new, mutant.bench) for mutant in MUTANTS}) == len(MUTANTS) > 100
 
