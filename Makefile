@@ -3,6 +3,7 @@
 # make test-hdl  only those of the Verilog: simulation, mutants, proofs, lint, synthesis
 # make test-slow a hundred thousand random swaps
 # make resources what the Verilog takes on FPGAs, into docs/resources.md
+# make instructions what the C takes on Cortex-M, into docs/instructions.md
 # make bench     what a build costs, against importing numpy
 # make figures   the pictures of the README and the docs
 # make clean     remove what these made
@@ -14,11 +15,13 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 
 # What the tests compile, simulate, prove and synthesise with.
 HDL_TOOLS := make g++ iverilog yosys nextpnr-ice40 z3
-TOOLS := gcc clang libclang-rt-dev ghdl $(HDL_TOOLS)
+FIRMWARE_TOOLS := gcc-arm-none-eabi qemu-system-arm gcc-avr avr-libc simavr gcc-riscv64-unknown-elf gcc-mips-linux-gnu \
+    libc6-dev-mips-cross qemu-user
+TOOLS := $(FIRMWARE_TOOLS) gcc clang libclang-rt-dev cppcheck cmake ninja-build ghdl $(HDL_TOOLS)
 # A file of tests goes to one process: what its tests share is made once.
 PYTEST := $(BIN)/python -m pytest --numprocesses auto --dist loadfile
 
-.PHONY: demo test test-hdl test-slow resources bench figures clean
+.PHONY: demo test test-hdl test-slow resources instructions bench figures clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/installed
@@ -42,6 +45,10 @@ test-slow: $(VENV)/installed-test
 resources: $(VENV)/installed-test
 	@.ci/system-packages $(HDL_TOOLS)
 	$(BIN)/python benchmarks/resources.py --write
+
+instructions: $(VENV)/installed-test
+	@.ci/system-packages gcc-arm-none-eabi
+	$(BIN)/python benchmarks/firmware.py --write
 
 bench: $(VENV)/installed
 	$(BIN)/python benchmarks/build_cost.py

@@ -5,8 +5,7 @@ Where a program comes from a plan, each code is held against its float waveform 
 what a swap must never do is read off the record by itself. Icarus plays every case, Verilator the long ones.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +13,16 @@ import pytest
 from building import Variant, write_variant
 from programs import random_dual
 from spi_monitor import Converter, Wires, receive, updates
+from stream_configurations import (
+    CONFIGURATIONS,
+    LEAST_PACE,
+    LEAST_PACES,
+    LOW_AREA,
+    SMALL,
+    SWAPS,
+    SWAPS_SLOW,
+    random_swaps,
+)
 from stream_laws import Broken, follow_their_programs, steps_are_limited
 from stream_scripts import (
     FAULTS,
@@ -38,13 +47,11 @@ from tablegen.plan import LinePlan, Plan, make_plan
 from tablegen.resources import verilog_runtime
 from tablegen.sequencer import DualProgram
 from tablegen.verify.bench import Played, SequencerBench, Shape
-from tablegen.verify.placement import Placement
 from tablegen.verify.stream import FLAGS, Script, Words
 
 HERE = Path(__file__).parent
 SAMPLES_ON_ICARUS = 100_000
 SAMPLES_ON_VERILATOR = 1_000_000
-SWAPS, SWAPS_SLOW = 10_000, 100_000
 
 
 def equal(bench: SequencerBench, script: Script) -> Played:
@@ -221,51 +228,6 @@ def test_the_longest_table(tmp_path: Path) -> None:
 # Random programs, back to back.
 
 
-@dataclass(frozen=True)
-class Configuration:
-    """A sequencer as synthesised, and how it is played; ``samples`` on Icarus."""
-
-    shape: Shape
-    parameters: Mapping[str, int] = field(default_factory=dict)
-    paces: tuple[int, ...] = (1,)
-    ticks: tuple[int, int] = (8, 40)
-    lines: tuple[int, int] = (1, 5)
-    samples: int = 9000
-
-
-PLAIN_MULTIPLIER = {"PLAIN_MULTIPLIER": 1}
-LOW_AREA = {"LOW_AREA": 1}
-LEAST_PACE = Placement("serial").tick_clocks
-LEAST_PACES = (LEAST_PACE, 64)  # clocks from tick to tick, with LOW_AREA
-CONFIGURATIONS: dict[str, Configuration] = {
-    "bits_16": Configuration(Shape(16, 1, 5, 16, 1, 4, 16), samples=12000),
-    "bits_16_plain": Configuration(Shape(16, 1, 5, 16, 1, 4, 16), PLAIN_MULTIPLIER, samples=12000),
-    "bits_8": Configuration(Shape(8, 1, 3, 8, 1, 2, 8)),
-    "bits_12": Configuration(Shape(12, 1, 2, 12, 0, 7, 12), paces=(1, 2, 3, 7)),
-    "bits_18_plain": Configuration(Shape(18, 0, 6, 18, 1, 3, 18), PLAIN_MULTIPLIER, paces=(1, 2, 3, 7)),
-    "bits_20": Configuration(Shape(20, 1, 3, 20, 1, 3, 20), paces=(7, 1)),
-    "bits_24": Configuration(Shape(24, 1, 3, 24, 1, 2, 24)),
-    "bits_24_plain": Configuration(Shape(24, 1, 3, 24, 1, 2, 24), PLAIN_MULTIPLIER),
-    "dac_24_words_8_plain": Configuration(Shape(24, 1, 4, 8, 0, 3, 12), PLAIN_MULTIPLIER),
-    "dac_24_words_8": Configuration(Shape(24, 1, 4, 8, 1, 3, 9)),
-    "dac_8_words_24": Configuration(Shape(8, 1, 4, 24, 1, 3, 22)),
-    "dac_8_words_24_plain": Configuration(Shape(8, 0, 5, 24, 1, 3, 21), PLAIN_MULTIPLIER),
-    "small_counters": Configuration(
-        Shape(16, 1, 3, 16, 1, 2, 16),
-        {"TICK_BITS": 5, "LINE_BITS": 3, "PERIOD_BITS": 9, "COUNT_BITS": 5},
-        ticks=(24, 32),
-        lines=(6, 8),
-    ),
-    "shortest_lines": Configuration(Shape(16, 1, 3, 16, 0, 3, 16), ticks=(8, 8), lines=(1, 2)),
-    "low_area": Configuration(Shape(16, 1, 5, 16, 1, 4, 16), LOW_AREA, LEAST_PACES, samples=1200),
-    "low_area_dac_24": Configuration(Shape(24, 1, 3, 8, 0, 4, 24), LOW_AREA, LEAST_PACES, samples=800),
-    "low_area_dac_8": Configuration(Shape(8, 0, 5, 24, 1, 3, 12), LOW_AREA, LEAST_PACES, samples=800),
-    "power_up_codes": Configuration(
-        Shape(16, 1, 3, 16, 0, 3, 14), {"X_POWER_UP_CODE": 65535, "Y_POWER_UP_CODE": 12345}, paces=(3, 1)
-    ),
-}
-
-
 def test_enough_is_played_on_icarus() -> None:
     assert sum(configuration.samples for configuration in CONFIGURATIONS.values()) >= SAMPLES_ON_ICARUS
 
@@ -273,16 +235,8 @@ def test_enough_is_played_on_icarus() -> None:
 @pytest.mark.parametrize("name", CONFIGURATIONS)
 def test_random_programs(name: str, tmp_path: Path) -> None:
     configuration = CONFIGURATIONS[name]
-    rng = np.random.default_rng(sum(name.encode()))
-    parameters = configuration.parameters
-    script = Script((parameters.get("X_POWER_UP_CODE", 0), parameters.get("Y_POWER_UP_CODE", 0)))
-    script.tick_every(configuration.paces[0])
-    script.wait_ticks(5)
-    random_play(
-        rng, script, configuration.shape, configuration.samples, configuration.paces, configuration.ticks,
-        configuration.lines,
-    )  # fmt: skip
-    bench = SequencerBench("icarus", configuration.shape, tmp_path, dict(parameters))
+    script = configuration.script(name)
+    bench = SequencerBench("icarus", configuration.shape, tmp_path, dict(configuration.parameters))
     played = equal(bench, script)
     assert played.samples >= configuration.samples
     assert script.swaps > configuration.samples // 400
@@ -314,8 +268,6 @@ def test_everything_that_a_host_may_ask(variant: str, tmp_path: Path) -> None:
 
 # Swaps.
 
-SMALL = Shape(16, 1, 2, 16, 1, 2, 16)  # so that an upload takes few clocks
-
 
 @pytest.fixture(scope="module")
 def small_on_verilator(tmp_path_factory: pytest.TempPathFactory) -> SequencerBench:
@@ -339,24 +291,6 @@ def test_a_swap_is_requested_at_every_tick_and_taken_at_line_starts(pace: int, t
         before = starts[starts < at][-1]
         assert at - before in {program.schedule.ticks for program in pair}  # the line before was whole
     follow_their_programs(record, script.taken)
-
-
-def random_swaps(rng: np.random.Generator, swaps: int) -> tuple[Script, list[DualProgram]]:
-    """A scan without end in which programs follow each other, committed at any tick; and the programs, in order."""
-    script, programs = Script(), []
-    script.tick_every(1)
-    for _ in range(swaps):
-        program = random_dual(rng, SMALL, (8, 20), kind="smooth", lines=(1, 3))
-        script.load(program)
-        script.wait(int(rng.integers(0, 20)))
-        script.request("commit", program=program)
-        if not programs:
-            script.wait(10)
-            script.request("arm", "trigger")
-        script.wait_ticks(24)
-        programs.append(program)
-    script.wait_ticks(100)
-    return script, programs
 
 
 @pytest.mark.parametrize("swaps", [SWAPS, pytest.param(SWAPS_SLOW, marks=pytest.mark.slow)])

@@ -13,3 +13,22 @@ def resource_folder(name: Literal["examples", "firmware_templates"]) -> Path:
 def verilog_runtime() -> list[Path]:
     """The Verilog sequencer, one module a file, in order of name; every build copies it."""
     return sorted((resource_folder("firmware_templates") / "verilog").glob("dac_*.v"))
+
+
+def c_runtime() -> list[Path]:
+    """The C sequencer, headers and sources, in order of name; every build copies it."""
+    return sorted((resource_folder("firmware_templates") / "c").glob("dac_*.[ch]"))
+
+
+def deciding_files() -> list[Path]:
+    """What of this package decides the bytes of a build: its modules, the templates and the runtime, in order of path.
+
+    In an installed package the record of the installation too, whose path has the version: package managers that give
+    files the times of an archive would otherwise hide a change of version from make.
+    """
+    package = Path(str(import_module("tablegen").__file__)).parent
+    others = {package / name for name in ("cli", "verify", "examples", "firmware_templates")}
+    modules = {path for path in package.rglob("*.py") if not others.intersection(path.parents)}
+    templates = resource_folder("firmware_templates")
+    emitted = {path for language in ("c", "verilog") for path in (templates / language).iterdir() if path.is_file()}
+    return sorted({*modules, *emitted, *package.parent.glob("tablegen-*.dist-info/RECORD")})

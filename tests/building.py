@@ -259,11 +259,14 @@ def fourier_words(axis: Mapping[str, Any]) -> list[int]:
     return words
 
 
-def run(command: Sequence[str | Path], folder: Path | None = None) -> subprocess.CompletedProcess[str]:
+def run(
+    command: Sequence[str | Path], folder: Path | None = None, environment: Mapping[str, str] | None = None
+) -> subprocess.CompletedProcess[str]:
     """Run a tool, whatever its exit status; a tool that is not installed fails the test by name."""
     tool = shutil.which(str(command[0]))
     assert tool is not None, f"{command[0]} is not installed; `.ci/system-packages {command[0]}` installs it"
-    return subprocess.run([tool, *map(str, command[1:])], cwd=folder, capture_output=True, text=True, check=False)
+    arguments = [tool, *map(str, command[1:])]
+    return subprocess.run(arguments, cwd=folder, env=environment, capture_output=True, text=True, check=False)
 
 
 def run_clean(command: Sequence[str | Path], folder: Path | None = None) -> str:

@@ -1,6 +1,23 @@
-"""Hypothesis without deadlines: how long an example takes is the machine's affair. In CI its examples are fixed."""
+"""What tests of several files share."""
 
+from pathlib import Path
+
+import pytest
 from hypothesis import settings
+from installing import install, make_wheel
 
+# Without deadlines: how long an example takes is the machine's affair. In CI Hypothesis's examples are fixed.
 settings.register_profile("tablegen", settings(), deadline=None)
 settings.load_profile("tablegen")
+
+
+@pytest.fixture(scope="session")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A wheel of this tree."""
+    return make_wheel(tmp_path_factory.mktemp("wheel"))
+
+
+@pytest.fixture(scope="session")
+def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """That wheel, installed into a folder of packages of its own; to be copied before it is changed."""
+    return install(wheel, tmp_path_factory.mktemp("installed"))

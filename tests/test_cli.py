@@ -21,7 +21,7 @@ from jsonschema import Draft202012Validator
 
 from tablegen import __version__
 
-COMMANDS = ("build", "check", "show", "verify", "init", "schema")
+COMMANDS = ("build", "check", "show", "verify", "init", "paths", "schema")
 OWN_FILES = [
     "annexin_200nm.c",
     "annexin_200nm.h",
@@ -34,7 +34,7 @@ OWN_FILES = [
     "annexin_200nm_y_fourier.mem",
     "manifest.json",
 ]
-RUNTIME = [path.name for path in (REPOSITORY / "firmware_templates" / "verilog").glob("dac_*.v")]
+RUNTIME = [path.name for path in (REPOSITORY / "firmware_templates").glob("*/dac_*.[chv]")]
 FILES = sorted(OWN_FILES + RUNTIME)
 
 
@@ -92,11 +92,20 @@ def test_help_names_every_command_and_every_exit_status() -> None:
     ("command", "taught"),
     [
         ("build", ("SCAN.TOML", "--output DIR", "--check", "--quiet", "[default: build]", "tablegen build annexin")),
+        ("build", ("--depfile FILE", "--depfile-target NAME", "gcc -MD -MP", "[default: DIR/manifest.json]")),
         ("check", ("SCAN.TOML", "file:line: key: why")),
         ("show", ("SCAN.TOML", "--json", "--plot / --no-plot", "> and <")),
         (
             "verify",
-            ("DIR", "--sim [icarus|verilator]", "--ticks N", "--junit FILE", "--keep DIR", "tablegen verify build"),
+            (
+                "DIR",
+                "--target [verilog|c|cortex-m]",
+                "--sim [icarus|verilator]",
+                "--ticks N",
+                "--junit FILE",
+                "--keep DIR",
+                "tablegen verify build",
+            ),
         ),
         ("init", ("[DIR]", "--force", "scanner.toml and annexin_200nm.toml")),
         ("schema", ("scan|scanner", "#:schema")),
@@ -151,7 +160,7 @@ def test_a_build_writes_its_files_and_says_what_they_promise(scan: Path) -> None
     lines = done.stdout.decode("ascii").splitlines()
     assert lines[0].startswith("annexin_200nm on 'hs-afm': 400 Hz lines of 1250 ticks")
     assert [line[0] for line in lines if re.match("[xy] ", line)] == ["x", "y"]
-    assert lines[-1] == f"some/where: {len(OWN_FILES)} of {len(OWN_FILES)} files and the runtime dac_*.v written"
+    assert lines[-1] == f"some/where: {len(OWN_FILES)} of {len(OWN_FILES)} files and the runtime dac_* written"
     out = scan.parent / "some" / "where"
     assert sorted(contents(out)) == FILES
     assert {path.stat().st_mode & 0o777 for path in out.iterdir()} == {0o666 & ~_umask()}
@@ -170,7 +179,7 @@ def test_a_second_build_touches_nothing(scan: Path) -> None:
     run("build", scan, "-o", out)
     before = stamps(out)
     outcome = run("build", scan, "-o", out)
-    assert outcome.out.splitlines()[-1] == f"{out}: {len(OWN_FILES)} files and the runtime dac_*.v up to date"
+    assert outcome.out.splitlines()[-1] == f"{out}: {len(OWN_FILES)} files and the runtime dac_* up to date"
     assert stamps(out) == before
 
 
@@ -197,7 +206,7 @@ def test_a_build_with_another_runtime_rewrites_the_runtime(scan: Path) -> None:
     (out / "dac_slew.v").write_text("// older\n", encoding="ascii")
     assert run("build", scan, "-o", out, "--check").status == 1
     outcome = run("build", scan, "-o", out)
-    assert outcome.out.splitlines()[-1] == f"{out}: the runtime dac_*.v written"
+    assert outcome.out.splitlines()[-1] == f"{out}: the runtime dac_* written"
     assert contents(out) == fresh
 
 
@@ -207,7 +216,8 @@ def test_the_runtime_is_copied_byte_for_byte(scan: Path) -> None:
     assert len(RUNTIME) > 20
     assert not [name for name in OWN_FILES if name.endswith(".v")], "no name of a scan can meet a module's"
     for name in RUNTIME:
-        assert (out / name).read_bytes() == (REPOSITORY / "firmware_templates" / "verilog" / name).read_bytes()
+        (source,) = (REPOSITORY / "firmware_templates").glob(f"*/{name}")
+        assert (out / name).read_bytes() == source.read_bytes()
 
 
 def test_a_quiet_build_prints_nothing(scan: Path) -> None:

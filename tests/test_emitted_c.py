@@ -4,9 +4,11 @@ Every configuration has to compile without a warning with gcc and clang in three
 on it has to print the codes of ``play_line``, tick for tick, and a header that was damaged must not compile.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
+import mpmath
 import numpy as np
 import pytest
 from building import NAME, REPOSITORY, VARIANTS, Build, Variant, build, build_stressed, constants, run, run_clean
@@ -85,14 +87,32 @@ def test_two_units_that_include_the_header_link(tmp_path: Path, name: str, diale
     run_clean([program])
 
 
+def c_constants(manifest: Mapping[str, Any]) -> dict[str, int]:
+    """Those that both languages have, and what C has for the sine: a period and a quarter of the longest table's."""
+    found = constants(manifest)
+    index_bits = max(found["X_INDEX_BITS"], found["Y_INDEX_BITS"])
+    return found | ({"SINE_INDEX_BITS": index_bits, "SINE_LENGTH": 5 << index_bits >> 2} if index_bits else {})
+
+
+def sines(index_bits: int, count: int) -> list[int]:
+    """round(2^30 sin(2 pi j / 2^index_bits)), by other means than the build's; no value but 0 and +-1 is near a tie."""
+    with mpmath.workdps(30):
+        return [
+            int(mpmath.nint(mpmath.ldexp(mpmath.sinpi(mpmath.mpf(2 * j) / (1 << index_bits)), 30)))
+            for j in range(count)
+        ]
+
+
 def test_constants_and_tables_equal_the_manifest(built: Build) -> None:
     """Every macro and every array element, printed by a program."""
-    manifest, names = built.manifest, constants(built.manifest)
+    manifest, names = built.manifest, c_constants(built.manifest)
+    arrays = [f"{NAME}_{axis}_{kind}" for axis in manifest["axes"] for kind in ("table", "fourier")]
+    arrays += [f"{NAME}_sine"] if "SINE_LENGTH" in names else []
     print_constants = "".join(f'    printf("%lld\\n", (long long){NAME.upper()}_{name});\n' for name in names)
     print_arrays = "".join(
         f"    for (size_t i = 0; i < sizeof {array} / sizeof {array}[0]; i++)\n"
         f'        printf("%lld\\n", (long long){array}[i]);\n'
-        for array in (f"{NAME}_{axis}_{kind}" for axis in manifest["axes"] for kind in ("table", "fourier"))
+        for array in arrays
     )
     source = built.folder / "print.c"
     source.write_text(
@@ -106,6 +126,8 @@ def test_constants_and_tables_equal_the_manifest(built: Build) -> None:
     for axis in manifest["axes"].values():
         fourier = axis["fourier"]
         expected += [*axis["table"]["words"], fourier["a0_word"], *fourier["a_words"], *fourier["b_words"]]
+    if "SINE_LENGTH" in names:
+        expected += sines(names["SINE_INDEX_BITS"], names["SINE_LENGTH"])
     assert digest == manifest["hash"]
     assert list(map(int, numbers)) == expected
 
@@ -115,7 +137,7 @@ def test_the_header_defines_what_the_manifest_knows_and_no_more(built: Build) ->
     prefix = f"#define {NAME.upper()}_"
     header = built.files[f"{NAME}.h"].decode("ascii")
     defined = {line[len(prefix) :].split()[0] for line in header.splitlines() if line.startswith(prefix)}
-    assert {name for name in defined if "(" not in name} == {*constants(built.manifest), "HASH", "H"}
+    assert {name for name in defined if "(" not in name} == {*c_constants(built.manifest), "HASH", "H"}
 
 
 def test_player_equals_the_model_over_a_whole_frame_and_into_the_next(built: Build) -> None:

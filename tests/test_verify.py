@@ -5,23 +5,20 @@ the tests of the sequencer in ``hdl_tests/``.
 """
 
 import json
-import os
 import re
 import shutil
 import signal
 import subprocess
 import sys
-import time
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 from building import NAME, VARIANTS, Build, Variant, build
 from editing import Outcome, run
+from verifying import check_interruption, command, differing, edit, edit_manifest, failed, verdicts
 
 from tablegen.emit.memory import memory_file
 from tablegen.fixedpoint.program import Program
@@ -67,37 +64,11 @@ def verify(folder: Path, *arguments: str | Path | int, ticks: int = TICKS) -> Ou
     return run("verify", folder, "--ticks", str(ticks), *map(str, arguments))
 
 
-def verdicts(outcome: Outcome) -> dict[tuple[str, str], str]:
-    """The last column of the table by its first two."""
-    rows = [re.split(r"  +", line) for line in outcome.out.splitlines() if re.search(r"  (ok|FAILED)$", line)]
-    return {(row[0], row[1]): row[-1] for row in rows}
-
-
-def failed(outcome: Outcome) -> set[tuple[str, str]]:
-    return {key for key, verdict in verdicts(outcome).items() if verdict == "FAILED"}
-
-
 def flip(path: Path, line: int, bit: int) -> None:
     """Flip one bit of one word of a memory file."""
     words = path.read_text("ascii").split()
     words[line] = f"{int(words[line], 16) ^ (1 << bit):0{len(words[line])}x}"
     path.write_text("\n".join(words) + "\n", "ascii")
-
-
-def edit(path: Path, old: str, new: str) -> None:
-    text = path.read_text("ascii")
-    assert text.count(old) == 1, f"{path.name} has {text.count(old)} of {old!r}"
-    path.write_text(text.replace(old, new), "ascii")
-
-
-def edit_manifest(folder: Path, *path: str | int, value: Any) -> None:
-    """Put another value into the manifest."""
-    manifest = json.loads((folder / "manifest.json").read_bytes())
-    place = manifest
-    for key in path[:-1]:
-        place = place[key]
-    place[path[-1]] = value
-    (folder / "manifest.json").write_text(json.dumps(manifest), "ascii")
 
 
 # What is right
@@ -155,14 +126,6 @@ def test_what_was_not_played_is_said(short: Build) -> None:
 
 
 # What is wrong in the directory
-
-
-def differing(outcome: Outcome) -> tuple[int, int, int, str, str]:
-    """The first differing tick as it is told: tick, line, tick of the line, expected and got."""
-    told = outcome.err.split("first difference: ")[1]
-    found = re.match(r"tick (\d+) \(line (\d+), tick (\d+) of it\)\n  expected  (.*)\n  got       (.*)\n", told)
-    assert found, told
-    return int(found[1]), int(found[2]), int(found[3]), found[4], found[5]
 
 
 @pytest.mark.parametrize(("axis", "at", "bit"), [("x", 70, 6), ("x", 250, 15), ("y", 100, 8)])
@@ -471,14 +434,6 @@ def test_memories_are_what_a_build_writes(short: Build) -> None:
 # Tools, interruptions
 
 
-def command(*arguments: str | Path, **environment: str) -> subprocess.CompletedProcess[str]:
-    """The command line in a process of its own."""
-    line = [sys.executable, "-m", "tablegen", "verify", *map(str, arguments)]
-    return subprocess.run(
-        line, env={**os.environ, **environment}, capture_output=True, text=True, check=False, timeout=120
-    )
-
-
 @pytest.mark.parametrize("simulator", ["icarus", "verilator"])
 def test_a_missing_simulator_is_status_6_with_its_remedy(short: Build, tmp_path: Path, simulator: str) -> None:
     done = command(short.folder, "--sim", simulator, PATH=str(tmp_path))
@@ -495,50 +450,19 @@ def test_missing_cocotb_is_status_6_with_its_remedy(short: Build) -> None:
     assert done.stderr == "cocotb is not installed: pip install 'tablegen[hdl]'\n"
 
 
-def processes_below(folder: Path) -> list[str]:
-    """Command lines of processes that name a folder."""
-    found = []
-    for entry in Path("/proc").glob("[0-9]*/cmdline"):
-        try:
-            text = entry.read_bytes().replace(b"\0", b" ").decode("utf-8", "replace")
-        except OSError:
-            continue
-        if str(folder) in text and str(os.getpid()) != entry.parent.name:
-            found.append(text)
-    return found
-
-
-def waited_for(folder: Path, pattern: str, process: subprocess.Popen[str]) -> Iterator[None]:
-    while not list(folder.glob(pattern)):
-        assert process.poll() is None, process.communicate()
-        yield
-        time.sleep(0.01)
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("begun", ["job.json", "record.hex"])
+def test_an_interruption_leaves_nothing_behind(tmp_path: Path, number: signal.Signals, begun: str) -> None:
+    """Before or while the simulator plays."""
+    built = build(tmp_path / "built", VARIANTS["header_only"])
+    check_interruption(built.folder, tmp_path / "temporary", number, begun, "--ticks", "40000")
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize("pattern", ["tablegen-*/job.json", "tablegen-*/record.hex"])
-def test_an_interruption_leaves_nothing_behind(tmp_path: Path, number: signal.Signals, pattern: str) -> None:
-    """Before or while the simulator plays: no process, no folder, and the build as it was."""
+def test_an_interruption_waits_until_there_is_a_process_to_end(tmp_path: Path, number: signal.Signals) -> None:
+    """One that comes while the worker is being started, and would have left it to play for nobody."""
     built = build(tmp_path / "built", VARIANTS["header_only"])
-    before = {path: path.stat().st_mtime_ns for path in built.folder.iterdir()}
-    temporary = tmp_path / "temporary"
-    temporary.mkdir()
-    with subprocess.Popen(
-        [sys.executable, "-m", "tablegen", "verify", str(built.folder), "--ticks", "40000"],
-        env={**os.environ, "TMPDIR": str(temporary)},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    ) as process:
-        for _ in waited_for(temporary, pattern, process):
-            pass
-        process.send_signal(number)
-        printed, told = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert (printed, told.strip()) == ("", "interrupted; the output directory was left as it was")
-    assert list(temporary.iterdir()) == []
-    assert processes_below(temporary) == []
-    assert {path: path.stat().st_mtime_ns for path in built.folder.iterdir()} == before
+    check_interruption(built.folder, tmp_path / "temporary", number, "icarus", "--ticks", "40000", within_popen=True)
 
 
 @pytest.mark.parametrize(

@@ -1,36 +1,12 @@
-"""The wheel against the source tree: what is inside, and that it builds the same bytes as the tree does.
+"""The wheel against the source tree: what is inside, and that it builds the same bytes as the tree does."""
 
-The tree is copied before it is packed, since setuptools works inside the folder that it packs. What ``pip install``
-would fetch is already there: nothing here needs a network.
-"""
-
-import os
 import shutil
-import subprocess
-import sys
 import zipfile
 from pathlib import Path
 
 import pytest
 from building import EXAMPLE, REPOSITORY
-
-PARTS = ("tablegen", "examples", "firmware_templates")
-
-
-def python(folder: Path, *arguments: str | Path | int, path: Path | None = None) -> str:
-    """Run this interpreter in a folder, with a folder of packages before its own."""
-    environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
-    if path is not None:
-        environment["PYTHONPATH"] = str(path)
-    command = [sys.executable, *map(str, arguments)]
-    result = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
-    assert result.returncode == 0, f"{' '.join(command)}\n{result.stdout}{result.stderr}"
-    return result.stdout
-
-
-def pip(folder: Path, *arguments: str | Path) -> None:
-    options = ("--no-deps", "--no-index", "--disable-pip-version-check", "--quiet")
-    python(folder, "-m", "pip", arguments[0], *options, *arguments[1:])
+from installing import python
 
 
 def shipped_files() -> set[str]:
@@ -38,33 +14,12 @@ def shipped_files() -> set[str]:
     found = {path.relative_to(REPOSITORY).as_posix() for path in REPOSITORY.glob("tablegen/**/*.py")}
     found |= {"tablegen/py.typed", "tablegen/examples/__init__.py", "tablegen/firmware_templates/__init__.py"}
     found |= {f"tablegen/examples/{path.name}" for path in REPOSITORY.glob("examples/*.toml")}
-    found |= {f"tablegen/verify/{path.name}" for path in REPOSITORY.glob("tablegen/verify/*.v")}
+    found |= {f"tablegen/verify/{path.name}" for path in REPOSITORY.glob("tablegen/verify/*.[chv]")}
+    found |= {f"tablegen/verify/{path.name}" for path in REPOSITORY.glob("tablegen/verify/*.ld")}
     for language in (REPOSITORY / "firmware_templates").iterdir():
         if language.is_dir() and language.name != "__pycache__":
             found |= {f"tablegen/firmware_templates/{language.name}/{path.name}" for path in language.iterdir()}
     return found
-
-
-@pytest.fixture(scope="module")
-def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("wheel")
-    source = folder / "source"
-    source.mkdir()
-    for part in PARTS:
-        shutil.copytree(REPOSITORY / part, source / part, ignore=shutil.ignore_patterns("__pycache__"))
-    for file in ("pyproject.toml", "LICENSE", "README.md"):
-        if (REPOSITORY / file).exists():
-            shutil.copy(REPOSITORY / file, source)
-    pip(folder, "wheel", "--no-build-isolation", "--wheel-dir", folder, source)
-    (built,) = folder.glob("*.whl")
-    return built
-
-
-@pytest.fixture(scope="module")
-def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("installed")
-    pip(folder, "install", "--target", folder / "packages", wheel)
-    return folder / "packages"
 
 
 def test_wheel_holds_the_package_and_nothing_else(wheel: Path) -> None:

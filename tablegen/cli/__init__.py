@@ -13,6 +13,7 @@ from tablegen.cli.build import build
 from tablegen.cli.check import check
 from tablegen.cli.common import Failure
 from tablegen.cli.init import init
+from tablegen.cli.paths import paths
 from tablegen.cli.schema import schema
 from tablegen.cli.show import show
 from tablegen.cli.status import Status
@@ -26,12 +27,12 @@ A first minute:
   tablegen init demo                        write a commented scanner and scan
   tablegen show demo/annexin_200nm.toml     what would be played, and how well
   tablegen build demo/annexin_200nm.toml -o build
-  tablegen verify build                     simulate the Verilog sequencer on it
+  tablegen verify build                     play its sequencer, against all of it
 
 \b
 Exit status: 0 done, 1 output is stale (build --check), 2 wrong input or usage,
 3 a limit of the certificate is broken, 4 cannot write, 5 a build does not verify,
-6 a simulator is missing, 130 interrupted.""",
+6 a simulator or compiler is missing, 130 interrupted.""",
 )
 @click.version_option(__version__, prog_name="tablegen", message="%(prog)s %(version)s")
 def cli() -> None:
@@ -42,7 +43,7 @@ def cli() -> None:
     """
 
 
-for command in (build, check, show, verify, init, schema):
+for command in (build, check, show, verify, init, paths, schema):
     cli.add_command(command)
 
 

@@ -2,9 +2,7 @@
 
 import os
 import signal
-import threading
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING, NoReturn
 
 import click
@@ -16,6 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from tablegen.certificate import Certificate
+    from tablegen.config.load import Setup
     from tablegen.plan import Plan
 
 scan_argument = click.argument("scan", type=click.Path(path_type=Path), metavar="SCAN.TOML")
@@ -38,7 +37,7 @@ def fail(lines: "Sequence[object]", status: Status) -> NoReturn:
     raise Failure(lines, status)
 
 
-def planned(scan: Path) -> "tuple[Plan, dict[str, Certificate]]":
+def planned(scan: Path) -> "tuple[Setup, Plan, dict[str, Certificate]]":
     """Load, plan and certify a scan; every failure ends the command with its status."""
     # No linear algebra library is used, and its threads would only spin: a good part of what importing numpy costs.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -58,7 +57,7 @@ def planned(scan: Path) -> "tuple[Plan, dict[str, Certificate]]":
         fail(rejected.problems, Status.WRONG_INPUT)
     if broken := broken_limits(plan, certificates, setup.scan_file):
         fail(broken, Status.BROKEN_LIMIT)
-    return plan, certificates
+    return setup, plan, certificates
 
 
 def written(folder: Path, files: "Mapping[str, bytes]") -> list[str]:
@@ -67,26 +66,15 @@ def written(folder: Path, files: "Mapping[str, bytes]") -> list[str]:
     An interruption waits until all files are in place, so that none is left half renamed; a second one does not wait.
     """
     from tablegen.emit.write import CannotWrite, write_files
+    from tablegen.interruption import held
 
-    held = []
-
-    def hold(_number: int, _frame: FrameType | None) -> None:
-        held.append(True)
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-
-    heard = signal.getsignal(signal.SIGINT) is signal.default_int_handler
-    waits = heard and threading.current_thread() is threading.main_thread()
-    if waits:
-        signal.signal(signal.SIGINT, hold)
     try:
-        names = write_files(folder, files)
+        with held(signal.SIGINT) as came:
+            names = write_files(folder, files)
     except CannotWrite as error:
         fail([error], Status.CANNOT_WRITE)
     except OSError as error:
         fail([f"{folder}: {error.strerror or error}"], Status.CANNOT_WRITE)
-    finally:
-        if waits:
-            signal.signal(signal.SIGINT, signal.default_int_handler)
-    if held:
+    if came:
         fail([f"interrupted, after the files of {folder} had been written"], Status.INTERRUPTED)
     return names

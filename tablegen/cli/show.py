@@ -17,7 +17,7 @@ def show(scan: Path, as_json: bool, plot: bool) -> None:
 
     Under each plot, > and < mark where the forward and the backward image are taken.
     """
-    plan, certificates = planned(scan)
+    _, plan, certificates = planned(scan)
     if as_json:
         from tablegen.emit import render
 

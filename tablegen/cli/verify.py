@@ -1,4 +1,4 @@
-"""``tablegen verify``: the emitted sequencer in a simulator, against the manifest."""
+"""``tablegen verify``: the emitted sequencer, simulated or compiled, against the manifest."""
 
 import os
 import signal
@@ -18,38 +18,47 @@ from tablegen.cli.status import Status
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from tablegen.verify.build import Report
+    from tablegen.verify.build import Report, Target
     from tablegen.verify.checks import Check
 
-_MOST_TICKS = {"icarus": 300_000, "verilator": 3_000_000}
+_MOST_TICKS = {"icarus": 300_000, "verilator": 3_000_000, "c": 3_000_000, "cortex-m": 1_000_000}
 
 
-@click.command(short_help="Simulate a build's sequencer, and hold every sample against it.")
+@click.command(short_help="Play a build's sequencer, and hold every sample against it.")
 @click.argument("folder", type=click.Path(path_type=Path, file_okay=False), metavar="DIR")
+@click.option(
+    "--target",
+    "target_name",
+    type=click.Choice(("verilog", "c", "cortex-m")),
+    default="verilog",
+    show_default=True,
+    help="Which sequencer: the dac_*.v in a simulator, the dac_*.c compiled for this machine, or the same for a "
+    "Cortex-M4 and emulated.",
+)
 @click.option(
     "--sim",
     "simulator",
-    type=click.Choice(sorted(_MOST_TICKS)),
-    default="icarus",
-    show_default=True,
-    help="The simulator; verilator compiles for some seconds and is then some forty times as fast.",
+    type=click.Choice(("icarus", "verilator")),
+    help="The simulator of Verilog; verilator compiles for some seconds and is then some forty times as fast.  "
+    "[default: icarus]",
 )
 @click.option(
     "--ticks",
     type=click.IntRange(min=1000, max=1 << 28),
     metavar="N",
-    help="Play at most N ticks.  [default: 300000; with verilator 3000000; serial a 41st]",
+    help="Play at most N ticks.  [default: icarus 300000, verilator 3000000, of these serial a 41st; c 3000000, "
+    "cortex-m 1000000]",
 )
 @click.option(
     "--axis",
     type=click.Choice(("pipelined", "blocks", "serial")),
-    default="pipelined",
-    show_default=True,
-    help="The axis that you place: a sample a clock in look-up tables (pipelined) or with multiplier blocks (blocks, "
-    "PLAIN_MULTIPLIER = 1), or in low area (serial, LOW_AREA = 1).",
+    help="The axis that you place in Verilog: a sample a clock in look-up tables (pipelined) or with multiplier blocks "
+    "(blocks, PLAIN_MULTIPLIER = 1), or in low area (serial, LOW_AREA = 1).  [default: pipelined]",
 )
 @click.option(
-    "--fourier", is_flag=True, help="Load Fourier words, and let the device render its tables from them (FOURIER = 1)."
+    "--fourier",
+    is_flag=True,
+    help="Let the device render its tables from Fourier words (FOURIER = 1; in C dac_synthesize).",
 )
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Of what is left to chance.")
 @click.option(
@@ -59,43 +68,53 @@ _MOST_TICKS = {"icarus": 300_000, "verilator": 3_000_000}
     "--keep",
     type=click.Path(path_type=Path, file_okay=False),
     metavar="DIR",
-    help="Simulate there, and leave script, record and logs. Without it nothing is left.",
+    help="Play there, and leave script, record and logs. Without it nothing is left.",
 )
 def verify(
     folder: Path,
-    simulator: str,
+    target_name: Literal["verilog", "c", "cortex-m"],
+    simulator: Literal["icarus", "verilator"] | None,
     ticks: int | None,
-    axis: Literal["pipelined", "blocks", "serial"],
+    axis: Literal["pipelined", "blocks", "serial"] | None,
     fourier: bool,
     seed: int,
     junit: Path | None,
     keep: Path | None,
 ) -> int:
-    """Verify the build in DIR: does its Verilog sequencer play what its manifest says, bit for bit?
+    """Verify the build in DIR: does its sequencer play what its manifest says, bit for bit?
 
-    Files are held against their SHA-256, the header's constants against the manifest. Then the dac_*.v of DIR
-    play the program and the tables of DIR's .mem files under cocotb: power-up, a frame and some lines, a swap in
-    mid-frame at a random tick, park. Every code, marker and fault has to equal the integer model, every code to be
-    as near to the float waveform as the certificate promises, every step and code inside its limits.
+    Files are held against their SHA-256, the header's constants and the tables against the manifest. Then the sequencer
+    of DIR plays the program and the tables of DIR: power-up, a frame and some lines, a swap in mid-frame at a random
+    tick, park. Every code, marker and fault has to equal the integer model, every code to be as near to the float
+    waveform as the certificate promises, every step and code inside its limits.
 
-    A frame that has more ticks than are played is played in part; a note says so. Needs tablegen[hdl] and Icarus
-    Verilog, or tablegen[verilator] and a C++ compiler.
+    \b
+    verilog   the dac_*.v with the .mem files, under cocotb. Needs tablegen[hdl] and
+              Icarus Verilog, or tablegen[verilator] and a C++ compiler.
+    c         the dac_*.c with NAME.h and NAME.c, a tick a call and many ticks a call,
+              converter words too. Needs a C compiler: $CC $CFLAGS, or cc.
+    cortex-m  the same for a Cortex-M4. Needs tablegen[cortex-m] and arm-none-eabi-gcc.
+
+    In C what is swapped in has half the amplitude and clamps, so that neither a mixture of two programs nor a missing
+    limit goes unseen. A frame that has more ticks than are played is played in part; a note says so.
 
     \b
       tablegen verify build
+      tablegen verify build --target c
       tablegen verify build --sim verilator --junit verify.xml     in CI
-    Exit status: 0 verified, 5 a check failed, 2 DIR holds no build, 6 the simulator is missing.
+    Exit status: 0 verified, 5 a check failed, 2 DIR holds no build, 6 a tool is missing.
     """
+    for option, value in (("--sim", simulator), ("--axis", axis)):
+        if target_name != "verilog" and value is not None:
+            raise click.UsageError(f"{option} is for Verilog; --target {target_name} has no choice of it")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from tablegen.verify.build import NotABuild, verify_build
-    from tablegen.verify.placement import Placement
     from tablegen.verify.simulate import ToolMissing
 
-    placement = Placement(axis, fourier)
+    target, most = _target(target_name, simulator or "icarus", axis or "pipelined", fourier)
     try:
         with _terminated_as_interrupted(), _work_folder(keep) as work, Progress() as progress:
-            most = _MOST_TICKS[simulator] // placement.tick_clocks if ticks is None else ticks
-            report = verify_build(folder, work, simulator, most, seed, placement, progress.now)
+            report = verify_build(folder, work, target, most if ticks is None else ticks, seed, progress.now)
     except NotABuild as error:
         fail([error], Status.WRONG_INPUT)
     except ToolMissing as error:
@@ -117,9 +136,27 @@ def verify(
     return Status.OK if written else Status.CANNOT_WRITE
 
 
+def _target(
+    name: Literal["verilog", "c", "cortex-m"],
+    simulator: Literal["icarus", "verilator"],
+    axis: Literal["pipelined", "blocks", "serial"],
+    fourier: bool,
+) -> "tuple[Target, int]":
+    """What plays, and how many ticks of it are soon over."""
+    if name != "verilog":
+        from tablegen.verify.c_target import CTarget
+
+        return CTarget(name, fourier), _MOST_TICKS[name]
+    from tablegen.verify.placement import Placement
+    from tablegen.verify.verilog_target import VerilogTarget
+
+    placement = Placement(axis, fourier)
+    return VerilogTarget(simulator, placement), _MOST_TICKS[simulator] // placement.tick_clocks
+
+
 @contextmanager
 def _work_folder(keep: Path | None) -> Iterator[Path]:
-    """Where the simulation takes place: taken away again, whatever happens, unless it is to be kept."""
+    """Where things are played: taken away again, whatever happens, unless it is to be kept."""
     try:
         if keep is not None:
             keep.mkdir(parents=True, exist_ok=True)
@@ -129,14 +166,14 @@ def _work_folder(keep: Path | None) -> Iterator[Path]:
             yield Path(folder).resolve()
     except OSError as error:
         fail(
-            [f"cannot simulate: {error.filename or keep or tempfile.gettempdir()}: {error.strerror or error}"],
+            [f"cannot verify: {error.filename or keep or tempfile.gettempdir()}: {error.strerror or error}"],
             Status.CANNOT_WRITE,
         )
 
 
 @contextmanager
 def _terminated_as_interrupted() -> Iterator[None]:
-    """A runner that cancels a job with SIGTERM leaves no simulator behind either."""
+    """A runner that cancels a job with SIGTERM leaves nothing behind either."""
 
     def interrupt(_number: int, _frame: FrameType | None) -> None:
         raise KeyboardInterrupt

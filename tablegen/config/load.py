@@ -41,6 +41,13 @@ class Setup:
     scanner_file: Document
     scanner_folder: Path
 
+    @property
+    def files(self) -> list[Path]:
+        """Every file that decides this scan, each once: the scan, the scanner, and the responses that it names."""
+        resonances = (axis.resonance for axis in (self.scanner.x, self.scanner.y))
+        responses = (self.scanner_folder / r.response for r in resonances if r is not None and r.response is not None)
+        return list(dict.fromkeys((Path(self.scan_file.name), Path(self.scanner_file.name), *responses)))
+
 
 def load(path: str | Path) -> Setup:
     """Read a scan file and the scanner file that it names.

@@ -8,6 +8,7 @@ from tablegen.emit.constants import axis_constants, sequence_constants
 from tablegen.fixedpoint.output import GAIN_BITS
 from tablegen.fixedpoint.phase import PHASE_BITS
 from tablegen.fixedpoint.rounding import signed_limits
+from tablegen.fixedpoint.synthesis import sine_periods
 from tablegen.numerics.arrays import Ints
 from tablegen.plan import LinePlan, Plan
 from tablegen.summary import summary
@@ -31,7 +32,7 @@ def template_context(plan: Plan, certificates: dict[str, Certificate], digest: s
         "greatest_gain": _Number(signed_limits(GAIN_BITS)[1]),
         "program_memory": f"{plan.name}_program.mem",
         "sine_memory": f"{plan.name}_sine.mem",
-        "has_sine": any(line.program.index_bits for line in plan.lines),
+        "sine": _sine(plan),
         "axes": [_axis(plan, line) for line in plan.lines],
     }
 
@@ -77,7 +78,7 @@ def _axis(plan: Plan, line: LinePlan) -> dict[str, Any]:
         "prefix": prefix,
         "PREFIX": prefix.upper(),
         "constants": {key: _Number(value) for key, value in constants.items()},
-        "word_type": _word_type(program.bits),
+        "word_type": _word_type(plan),
         "table_rows": _rows(program.words),
         "fourier_rows": _rows(line.fourier.in_order),
         "interpolated": program.mode == "interpolated",
@@ -87,8 +88,19 @@ def _axis(plan: Plan, line: LinePlan) -> dict[str, Any]:
     }
 
 
-def _word_type(bits: int) -> str:
-    return "int8_t" if bits <= 8 else "int16_t" if bits <= 16 else "int32_t"
+def _word_type(plan: Plan) -> str:
+    """That of both tables, since the C runtime is compiled for one."""
+    return "int16_t" if max(line.program.bits for line in plan.lines) <= 16 else "int32_t"
+
+
+def _sine(plan: Plan) -> dict[str, Any] | None:
+    """The sine from which a device renders Fourier words, for the longest interpolated table; None without one."""
+    index_bits = max(line.program.index_bits for line in plan.lines)
+    if not index_bits:
+        return None
+    words = sine_periods(index_bits)
+    constants = {"SINE_INDEX_BITS": index_bits, "SINE_LENGTH": len(words)}
+    return {"constants": {key: _Number(value) for key, value in constants.items()}, "rows": _rows(words)}
 
 
 def _rows(words: Ints) -> list[str]:

@@ -78,6 +78,15 @@ def sine_quarter(index_bits: int) -> Ints:
     return sine_table(1 << index_bits)[: 1 << (index_bits - 2)]
 
 
+def sine_periods(index_bits: int) -> Ints:
+    """One period and a quarter of the sine table of 2^index_bits words: the cosine begins a quarter after the sine.
+
+    What the C runtime renders with, from a longer table too. Shape (5/4 2^index_bits,), index_bits >= 2.
+    """
+    sines = sine_table(1 << index_bits)
+    return np.concatenate([sines, sines[: len(sines) // 4]])
+
+
 def synthesize(words: FourierWords, length: int, bits: int) -> Ints:
     """Table words k = 0..length-1: saturate(round(2^(bits-1) s(k / length))), ties up, int64 of shape (length,).
 

@@ -1,5 +1,6 @@
-"""What a simulation recorded against the integer model, the float waveform, and the limits of the program."""
+"""What was recorded against the integer model, the float waveform, and the limits of the program."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -11,6 +12,7 @@ from tablegen.verify.stream import FLAGS, Sample, Words
 
 _UNDEFINED = np.uint64((1 << 64) - 1)  # how a record is read where the simulator has an unknown bit
 _MASK = {"x": (0, 0xFFFFFF), "y": (24, 0xFFFFFF), "markers": (48, 0xFF), "faults": (56, 0xFF)}
+_FAULTS = ("slew", "clamp", "overrun", "underrun")
 _TOLERANCE = 1e-9  # the last bits of two ways to evaluate the float waveform
 
 
@@ -30,13 +32,15 @@ class Check:
 class Record:
     """The words that left the device, those of the model, and where in its program the model was.
 
-    ``place`` is the tick of the frame, -1 where nothing plays; ``steady`` says where the output had caught up.
+    ``place`` is the tick of the frame, -1 where nothing plays; ``steady`` says where the output had caught up with the
+    program of the build. From tick ``own`` on a variation of it plays.
     """
 
     got: Words
     wanted: Words
     place: Ints
     steady: Bools
+    own: int
     lost: int  # ticks that the model has and the record has not, or the other way round
 
 
@@ -46,8 +50,8 @@ def _part(subject: str, words: Words) -> Ints:
     return (words >> np.uint64(shift) & np.uint64(mask)).astype(np.int64)
 
 
-def make_record(recorded: Recorded, expected: list[int], got: Words) -> Record:
-    """Line record and model up."""
+def make_record(recorded: Recorded, expected: list[int], got: Words, own: int | None = None) -> Record:
+    """Line record and model up; ``own`` ticks are of the program of the build, all if not given."""
     wanted = np.array(expected, dtype=np.uint64)
     flags = {name: (wanted >> np.uint64(48 + i) & np.uint64(1)).astype(np.bool_) for i, name in enumerate(FLAGS)}
     index = np.arange(len(wanted))
@@ -62,8 +66,10 @@ def make_record(recorded: Recorded, expected: list[int], got: Words) -> Record:
     begun = np.maximum.accumulate(np.where(begins, index, 0))
     # Caught up is for good: one right tick since the program began, this one included, is enough.
     steady = (place >= 0) & (np.maximum.accumulate(np.where(reached, index, -1)) >= begun)
+    own = len(wanted) if own is None else own
+    steady[own:] = False
     length = min(len(wanted), len(got))
-    return Record(got[:length], wanted[:length], place[:length], steady[:length], abs(len(wanted) - len(got)))
+    return Record(got[:length], wanted[:length], place[:length], steady[:length], own, abs(len(wanted) - len(got)))
 
 
 def first_difference(record: Record, recorded: Recorded) -> str | None:
@@ -76,14 +82,15 @@ def first_difference(record: Record, recorded: Recorded) -> str | None:
     return f"{_where(record, recorded, at)}\n  expected  {wanted}\n  got       {got}"
 
 
-def check_record(record: Record, recorded: Recorded, status: dict[str, Any], counts: list[int]) -> list[Check]:
-    """Every check of what was played; ``status`` are the bench's counters, ``counts`` the faults of the model."""
+def check_codes(record: Record, recorded: Recorded, sent: Mapping[str, Ints] | None = None) -> list[Check]:
+    """Codes against model, waveform and limits, converter words that were ``sent``, and markers against the model."""
     checks = []
     for axis, content in recorded.axes:
         checks += [_model(record, recorded, axis), _float(record, recorded, axis, content)]
         checks += _bounds(record, axis, content)
-    checks += [_model(record, recorded, "markers"), _faults(record, recorded, status, counts), _timing(record, status)]
-    return checks
+        if sent is not None:
+            checks.append(_converter(record, recorded, axis, content, sent[axis]))
+    return [*checks, _model(record, recorded, "markers")]
 
 
 def _model(record: Record, recorded: Recorded, subject: str) -> Check:
@@ -161,24 +168,88 @@ def _bounds(record: Record, axis: str, content: Axis) -> list[Check]:
     ]
 
 
-def _faults(record: Record, recorded: Recorded, status: dict[str, Any], counts: list[int]) -> Check:
-    """No fault is to be seen, and none to be counted."""
-    flags = _part("faults", record.got)
+def check_no_faults(record: Record, recorded: Recorded) -> Check:
+    """The program of the build raises no fault."""
+    flags = _part("faults", record.got)[: record.own]
     wrong = np.flatnonzero(flags)
-    counted = [int(count) for count in status["counts"]]
     failure = None
-    names = ("slew", "clamp", "overrun", "underrun")
     if len(wrong):
         at = int(wrong[0])
-        raised = " ".join(name for i, name in enumerate(names) if flags[at] >> i & 1)
-        failure = f"faults: {raised}, at {_where(record, recorded, at)}"
-    elif any(counted) or any(counts) or status["refused"]:
-        shown = ", ".join(f"{name} {count}" for name, count in zip(names, counted, strict=True))
-        failure = f"faults: counted are {shown}; writes were {'' if status['refused'] else 'not '}refused"
-    return Check("faults", "none to occur", f"{len(flags)} ticks", str(sum(counted)), "0", failure)
+        failure = f"faults: {_raised(int(flags[at]))}, at {_where(record, recorded, at)}"
+    return Check("faults", "none to occur", f"{len(flags)} ticks", str(len(wrong)), "0", failure)
 
 
-def _timing(record: Record, status: dict[str, Any]) -> Check:
+def check_faults(record: Record, recorded: Recorded, counted: list[int], counts: list[int]) -> Check:
+    """Those of a variation are the model's, tick for tick, and so are their ``counted`` numbers."""
+    got, wanted = _part("faults", record.got), _part("faults", record.wanted)
+    wrong = np.flatnonzero(got != wanted)
+    failure = None
+    if len(wrong):
+        at = int(wrong[0])
+        failure = (
+            f"faults: {len(wrong)} of {len(got)} ticks differ from the model, the first at "
+            f"{_where(record, recorded, at)}: expected {_raised(int(wanted[at]))}, got {_raised(int(got[at]))}"
+        )
+    elif counted != counts:
+        failure = f"faults: expected are {_counts(counts)}; counted are {_counts(counted)}"
+    return Check("faults", "integer model", f"{len(got)} ticks", f"{len(wrong)} differ", "0", failure)
+
+
+def check_nothing_counted(
+    record: Record, recorded: Recorded, counted: list[int], counts: list[int], refused: bool
+) -> Check:
+    """No fault is to be seen, none to be counted, by device or model, no write to be refused."""
+    failure = check_no_faults(record, recorded).failure
+    if failure is None and (any(counted) or any(counts) or refused):
+        failure = f"faults: counted are {_counts(counted)}; writes were {'' if refused else 'not '}refused"
+    return Check("faults", "none to occur", f"{len(record.got)} ticks", str(sum(counted)), "0", failure)
+
+
+def _converter(record: Record, recorded: Recorded, axis: str, content: Axis, words: Ints) -> Check:
+    """What the converter is sent: coding and alignment of the model's codes."""
+    output = content.program.output
+    codes, which = np.unique(_part(axis, record.wanted), return_inverse=True)
+    wanted = np.array([output.word(code) for code in codes.tolist()], dtype=np.int64)[which.reshape(-1)]
+    words = words[: len(wanted)]
+    differs = np.flatnonzero(words != wanted)
+    failure = None
+    if len(differs):
+        at = int(differs[0])
+        failure = (
+            f"{axis}: {len(differs)} of {len(words)} converter words differ from the model's, the first at "
+            f"{_where(record, recorded, at)}: expected 0x{wanted[at]:x}, got 0x{words[at]:x}"
+        )
+    return Check(axis, "converter", f"{len(words)} words", f"{len(differs)} differ", "0", failure)
+
+
+def check_filled(record: Record, recorded: Recorded, counted: list[int], counts: list[int]) -> Check:
+    """The same session played many ticks at a time: codes and markers; of faults only how many there were."""
+    mask = ~np.uint64(_MASK["faults"][1] << _MASK["faults"][0])
+    got, wanted = record.got & mask, record.wanted & mask
+    differs = np.flatnonzero(got != wanted)
+    failure = None
+    if len(differs):
+        at = int(differs[0])
+        failure = (
+            f"fill: {len(differs)} of {len(got)} ticks differ from the model, the first at "
+            f"{_where(record, recorded, at)}:\n  expected  {_sample(wanted[at])}\n  got       {_sample(got[at])}"
+        )
+    elif record.lost:
+        failure = f"fill: {record.lost} ticks are lost or too many, at the end of the record"
+    elif counted != counts:
+        failure = f"fill: faults expected are {_counts(counts)}; counted are {_counts(counted)}"
+    return Check("fill", "integer model", f"{len(got)} ticks", f"{len(differs)} differ", "0", failure)
+
+
+def _raised(flags: int) -> str:
+    return " ".join(name for i, name in enumerate(_FAULTS) if flags >> i & 1) or "none"
+
+
+def _counts(counted: list[int]) -> str:
+    return ", ".join(f"{name} {count}" for name, count in zip(_FAULTS, counted, strict=True))
+
+
+def check_timing(record: Record, status: dict[str, Any]) -> Check:
     """A strobe for every tick, always as many clocks after it."""
     jitter, ticks, strobes = (int(status[key]) for key in ("jitter", "ticks", "strobes"))
     failure = None

@@ -1,6 +1,8 @@
 """The files of a build against its manifest: their digests, the constants of the Verilog header, the memory files."""
 
 import re
+import shutil
+from collections.abc import Mapping
 from hashlib import sha256
 from pathlib import Path
 
@@ -36,14 +38,18 @@ def wrong_constants(folder: Path, recorded: Recorded) -> tuple[int, list[str]]:
     except OSError as error:
         return len(wanted), [f"{name}: cannot be read: {error.strerror or error}"]
     found: dict[str, int | str] = {key: _value(value) for key, value in _LOCALPARAM.findall(text)}
+    return len(wanted), differing(name, found, wanted)
+
+
+def differing(name: str, found: Mapping[str, int | str], wanted: Mapping[str, int | str]) -> list[str]:
+    """The constants that a header has not, has otherwise, or has beyond those that it is to have."""
     wrong = []
     for key, value in wanted.items():
         if key not in found:
             wrong.append(f"{name}: {key} is missing, it is {_shown(value)} in the manifest")
         elif found[key] != value:
             wrong.append(f"{name}: {key} is {_shown(found[key])}, it is {_shown(value)} in the manifest")
-    wrong += [f"{name}: {key} is not in the manifest" for key in found if key not in wanted]
-    return len(wanted), wrong
+    return wrong + [f"{name}: {key} is not in the manifest" for key in found if key not in wanted]
 
 
 def expected_constants(recorded: Recorded) -> dict[str, int | str]:
@@ -121,6 +127,23 @@ def memory_words(path: Path, count: int) -> list[int]:
     if len(words) != count:
         raise ValueError(f"{path.name} has {len(words)} words in place of {count}")
     return words
+
+
+def copies(folder: Path, names: list[str], into: Path) -> tuple[list[Path], list[str]]:
+    """Copies of files of a build, and what is wrong where there are none.
+
+    They are copied since make, and with it Verilator, does not like every path.
+    """
+    into.mkdir(exist_ok=True)
+    wrong = []
+    for name in names:
+        try:
+            shutil.copyfile(folder / name, into / name)
+        except FileNotFoundError:
+            wrong.append(f"{name} is missing")
+        except OSError as error:
+            wrong.append(f"{name} cannot be read: {error.strerror or error}")
+    return [into / name for name in names], wrong
 
 
 def some(wrong: list[str]) -> str:

@@ -227,10 +227,9 @@ class Recorded:
         """Both axes with their names, the fast one first."""
         return ("x", self.manifest.axes.x), ("y", self.manifest.axes.y)
 
-    @property
-    def runtime(self) -> list[str]:
-        """The files of the build that are Verilog modules."""
-        return sorted(name for name in self.manifest.files if name.startswith("dac_") and name.endswith(".v"))
+    def runtime(self, *suffixes: str) -> list[str]:
+        """The files of the build that are parts of a sequencer, by the ends of their names."""
+        return sorted(name for name in self.manifest.files if name.startswith("dac_") and name.endswith(suffixes))
 
 
 def read_manifest(folder: Path) -> Recorded:

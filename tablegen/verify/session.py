@@ -1,16 +1,18 @@
 """What is played to verify a build: power-up, a start, frames, a swap in mid-frame, and a park."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tablegen.registers import AXIS_WORDS, PAGE_WORDS
 from tablegen.sequencer import DualProgram
 from tablegen.verify.placement import Placement
-from tablegen.verify.stream import PROGRAM, X_FOURIER, X_TABLE, Y_TABLE, Script
+from tablegen.verify.stream import FLAGS, PROGRAM, X_FOURIER, X_TABLE, Y_TABLE, Script
 
 _BEFORE = 8  # ticks between the requests of the beginning
+VARIATION = 1  # as the argument of a commit: which program
+_SWAPPED = 48 + FLAGS.index("swapped")  # bit of a recorded tick
 _STRIDE = 64  # ticks after which it is seen whether an output has caught up
 
 
@@ -32,6 +34,7 @@ class Session:
     script: Script
     whole_frame: bool
     swapped_in_frame: bool
+    own: int | None  # so many ticks are of the program itself, then a variation of it plays; None if it never does
 
 
 def needed_ticks(program: DualProgram) -> int:
@@ -44,22 +47,41 @@ def needed_ticks(program: DualProgram) -> int:
     return 4 * _BEFORE + schedule.frame_ticks + lines * schedule.ticks + 3 * (min(ramp, schedule.frame_ticks) + _STRIDE)
 
 
-def make_session(program: DualProgram, memories: Memories, most: int, seed: int, placement: Placement) -> Session:
+def varied(program: DualProgram) -> DualProgram:
+    """Half the amplitude, and a limit in its middle: a program that differs everywhere and clamps.
+
+    The park code stays inside the limits. ``stream_bench.c`` varies the emitted program in the same way.
+    """
+    axes = []
+    for axis in (program.x, program.y):
+        output, middle = axis.output, axis.output.offset_code
+        gain = abs(output.gain_word) // 2 * (1 if output.gain_word >= 0 else -1)  # towards 0, as C divides
+        below = output.park_code <= middle
+        limited = replace(output, code_max=middle) if below else replace(output, code_min=middle)
+        axes.append(replace(axis, output=replace(limited, gain_word=gain)))
+    return DualProgram(axes[0], axes[1], program.schedule)
+
+
+def make_session(
+    program: DualProgram, memories: Memories | None, most: int, seed: int, placement: Placement
+) -> Session:
     """At most ``most`` ticks of a program whose words come from ``memories``; the model plays ``program``.
 
     The device powers up at the park codes, takes the program, and plays a frame and some lines more, or what there are
     ticks for. At a random tick the same program is committed again from the other bank: it is taken at the next
     line start, in mid-frame, and plays while it settles and a line longer, with a tick every one to three clocks. Then
     it parks.
+
+    Without memories the device has the program already, so nothing is written, and can make a variation of it: that is
+    what is committed in mid-frame.
     """
     random, schedule = np.random.default_rng(seed), program.schedule
     parks = program.x.output.park_code, program.y.output.park_code
-    commit_clocks = placement.commit_clocks(
-        (len(program.x.words), memories.x_harmonics), (len(program.y.words), memories.y_harmonics)
-    )
+    harmonics = (memories.x_harmonics, memories.y_harmonics) if memories else (0, 0)
+    commit_clocks = placement.commit_clocks((len(program.x.words), harmonics[0]), (len(program.y.words), harmonics[1]))
     script = Script(power_up=parks, drain=48 + placement.tick_clocks, commit_clocks=commit_clocks)
     pace = placement.tick_clocks
-    most -= 1  # a script ends with a tick of its own
+    most -= 2  # a script ends with one or two ticks of its own
 
     def played() -> int:
         return len(script.expected)
@@ -68,13 +90,15 @@ def make_session(program: DualProgram, memories: Memories, most: int, seed: int,
         while script.model.catching_up and played() < until:
             script.wait_ticks(min(_STRIDE, until - played()))
 
-    _load(script, memories)
+    if memories:
+        _load(script, memories)
     script.request("commit", program=program)
     script.wait(commit_clocks)
     script.tick_every(pace)
     script.wait_ticks(min(_BEFORE, most))
     script.tick_every(0)
-    _load(script, memories)
+    if memories:
+        _load(script, memories)
     script.tick_every(pace)
     script.request("arm")
     script.request("trigger")
@@ -91,8 +115,10 @@ def make_session(program: DualProgram, memories: Memories, most: int, seed: int,
         script.request("commit", program=program)
         script.wait(commit_clocks - 8)
         script.tick_every(pace)
-    else:
+    elif memories:
         script.request("commit", program=program)
+    else:
+        script.request("commit", program=varied(program), frames=VARIATION)
     swaps = script.swaps
     script.wait_ticks(max(min(schedule.ticks, most - played() - _BEFORE), 0))  # a line start is among them
     in_frame = script.swaps > swaps
@@ -105,7 +131,9 @@ def make_session(program: DualProgram, memories: Memories, most: int, seed: int,
     script.request("park")
     while not script.model.parked and played() < most:
         script.wait_ticks(min(_STRIDE, most - played()))
-    return Session(script, whole, in_frame)
+    swaps_at = [at for at, word in enumerate(script.expected) if word >> _SWAPPED & 1]
+    own = None if memories or len(swaps_at) < 2 else swaps_at[1]
+    return Session(script, whole, in_frame, own)
 
 
 def _load(script: Script, memories: Memories) -> None:

@@ -1,4 +1,4 @@
-"""A simulation in a process group of its own, so that an interruption ends the simulator and its compiler with it.
+"""Playing in a process group of its own, so that an interruption ends simulator, compiler and program with it.
 
 ``run`` starts this module as a process and waits for it; what it does and finds is passed in files of its folder.
 """
@@ -8,58 +8,48 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import asdict
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from tablegen.verify.bench import SequencerBench, Shape
+from tablegen.interruption import deliver, held
 from tablegen.verify.simulate import SimulationFailed, ToolMissing
 
 _JOB, _OUTCOME, _LOG = "job.json", "outcome.json", "worker.log"
 
 
-def run(
-    folder: Path,
-    simulator: str,
-    shape: Shape,
-    sources: Sequence[Path],
-    parameters: Mapping[str, int | str],
-    clocks: int,
-) -> dict[str, Any]:
-    """Play the script in ``folder`` on a sequencer compiled from ``sources`` with ``parameters``.
+def run(folder: Path, module: str, job: Mapping[str, Any]) -> dict[str, Any]:
+    """What ``play_job(folder, job)`` of a module returns, called in a process of its own; both are plain data.
 
-    Returns the bench's counters; raises ``ToolMissing`` and ``SimulationFailed``.
+    Raises ``ToolMissing`` and ``SimulationFailed`` as it does.
     """
-    job = {
-        "simulator": simulator,
-        "shape": asdict(shape),
-        "sources": [str(path) for path in sources],
-        "parameters": dict(parameters),
-        "clocks": clocks,
-    }
-    (folder / _JOB).write_text(json.dumps(job), "utf-8")
+    (folder / _JOB).write_text(json.dumps({"module": module, "job": job}), "utf-8")
     outcome = folder / _OUTCOME
     outcome.unlink(missing_ok=True)
     scratch = folder / "tmp"  # compilers that are ended leave theirs behind
     scratch.mkdir(exist_ok=True)
     path = os.pathsep.join(os.path.abspath(entry) for entry in sys.path if entry)
+    process = None
     with (folder / _LOG).open("wb") as log:
-        process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "tablegen.verify.worker", str(folder)],
-            stdin=subprocess.DEVNULL,
-            stdout=log,
-            stderr=subprocess.STDOUT,
-            env={**os.environ, "PYTHONPATH": path, "TMPDIR": str(scratch)},
-            start_new_session=True,
-        )
         try:
+            with held(signal.SIGINT, signal.SIGTERM) as came:  # inside Popen nobody could end what it has started
+                process = subprocess.Popen(
+                    [sys.executable, "-P", "-m", "tablegen.verify.worker", str(folder)],
+                    stdin=subprocess.DEVNULL,
+                    stdout=log,
+                    stderr=subprocess.STDOUT,
+                    env={**os.environ, "PYTHONPATH": path, "TMPDIR": str(scratch)},
+                    start_new_session=True,
+                )
+            deliver(came)
             process.wait()
         finally:
-            with suppress(ProcessLookupError, PermissionError):
-                os.killpg(process.pid, signal.SIGKILL)  # all that it started, whether it ended or was interrupted
-            process.wait()
+            if process is not None:
+                with suppress(ProcessLookupError, PermissionError):
+                    os.killpg(process.pid, signal.SIGKILL)  # all that it started, whether it ended or was interrupted
+                process.wait()
     if not outcome.is_file():
         raise SimulationFailed((folder / _LOG).read_text("utf-8", "replace").strip() or "the simulation was killed")
     found = json.loads(outcome.read_text("utf-8"))
@@ -72,11 +62,9 @@ def run(
 
 
 def _work(folder: Path) -> dict[str, Any]:
-    job = json.loads((folder / _JOB).read_text("utf-8"))
+    wanted = json.loads((folder / _JOB).read_text("utf-8"))
     try:
-        sources = [Path(source) for source in job["sources"]]
-        bench = SequencerBench(job["simulator"], Shape(**job["shape"]), folder, job["parameters"], sources)
-        return {"status": bench.run(job["clocks"])}
+        return {"status": import_module(wanted["module"]).play_job(folder, wanted["job"])}
     except ToolMissing as error:
         return {"missing": str(error)}
     except SimulationFailed as error:

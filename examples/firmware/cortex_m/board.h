@@ -1,0 +1,23 @@
+/* What the firmware asks of a board: a console, a timer, and a place for the log of what left the converters. */
+#ifndef BOARD_H
+#define BOARD_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#define REGISTER(address) (*(volatile uint32_t *)(uintptr_t)(address))
+
+void board_start(void);
+void board_start_timer(uint32_t hz); /* its interrupt calls player_timer() */
+
+int board_getc(void); /* a character that was received, or -1 */
+void board_putc(char c);
+
+bool board_log_ready(void); /* whether board_log_putc() would not wait */
+void board_log_putc(char c);
+
+/* Interrupts that only some boards have. */
+void board_timer_interrupt(void);
+void board_uart_interrupt(void);
+
+#endif

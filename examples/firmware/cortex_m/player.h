@@ -1,0 +1,14 @@
+/* The consumer of the sequencer: what the interrupts do. player_step.c is the simple one, player_fill.c the fast one.
+ * */
+#ifndef PLAYER_H
+#define PLAYER_H
+
+#include "dac_sequencer.h"
+
+extern dac_sequencer sequencer;
+
+void player_start(void);  /* before the timer */
+void player_timer(void);  /* interrupt: a sample is due */
+void player_pended(void); /* interrupt of the lowest priority, PendSV */
+
+#endif

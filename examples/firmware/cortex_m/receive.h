@@ -1,0 +1,33 @@
+/* Characters from the interrupt of a UART to the main loop: one writes, one reads, nobody waits. */
+#ifndef RECEIVE_H
+#define RECEIVE_H
+
+#include <stdint.h>
+
+enum { RECEIVED = 256 }; /* a power of two; a longer line than that is lost in part */
+
+typedef struct {
+    volatile char characters[RECEIVED];
+    volatile uint32_t head, tail;
+} receive_queue;
+
+static inline void received(receive_queue *queue, char c)
+{
+    const uint32_t head = queue->head;
+    if (head - queue->tail == RECEIVED)
+        return;
+    queue->characters[head % RECEIVED] = c;
+    queue->head = head + 1; /* volatile accesses stay in order, and one core sees its own */
+}
+
+static inline int receive(receive_queue *queue)
+{
+    const uint32_t tail = queue->tail;
+    if (tail == queue->head)
+        return -1;
+    const char c = queue->characters[tail % RECEIVED];
+    queue->tail = tail + 1;
+    return (unsigned char)c;
+}
+
+#endif

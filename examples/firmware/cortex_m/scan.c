@@ -1,0 +1,39 @@
+/* The only file that knows the names of a build: SCAN and SCAN_UPPER, SCAN_HEADER, from the Makefile. */
+#include "scan.h"
+#include SCAN_HEADER
+
+#define JOIN_(a, b) a##b
+#define JOIN(a, b) JOIN_(a, b)
+#define NAMED(suffix) JOIN(SCAN, suffix)
+#define CONSTANT(suffix) JOIN(SCAN_UPPER, suffix)
+#define PROGRAM(NAME, name) DAC_PROGRAM(NAME, name)
+#define CONVERTER(AXIS) DAC_CONVERTER(AXIS, 0)
+
+const dac_program scan_whole = PROGRAM(SCAN_UPPER, SCAN);
+const dac_converter scan_x_converter = CONVERTER(CONSTANT(_X));
+const dac_converter scan_y_converter = CONVERTER(CONSTANT(_Y));
+
+static dac_word x_tables[2][CONSTANT(_X_TABLE_LENGTH)], y_tables[2][CONSTANT(_Y_TABLE_LENGTH)];
+
+static bool halve(dac_axis_program *axis, dac_word *table, const int32_t *words, unsigned harmonics)
+{
+    axis->gain_word /= 2;
+    if (axis->index_bits == 0)
+        return true; /* direct tables are made on the host: that of the whole scan serves */
+    axis->table = table;
+#ifdef SCAN_SINE
+    return dac_synthesize(table, axis->index_bits, axis->bits, words, harmonics, NAMED(_sine),
+                          CONSTANT(_SINE_INDEX_BITS));
+#else
+    (void)words;
+    (void)harmonics;
+    return false;
+#endif
+}
+
+bool scan_half(dac_program *program, unsigned place)
+{
+    *program = scan_whole;
+    return halve(&program->x, x_tables[place], NAMED(_x_fourier), CONSTANT(_X_HARMONICS))
+        && halve(&program->y, y_tables[place], NAMED(_y_fourier), CONSTANT(_Y_HARMONICS));
+}

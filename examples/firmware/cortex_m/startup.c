@@ -1,0 +1,75 @@
+/* From reset to main(): vectors, memory, and what compilers call by themselves, since there is no C library. */
+#include <stddef.h>
+#include <stdint.h>
+
+#include "board.h"
+#include "player.h"
+
+extern uint32_t data_start[], data_end[], bss_start[], bss_end[], stack_top[];
+extern const uint32_t data_load[];
+
+int main(void);
+void reset(void);
+void fault(void);
+
+void reset(void)
+{
+    const uint32_t *from = data_load;
+    for (uint32_t *to = data_start; to != data_end; to++)
+        *to = *from++;
+    for (uint32_t *to = bss_start; to != bss_end; to++)
+        *to = 0;
+    main();
+    fault();
+}
+
+void fault(void)
+{
+    for (;;)
+        ;
+}
+
+/* The interrupts of all boards: each has a UART and a timer, at places of its own. */
+typedef union {
+    void *stack;
+    void (*handler)(void);
+} vector;
+
+__attribute__((section(".vectors"), used)) static const vector vectors[16 + 16] = {
+    [0] = {.stack = stack_top},
+    [1] = {.handler = reset},
+    [2] = {.handler = fault},
+    [3] = {.handler = fault},
+    [4] = {.handler = fault},
+    [5] = {.handler = fault},
+    [6] = {.handler = fault},
+    [14] = {.handler = player_pended},
+    [15] = {.handler = board_timer_interrupt},     /* SysTick */
+    [16] = {.handler = board_uart_interrupt},      /* MPS2: UART 0 has received */
+    [16 + 5] = {.handler = board_uart_interrupt},  /* LM3S6965: UART 0 */
+    [16 + 8] = {.handler = board_timer_interrupt}, /* MPS2: timer 0 */
+};
+
+/* The barriers keep compilers from making a call of the function itself out of its loop. */
+void *memcpy(void *restrict to, const void *restrict from, size_t count);
+void *memcpy(void *restrict to, const void *restrict from, size_t count)
+{
+    unsigned char *t = to;
+    const unsigned char *f = from;
+    while (count-- != 0) {
+        *t++ = *f++;
+        __asm__ volatile("" ::: "memory");
+    }
+    return to;
+}
+
+void *memset(void *to, int value, size_t count);
+void *memset(void *to, int value, size_t count)
+{
+    unsigned char *t = to;
+    while (count-- != 0) {
+        *t++ = (unsigned char)value;
+        __asm__ volatile("" ::: "memory");
+    }
+    return to;
+}

@@ -1,0 +1,74 @@
+/* From the boot ROM to main(). The image is for RAM: picotool or the drive of the boot ROM loads it there and enters it
+ * at its start. */
+#include <stddef.h>
+#include <stdint.h>
+
+#include "rp2040.h"
+
+extern uint32_t bss_start[], bss_end[], stack_top[];
+
+int main(void);
+void entry(void);
+void reset(void);
+void fault(void);
+
+typedef union {
+    void *stack;
+    void (*handler)(void);
+} vector;
+
+extern const vector vectors[];
+__attribute__((aligned(256), used)) const vector vectors[16] = {
+    [0] = {.stack = stack_top},
+    [1] = {.handler = reset},
+    [2] = {.handler = fault},
+    [3] = {.handler = fault},
+};
+
+/* The first instructions of the image: a stack, then C. */
+__attribute__((naked, section(".vectors"), used)) void entry(void)
+{
+    __asm__("ldr r0, =stack_top\n"
+            "mov sp, r0\n"
+            "ldr r0, =reset\n"
+            "bx r0\n"
+            ".ltorg\n");
+}
+
+void reset(void)
+{
+    VTOR = (uint32_t)(uintptr_t)vectors;
+    for (uint32_t *to = bss_start; to != bss_end; to++)
+        *to = 0;
+    main();
+}
+
+void fault(void)
+{
+    for (;;)
+        ;
+}
+
+/* The barriers keep compilers from making a call of the function itself out of its loop. */
+void *memcpy(void *restrict to, const void *restrict from, size_t count);
+void *memcpy(void *restrict to, const void *restrict from, size_t count)
+{
+    unsigned char *t = to;
+    const unsigned char *f = from;
+    while (count-- != 0) {
+        *t++ = *f++;
+        __asm__ volatile("" ::: "memory");
+    }
+    return to;
+}
+
+void *memset(void *to, int value, size_t count);
+void *memset(void *to, int value, size_t count)
+{
+    unsigned char *t = to;
+    while (count-- != 0) {
+        *t++ = (unsigned char)value;
+        __asm__ volatile("" ::: "memory");
+    }
+    return to;
+}

@@ -1,0 +1,67 @@
+/* From reset to main(). */
+#include <stddef.h>
+#include <stdint.h>
+
+extern uint32_t data_start[], data_end[], bss_start[], bss_end[], stack_top[];
+extern const uint32_t data_load[];
+
+int main(void);
+void dma_interrupt(void);
+void reset(void);
+void fault(void);
+
+void reset(void)
+{
+    const uint32_t *from = data_load;
+    for (uint32_t *to = data_start; to != data_end; to++)
+        *to = *from++;
+    for (uint32_t *to = bss_start; to != bss_end; to++)
+        *to = 0;
+    main();
+}
+
+void fault(void)
+{
+    for (;;)
+        ;
+}
+
+typedef union {
+    void *stack;
+    void (*handler)(void);
+} vector;
+
+__attribute__((section(".vectors"), used)) static const vector vectors[16 + 17] = {
+    [0] = {.stack = stack_top},
+    [1] = {.handler = reset},
+    [2] = {.handler = fault},
+    [3] = {.handler = fault},
+    [4] = {.handler = fault},
+    [5] = {.handler = fault},
+    [6] = {.handler = fault},
+    [16 + 16] = {.handler = dma_interrupt}, /* DMA1, stream 5 */
+};
+
+/* The barriers keep compilers from making a call of the function itself out of its loop. */
+void *memcpy(void *restrict to, const void *restrict from, size_t count);
+void *memcpy(void *restrict to, const void *restrict from, size_t count)
+{
+    unsigned char *t = to;
+    const unsigned char *f = from;
+    while (count-- != 0) {
+        *t++ = *f++;
+        __asm__ volatile("" ::: "memory");
+    }
+    return to;
+}
+
+void *memset(void *to, int value, size_t count);
+void *memset(void *to, int value, size_t count)
+{
+    unsigned char *t = to;
+    while (count-- != 0) {
+        *t++ = (unsigned char)value;
+        __asm__ volatile("" ::: "memory");
+    }
+    return to;
+}

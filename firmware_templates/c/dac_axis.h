@@ -1,0 +1,86 @@
+/* Private to the runtime: an axis, from a position in its period to its code, for a tick or for many. */
+#ifndef DAC_AXIS_H
+#define DAC_AXIS_H
+
+#include "dac_sequencer.h"
+
+#define DAC_RUN 16 /* ticks that are checked at once */
+#ifndef DAC_WAIT
+#define DAC_WAIT 8 /* ticks that are played one by one before a run is tried again that was refused at once */
+#endif
+
+/* What makes writes visible in their order to the other side. On one core a barrier for the compiler would do. */
+#ifndef DAC_RELEASE
+#if defined(__GNUC__)
+#define DAC_RELEASE() __atomic_thread_fence(__ATOMIC_RELEASE)
+#define DAC_ACQUIRE() __atomic_thread_fence(__ATOMIC_ACQUIRE)
+#elif defined(__STDC_VERSION__) && __STDC_VERSION__ >= 201112L
+#include <stdatomic.h>
+#define DAC_RELEASE() atomic_thread_fence(memory_order_release)
+#define DAC_ACQUIRE() atomic_thread_fence(memory_order_acquire)
+#else
+#error "define DAC_RELEASE() and DAC_ACQUIRE() as fences of your compiler"
+#endif
+#endif
+
+/* Whether 32 by 32 bits to 64 is an instruction and not a call. */
+#ifndef DAC_LONG_MULTIPLY
+#if defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__) || defined(__AVR__)
+#define DAC_LONG_MULTIPLY 0
+#else
+#define DAC_LONG_MULTIPLY 1
+#endif
+#endif
+
+/* Where it is not, runs multiply gain and sample in two halves, the lower one of so many bits. */
+#if DAC_LONG_MULTIPLY || DAC_TABLE_STORAGE_BITS != 16
+#define DAC_SPLIT 0
+#else
+#define DAC_SPLIT 10
+#endif
+
+#if DAC_TABLE_STORAGE_BITS == 16
+typedef int32_t dac_wide; /* holds the difference of two words times a fraction */
+#define DAC_GUARD(bank) 4
+#else
+typedef int64_t dac_wide;
+#define DAC_GUARD(bank) ((bank)->guard)
+#endif
+
+/* One advance: 96-bit addition. The step is ceil(2^(79 + index bits) / period), so that after k < period advances the
+ * position exceeds the exact k 2^(79 + index bits) / period by less than k, and k < 2^64 / period: floors to 2^64 are exact. */
+static inline void dac_advance(dac_position *at, const dac_position *step)
+{
+    const uint64_t low = at->low + step->low;
+    at->high += step->high + (low < step->low ? 1u : 0u);
+    at->low = low;
+}
+
+/* The sample between two words: guard bits below the LSB of a word, rounded to nearest, ties up. `half` is DAC_HALF(guard). */
+#define DAC_HALF(guard) ((dac_wide)1 << (14u - (guard)))
+static inline int32_t dac_between(int32_t here, int32_t there, uint32_t fraction, unsigned guard, dac_wide half)
+{
+    const dac_wide rise = ((dac_wide)(there - here) * (dac_wide)fraction + half) >> (15u - guard);
+    return (int32_t)(rise + (dac_wide)here * ((dac_wide)1 << guard));
+}
+
+static inline dac_output dac_coded(const dac_axis *axis, int32_t code)
+{
+    return (dac_output)(((uint32_t)code ^ axis->flip) << axis->shift);
+}
+
+/* One tick: moves the code towards where the waveform is, and the position on. Returns whether the code has arrived; sets *outside
+ * where the clamp acted. */
+bool dac_axis_step(dac_axis *axis, const dac_bank_axis *bank, bool *outside);
+
+/* Moves the code towards a target, by at most max_step; returns whether it has arrived. */
+bool dac_axis_approach(dac_axis *axis, const dac_bank_axis *bank, int32_t target);
+
+/* The codes of up to `ticks` ticks to out[0], out[DAC_STRIDE].., not coded yet; returns how many were played. It ends before ticks on
+ * which the clamp or the slew guard might have to act, or which need the table's last word: these are played step by step. */
+uint32_t dac_axis_run(dac_axis *axis, const dac_bank_axis *bank, dac_output *out, uint32_t ticks);
+
+/* The position `ticks` ticks on; ticks below 2^24. */
+void dac_axis_skip(dac_axis *axis, const dac_bank_axis *bank, uint32_t ticks);
+
+#endif

@@ -1,0 +1,149 @@
+/* Loading a program: what can be wrong with it, and what the sequencer wants to know of it. */
+#include "dac_axis.h"
+
+static bool inside(const dac_window *window, uint32_t length)
+{
+    return window->first <= length && window->count <= length - window->first;
+}
+
+static bool good_schedule(const dac_schedule *p)
+{
+    return p->line_ticks - 1 < UINT32_C(1) << 24 && p->frame_lines != 0 && p->frame_lines <= INT32_MAX / p->line_ticks
+        && p->turn_tick <= p->line_ticks && p->pixels <= p->line_ticks
+        && inside(&p->forward, p->line_ticks) && inside(&p->backward, p->line_ticks)
+        && inside(&p->up, p->frame_lines) && inside(&p->down, p->frame_lines);
+}
+
+static bool good_table(const dac_axis_program *p)
+{
+    if (p->table == NULL || p->bits < 8 || p->bits > 24 || p->bits > DAC_TABLE_STORAGE_BITS)
+        return false;
+    if (p->index_bits == 0)
+        return p->length == p->phase_period && p->length <= UINT32_C(1) << 17;
+    return p->index_bits >= 3 && p->index_bits <= 16 && p->length == UINT32_C(1) << p->index_bits;
+}
+
+/* x plays a period a line, y one a frame, in as many advances as it has ticks, or lines if it is held for each of them. */
+static bool good_periods(const dac_program *p)
+{
+    const uint32_t ticks = p->schedule.line_ticks, lines = p->schedule.frame_lines;
+
+    return p->x.hold_ticks == 1 && p->x.phase_period == ticks
+        && (p->y.hold_ticks == 1 ? p->y.phase_period == ticks * lines
+                                 : p->y.hold_ticks == ticks && p->y.phase_period == lines);
+}
+
+static unsigned guard_bits(const dac_axis_program *p)
+{
+    return p->bits > 21 ? 25u - p->bits : 4u;
+}
+
+static bool good_output(const dac_axis_program *p)
+{
+    return p->gain_word >= -(INT32_C(1) << 17) && p->gain_word < INT32_C(1) << 17
+        && p->gain_q == 16u + p->bits + guard_bits(p) - p->dac_bits
+        && p->offset_word > -(INT64_C(2) << (p->dac_bits + p->gain_q)) /* twice what a code needs; 2^42 at most */
+        && p->offset_word < INT64_C(2) << (p->dac_bits + p->gain_q)
+        && 0 <= p->code_min && p->code_min <= p->park_code && p->park_code <= p->code_max
+        && p->code_max < INT32_C(1) << p->dac_bits && p->max_step >= 1 && p->max_step < INT32_C(1) << 24;
+}
+
+static bool same_converter(const dac_axis_program *p, const dac_axis *axis)
+{
+    const bool shifted = p->left_aligned && p->word_bits != p->dac_bits;
+    return p->dac_bits >= 8 && p->dac_bits <= 24 && p->dac_bits <= p->word_bits
+        && p->word_bits <= DAC_OUTPUT_STORAGE_BITS && p->dac_bits == axis->bits && p->word_bits == axis->word_bits
+        && p->twos_complement == (axis->flip != 0) && shifted == (axis->shift != 0);
+}
+
+/* numerator 2^`zeros` by divisor < 2^31, rounded up, by long division: 95 bits or fewer, some 12 instructions a bit. */
+static dac_position power_divided(unsigned zeros, uint32_t divisor)
+{
+    dac_position quotient = {0, 0};
+    uint32_t rest = 1 % divisor;
+    const dac_position one = {0, 1};
+
+    quotient.low = divisor == 1;
+    while (zeros-- != 0) {
+        rest <<= 1;
+        quotient.high = quotient.high << 1 | (uint32_t)(quotient.low >> 63);
+        quotient.low <<= 1;
+        if (rest >= divisor) {
+            rest -= divisor;
+            quotient.low |= 1;
+        }
+    }
+    if (rest != 0)
+        dac_advance(&quotient, &one);
+    return quotient;
+}
+
+/* The windows of dac_axis_run, if there may be runs at all. */
+static void allow_runs(dac_bank_axis *b, const dac_axis_program *p)
+{
+    int32_t widest = (p->code_max - p->code_min) / 32; /* so that most of the range is far enough from the limits */
+    const uint32_t most = UINT32_MAX / p->phase_period;
+
+    b->run_bits = 0;
+    b->run_most = 0;
+#if DAC_SPLIT
+    if (p->gain_q > 32 || p->gain_q < DAC_SPLIT)
+        return;
+#else
+    const unsigned left = 32u - p->gain_q;
+    if (left > 14) /* the gain would not fit */
+        return;
+    b->run_gain = p->gain_word * (INT32_C(1) << left);
+    b->run_offset = b->offset * ((int64_t)1 << left);
+#endif
+    b->run_most = most > 258 ? 256 : most > 2 ? most - 2 : 0;
+    if (widest > p->max_step)
+        widest = p->max_step;
+    while ((widest + 1) >> (b->run_bits + 1) != 0)
+        b->run_bits++;
+    b->run_half = INT32_C(1) << b->run_bits >> 1;
+    b->run_room = p->code_max - p->code_min + 1 - (INT32_C(1) << b->run_bits);
+}
+
+static void derive(dac_bank_axis *b, const dac_axis_program *p)
+{
+    const dac_position word = {UINT32_C(1) << 15, 0};
+
+    b->step = p->index_bits ? power_divided(79u + p->index_bits, p->phase_period) : word;
+    b->table = p->table;
+    b->last = p->length - 1;
+    b->holds = p->hold_ticks != 1;
+    b->guard = (uint8_t)guard_bits(p);
+    b->gain = p->gain_word;
+    b->gain_q = p->gain_q;
+    b->offset = p->offset_word + ((int64_t)1 << (p->gain_q - 1));
+    b->code_min = p->code_min;
+    b->code_max = p->code_max;
+    b->max_step = p->max_step;
+    b->park_code = p->park_code;
+    allow_runs(b, p);
+}
+
+dac_loaded dac_sequencer_load(dac_sequencer *s, const dac_program *p)
+{
+    if (!dac_sequencer_writable(s))
+        return DAC_BUSY;
+    if (!same_converter(&p->x, &s->x) || !same_converter(&p->y, &s->y))
+        return DAC_OTHER_CONVERTER;
+    if (!good_schedule(&p->schedule))
+        return DAC_BAD_SCHEDULE;
+    if (!good_table(&p->x) || !good_table(&p->y))
+        return DAC_BAD_TABLE;
+    if (!good_periods(p))
+        return DAC_BAD_PERIOD;
+    if (!good_output(&p->x) || !good_output(&p->y))
+        return DAC_BAD_OUTPUT;
+
+    dac_bank *const bank = &s->bank[dac_sequencer_idle(s)];
+    bank->schedule = p->schedule;
+    derive(&bank->x, &p->x);
+    derive(&bank->y, &p->y);
+    s->loaded = 1;
+    s->loaded_after = s->swaps;
+    return DAC_LOADED;
+}

@@ -1,0 +1,418 @@
+/* What happens when: requests, swaps, ticks, markers, faults. The arithmetic is in dac_axis.h. */
+#include "dac_axis.h"
+
+enum { COMMIT, WITHDRAW, ARM, TRIGGER, RESET, CLEAR_FAULTS, PARK };
+enum { NOTHING = 2 };         /* plays before the first program */
+#define UNKNOWN UINT32_MAX /* where the pixels are, after ticks that nobody wanted the markers of */
+
+static void clear_faults(dac_sequencer *s)
+{
+    s->faults = 0;
+    for (int i = 0; i < DAC_FAULTS; i++)
+        s->fault_counts[i] = 0;
+}
+
+/* The producer's side. */
+
+static void power_up(dac_axis *axis, const dac_converter *converter)
+{
+    axis->code = converter->power_up_code;
+    axis->bits = converter->bits;
+    axis->word_bits = converter->word_bits;
+    axis->flip = converter->twos_complement ? UINT32_C(1) << (converter->bits - 1) : 0;
+    axis->shift = (uint8_t)(converter->left_aligned ? converter->word_bits - converter->bits : 0);
+}
+
+void dac_sequencer_init(dac_sequencer *s, const dac_converter *x, const dac_converter *y)
+{
+    unsigned char *const bytes = (unsigned char *)s;
+
+    for (size_t i = 0; i < sizeof *s; i++)
+        bytes[i] = 0;
+    power_up(&s->x, x);
+    power_up(&s->y, y);
+    s->pixel_rest = UNKNOWN;
+    s->playing = NOTHING;
+}
+
+bool dac_sequencer_writable(const dac_sequencer *s)
+{
+    /* In this order: a commit that is still in the queue would set `waiting`. */
+    if (s->commits_answered != s->commits)
+        return false;
+    DAC_ACQUIRE();
+    if (s->waiting)
+        return false;
+    DAC_ACQUIRE();
+    return true;
+}
+
+unsigned dac_sequencer_idle(const dac_sequencer *s)
+{
+    return s->playing == 0 ? 1 : 0;
+}
+
+static bool request(dac_sequencer *s, uint8_t what, uint32_t argument)
+{
+    const uint8_t head = s->head;
+
+    if ((uint8_t)(head - s->tail) == DAC_REQUESTS)
+        return false;
+    DAC_ACQUIRE();
+    s->request[head % DAC_REQUESTS] = what;
+    s->argument[head % DAC_REQUESTS] = argument;
+    DAC_RELEASE();
+    s->head = (uint8_t)(head + 1u);
+    return true;
+}
+
+bool dac_sequencer_commit(dac_sequencer *s)
+{
+    /* The consumer knows by the number whether the bank is still the one that was loaded. */
+    if (!s->loaded || !request(s, COMMIT, s->loaded_after))
+        return false;
+    s->commits++;
+    return true;
+}
+
+bool dac_sequencer_withdraw(dac_sequencer *s) { return request(s, WITHDRAW, 0); }
+bool dac_sequencer_arm(dac_sequencer *s, uint32_t frames) { return request(s, ARM, frames); }
+bool dac_sequencer_trigger(dac_sequencer *s) { return request(s, TRIGGER, 0); }
+bool dac_sequencer_park(dac_sequencer *s) { return request(s, PARK, 0); }
+bool dac_sequencer_reset(dac_sequencer *s) { return request(s, RESET, 0); }
+bool dac_sequencer_clear_faults(dac_sequencer *s) { return request(s, CLEAR_FAULTS, 0); }
+
+/* Where a processor writes 32 bits in parts, a second look tells. */
+static uint32_t settled(const volatile uint32_t *shared)
+{
+    uint32_t first, second = *shared;
+    do {
+        first = second;
+        second = *shared;
+    } while (first != second);
+    return first;
+}
+
+dac_status dac_sequencer_status(const dac_sequencer *s)
+{
+    dac_status status;
+    status.markers = s->markers;
+    status.faults = s->faults;
+    for (int i = 0; i < DAC_FAULTS; i++)
+        status.fault_counts[i] = settled(&s->fault_counts[i]);
+    status.swaps = settled(&s->swaps);
+    status.line = settled(&s->line);
+    return status;
+}
+
+/* The consumer's side. */
+
+void dac_sequencer_report(dac_sequencer *s, uint8_t fault)
+{
+    for (int i = 0; i < DAC_FAULTS; i++)
+        if (((unsigned)fault >> i & 1u) != 0 && s->fault_counts[i] != UINT32_MAX)
+            s->fault_counts[i] = s->fault_counts[i] + 1;
+    s->faults = (uint8_t)(s->faults | fault);
+}
+
+static void to_start(dac_axis *axis)
+{
+    axis->at.low = 0;
+    axis->at.high = 0;
+}
+
+/* At line 0 of the program that plays. */
+static void begin(dac_sequencer *s)
+{
+    s->tick = 0;
+    s->line = 0;
+    to_start(&s->x);
+    to_start(&s->y);
+    s->settle_left = s->now->schedule.settle_lines;
+    s->catching_up = true;
+}
+
+static void trigger(dac_sequencer *s)
+{
+    if (!s->armed || s->running || s->now == NULL)
+        return;
+    s->armed = false;
+    s->endless = s->armed_frames == 0;
+    s->frames_left = s->armed_frames;
+    s->running = true;
+    begin(s);
+}
+
+static void park(dac_sequencer *s)
+{
+    s->armed = s->running = false;
+}
+
+static void act(dac_sequencer *s, uint8_t what, uint32_t argument)
+{
+    switch (what) {
+    case COMMIT:
+        s->waiting = argument == s->swaps;
+        DAC_RELEASE();
+        s->commits_answered = (uint8_t)(s->commits_answered + 1u);
+        break;
+    case WITHDRAW:
+        s->waiting = 0;
+        break;
+    case ARM:
+        s->armed = true;
+        s->armed_frames = argument;
+        break;
+    case TRIGGER:
+        trigger(s);
+        break;
+    case RESET:
+        s->waiting = 0;
+        park(s);
+        clear_faults(s);
+        break;
+    case CLEAR_FAULTS:
+        clear_faults(s);
+        break;
+    default:
+        park(s);
+    }
+}
+
+void dac_sequencer_answer(dac_sequencer *s)
+{
+    const uint8_t head = s->head;
+    uint8_t tail = s->tail;
+
+    if (tail == head)
+        return;
+    DAC_ACQUIRE();
+    do {
+        act(s, s->request[tail % DAC_REQUESTS], s->argument[tail % DAC_REQUESTS]);
+        tail++;
+    } while (tail != head);
+    DAC_RELEASE();
+    s->tail = tail;
+}
+
+/* Takes the program that waits, if this tick is one to take it on. */
+static bool swap(dac_sequencer *s)
+{
+    if (!s->waiting || (s->running && s->tick != 0))
+        return false;
+    s->playing = s->playing == 0 ? 1 : 0;
+    s->now = &s->bank[s->playing];
+    s->swaps = s->swaps + 1;
+    DAC_RELEASE(); /* from here on the other bank may be written */
+    s->waiting = 0;
+    if (s->running)
+        begin(s);
+    return true;
+}
+
+static bool in(const dac_window *window, uint32_t at)
+{
+    return at - window->first < window->count;
+}
+
+/* Ticks from `tick` on, at most `most`, up to the next edge of a window or the turn. */
+static uint32_t until_edge(const dac_schedule *plan, uint32_t tick, uint32_t most)
+{
+    const uint32_t edges[] = {plan->turn_tick, plan->forward.first, plan->forward.first + plan->forward.count,
+                              plan->backward.first, plan->backward.first + plan->backward.count};
+    for (unsigned i = 0; i < sizeof edges / sizeof edges[0]; i++)
+        if (edges[i] - tick - 1 < most - 1)
+            most = edges[i] - tick;
+    return most;
+}
+
+/* Of the ticks from s->tick on, up to `most` of them and to the next at which more than pixels changes; returns how many. `clean`:
+ * nothing that this tick or an earlier one did spoils the image. */
+static uint32_t mark(dac_sequencer *s, bool clean, uint8_t *markers, uint32_t most)
+{
+    const dac_schedule *const plan = &s->now->schedule;
+    const uint32_t tick = s->tick;
+    const dac_window *const window = in(&plan->forward, tick) ? &plan->forward
+                                   : in(&plan->backward, tick) ? &plan->backward : NULL;
+    uint8_t all = DAC_PLAYING;
+
+    if (tick >= plan->turn_tick)
+        all |= DAC_BACKWARD;
+    if (window != NULL && clean && s->settle_left == 0 && (in(&plan->up, s->line) || in(&plan->down, s->line)))
+        all |= DAC_VALID;
+    if (most != 1)
+        most = until_edge(plan, tick, most);
+    for (uint32_t i = 0; i < most; i++)
+        markers[i] = all;
+    if (tick == 0)
+        markers[0] = (uint8_t)(all | DAC_LINE | (s->line == 0 ? DAC_FRAME : 0));
+    if (window == NULL)
+        return most;
+    if (tick == window->first)
+        s->pixel_rest = window->count;
+    if (s->pixel_rest == UNKNOWN)
+        return most;
+    for (uint32_t i = 0; i < most; i++) {
+        if (s->pixel_rest >= window->count) {
+            s->pixel_rest -= window->count;
+            markers[i] |= DAC_PIXEL;
+        }
+        s->pixel_rest += plan->pixels;
+    }
+    return most;
+}
+
+static void go_on(dac_sequencer *s, uint32_t ticks)
+{
+    const dac_bank *const bank = s->now;
+
+    s->tick += ticks;
+    if (s->tick != bank->schedule.line_ticks)
+        return;
+    s->tick = 0;
+    if (s->settle_left != 0)
+        s->settle_left--;
+    to_start(&s->x);
+    if (bank->y.holds)
+        dac_advance(&s->y.at, &bank->y.step);
+    if (s->line + 1 != bank->schedule.frame_lines) {
+        s->line = s->line + 1;
+        return;
+    }
+    s->line = 0;
+    to_start(&s->y);
+    if (!s->endless && --s->frames_left == 0)
+        s->running = false;
+}
+
+static uint8_t play(dac_sequencer *s)
+{
+    const dac_bank *const bank = s->now;
+    uint8_t markers;
+    bool outside = false;
+    bool reached = dac_axis_step(&s->x, &bank->x, &outside);
+
+    reached &= dac_axis_step(&s->y, &bank->y, &outside);
+    if (outside)
+        dac_sequencer_report(s, DAC_FAULT_CLAMP);
+    if (reached)
+        s->catching_up = false;
+    else if (!s->catching_up)
+        dac_sequencer_report(s, DAC_FAULT_SLEW);
+    mark(s, reached && !s->faults, &markers, 1);
+    go_on(s, 1);
+    return markers;
+}
+
+static uint8_t rest(dac_sequencer *s)
+{
+    const dac_bank *const bank = s->now;
+    bool parked = true;
+
+    if (bank != NULL) {
+        parked = dac_axis_approach(&s->x, &bank->x, bank->x.park_code);
+        parked &= dac_axis_approach(&s->y, &bank->y, bank->y.park_code);
+    }
+    return parked ? DAC_PARKED : 0;
+}
+
+/* One tick, once the requests were answered. */
+static void one_tick(dac_sequencer *s, dac_tick *out)
+{
+    const uint8_t swapped = swap(s) ? DAC_SWAPPED : 0;
+
+    out->markers = (uint8_t)((s->running ? play(s) : rest(s)) | swapped);
+    s->markers = out->markers;
+    out->faults = s->faults;
+    out->x = dac_coded(&s->x, s->x.code);
+    out->y = dac_coded(&s->y, s->y.code);
+}
+
+void dac_sequencer_step(dac_sequencer *s, dac_tick *out)
+{
+    dac_sequencer_answer(s);
+    one_tick(s, out);
+}
+
+/* As many ticks as both axes play in a run from here on, no more than `most`; their codes are not coded yet. */
+static uint32_t run(dac_sequencer *s, dac_output *x, dac_output *y, uint32_t most)
+{
+    const dac_bank *const bank = s->now;
+    const dac_position at = s->x.at;
+    const int32_t code = s->x.code;
+    const uint32_t x_ticks = dac_axis_run(&s->x, &bank->x, x, most);
+    const uint32_t ticks = dac_axis_run(&s->y, &bank->y, y, x_ticks);
+
+    if (ticks != x_ticks) { /* y came to a tick that has to be looked at; x has gone too far */
+        s->x.at = at;
+        s->x.code = ticks != 0 ? (int32_t)x[(ticks - 1) * DAC_STRIDE] : code;
+        dac_axis_skip(&s->x, &bank->x, ticks);
+    }
+    return ticks;
+}
+
+/* The markers of ticks that were played in a run, and the way to the tick after them. */
+static void pass(dac_sequencer *s, uint8_t *markers, uint32_t ticks)
+{
+    s->catching_up = false;
+    if (markers == NULL) {
+        s->pixel_rest = UNKNOWN;
+        s->markers = DAC_PLAYING;
+        go_on(s, ticks);
+        return;
+    }
+    while (ticks != 0) {
+        const uint32_t marked = mark(s, !s->faults, markers, ticks);
+        markers += marked;
+        ticks -= marked;
+        go_on(s, marked);
+    }
+    s->markers = markers[-1];
+}
+
+static void encode(const dac_axis *axis, dac_output *out, uint32_t ticks)
+{
+    if (axis->flip == 0 && axis->shift == 0)
+        return;
+    for (; ticks != 0; ticks--, out += DAC_STRIDE)
+        *out = dac_coded(axis, (int32_t)*out);
+}
+
+void dac_sequencer_fill(dac_sequencer *s, dac_output *x, dac_output *y, uint8_t *markers, size_t ticks)
+{
+    uint32_t done, most = UINT32_C(1) << 16, wait = 0;
+
+    dac_sequencer_answer(s);
+    for (; ticks != 0; ticks -= (size_t)done, x += done * DAC_STRIDE, y += done * DAC_STRIDE) {
+        done = 0;
+        if (wait != 0) {
+            wait--;
+        } else if (s->running && (s->tick != 0 || !s->waiting)) {
+            const uint32_t left = s->now->schedule.line_ticks - s->tick;
+            const uint32_t possible = ticks < left ? (uint32_t)ticks : left;
+            const uint32_t asked = possible < most ? possible : most;
+            done = run(s, x, y, asked);
+            /* What x has played before y refuses was for nothing: ask for little after that, and not at once again. */
+            if (done != asked)
+                most = DAC_RUN;
+            else if (asked == most)
+                most *= 2;
+            wait = done != 0 ? 0 : DAC_WAIT;
+        }
+        if (done != 0) {
+            encode(&s->x, x, done);
+            encode(&s->y, y, done);
+            pass(s, markers, done);
+        } else {
+            dac_tick one;
+            one_tick(s, &one);
+            *x = one.x;
+            *y = one.y;
+            if (markers != NULL)
+                *markers = one.markers;
+            done = 1;
+        }
+        if (markers != NULL)
+            markers += done;
+    }
+}

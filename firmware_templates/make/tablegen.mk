@@ -1,0 +1,70 @@
+# tablegen as a build step of GNU make. In a Makefile:
+#
+#   TABLEGEN ?= tablegen
+#   include $(or $(shell $(TABLEGEN) paths --make),$(error $(TABLEGEN) does not run: install it or give TABLEGEN=PATH))
+#   $(eval $(call tablegen_build,scan.toml,build/scan))
+#
+#   firmware: main.o $(build/scan_SOURCES:.c=.o)
+#
+# builds scan.toml into the directory build/scan before make looks at anything else, and gives
+#
+#   build/scan_SOURCES     the C sources: NAME.c, unless the scan is header-only, and the runtime dac_*.c
+#   build/scan_HEADERS     NAME.h, dac_*.h; compile with -Ibuild/scan
+#   build/scan_VERILOG     dac_*.v
+#   build/scan_MEMORY      the .mem files
+#   build/scan_FILES       all of them, NAME.vh and manifest.json too
+#
+# Paths are relative to where make runs. They cannot have spaces, since make cannot.
+#
+# How it works: tablegen writes what it has read into DIR/tablegen-build.d, as the last thing that it does, and only if
+# it succeeds. That file is a stamp, a rule for itself, and a makefile that this one includes. Make therefore brings it
+# up to date first, once for all jobs, and then starts again, now knowing what the build consists of. Files whose
+# content stays are not touched, so that nothing is compiled for a changed comment.
+
+TABLEGEN ?= tablegen
+
+# Nothing is built if make is asked for no other goals than these.
+TABLEGEN_IDLE_GOALS ?= clean distclean
+
+ifeq ($(shell command -v $(firstword $(TABLEGEN)) 2>/dev/null),)
+$(error $(firstword $(TABLEGEN)) is not found: put tablegen on PATH ('pip install' does), or give TABLEGEN=PATH)
+endif
+
+# $(call tablegen_build,SCAN,DIR): to be evaluated; see above.
+tablegen_build = $(call tablegen_rules,$(call tablegen_path,scan,$(1)),$(call tablegen_path,directory,$(2)))
+
+tablegen_path = $(if $(filter 1,$(words $(2))),$(patsubst %/,%,$(strip $(2))),$(error \
+    tablegen_build: the $(1) is '$(2)'; give one path without a space, which make cannot take (CMake can)))
+
+tablegen_goals := $(if $(MAKECMDGOALS),$(filter-out $(TABLEGEN_IDLE_GOALS),$(MAKECMDGOALS)),all)
+
+# What the manifest lists: a line "NAME.EXTENSION": "SHA-256" for each file.
+tablegen_listed = $(shell \
+    sed -n 's/^ *"\([A-Za-z0-9_]*\.[a-z]*\)": "[0-9a-f]\{64\}",*$$/\1/p' $(1)/manifest.json 2>/dev/null)
+
+.PHONY: tablegen-incomplete
+
+# Rules must not become the default goal of the Makefile, which may come later.
+define tablegen_rules
+tablegen_default := $$(.DEFAULT_GOAL)
+
+$(2)/tablegen-build.d: $(1)
+	$$(TABLEGEN) build $(1) --output $(2) --quiet --depfile $$@ --depfile-target $$@
+
+ifneq ($$(tablegen_goals),)
+include $(2)/tablegen-build.d
+endif
+
+$(2)_FILES := $(2)/manifest.json $$(addprefix $(2)/,$$(call tablegen_listed,$(2)))
+$(2)_SOURCES := $$(filter %.c,$$($(2)_FILES))
+$(2)_HEADERS := $$(filter %.h,$$($(2)_FILES))
+$(2)_VERILOG := $$(filter %.v,$$($(2)_FILES))
+$(2)_MEMORY := $$(filter %.mem,$$($(2)_FILES))
+
+# A file that somebody has removed is made again.
+ifneq ($$(filter-out $$(wildcard $$($(2)_FILES)),$$($(2)_FILES)),)
+$(2)/tablegen-build.d: tablegen-incomplete
+endif
+
+.DEFAULT_GOAL := $$(tablegen_default)
+endef

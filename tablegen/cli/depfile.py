@@ -1,0 +1,69 @@
+"""``tablegen build --depfile``: what a build has read, for make, CMake and Ninja."""
+
+import os
+import stat
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from tablegen.cli.common import fail, written
+from tablegen.cli.status import Status
+from tablegen.resources import deciding_files
+
+
+class Depfile:
+    """A dependency file that exists only while the last build succeeded: it is removed first and written last.
+
+    It thus serves as the stamp of the build as well. Its time is that of the start, so that a file which is edited
+    while it is being read is newer.
+    """
+
+    def __init__(self, path: Path, target: str, scan: Path) -> None:
+        self._path = path
+        self._target = target
+        self._prerequisites: list[Path] = []
+        self._started_ns = time.time_ns()
+        _remove(path, scan)
+
+    def note(self, read: Sequence[Path]) -> None:
+        """Note the files that were read, and those of the package."""
+        self._prerequisites = [*read, *deciding_files()]
+        for name in (self._target, *map(str, self._prerequisites)):
+            if "\n" in name or "\t" in name:
+                why = "no dependency file can name a path with a line end or a tab; rename it"
+                fail([f"{name!r}: {why}"], Status.WRONG_INPUT)
+
+    def write(self) -> None:
+        """Write the file; the last step of a build."""
+        from tablegen.emit.depfile import depfile
+
+        times = {path: _changed_ns(path) for path in self._prerequisites}
+        written(self._path.parent, {self._path.name: depfile(self._target, self._prerequisites)})
+        newest = max(times, key=lambda path: times[path])
+        ahead_ns = times[newest] - _changed_ns(self._path)
+        if ahead_ns > 0:  # whatever depends on it is out of date when it is built: make would not end
+            self._path.unlink()
+            why = f"was changed {ahead_ns * 1e-9:.1f} s from now by its time; set the clock right, or touch it"
+            fail([f"{newest}: {why}"], Status.WRONG_INPUT)
+        os.utime(self._path, ns=(self._started_ns, self._started_ns))
+
+
+def _changed_ns(path: Path) -> int:
+    """When a file was last changed; one that has been removed meanwhile, never."""
+    try:
+        return path.stat().st_mtime_ns
+    except OSError:
+        return 0
+
+
+def _remove(path: Path, scan: Path) -> None:
+    try:
+        if not stat.S_ISREG(path.lstat().st_mode):
+            fail([f"{path}: is no regular file; --depfile needs a file of its own"], Status.WRONG_INPUT)
+        if scan.exists() and path.samefile(scan):
+            fail([f"{path}: is the scan; --depfile needs a file of its own"], Status.WRONG_INPUT)
+        path.unlink()
+    except FileNotFoundError:
+        pass
+    except OSError as error:
+        fail([f"{path}: {error.strerror or error}"], Status.CANNOT_WRITE)

@@ -1,0 +1,51 @@
+"""``tablegen paths``: where the files of this installation are that other tools need."""
+
+import os
+
+import click
+
+from tablegen.cli.status import Status
+
+
+@click.command(short_help="Print where the Make include, the CMake package and the runtime are.")
+@click.option("--make", is_flag=True, help="The Make include, tablegen.mk.")
+@click.option("--cmake", is_flag=True, help="The directory of the CMake package, TablegenConfig.cmake.")
+@click.option("--runtime-c", is_flag=True, help="The directory of the C sequencer, dac_*.h and dac_*.c.")
+@click.option("--runtime-verilog", is_flag=True, help="The directory of the Verilog sequencer, dac_*.v.")
+def paths(**asked: bool) -> int:
+    """Print where the files of this installation are; without an option all of them, as a table.
+
+    \b
+    In a Makefile, `tablegen build` as a build step:
+      include $(shell tablegen paths --make)
+      $(eval $(call tablegen_build,scan.toml,build/scan))    # then compile $(build/scan_SOURCES)
+
+    \b
+    In a CMakeLists.txt, with cmake -DTablegen_DIR="$(tablegen paths --cmake)":
+      find_package(Tablegen REQUIRED)
+      tablegen_build(scan.toml TARGET scan)                  # a library to link to
+
+    \b
+    To read, lint or link the sequencers, which are also in every build:
+      less "$(tablegen paths --runtime-c)/dac_sequencer.h"
+      cppcheck "$(tablegen paths --runtime-c)"
+
+    \b
+      less "$(tablegen paths --runtime-verilog)/dac_sequencer.v"
+      iverilog -g2005 -Wall -t null "$(tablegen paths --runtime-verilog)"/dac_*.v
+    """
+    from tablegen.resources import resource_folder
+
+    folder = resource_folder("firmware_templates")
+    found = {
+        "make": folder / "make" / "tablegen.mk",
+        "cmake": folder / "cmake",
+        "runtime-c": folder / "c",
+        "runtime-verilog": folder / "verilog",
+    }
+    chosen = [name for name in found if asked[name.replace("-", "_")]]
+    width = max(map(len, found))
+    for name in chosen or found:
+        # As bytes: a path has to come out as it is, whatever the terminal can show.
+        click.echo((b"" if chosen else f"{name:<{width}}  ".encode()) + os.fsencode(found[name]))
+    return Status.OK

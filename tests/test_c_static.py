@@ -1,0 +1,116 @@
+"""The C runtime as text and as symbols: warnings, static analysers, C++, what it exports and what it asks for."""
+
+import re
+from itertools import product
+from pathlib import Path
+
+import pytest
+from building import run, run_clean
+
+from tablegen.resources import c_runtime
+
+SOURCES = [path for path in c_runtime() if path.suffix == ".c"]
+HEADERS = {path.name: path for path in c_runtime() if path.suffix == ".h"}
+WARNINGS = [
+    "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wsign-conversion", "-Wshadow", "-Wcast-qual", "-Wundef",
+    "-Wstrict-prototypes", "-Wmissing-prototypes", "-Wdouble-promotion", "-Werror",
+]  # fmt: skip
+CHOICES = {
+    "default": [],
+    "wide": ["-DDAC_TABLE_STORAGE_BITS=32", "-DDAC_OUTPUT_STORAGE_BITS=32", "-DDAC_STRIDE=1"],
+    "narrow_words_wide_codes": ["-DDAC_OUTPUT_STORAGE_BITS=32", "-DDAC_REQUESTS=128"],
+    "no_long_multiplication": ["-DDAC_LONG_MULTIPLY=0"],
+    "small": ["-DDAC_SMALL=1", "-Os"],
+}
+# 32 bits without a C library for them: the runtime is freestanding, and so are these.
+COMPILERS = {
+    "gcc-c99": ["gcc", "-std=c99"],
+    "gcc-c11": ["gcc", "-std=c11"],
+    "gcc-c99-32": ["gcc", "-std=c99", "-m32", "-ffreestanding"],
+    "clang-c99": ["clang", "-std=c99"],
+    "clang-c11": ["clang", "-std=c11"],
+    "clang-c99-32": ["clang", "-std=c99", "-m32", "-ffreestanding"],
+}
+QUICK = ("default", "small")
+# An analyser reports what it finds in a file that is wrong in this way.
+FAULTY = "int faulty(void);\nint faulty(void)\n{\n    int *nothing = 0;\n    return *nothing;\n}\n"
+ANALYSERS = {
+    "gcc": ["gcc", "-std=c99", "-O2", "-fanalyzer", "-Werror", "-c", "-o", "/dev/null"],
+    "clang": ["clang", "--analyze", "-Xclang", "-analyzer-werror", "-std=c99", "-o", "/dev/null"],
+    "cppcheck": [
+        "cppcheck",
+        "--enable=warning,style,performance,portability",
+        "--error-exitcode=1",
+        "--std=c99",
+        "-q",
+        "-D__GNUC__=12",
+    ],
+}
+
+
+@pytest.mark.parametrize("choice", CHOICES)
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_no_warnings(compiler: str, choice: str, tmp_path: Path) -> None:
+    run_clean([*COMPILERS[compiler], "-O2", *WARNINGS, *CHOICES[choice], "-c", *SOURCES], tmp_path)
+
+
+@pytest.mark.parametrize("compiler", ["g++", "clang++"])
+def test_the_header_is_cplusplus(compiler: str, tmp_path: Path) -> None:
+    """Included from C++17 it has C linkage, and its program is an initialiser."""
+    unit, header = tmp_path / "unit.cpp", HEADERS["dac_sequencer.h"]
+    unit.write_text(
+        '#include "dac_sequencer.h"\nstatic dac_sequencer sequencer;\nint main()\n{\n    const dac_converter c = {};\n'
+        "    dac_sequencer_init(&sequencer, &c, &c);\n    return dac_sequencer_commit(&sequencer);\n}\n"
+    )
+    warnings = [each for each in WARNINGS if "prototypes" not in each]
+    run_clean(["gcc" if compiler == "g++" else "clang", "-std=c99", "-c", *SOURCES], tmp_path)
+    objects = sorted(tmp_path.glob("*.o"))
+    program = tmp_path / "unit"
+    run_clean([compiler, "-std=c++17", *warnings, f"-I{header.parent}", unit, *objects, "-o", program])
+    run_clean([program])
+
+
+# clang's takes its time.
+@pytest.mark.parametrize(
+    ("analyser", "choice"), [each for each in product(ANALYSERS, CHOICES) if each[0] != "clang" or each[1] in QUICK]
+)
+def test_analysers_find_nothing(analyser: str, choice: str) -> None:
+    definitions = [each for each in CHOICES[choice] if each.startswith("-D")]
+    for source in SOURCES:
+        run_clean([*ANALYSERS[analyser], *definitions, source])
+
+
+@pytest.mark.parametrize("analyser", ANALYSERS)
+def test_analysers_find_a_fault(analyser: str, tmp_path: Path) -> None:
+    source = tmp_path / "faulty.c"
+    source.write_text(FAULTY)
+    assert run([*ANALYSERS[analyser], source]).returncode != 0
+
+
+def declared(*headers: str) -> set[str]:
+    """Functions that headers declare, but for those that they define themselves."""
+    text = "".join(HEADERS[name].read_text("utf-8") for name in headers)
+    text = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
+    return set(re.findall(r"^(?!static|#)[\w ]+?[ *](dac_\w+)\([^;{]*\);", text, flags=re.MULTILINE))
+
+
+@pytest.mark.parametrize("options", [["-O0"], ["-O2"], ["-Os"], ["-O2", *CHOICES["wide"]]], ids=" ".join)
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+def test_symbols(compiler: str, options: list[str], tmp_path: Path) -> None:
+    """Exported is what headers declare; asked for are its own functions, memcpy and memset. It has no variables."""
+    run_clean([compiler, "-std=c99", "-ffreestanding", "-fno-pic", *options, "-c", *SOURCES], tmp_path)
+    found: dict[str, set[str]] = {}
+    for path in sorted(tmp_path.glob("*.o")):
+        for line in run_clean(["nm", path]).splitlines():
+            *_, kind, name = line.split()
+            found.setdefault(kind, set()).add(name)
+    assert found.pop("T") == declared("dac_sequencer.h", "dac_axis.h") >= {"dac_sequencer_step", "dac_axis_run"}
+    assert found.pop("U", set()) <= declared("dac_axis.h", "dac_sequencer.h") | {"memcpy", "memset"}
+    assert set(found) <= {"t", "r"}, found
+
+
+def test_public_names_have_the_prefix_of_the_sequencer() -> None:
+    public = declared("dac_sequencer.h")
+    assert len(public) >= 17
+    assert {name for name in public if not name.startswith("dac_sequencer_")} == {"dac_synthesize"}
+    assert all(name.startswith("dac_axis_") for name in declared("dac_axis.h"))
