@@ -22,6 +22,7 @@ from tablegen.verify.emulate import CORES, Processor, compile_bare
 
 HERE = Path(__file__).parent
 EXAMPLE = HERE.parent / "examples" / "annexin_200nm.toml"
+MEMORY = HERE.parent / "examples" / "firmware" / "memory.c"
 PAGE = HERE.parent / "docs" / "instructions.md"
 TICKS = 256  # of a fill
 CASES = [
@@ -58,7 +59,7 @@ def measure(core: str, optimisation: str, folder: Path) -> Counts:
     plan = make_plan(load(EXAMPLE))
     for name, content in render(plan, certify(plan)).items():
         (folder / name).write_bytes(content)
-    sources = [*c_runtime(), HERE / "firmware_count.c", folder / f"{plan.name}.c", folder / f"{plan.name}.h"]
+    sources = [*c_runtime(), HERE / "firmware_count.c", MEMORY, folder / f"{plan.name}.c", folder / f"{plan.name}.h"]
     options = ("-std=c99", optimisation)
     machine = Processor(compile_bare(folder / "count.elf", sources, core, None, options), core)
     machine.call("count_init")

@@ -17,24 +17,6 @@ const uint32_t bytes[] = {sizeof(dac_sequencer), sizeof(dac_bank)};
 
 void bench_main(void) {}
 
-/* There is no C library; volatile, lest the compiler makes calls of themselves of these. */
-void *memcpy(void *to, const void *from, size_t count)
-{
-    volatile uint8_t *target = to;
-    const uint8_t *source = from;
-    while (count-- != 0)
-        *target++ = *source++;
-    return to;
-}
-
-void *memset(void *to, int value, size_t count)
-{
-    volatile uint8_t *target = to;
-    while (count-- != 0)
-        *target++ = (uint8_t)value;
-    return to;
-}
-
 void count_init(void)
 {
     dac_sequencer_init(&sequencer, &x_converter, &y_converter);

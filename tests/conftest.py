@@ -1,5 +1,6 @@
 """What tests of several files share."""
 
+import signal
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,10 @@ from installing import install, make_wheel
 # Without deadlines: how long an example takes is the machine's affair. In CI Hypothesis's examples are fixed.
 settings.register_profile("tablegen", settings(), deadline=None)
 settings.load_profile("tablegen")
+
+# A shell that starts the tests in the background has SIGINT ignored, and whatever they start would ignore it too.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")

@@ -108,7 +108,11 @@ def check_interruption(
                 assert process.poll() is None, process.communicate()
                 time.sleep(0.01)
             process.send_signal(number)
-        printed, told = process.communicate(timeout=60)
+        try:
+            printed, told = process.communicate(timeout=60)
+        except subprocess.TimeoutExpired:
+            process.terminate()  # otherwise one would wait for ever
+            raise
     assert process.returncode == 130
     assert (printed, told.strip()) == ("", "interrupted; the output directory was left as it was")
     assert list(temporary.iterdir()) == []

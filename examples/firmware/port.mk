@@ -8,7 +8,8 @@ $(eval $(call tablegen_build,$(SCAN),$(BUILD)/scan))
 
 SCAN_NAME := $(basename $(notdir $(filter-out $(BUILD)/scan/dac_%,$($(BUILD)/scan_HEADERS))))
 SCAN_UPPER := $(shell echo $(SCAN_NAME) | tr a-z A-Z)
-OBJECTS := $(OWN:%=$(BUILD)/%.o) $(patsubst %.c,%.o,$($(BUILD)/scan_SOURCES))
+vpath memory.c ..
+OBJECTS := $(patsubst %,$(BUILD)/%.o,$(OWN) memory) $(patsubst %.c,%.o,$($(BUILD)/scan_SOURCES))
 COMPILE := $(CROSS) -std=c99 -mcpu=$(CPU) -mthumb -ffreestanding -ffunction-sections -fdata-sections \
     -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Werror -I$(BUILD)/scan -I. -MMD -MP \
     -DSCAN=$(SCAN_NAME) -DSCAN_UPPER=$(SCAN_UPPER) -DSCAN_HEADER='"$(SCAN_NAME).h"' \

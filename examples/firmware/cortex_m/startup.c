@@ -1,5 +1,4 @@
 /* From reset to main(): vectors, memory, and what compilers call by themselves, since there is no C library. */
-#include <stddef.h>
 #include <stdint.h>
 
 #include "board.h"
@@ -49,27 +48,3 @@ __attribute__((section(".vectors"), used)) static const vector vectors[16 + 16] 
     [16 + 5] = {.handler = board_uart_interrupt},  /* LM3S6965: UART 0 */
     [16 + 8] = {.handler = board_timer_interrupt}, /* MPS2: timer 0 */
 };
-
-/* The barriers keep compilers from making a call of the function itself out of its loop. */
-void *memcpy(void *restrict to, const void *restrict from, size_t count);
-void *memcpy(void *restrict to, const void *restrict from, size_t count)
-{
-    unsigned char *t = to;
-    const unsigned char *f = from;
-    while (count-- != 0) {
-        *t++ = *f++;
-        __asm__ volatile("" ::: "memory");
-    }
-    return to;
-}
-
-void *memset(void *to, int value, size_t count);
-void *memset(void *to, int value, size_t count)
-{
-    unsigned char *t = to;
-    while (count-- != 0) {
-        *t++ = (unsigned char)value;
-        __asm__ volatile("" ::: "memory");
-    }
-    return to;
-}

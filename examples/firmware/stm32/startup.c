@@ -1,5 +1,4 @@
 /* From reset to main(). */
-#include <stddef.h>
 #include <stdint.h>
 
 extern uint32_t data_start[], data_end[], bss_start[], bss_end[], stack_top[];
@@ -41,27 +40,3 @@ __attribute__((section(".vectors"), used)) static const vector vectors[16 + 17] 
     [6] = {.handler = fault},
     [16 + 16] = {.handler = dma_interrupt}, /* DMA1, stream 5 */
 };
-
-/* The barriers keep compilers from making a call of the function itself out of its loop. */
-void *memcpy(void *restrict to, const void *restrict from, size_t count);
-void *memcpy(void *restrict to, const void *restrict from, size_t count)
-{
-    unsigned char *t = to;
-    const unsigned char *f = from;
-    while (count-- != 0) {
-        *t++ = *f++;
-        __asm__ volatile("" ::: "memory");
-    }
-    return to;
-}
-
-void *memset(void *to, int value, size_t count);
-void *memset(void *to, int value, size_t count)
-{
-    unsigned char *t = to;
-    while (count-- != 0) {
-        *t++ = (unsigned char)value;
-        __asm__ volatile("" ::: "memory");
-    }
-    return to;
-}
