@@ -1,0 +1,161 @@
+"""What a device checks before it takes a program: the specification behind docs/protocol.md.
+
+Devices do the same in C; the host asks here before it uploads, so that it can say what would be refused.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tablegen.fixedpoint.output import GAIN_BITS
+from tablegen.fixedpoint.phase import MAXIMUM_TICKS, PHASE_BITS
+from tablegen.fixedpoint.program import Program
+from tablegen.fixedpoint.rounding import signed_limits
+from tablegen.fixedpoint.synthesis import FRACTION_BITS
+from tablegen.link.image import Contents
+from tablegen.link.messages import AxisLimits, Reason
+from tablegen.numerics.arrays import Bools, Ints
+from tablegen.schedule import MAXIMUM_LINE_TICKS
+
+_OUTSIDE = 1  # codes: ticks need not visit a word, and rounding may carry it over a limit that no tick crosses
+_MAXIMUM_STEP = (1 << 24) - 1
+
+
+@dataclass(frozen=True, eq=False)
+class Playing:
+    """What a device does while a program is checked: the programs of x and y, and whether a scan runs."""
+
+    x: Program
+    y: Program
+    running: bool
+
+
+Finding = tuple[Reason, int]  # and its detail
+
+
+def first_objection(contents: Contents, x: AxisLimits, y: AxisLimits, playing: Playing | None) -> Finding | None:
+    """The first check that a program fails, in the order of the protocol; None where it passes all of them.
+
+    ``x`` and ``y`` are the limits of the device, ``playing`` what it plays now (None: nothing yet).
+    """
+    if not _schedule_is_good(contents):
+        return Reason.SCHEDULE, 0
+    for checked in (_period, _output):
+        for page in (1, 2):
+            if found := checked(contents, page):
+                return found
+    for page, limits in ((1, x), (2, y)):
+        if contents.axis(page, "code_min") < limits.code_min or contents.axis(page, "code_max") > limits.code_max:
+            return Reason.CODES, page - 1
+    for page, limits in ((1, x), (2, y)):
+        if contents.axis(page, "max_step") > limits.max_step:
+            return Reason.STEP, page - 1
+    for check in (_fourier, _word, _range, _slew):
+        for page in (1, 2):
+            if found := check(contents, page):
+                return found
+    return _jump(contents, x, y, playing)
+
+
+def _schedule_is_good(contents: Contents) -> bool:
+    ticks, lines = contents.scan("line_ticks"), contents.scan("frame_lines")
+    if not 1 <= ticks <= MAXIMUM_LINE_TICKS or not 1 <= lines <= MAXIMUM_TICKS // ticks:
+        return False
+    windows = (("forward", ticks), ("backward", ticks), ("up", lines), ("down", lines))
+    return (
+        all(contents.scan(f"{name}_first") + contents.scan(f"{name}_count") <= length for name, length in windows)
+        and contents.scan("turn_tick") <= ticks
+        and contents.scan("pixels") <= ticks
+        and contents.scan("y_steps") <= 1
+    )
+
+
+def _period(contents: Contents, page: int) -> Finding | None:
+    ticks, lines = contents.scan("line_ticks"), contents.scan("frame_lines")
+    wanted = ticks if page == 1 else lines if contents.scan("y_steps") else ticks * lines
+    period = contents.axis(page, "phase_period")
+    step = (1 << PHASE_BITS) // wanted & ((1 << PHASE_BITS) - 1)
+    good = (
+        period == wanted
+        and contents.axis(page, "phase_step") == step
+        and contents.axis(page, "phase_remainder") == (1 << PHASE_BITS) % wanted
+    )
+    return None if good else (Reason.PERIOD, page - 1)
+
+
+def _output(contents: Contents, page: int) -> Finding | None:
+    shape = contents.x_shape if page == 1 else contents.y_shape
+    low, high = signed_limits(GAIN_BITS)
+    output = contents.program(page).output
+    # twice what a code needs
+    reach = 2 << (output.dac_bits + output.gain_q)
+    good = (
+        low <= output.gain_word <= high
+        and -reach < output.offset_word < reach
+        and contents.axis(page, "offset_low") < 1 << 18
+        and output.code_min <= output.park_code <= output.code_max < 1 << shape.dac_bits
+        and 1 <= output.max_step <= _MAXIMUM_STEP
+    )
+    return None if good else (Reason.OUTPUT, page - 1)
+
+
+def _fourier(contents: Contents, page: int) -> Finding | None:
+    words = contents.x if page == 1 else contents.y
+    too_much = contents.axis(page, "harmonics") and int(np.sum(np.abs(words))) >= 4 << FRACTION_BITS
+    return (Reason.FOURIER, page - 1) if too_much else None
+
+
+def _word(contents: Contents, page: int) -> Finding | None:
+    shape, words = (contents.x_shape, contents.x) if page == 1 else (contents.y_shape, contents.y)
+    low, high = signed_limits(shape.word_bits)
+    return None if contents.axis(page, "harmonics") else _first((words < low) | (words > high), Reason.WORD, page)
+
+
+def _range(contents: Contents, page: int) -> Finding | None:
+    program = contents.program(page)
+    output = program.output
+    codes = output.unclamped(program.words << program.guard)
+    return _first((codes < output.code_min - _OUTSIDE) | (codes > output.code_max + _OUTSIDE), Reason.RANGE, page)
+
+
+def _slew(contents: Contents, page: int) -> Finding | None:
+    program = contents.program(page)
+    output = program.output
+    advances, length = program.phase.ticks, len(program.words)
+    if advances <= 2 * length:
+        codes = program.codes(np.arange(advances, dtype=np.int64) * program.hold)
+        return _first(np.abs(np.roll(codes, -1) - codes) > output.max_step, Reason.SLEW, page)
+    rise = np.abs(np.roll(program.words, -1) - program.words) << program.guard
+    steepest = int(np.argmax(rise))
+    most, gain = int(rise[steepest]), abs(output.gain_word)
+    slack = 2 + ((gain * (2 + (most >> 14))) >> output.gain_q)
+    if (gain * most * length) >> output.gain_q <= advances * (output.max_step + slack):
+        return None
+    return Reason.SLEW, page - 1 + 2 * steepest
+
+
+def _jump(contents: Contents, x: AxisLimits, y: AxisLimits, playing: Playing | None) -> Finding | None:
+    if playing is None:
+        return None
+    for page, limits, old in ((1, x, playing.x), (2, y, playing.y)):
+        new = contents.program(page)
+        if playing.running:
+            before = _word_codes(old) if page == 2 else _word_codes(old)[:1]
+            begin = int(_word_codes(new)[0])
+            jump = int(np.max(np.abs(before - begin)))
+        else:
+            jump = abs(new.output.park_code - old.output.park_code)
+        if jump > limits.max_jump:
+            return Reason.JUMP, page - 1
+    return None
+
+
+def _word_codes(program: Program) -> Ints:
+    """The codes of the words of a table."""
+    return program.output.code(program.words << program.guard)
+
+
+def _first(wrong: Bools, reason: Reason, page: int) -> Finding | None:
+    if not wrong.any():
+        return None
+    return reason, page - 1 + 2 * int(np.argmax(wrong))

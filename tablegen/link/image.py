@@ -1,0 +1,153 @@
+"""The image of a program: what an upload puts into a device, and what a device reads out of it (docs/protocol.md)."""
+
+import zlib
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from tablegen.fixedpoint.interpolation import guard_bits
+from tablegen.fixedpoint.output import UNIT_GAIN_BITS, Output
+from tablegen.fixedpoint.phase import RationalPhase
+from tablegen.fixedpoint.program import Program
+from tablegen.fixedpoint.synthesis import FourierWords, synthesize
+from tablegen.link.messages import AxisShape, ImageInfo
+from tablegen.numerics.arrays import Ints
+from tablegen.registers import AXIS_WORDS, OFFSET_LOW_BITS, PAGE_WORDS, SCAN_WORDS, program_words
+from tablegen.sequencer import DualProgram
+
+PROGRAM_WORDS = 3 * PAGE_WORDS
+PROGRAM_BYTES = 4 * PROGRAM_WORDS
+FOURIER_BYTES = 4  # a word
+_HARMONICS = AXIS_WORDS.index("harmonics")
+
+
+@dataclass(frozen=True, slots=True)
+class Image:
+    """What is uploaded, and what BEGIN says of it."""
+
+    info: ImageInfo
+    data: bytes
+
+
+def make_image(
+    program: DualProgram, digest: str, x_fourier: Ints | None = None, y_fourier: Ints | None = None
+) -> Image:
+    """The image of a program of the plan with this SHA-256 (64 hexadecimal digits).
+
+    Where Fourier words are given, int64 of shape (2 H + 1,) in the order of devices, they go in place of the table.
+    """
+    harmonics = [0 if words is None else len(words) // 2 for words in (x_fourier, y_fourier)]
+    words = program_words(program.schedule, program.x, program.y, (harmonics[0], harmonics[1]))
+    data = np.array(words, dtype="<u4").tobytes()
+    for axis, fourier in ((program.x, x_fourier), (program.y, y_fourier)):
+        data += _bytes(axis.words, _shape(axis).word_bytes) if fourier is None else _bytes(fourier, FOURIER_BYTES)
+    info = ImageInfo(bytes.fromhex(digest), len(data), zlib.crc32(data), _shape(program.x), _shape(program.y))
+    return Image(info, data)
+
+
+def _shape(axis: Program) -> AxisShape:
+    return AxisShape(axis.index_bits, axis.bits, axis.output.dac_bits)
+
+
+def _bytes(words: Ints, size: int) -> bytes:
+    """The low bytes of two's complement words, the lowest first."""
+    return words.astype("<i8").view(np.uint8).reshape(-1, 8)[:, :size].tobytes()
+
+
+def _words(data: bytes, size: int) -> Ints:
+    """Signed words of so many bytes."""
+    raw = np.frombuffer(data, dtype=np.uint8).reshape(-1, size)
+    wide = np.where(raw[:, -1:] & 0x80, np.uint8(255), np.uint8(0)).repeat(8, axis=1)
+    wide[:, :size] = raw
+    return np.ascontiguousarray(wide).view("<i8")[:, 0].astype(np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class Contents:
+    """An image taken apart: the program words, unsigned, and the words of both axes, signed."""
+
+    words: tuple[int, ...]
+    x_shape: AxisShape
+    y_shape: AxisShape
+    x: Ints
+    y: Ints
+
+    def scan(self, name: str) -> int:
+        """A word of the page of the scan by its name in ``tablegen.registers.SCAN_WORDS``."""
+        return self.words[SCAN_WORDS.index(name)]
+
+    def axis(self, page: int, name: str) -> int:
+        """A word of the page of x (1) or y (2) by its name in ``AXIS_WORDS``."""
+        return self.words[page * PAGE_WORDS + AXIS_WORDS.index(name)]
+
+    def signed(self, page: int, name: str) -> int:
+        """The same as a signed number."""
+        return _signed(self.axis(page, name))
+
+    def offset_word(self, page: int) -> int:
+        """The offset of an axis, from its two parts."""
+        return (self.signed(page, "offset_high") << OFFSET_LOW_BITS) + self.axis(page, "offset_low")
+
+    def program(self, page: int) -> Program:
+        """What x (1) or y (2) plays, with the table rendered where Fourier words came. Its converter is a plain one.
+
+        Raises ``ValueError`` where it could not be played at all.
+        """
+        shape, words = (self.x_shape, self.x) if page == 1 else (self.y_shape, self.y)
+        if self.axis(page, "harmonics"):
+            half = len(words) // 2
+            fourier = FourierWords(int(words[0]), words[1 : half + 1], words[half + 1 :])
+            words = synthesize(fourier, 1 << shape.index_bits, shape.word_bits)
+        output = Output(
+            gain_word=self.signed(page, "gain"),
+            gain_q=UNIT_GAIN_BITS + shape.word_bits + guard_bits(shape.word_bits) - shape.dac_bits,
+            offset_word=self.offset_word(page),
+            code_min=self.axis(page, "code_min"),
+            code_max=self.axis(page, "code_max"),
+            max_step=self.axis(page, "max_step"),
+            park_code=self.axis(page, "park_code"),
+            dac_bits=shape.dac_bits,
+            coding="offset-binary",
+            align="right",
+            word_bits=shape.dac_bits,
+        )
+        hold = self.scan("line_ticks") if page == 2 and self.scan("y_steps") else 1
+        phase = RationalPhase(self.axis(page, "phase_period"))
+        mode: Literal["interpolated", "direct"] = "interpolated" if shape.index_bits else "direct"
+        return Program(phase, hold, mode, shape.word_bits, words, output)
+
+
+def _signed(word: int) -> int:
+    return word - (1 << 32) if word >> 31 else word
+
+
+def layout(words: tuple[int, ...], x: AxisShape, y: AxisShape) -> tuple[int, int]:
+    """Bytes that follow the program words for x and for y."""
+    sizes = []
+    for page, shape in ((1, x), (2, y)):
+        harmonics = words[page * PAGE_WORDS + _HARMONICS]
+        period = words[page * PAGE_WORDS + AXIS_WORDS.index("phase_period")]
+        length = 1 << shape.index_bits if shape.index_bits else period
+        sizes.append(FOURIER_BYTES * (2 * harmonics + 1) if harmonics else shape.word_bytes * length)
+    return sizes[0], sizes[1]
+
+
+def take_apart(data: bytes, x: AxisShape, y: AxisShape) -> Contents:
+    """An image of tables of these shapes.
+
+    Raises ``ValueError`` where its length is not what its program words say.
+    """
+    if len(data) < PROGRAM_BYTES:
+        raise ValueError(f"an image of {len(data)} bytes; the program words alone have {PROGRAM_BYTES}")
+    words = tuple(int(word) for word in np.frombuffer(data, dtype="<u4", count=PROGRAM_WORDS))
+    x_bytes, y_bytes = layout(words, x, y)
+    if len(data) != PROGRAM_BYTES + x_bytes + y_bytes:
+        raise ValueError(f"an image of {len(data)} bytes; it says {PROGRAM_BYTES + x_bytes + y_bytes} of itself")
+    parts = []
+    at = PROGRAM_BYTES
+    for page, shape, size in ((1, x, x_bytes), (2, y, y_bytes)):
+        harmonics = words[page * PAGE_WORDS + _HARMONICS]
+        parts.append(_words(data[at : at + size], FOURIER_BYTES if harmonics else shape.word_bytes))
+        at += size
+    return Contents(words, x, y, *parts)

@@ -1,0 +1,305 @@
+"""What requests and answers say: the tables of docs/protocol.md."""
+
+import struct
+from dataclasses import dataclass, fields
+from enum import IntEnum, IntFlag
+from typing import ClassVar, Self
+
+VERSION = 1
+DATA_BYTES = 240  # at most in a DATA
+TAG_BYTES = 16
+NONCE_BYTES = 16
+HASH_BYTES = 32
+ANSWER = 0x80
+REFUSAL = 0xFF
+
+
+class Request(IntEnum):
+    """Types of requests; the answer has bit 7 set."""
+
+    HELLO = 1
+    BEGIN = 2
+    DATA = 3
+    COMMIT = 4
+    ABORT = 5
+    STATUS = 6
+    READBACK = 7
+    PARK = 8
+    ARM = 9
+    TRIGGER = 10
+    CLEAR = 11
+    CHALLENGE = 12
+    LIMITS = 13
+
+
+class Reason(IntEnum):
+    """Why a request was refused."""
+
+    TYPE = 1
+    PAYLOAD = 2
+    VERSION = 3
+    SESSION = 4
+    OLD = 5
+    KEY = 6
+    BUSY = 7
+    UPLOAD = 8
+    SHAPE = 9
+    LENGTH = 10
+    HARMONICS = 11
+    INCOMPLETE = 12
+    INTERLOCK = 13
+    IMAGE = 14
+    SCHEDULE = 15
+    PERIOD = 16
+    OUTPUT = 17
+    CODES = 18
+    STEP = 19
+    FOURIER = 20
+    WORD = 21
+    RANGE = 22
+    SLEW = 23
+    JUMP = 24
+    WITHDRAWN = 25
+    READBACK = 26
+    TICKS = 27
+    REFUSED = 28
+
+
+class Feature(IntFlag):
+    """What a device can do."""
+
+    TABLES = 1
+    FOURIER = 2
+    KEY = 4
+    READBACK = 8
+    INTERLOCK = 16
+    NARROWS = 32
+
+
+class State(IntEnum):
+    """What the sequencer of a device does."""
+
+    NO_PROGRAM = 0
+    PARKED = 1
+    PARKING = 2
+    PLAYING = 3
+
+
+class Upload(IntEnum):
+    """What became of an upload so far."""
+
+    NONE = 0
+    RECEIVING = 1
+    CHECKING = 2
+    WAITING = 3
+
+
+PERMITS = 1  # of Status.flags
+
+
+class _Struct:
+    """A payload of fixed layout; ``unpack`` ignores what later versions may append.
+
+    Raises ``ValueError`` for fewer bytes than the layout has.
+    """
+
+    LAYOUT: ClassVar[struct.Struct]
+
+    def pack(self) -> bytes:
+        """As it stands in a payload."""
+        return self.LAYOUT.pack(*(getattr(self, field.name) for field in fields(self)))  # type: ignore[arg-type]
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> Self:
+        """What a payload says."""
+        if len(payload) < cls.LAYOUT.size:
+            raise ValueError(f"{len(payload)} bytes, too few for {cls.__name__}, which has {cls.LAYOUT.size}")
+        return cls(*cls.LAYOUT.unpack_from(payload))
+
+
+@dataclass(frozen=True, slots=True)
+class AxisShape(_Struct):
+    """Bits of the index of the (longest) table, 0 where it is not interpolated; of its words; of a code.
+
+    ``converter``, of a device: bits of the converter's word, + 64 for two's complement, + 128 for left alignment.
+    """
+
+    LAYOUT: ClassVar[struct.Struct] = struct.Struct("<4B")
+
+    index_bits: int
+    word_bits: int
+    dac_bits: int
+    converter: int = 0
+
+    @property
+    def word_bytes(self) -> int:
+        """Of a table word in an image."""
+        return 2 if self.word_bits <= 16 else 3
+
+
+@dataclass(frozen=True, slots=True)
+class AxisLimits(_Struct):
+    """Beyond these no program of an axis may go: straight binary codes, and codes a tick."""
+
+    LAYOUT: ClassVar[struct.Struct] = struct.Struct("<4I")
+
+    code_min: int
+    code_max: int
+    max_step: int
+    max_jump: int
+
+    def within(self, other: "AxisLimits") -> "AxisLimits":
+        """What both allow."""
+        return AxisLimits(
+            max(self.code_min, other.code_min),
+            min(self.code_max, other.code_max),
+            min(self.max_step, other.max_step),
+            min(self.max_jump, other.max_jump),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceInfo:
+    """What a device is, fixed at its build (56 bytes)."""
+
+    LAYOUT: ClassVar[struct.Struct] = struct.Struct("<4B2HI4s4s16s16sI")
+
+    version: int
+    features: Feature
+    window: int
+    data_bytes: int
+    harmonics: int
+    image_bytes: int
+    x: AxisShape
+    y: AxisShape
+    x_limits: AxisLimits
+    y_limits: AxisLimits
+    update_rate_hz: int
+
+    def pack(self) -> bytes:
+        """As it stands in the answer to HELLO."""
+        parts = (self.x.pack(), self.y.pack(), self.x_limits.pack(), self.y_limits.pack())
+        first = (self.version, self.features, self.window, self.data_bytes, self.harmonics, 0, self.image_bytes)
+        return self.LAYOUT.pack(*first, *parts, self.update_rate_hz)
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> "DeviceInfo":
+        """What the answer to HELLO begins with. Raises ``ValueError`` if it is too short."""
+        if len(payload) < cls.LAYOUT.size:
+            raise ValueError(f"{len(payload)} bytes, too few for a device")
+        version, features, window, data, harmonics, _, image, x, y, x_limits, y_limits, rate = cls.LAYOUT.unpack_from(
+            payload
+        )
+        return cls(
+            version,
+            Feature(features),
+            window,
+            data,
+            harmonics,
+            image,
+            AxisShape.unpack(x),
+            AxisShape.unpack(y),
+            AxisLimits.unpack(x_limits),
+            AxisLimits.unpack(y_limits),
+            rate,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceStatus:
+    """What a device does (76 bytes)."""
+
+    LAYOUT: ClassVar[struct.Struct] = struct.Struct("<4B5I16sI32s")
+
+    state: State
+    upload: Upload
+    faults: int
+    flags: int
+    boot: int
+    generation: int
+    line: int
+    received: int
+    image_crc: int
+    fault_counts: tuple[int, int, int, int]  # slew, clamp, overrun, underrun
+    bad_frames: int
+    hash: bytes
+
+    @property
+    def permits(self) -> bool:
+        """Whether the interlock does, or there is none."""
+        return bool(self.flags & PERMITS)
+
+    def pack(self) -> bytes:
+        """As it stands in an answer."""
+        return self.LAYOUT.pack(
+            self.state,
+            self.upload,
+            self.faults,
+            self.flags,
+            self.boot,
+            self.generation,
+            self.line,
+            self.received,
+            self.image_crc,
+            struct.pack("<4I", *self.fault_counts),
+            self.bad_frames,
+            self.hash,
+        )
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> "DeviceStatus":
+        """What an answer says. Raises ``ValueError`` if it is too short, or of a state that there is not."""
+        if len(payload) < cls.LAYOUT.size:
+            raise ValueError(f"{len(payload)} bytes, too few for a status")
+        state, upload, *numbers, counts, bad, digest = cls.LAYOUT.unpack_from(payload)
+        faults, flags, boot, generation, line, received, crc = numbers
+        return cls(
+            State(state),
+            Upload(upload),
+            faults,
+            flags,
+            boot,
+            generation,
+            line,
+            received,
+            crc,
+            struct.unpack("<4I", counts),
+            bad,
+            digest,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class ImageInfo:
+    """What BEGIN announces (48 bytes)."""
+
+    LAYOUT: ClassVar[struct.Struct] = struct.Struct("<32s2I4s4s")
+
+    hash: bytes
+    image_bytes: int
+    image_crc: int
+    x: AxisShape
+    y: AxisShape
+
+    def pack(self) -> bytes:
+        """As it stands in BEGIN."""
+        return self.LAYOUT.pack(self.hash, self.image_bytes, self.image_crc, self.x.pack(), self.y.pack())
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> "ImageInfo":
+        """What BEGIN says. Raises ``ValueError`` if it is too short."""
+        if len(payload) < cls.LAYOUT.size:
+            raise ValueError(f"{len(payload)} bytes, too few for an image")
+        digest, size, crc, x, y = cls.LAYOUT.unpack_from(payload)
+        return cls(digest, size, crc, AxisShape.unpack(x), AxisShape.unpack(y))
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal(_Struct):
+    """The payload of a refusal; ``reason`` may be one that only a later version knows."""
+
+    LAYOUT: ClassVar[struct.Struct] = struct.Struct("<2BI")
+
+    type: int
+    reason: int
+    detail: int
