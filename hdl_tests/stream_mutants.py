@@ -1,19 +1,16 @@
 """Faults put into the Verilog of the sequencer, each of which the bench has to find; run as a program it lists them.
 
-A mutant is a module with one piece of text replaced. It is played the scripts that the module itself plays equal to the
-model. Text that is found no more, or found twice, is an error: a mutant has to be of the Verilog as it is.
+A mutant is played the scripts that the module itself plays equal to the model.
 """
 
-import sys
-import tempfile
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import cache
-from multiprocessing import get_context
 from pathlib import Path
 
+import mutants
 import numpy as np
+from mutants import Verdict
 from programs import random_dual
 from stream_scripts import (
     counted_frames,
@@ -33,7 +30,6 @@ from tablegen.verify.bench import SequencerBench, Shape
 from tablegen.verify.placement import Placement
 from tablegen.verify.stream import Script
 
-WORKERS = 2
 HARMONICS = 4
 LEAST_PACE = Placement("serial").tick_clocks
 Y_AXIS_AFTER_LOADS = """
@@ -52,34 +48,14 @@ BENCHES = tuple(_SHAPES)
 
 
 @dataclass(frozen=True)
-class Mutant:
-    """What is put in place of what in a module, and what that breaks; ``bench`` is where it shows."""
+class Mutant(mutants.Mutant):
+    """A fault in a module, by its name without .v; ``where`` is the bench in which it shows."""
 
-    breaks: str
-    module: str
-    old: str
-    new: str
-    bench: str = "plain"
+    where: str = "plain"
 
     @property
-    def source(self) -> str:
-        """The text of the module with the fault in it."""
-        text = _module(self.module).read_text("utf-8")
-        if text.count(self.old) != 1:
-            raise ValueError(f"{self.module} has {text.count(self.old)} times: {self.old}")
-        return text.replace(self.old, self.new)
-
-
-@dataclass(frozen=True)
-class Verdict:
-    """How a mutant was found, or that it was not."""
-
-    killed: bool
-    by: str
-
-
-def _module(name: str) -> Path:
-    return next(path for path in verilog_runtime() if path.stem == name)
+    def path(self) -> Path:
+        return next(path for path in verilog_runtime() if path.stem == self.file)
 
 
 @cache
@@ -121,9 +97,9 @@ def bench_of(bench: str, folder: Path, mutant: Mutant | None = None) -> Sequence
     sources = list(verilog_runtime())
     folder.mkdir(parents=True, exist_ok=True)
     if mutant is not None:
-        changed = folder / f"{mutant.module}.v"
+        changed = folder / f"{mutant.file}.v"
         changed.write_text(mutant.source, "utf-8")
-        sources[sources.index(_module(mutant.module))] = changed
+        sources[sources.index(mutant.path)] = changed
     parameters: dict[str, int | str] = {"PLAIN_MULTIPLIER": int(bench in ("plain", "fourier", "long table"))}
     parameters["LOW_AREA"] = int(bench == "low area")
     if bench == "fourier":
@@ -135,7 +111,7 @@ def bench_of(bench: str, folder: Path, mutant: Mutant | None = None) -> Sequence
 
 def judge(mutant: Mutant, folder: Path) -> Verdict:
     """Play a mutant to the end of its script."""
-    played = bench_of(mutant.bench, folder, mutant).play(script_of(mutant.bench))
+    played = bench_of(mutant.where, folder, mutant).play(script_of(mutant.where))
     if played.equal:
         return Verdict(False, "")
     if played.mismatch is not None:
@@ -143,14 +119,6 @@ def judge(mutant: Mutant, folder: Path) -> Verdict:
     if played.jitter:
         return Verdict(True, "latency")
     return Verdict(True, "refused writes" if played.refused else "fault counts")
-
-
-def judge_all(folder: Path) -> Iterator[tuple[Mutant, Verdict]]:
-    """Verdicts on all mutants, in order."""
-    folders = [folder / str(number) for number in range(len(MUTANTS))]
-    # The simulators are found by variables of the process: one process plays one mutant at a time.
-    with ProcessPoolExecutor(WORKERS, mp_context=get_context("spawn")) as pool:
-        yield from zip(MUTANTS, pool.map(judge, MUTANTS, folders), strict=True)
 
 
 def _axis() -> Iterator[Mutant]:
@@ -698,16 +666,5 @@ MUTANTS: tuple[Mutant, ...] = (
 )  # fmt: skip
 
 
-def table(verdicts: Iterator[tuple[Mutant, Verdict]]) -> Iterator[str]:
-    """The list as Markdown, a line at a time."""
-    yield "| fault | module | bench | found by |"
-    yield "|---|---|---|---|"
-    for mutant, verdict in verdicts:
-        yield f"| {mutant.breaks} | `{mutant.module}` | {mutant.bench} | {verdict.by or '**not found**'} |"
-
-
 if __name__ == "__main__":
-    with tempfile.TemporaryDirectory() as scratch:
-        for row in table(judge_all(Path(scratch))):
-            sys.stdout.write(row + "\n")
-            sys.stdout.flush()
+    mutants.print_list(judge, MUTANTS, "module", "bench")

@@ -3,12 +3,13 @@
 from pathlib import Path
 
 import pytest
-from stream_mutants import BENCHES, MUTANTS, Mutant, Verdict, bench_of, judge_all, script_of
+from mutants import Verdict, judge_all
+from stream_mutants import BENCHES, MUTANTS, Mutant, bench_of, judge, script_of
 
 
 @pytest.fixture(scope="module")
 def verdicts(tmp_path_factory: pytest.TempPathFactory) -> dict[Mutant, Verdict]:
-    return dict(judge_all(tmp_path_factory.mktemp("mutants")))
+    return dict(judge_all(judge, MUTANTS, tmp_path_factory.mktemp("mutants")))
 
 
 @pytest.mark.parametrize("name", BENCHES)
@@ -23,10 +24,10 @@ def test_the_documentation_counts_them() -> None:
 
 
 def test_no_mutant_is_listed_twice() -> None:
-    assert len({(mutant.module, mutant.old, mutant.new, mutant.bench) for mutant in MUTANTS}) == len(MUTANTS) > 100
+    assert len({(mutant.file, mutant.old, mutant.new, mutant.where) for mutant in MUTANTS}) == len(MUTANTS) > 100
 
 
-@pytest.mark.parametrize("mutant", MUTANTS, ids=lambda mutant: f"{mutant.module}: {mutant.breaks}")
+@pytest.mark.parametrize("mutant", MUTANTS, ids=lambda mutant: f"{mutant.file}: {mutant.breaks}")
 def test_every_mutant_is_found(mutant: Mutant, verdicts: dict[Mutant, Verdict]) -> None:
     assert mutant.source != ""
     assert verdicts[mutant].killed

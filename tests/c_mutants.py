@@ -1,27 +1,25 @@
 """Faults put into the C sequencer, each of which the tests have to find; run as a program it lists them.
 
-A mutant is a file of the runtime with one piece of text replaced. It is tried where it shows: by scripts that are
-played by fills or by steps, with words of 16 bits or of 32, by the checks of the functions, or between two threads.
-Text that is found no more, or found twice, is an error: a mutant has to be of the C as it is.
+A mutant is tried where it shows: by scripts that are played by fills or by steps, with words of 16 bits or of 32, by
+the checks of the functions, or between two threads. As a program it needs ``PYTHONPATH=hdl_tests``.
 """
 
 import os
 import subprocess
 import sys
-import tempfile
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import cache
-from multiprocessing import get_context
 from pathlib import Path
 
+import mutants
 from c_benches import FILL, words_of
 from c_library import compile_both
 from c_scripts import IN_C, LONG, everything, long_periods, long_play
 from c_scripts import LONG_PERIODS as PERIODS
 from c_threads import compile_threads
 from c_threads import play as play_threads
+from mutants import Verdict
 
 from tablegen.resources import c_runtime
 from tablegen.verify.bench import Shape
@@ -30,7 +28,6 @@ from tablegen.verify.simulate import SimulationFailed
 from tablegen.verify.stream import Script, compare
 
 HERE = Path(__file__).parent
-WORKERS = 2
 OPTIONS = ("-std=c99", "-O1", "-DDAC_WAIT=0")  # as many runs as can be
 CHECKS = {"checks": (), "checks small": ("-DDAC_SMALL=1",), "checks split": ("-DDAC_LONG_MULTIPLY=0",)}
 HANGS = 60.0  # seconds
@@ -38,34 +35,14 @@ _PROGRAMS = 3000  # between two threads
 
 
 @dataclass(frozen=True)
-class Mutant:
-    """What is put in place of what in a file, what that breaks, and where it shows."""
+class Mutant(mutants.Mutant):
+    """A fault in a file, by its whole name; ``where`` is one of ``PLACES``."""
 
-    breaks: str
-    file: str
-    old: str
-    new: str
     where: str = "fill"
 
     @property
-    def source(self) -> str:
-        """The text of the file with the fault in it."""
-        text = _file(self.file).read_text("utf-8")
-        if text.count(self.old) != 1:
-            raise ValueError(f"{self.file} has {text.count(self.old)} times: {self.old}")
-        return text.replace(self.old, self.new)
-
-
-@dataclass(frozen=True)
-class Verdict:
-    """How a mutant was found, or that it was not."""
-
-    killed: bool
-    by: str
-
-
-def _file(name: str) -> Path:
-    return next(path for path in c_runtime() if path.name == name)
+    def path(self) -> Path:
+        return next(path for path in c_runtime() if path.name == self.file)
 
 
 @cache
@@ -146,13 +123,6 @@ def _play(where: str, folder: Path, runtime: list[Path]) -> Verdict:
         if played.counts[:2] != script.counts:
             return Verdict(True, "fault counts")
     return Verdict(False, "")
-
-
-def judge_all(folder: Path, mutants: tuple[Mutant, ...]) -> Iterator[tuple[Mutant, Verdict]]:
-    """Verdicts on mutants, in order."""
-    folders = [folder / str(number) for number in range(len(mutants))]
-    with ProcessPoolExecutor(WORKERS, mp_context=get_context("spawn")) as pool:
-        yield from zip(mutants, pool.map(judge, mutants, folders), strict=True)
 
 
 def _of(file: str, *rows: tuple[str, ...]) -> Iterator[Mutant]:
@@ -826,16 +796,5 @@ EQUIVALENT: dict[Mutant, str] = {
 PLACES = ("fill", "step", "wide", "split wide", *CHECKS, "threads")
 
 
-def table(verdicts: Iterator[tuple[Mutant, Verdict]]) -> Iterator[str]:
-    """The list as Markdown, a line at a time."""
-    yield "| fault | file | where | found by |"
-    yield "|---|---|---|---|"
-    for mutant, verdict in verdicts:
-        yield f"| {mutant.breaks} | `{mutant.file}` | {mutant.where} | {verdict.by or '**not found**'} |"
-
-
 if __name__ == "__main__":
-    with tempfile.TemporaryDirectory() as scratch:
-        for row in table(judge_all(Path(scratch), MUTANTS)):
-            sys.stdout.write(row + "\n")
-            sys.stdout.flush()
+    mutants.print_list(judge, MUTANTS, "file", "where")

@@ -3,7 +3,9 @@
 from pathlib import Path
 
 import pytest
-from c_mutants import EQUIVALENT, MUTANTS, PLACES, Mutant, Verdict, judge, judge_all
+from building import REPOSITORY
+from c_mutants import EQUIVALENT, MUTANTS, PLACES, Mutant, judge
+from mutants import Verdict, judge_all
 
 # By name in the requirements: they have to be among the mutants.
 CONTROLS = (
@@ -20,12 +22,18 @@ CONTROLS = (
 
 @pytest.fixture(scope="module")
 def verdicts(tmp_path_factory: pytest.TempPathFactory) -> dict[Mutant, Verdict]:
-    return dict(judge_all(tmp_path_factory.mktemp("mutants"), MUTANTS))
+    return dict(judge_all(judge, MUTANTS, tmp_path_factory.mktemp("mutants")))
 
 
 @pytest.mark.parametrize("where", PLACES)
 def test_the_runtime_as_it_is_passes(where: str, tmp_path: Path) -> None:
     assert judge(None, tmp_path, where) == Verdict(False, "")
+
+
+def test_the_documentation_counts_them() -> None:
+    page = " ".join((REPOSITORY / "docs" / "c.md").read_text("utf-8").split())
+    assert f"{len(MUTANTS)} faults put into the C" in page
+    assert f"{len(EQUIVALENT)} more" in page
 
 
 def test_no_mutant_is_listed_twice() -> None:

@@ -6,8 +6,8 @@ the runtime's own addition and multiplication, and Python's integers say what is
 """
 
 import pytest
-from c_checks import RUN_TICKS, WHOLE, advanced, loaded, nearest, runs_from, skipped, step_of
 from c_library import Library, compile_library
+from c_runs import RUN_TICKS, WHOLE, advanced, loaded, nearest, runs_from, skipped, step_of
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 

@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 from building import NAME, VARIANTS, build, run_clean
 from c_benches import COMPILERS, FILL, Benches
-from c_checks import CHECKS, Check, Libraries
+from c_checks import CHECKS
+from c_devices import Check, Libraries
 from c_library import Converter, CProgram, Library, Twin, compile_both, compile_library, storage
 from c_scripts import (
     IN_C,

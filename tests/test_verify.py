@@ -8,21 +8,29 @@ import json
 import re
 import shutil
 import signal
-import subprocess
-import sys
-from dataclasses import replace
 from pathlib import Path
-from xml.etree import ElementTree
 
-import numpy as np
 import pytest
 from building import NAME, VARIANTS, Build, Variant, build
 from editing import Outcome, run
-from verifying import check_interruption, command, differing, edit, edit_manifest, failed, verdicts
+from verifying import (
+    check_first_difference,
+    check_interruption,
+    command,
+    command_without,
+    differing,
+    edit,
+    edit_manifest,
+    failed,
+    first_heard,
+    read_report,
+    verdicts,
+    with_a_long_table,
+)
 
 from tablegen.emit.memory import memory_file
 from tablegen.fixedpoint.program import Program
-from tablegen.verify.recorded import read_manifest
+from tablegen.recorded import read_manifest
 
 TICKS = 2000
 CHECKS = 15
@@ -135,25 +143,15 @@ def test_a_flipped_bit_of_a_table_is_found_at_its_first_tick(folder: Path, axis:
     word = at * len(program.words) // program.ticks
     flip(folder / f"{NAME}_{axis}.mem", word, bit)
     raw = int((folder / f"{NAME}_{axis}.mem").read_text("ascii").split()[word], 16)
-    words = program.words.copy()
-    words[word] = raw - (raw >> (program.bits - 1) << program.bits)
-    k = np.arange(program.ticks)
-    wanted, altered = program.codes(k), replace(program, words=words).codes(k)
-    first = int(np.flatnonzero(wanted != altered)[0])
+    heard = first_heard(program, word, raw - (raw >> (program.bits - 1) << program.bits))
 
     outcome = verify(folder)
     assert outcome.status == 5
     assert {*FILES, (axis, "integer model")} <= failed(outcome)
     assert ("x" if axis == "y" else "y", "integer model") not in failed(outcome)
     assert f"files: {NAME}_{axis}.mem: stale or edited" in outcome.err
-    _, line, tick, expected, got = differing(outcome)
-    assert line * 331 + tick == first
-    assert f"{axis} {wanted[first]}," in expected
-    # A large step is held by the slew guard.
-    before = int(wanted[first - 1])
-    held = before + int(np.clip(altered[first] - before, -program.output.max_step, program.output.max_step))
-    assert f"{axis} {held}," in got
-    assert f"expected {wanted[first]}, got {held}" in outcome.err
+    check_first_difference(outcome, axis, heard, 331)
+    assert f"expected {heard.wanted}, got {heard.got}" in outcome.err
 
 
 @pytest.mark.parametrize(
@@ -366,13 +364,7 @@ def test_a_build_of_another_version_is_noted(folder: Path) -> None:
 
 
 def test_a_table_that_no_sequencer_can_address_is_wrong_input(tmp_path: Path) -> None:
-    changes = {
-        "y.table": {"mode": "direct", "bits": 16},
-        "timing.lines": 40,
-        "timing.ticks_per_line": 2000,
-        "timing.line_rate_hz": 250.0,
-    }
-    outcome = verify(build(tmp_path, Variant(changes)).folder)
+    outcome = verify(with_a_long_table(tmp_path, 40))
     assert outcome.status == 2
     assert "the table of y has 80000 words, dac_sequencer.v plays at most 65536" in outcome.err
 
@@ -384,26 +376,20 @@ def test_junit_has_a_case_a_check(short: Build, tmp_path: Path) -> None:
     report = tmp_path / "reports" / "verify.xml"
     outcome = verify(short.folder, "--junit", report)
     assert outcome.status == 0
-    (suite,) = ElementTree.parse(report).getroot()
-    assert (suite.get("tests"), suite.get("failures"), suite.get("errors")) == (str(CHECKS), "0", "0")
-    cases = [(case.get("classname"), case.get("name")) for case in suite]
-    assert cases == [(f"{NAME}.{subject}", against) for subject, against in verdicts(outcome)]
-    assert [len(case) for case in suite] == [0] * CHECKS
+    told = read_report(report)
+    assert told.counts == (str(CHECKS), "0", "0")
+    assert list(told.cases) == list(verdicts(outcome))
+    assert told.failed == set()
 
 
 def test_junit_tells_failures(folder: Path, tmp_path: Path) -> None:
     edit(folder / "dac_interpolator.v", "1'b1} + step", "1'b0} + step  /* <&]]> */")
     report = tmp_path / "verify.xml"
     outcome = verify(folder, "--junit", report)
-    (suite,) = ElementTree.parse(report).getroot()
-    told = {
-        (str(case.get("classname")).removeprefix(f"{NAME}."), case.get("name")): failure
-        for case in suite
-        for failure in case
-    }
-    assert set(told) == failed(outcome)
-    assert suite.get("failures") == str(len(told))
-    model = told["y", "integer model"]
+    told = read_report(report)
+    assert told.failed == failed(outcome)
+    assert told.counts == (str(CHECKS), str(len(told.failed)), "0")
+    (model,) = told.cases["y", "integer model"]
     assert model.text == model.get("message")
     assert re.search(r"the first at tick \d+ \(line \d+, tick \d+ of it\): expected \d+, got \d+$", str(model.text))
 
@@ -443,9 +429,7 @@ def test_a_missing_simulator_is_status_6_with_its_remedy(short: Build, tmp_path:
 
 
 def test_missing_cocotb_is_status_6_with_its_remedy(short: Build) -> None:
-    code = "import sys; sys.modules['cocotb_tools'] = None; from tablegen.cli import main; main()"
-    line = [sys.executable, "-c", code, "verify", str(short.folder)]
-    done = subprocess.run(line, capture_output=True, text=True, check=False)
+    done = command_without(["cocotb_tools"], short.folder)
     assert (done.returncode, done.stdout) == (6, "")
     assert done.stderr == "cocotb is not installed: pip install 'tablegen[hdl]'\n"
 

@@ -7,12 +7,8 @@ runtime; each kind has to be found, and told with what was expected and what cam
 import re
 import shutil
 import signal
-import subprocess
-import sys
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
-from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -20,16 +16,29 @@ from building import NAME, VARIANTS, Build, Variant, build
 from editing import Outcome, run
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from verifying import check_interruption, command, differing, edit, edit_manifest, failed, verdicts
+from verifying import (
+    check_first_difference,
+    check_interruption,
+    command,
+    command_without,
+    differing,
+    edit,
+    edit_manifest,
+    failed,
+    first_heard,
+    read_report,
+    verdicts,
+    with_a_long_table,
+)
 
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.program import Program
+from tablegen.recorded import Recorded, read_manifest
 from tablegen.verify.bench import Shape
 from tablegen.verify.c_bench import CBench, script_words
 from tablegen.verify.c_files import arrays_file, wrong_arrays, wrong_constants
 from tablegen.verify.c_target import CTarget, _codes, _packed, _sources
 from tablegen.verify.placement import Placement
-from tablegen.verify.recorded import Recorded, read_manifest
 from tablegen.verify.session import make_session, varied
 from tablegen.verify.simulate import SimulationFailed
 from tablegen.verify.stream import Script
@@ -321,23 +330,14 @@ def test_a_damaged_table_is_found_at_its_first_tick(folder: Path, axis: str, at:
     program: Program = getattr(read_manifest(folder).program, axis)
     word = at * len(program.words) // program.ticks
     old, new = put_word(folder, f"{axis}_table", word, lambda value: value ^ 1 << bit)
-    words = program.words.copy()
-    words[word] = new
-    k = np.arange(program.ticks)
-    wanted, altered = program.codes(k), replace(program, words=words).codes(k)
-    first = int(np.flatnonzero(wanted != altered)[0])
+    heard = first_heard(program, word, new)
 
     outcome = verify(folder)
     assert outcome.status == 5
     assert {FILES, ARRAYS, FILL, (axis, "integer model"), (axis, "converter")} <= failed(outcome)
     assert differs(outcome) == {axis}
     assert f"{NAME}.c: {NAME}_{axis}_table[{word}] is {new}, it is {old} in the manifest" in outcome.err
-    _, line, tick, expected, got = differing(outcome)
-    assert line * 331 + tick == first
-    before = int(wanted[first - 1])
-    held = before + int(np.clip(altered[first] - before, -program.output.max_step, program.output.max_step))
-    assert f"{axis} {wanted[first]}," in expected
-    assert f"{axis} {held}," in got
+    check_first_difference(outcome, axis, heard, 331)
 
 
 @pytest.mark.parametrize("array", ["x_fourier", "y_fourier", "sine"])
@@ -492,13 +492,7 @@ def test_codes_beyond_the_certificate_are_found(folder: Path, short: Build) -> N
 
 
 def test_a_table_that_no_runtime_takes_is_wrong_input(tmp_path: Path) -> None:
-    changes = {
-        "y.table": {"mode": "direct", "bits": 16},
-        "timing.lines": 70,
-        "timing.ticks_per_line": 2000,
-        "timing.line_rate_hz": 250.0,
-    }
-    outcome = verify(build(tmp_path, Variant(changes)).folder)
+    outcome = verify(with_a_long_table(tmp_path, 70))
     assert outcome.status == 2
     assert "the table of y has 140000 words, the C sequencer plays at most 131072" in outcome.err
 
@@ -509,10 +503,11 @@ def test_a_table_that_no_runtime_takes_is_wrong_input(tmp_path: Path) -> None:
 def test_junit_has_a_case_a_check(folder: Path, tmp_path: Path) -> None:
     define(folder, "PIXELS", lambda value: value - 1)
     outcome = verify(folder, "--junit", tmp_path / "verify.xml")
-    (suite,) = ElementTree.parse(tmp_path / "verify.xml").getroot()
-    cases = {(str(case.get("classname")).removeprefix(f"{NAME}."), case.get("name")): len(case) for case in suite}
-    assert {key: "FAILED" if failures else "ok" for key, failures in cases.items()} == verdicts(outcome)
-    assert suite.get("failures") == str(len(failed(outcome)))
+    assert outcome.status == 5, outcome.err
+    told = read_report(tmp_path / "verify.xml")
+    assert list(told.cases) == list(verdicts(outcome))
+    assert told.failed == failed(outcome)
+    assert told.counts == (str(CHECKS), str(len(told.failed)), "0")
 
 
 def test_what_is_played_is_kept_on_request(short: Build, tmp_path: Path) -> None:
@@ -560,9 +555,7 @@ def test_those_options_are_not_for_a_cortex_m4(short: Build) -> None:
 
 
 def test_nothing_of_cocotb_is_needed(short: Build) -> None:
-    code = "import sys; sys.modules.update(cocotb=None, cocotb_tools=None); from tablegen.cli import main; main()"
-    line = [sys.executable, "-c", code, "verify", str(short.folder), "--target", "c"]
-    done = subprocess.run(line, capture_output=True, text=True, check=False)
+    done = command_without(["cocotb", "cocotb_tools"], short.folder, "--target", "c")
     assert (done.returncode, done.stderr) == (0, "")
 
 
@@ -626,8 +619,6 @@ def test_a_missing_cross_compiler_is_status_6_with_its_remedy(short: Build, tmp_
 
 
 def test_a_missing_emulator_is_status_6_with_its_remedy(short: Build) -> None:
-    code = "import sys; sys.modules['unicorn'] = None; from tablegen.cli import main; main()"
-    line = [sys.executable, "-c", code, "verify", str(short.folder), "--target", "cortex-m"]
-    done = subprocess.run(line, capture_output=True, text=True, check=False)
+    done = command_without(["unicorn"], short.folder, "--target", "cortex-m")
     assert (done.returncode, done.stdout) == (6, "")
     assert done.stderr == "unicorn is not installed: pip install 'tablegen[cortex-m]'\n"

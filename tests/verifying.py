@@ -7,10 +7,17 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
+import numpy as np
+from building import NAME, Variant, build
 from editing import Outcome
+
+from tablegen.fixedpoint.program import Program
 
 
 def verdicts(outcome: Outcome) -> dict[tuple[str, str], str]:
@@ -47,9 +54,85 @@ def differing(outcome: Outcome) -> tuple[int, int, int, str, str]:
     return int(found[1]), int(found[2]), int(found[3]), found[4], found[5]
 
 
+@dataclass(frozen=True)
+class Heard:
+    """The first tick of a period on which words other than the program's are heard, and the codes of that tick."""
+
+    tick: int
+    wanted: int
+    got: int
+
+
+def first_heard(program: Program, word: int, value: int) -> Heard:
+    """What comes of another value of a word; the slew guard holds a step that is too large."""
+    words = program.words.copy()
+    words[word] = value
+    k = np.arange(program.ticks)
+    wanted, altered = program.codes(k), replace(program, words=words).codes(k)
+    tick = int(np.flatnonzero(wanted != altered)[0])
+    before, most = int(wanted[tick - 1]), program.output.max_step
+    return Heard(tick, int(wanted[tick]), before + int(np.clip(altered[tick] - before, -most, most)))
+
+
+def check_first_difference(outcome: Outcome, axis: str, heard: Heard, line_ticks: int) -> None:
+    """The tick and both codes are told."""
+    _, line, tick, expected, got = differing(outcome)
+    assert line * line_ticks + tick == heard.tick
+    assert f"{axis} {heard.wanted}," in expected
+    assert f"{axis} {heard.got}," in got
+
+
+def with_a_long_table(folder: Path, lines: int) -> Path:
+    """A build whose y is a direct table of so many lines of 2000 words."""
+    changes = {
+        "y.table": {"mode": "direct", "bits": 16},
+        "timing.lines": lines,
+        "timing.ticks_per_line": 2000,
+        "timing.line_rate_hz": 250.0,
+    }
+    return build(folder, Variant(changes)).folder
+
+
+@dataclass(frozen=True)
+class Report:
+    """A JUnit file: what its suite counts, and the failures of each case by the first two columns of the table."""
+
+    counts: tuple[str | None, str | None, str | None]  # tests, failures, errors
+    cases: dict[tuple[str, str], list[ElementTree.Element]]
+
+    @property
+    def failed(self) -> set[tuple[str, str]]:
+        return {case for case, failures in self.cases.items() if failures}
+
+
+def read_report(path: Path) -> Report:
+    """Its one suite."""
+    (suite,) = ElementTree.parse(path).getroot()
+    cases = {}
+    for case in suite:
+        classname = case.get("classname", "")
+        assert classname.startswith(f"{NAME}."), classname
+        cases[classname.removeprefix(f"{NAME}."), case.get("name", "")] = list(case)
+    assert len(cases) == len(suite), "two cases of one name"
+    return Report((suite.get("tests"), suite.get("failures"), suite.get("errors")), cases)
+
+
 def command(*arguments: str | Path, **environment: str) -> subprocess.CompletedProcess[str]:
     """The command line in a process of its own."""
-    line = [sys.executable, "-m", "tablegen", "verify", *map(str, arguments)]
+    return _command(["-m", "tablegen"], arguments, environment)
+
+
+def command_without(packages: Sequence[str], *arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    """The same where these packages are not installed."""
+    missing = dict.fromkeys(packages)
+    code = f"import sys; sys.modules.update({missing}); from tablegen.cli import main; main()"
+    return _command(["-c", code], arguments, {})
+
+
+def _command(
+    start: Sequence[str], arguments: Sequence[str | Path], environment: Mapping[str, str]
+) -> subprocess.CompletedProcess[str]:
+    line = [sys.executable, *start, "verify", *map(str, arguments)]
     return subprocess.run(
         line, env={**os.environ, **environment}, capture_output=True, text=True, check=False, timeout=120
     )

@@ -26,7 +26,7 @@ module dac_boot #(
     input  wire [15:0] host_address,
     input  wire [31:0] host_data,
     input  wire        host_commit,
-    input  wire        writable,        // of the sequencer
+    input  wire        writable,        // of the sequencer; the boot waits while it is low
     output wire        write,
     output wire [2:0]  write_region,
     output wire [15:0] write_address,
@@ -51,7 +51,7 @@ module dac_boot #(
         if (Y_FILE != "") $readmemh(Y_FILE, y_words);
     end
 
-    // A word is read on one clock and written on the next.
+    // A word is read on one clock and written on the next; both wait while the sequencer takes no write.
     reg [1:0] reads, writes;
     reg [16:0] read_at;
     reg [15:0] write_at;
@@ -72,12 +72,14 @@ module dac_boot #(
     end
 
     always @(posedge clock) begin
-        program_word <= program_words[read_at[5:0]];
-        x_word <= x_words[read_at[X_ADDRESS_BITS-1:0]];
-        y_word <= y_words[read_at[Y_ADDRESS_BITS-1:0]];
-        writing <= reading && writable;
-        writes <= reads;
-        write_at <= read_at[15:0];
+        if (writable) begin
+            program_word <= program_words[read_at[5:0]];
+            x_word <= x_words[read_at[X_ADDRESS_BITS-1:0]];
+            y_word <= y_words[read_at[Y_ADDRESS_BITS-1:0]];
+            writing <= reading;
+            writes <= reads;
+            write_at <= read_at[15:0];
+        end
         if (reset) begin
             reads <= PROGRAM;
             read_at <= 17'd0;
@@ -98,12 +100,13 @@ module dac_boot #(
                                FOURIER != 0 && write_at[5:0] == Y_HARMONICS_AT ? Y_H : program_word;
     wire unused = &{read_at, x_wide, y_wide};
 
-    assign write = booting ? writing && writes != COMMIT : host_write;
+    wire now = writing && writable;
+    assign write = booting ? now && writes != COMMIT : host_write;
     assign write_region = !booting ? host_region : writes == PROGRAM ? 3'd0 : {1'b0, writes} + (FOURIER ? 3'd2 : 3'd0);
     assign write_address = booting ? write_at : host_address;
     assign write_data = !booting ? host_data :
                         writes == PROGRAM ? program_data : writes == X ? x_wide[31:0] : y_wide[31:0];
-    assign commit = booting ? writing && writes == COMMIT : host_commit;
+    assign commit = booting ? now && writes == COMMIT : host_commit;
 endmodule
 
 `default_nettype wire

@@ -1,0 +1,284 @@
+"""dac_boot: the program of the memory files and nothing else, wherever it has to wait or begins again; then the host.
+
+A boot is every program word, every word of both tables (or their Fourier words) and a commit, each once and in order,
+on clocks on which the sequencer takes a write. It is held up on each of its clocks, and reset on each. What the words
+are follows from the programs, not from the files that are read.
+"""
+
+import random
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import mutants
+import numpy as np
+import pytest
+from building import REPOSITORY
+from programs import random_dual, random_fourier
+
+from tablegen.emit.memory import memory_files
+from tablegen.registers import program_words
+from tablegen.resources import verilog_runtime
+from tablegen.verify.bench import Shape
+from tablegen.verify.simulate import Design, compile_design
+
+BENCH = Path(__file__).parent / "boot_bench.v"
+BOOT = next(path for path in verilog_runtime() if path.name == "dac_boot.v")
+X_TABLE, X_FOURIER = 1, 3  # regions; those of y are one more
+AT_BOTH_ENDS = 2  # clocks on which a boot that is not held up writes nothing: it reads the first word, it has ended
+AFTER = 6  # clocks of the host before the next reset
+Write = tuple[int, int, int]  # region, address, data
+COMMIT: Write = (-1, 0, 0)
+
+
+class Wrong(Exception):
+    """What left is not what was to leave."""
+
+
+@dataclass(frozen=True)
+class Setup:
+    """The memory files of a program by their parameters, the parameters to go with them, and the writes of a boot."""
+
+    files: Mapping[str, bytes]
+    parameters: Mapping[str, int]
+    writes: Sequence[Write]
+
+
+def setup(seed: int, shape: Shape, harmonics: tuple[int, int] | None = None) -> Setup:
+    """A random program of a shape; from its tables, or from Fourier words of so many harmonics."""
+    rng = np.random.default_rng(seed)
+    program = random_dual(rng, shape, (9, 13), lines=(2, 3))
+    fourier = [random_fourier(rng, each).in_order for each in harmonics or (1, 1)]
+    made = memory_files("boot", program.schedule, program.x, program.y, {"x": fourier[0], "y": fourier[1]})
+    kind, region, tables = ("_fourier", X_FOURIER, fourier) if harmonics else ("", X_TABLE, None)
+    parameters = {"FOURIER": int(harmonics is not None)}
+    registers = program_words(program.schedule, program.x, program.y, harmonics or (0, 0))
+    writes = [(0, address, word) for address, word in enumerate(registers)]
+    for index, (name, axis) in enumerate((("X", program.x), ("Y", program.y))):
+        words = tables[index] if tables else axis.words
+        writes += [(region + index, address, int(word) & 0xFFFFFFFF) for address, word in enumerate(words)]
+        parameters[f"{name}_WORDS"] = len(words)
+        parameters[f"{name}_WORD_BITS"] = 32 if tables else axis.bits
+        parameters[f"{name}_HARMONICS"] = harmonics[index] if harmonics else 7  # which no table has
+    files = {"PROGRAM": "boot_program.mem", "X": f"boot_x{kind}.mem", "Y": f"boot_y{kind}.mem"}
+    return Setup({key: made[file] for key, file in files.items()}, parameters, [*writes, COMMIT])
+
+
+SETUPS = {
+    "interpolated": setup(1, Shape(16, 1, 4, 16, 1, 3, 12)),
+    "direct": setup(2, Shape(12, 0, 5, 8, 0, 5, 24)),
+    "fourier": setup(3, Shape(16, 1, 4, 16, 1, 3, 12), (4, 1)),
+    "longest": setup(4, Shape(16, 1, 16, 16, 1, 3, 16)),
+}
+
+
+@dataclass(frozen=True)
+class Clock:
+    """What goes in on a clock."""
+
+    reset: int
+    writable: int
+    host_write: int
+    host_commit: int
+    host: Write
+
+    @property
+    def word(self) -> int:
+        """As the bench reads it."""
+        flags = self.reset << 3 | self.writable << 2 | self.host_write << 1 | self.host_commit
+        region, address, data = self.host
+        return flags << 51 | region << 48 | address << 32 | data
+
+
+def boots(clocks: int) -> Iterator[tuple[int, int]]:
+    """Reset and writable by clocks: held up on every clock of a boot of so many, reset on every one, and at random."""
+    for held in range(clocks):
+        long = 1 + held % 3
+        for clock in range(clocks + long + AFTER):
+            yield 0, int(not held <= clock < held + long)
+        yield 1, held % 2
+    for last in range(clocks + AFTER):
+        for _ in range(last):
+            yield 0, 1
+        yield 1, int(last % 3 != 0)
+    rng = random.Random(clocks)
+    for often in (0.5, 0.1, 0.9):
+        for _ in range(12 * clocks):
+            yield int(rng.random() < 0.3 / clocks), int(rng.random() < often)
+
+
+def stimulus(name: str) -> list[Clock]:
+    """For a setup; the host asks for something on most clocks. It ends with a boot and some clocks of the host."""
+    clocks = len(SETUPS[name].writes) + AT_BOTH_ENDS
+    rng = random.Random(name)
+    levels = list(boots(clocks)) if name != "longest" else []
+    return [
+        Clock(
+            reset, writable, rng.getrandbits(1), int(rng.random() < 0.2),
+            (rng.getrandbits(3), rng.getrandbits(16), rng.getrandbits(32)),
+        )
+        for reset, writable in [*levels, *[(0, 1)] * (clocks + AFTER)]
+    ]  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Mutant(mutants.Mutant):
+    """A fault of dac_boot, and in ``where`` the setup that shows it."""
+
+    where: str = "interpolated"
+
+    @property
+    def path(self) -> Path:
+        return BOOT
+
+
+FAULTS: dict[str, tuple[str, ...]] = {
+    "a_word_is_lost": ("writing <= reading;", "writing <= reading && write_at[0];"),
+    "the_word_does_not_wait": ("now = writing && writable", "now = writing"),
+    "the_address_does_not_wait": ("end else if (reading && writable)", "end else if (reading)"),
+    "the_word_read_does_not_wait": ("        if (writable) begin", "        if (1'b1) begin"),
+    "x_has_no_sign": ("{{32{x_word[X_WORD_BITS-1]}}, x_word}", "{32'd0, x_word}"),
+    "y_has_no_sign": ("{{32{y_word[Y_WORD_BITS-1]}}, y_word}", "{32'd0, y_word}"),
+    "x_ends_early": ("LAST_X = X_WORDS - 1", "LAST_X = X_WORDS - 2"),
+    "y_ends_late": ("LAST_Y = Y_WORDS - 1", "LAST_Y = Y_WORDS", "direct"),
+    "tables_go_where_fourier_words_go": ("FOURIER ? 3'd2 : 3'd0", "3'd2"),
+    "fourier_words_go_where_tables_go": ("FOURIER ? 3'd2 : 3'd0", "3'd0", "fourier"),
+    "tables_have_harmonics": ("FOURIER != 0 && write_at[5:0] == X_", "write_at[5:0] == X_"),
+    "harmonics_are_elsewhere": ("Y_HARMONICS_AT = 6'd42", "Y_HARMONICS_AT = 6'd43", "fourier"),
+    "no_commit": ("booting ? now && writes == COMMIT", "booting ? 1'b0"),
+    "the_commit_writes_as_well": ("now && writes != COMMIT", "now"),
+    "the_boot_has_no_end": ("booting <= 1'b0", "booting <= 1'b1"),
+    "the_boot_ends_before_its_commit": ("!reading && !writing", "!reading"),
+    "the_host_is_heard_in_a_boot": ("writes != COMMIT : host", "writes != COMMIT || host_write : host"),
+    "the_host_commits_in_a_boot": ("writes == COMMIT : host", "writes == COMMIT || host_commit : host"),
+    "the_host_is_not_heard": ("COMMIT : host_write", "COMMIT : 1'b0"),
+    "the_host_has_no_commit": ("COMMIT : host_commit", "COMMIT : 1'b0"),
+    "the_host_is_heard_elsewhere": ("write_at : host_address", "write_at : write_at"),
+    "a_reset_goes_on_where_it_was": ("            read_at <= 17'd0;\n", ""),
+    "a_reset_goes_on_in_the_region": ("            reads <= PROGRAM;\n", ""),
+    "a_reset_after_the_boot_is_not_heard": ("            reading <= 1'b1;\n", ""),
+    "a_reset_does_not_boot": ("            booting <= 1'b1;\n", ""),
+    "a_reset_leaves_a_word_on_its_way": ("            writing <= 1'b0;\n", ""),
+}  # fmt: skip
+MUTANTS = {name: Mutant(name, BOOT.name, *fault) for name, fault in FAULTS.items()}
+
+
+def play(folder: Path, played: Mapping[str, tuple[str, Mutant | None]]) -> dict[str, list[str]]:
+    """Setups by the names of benches, all in one simulation; those with a mutant have a module of their own."""
+    (folder / "build").mkdir(parents=True)
+    sources, instances = [BENCH, BOOT], []
+    for index, (bench, (name, mutant)) in enumerate(played.items()):
+        module, files, clocks = "boot_bench", SETUPS[name].files, stimulus(name)
+        if mutant is not None:
+            module = f"boot_bench_{bench}"
+            for path, text in ((BENCH, BENCH.read_text("utf-8")), (BOOT, mutant.source)):
+                sources.append(folder / f"{path.stem}_{bench}.v")
+                renamed = text.replace("dac_boot ", f"dac_boot_{bench} ").replace("boot_bench ", f"{module} ")
+                sources[-1].write_text(renamed, "utf-8")
+        for key, content in files.items():
+            (folder / "build" / f"{bench}_{key}.mem").write_bytes(content)
+        (folder / "build" / f"{bench}.hex").write_text("".join(f"{each.word:x}\n" for each in clocks), "ascii")
+        given = [f".{key}({value})" for key, value in {**SETUPS[name].parameters, "DEPTH": len(clocks)}.items()]
+        given += [f'.{key}_FILE("{bench}_{key}.mem")' for key in files]
+        given += [f'.STIMULUS("{bench}.hex")', f'.CAPTURE("{bench}.txt")']
+        instances.append(f"    {module} #({', '.join(given)}) bench_{index} (.clock(clock), .done(done[{index}]));\n")
+    top = folder / "boot_top.v"
+    top.write_text(
+        "`timescale 1ns / 1ps\nmodule boot_top;\n    reg clock = 0;\n    always #5 clock = !clock;\n"
+        f"    wire [{len(instances) - 1}:0] done;\n    wire all_done = &done;\n{''.join(instances)}endmodule\n",
+        "ascii",
+    )
+    compiled = compile_design("icarus", Design([top, *sources], "boot_top"), folder / "build")
+    assert compiled.run("cocotb_outputs") == (1, 0)
+    return {bench: (compiled.folder / f"{bench}.txt").read_text("ascii").splitlines() for bench in played}
+
+
+def hexadecimal(digits: str) -> int:
+    """Of what a simulator prints; a level that is none is ``Wrong``."""
+    try:
+        return int(digits, 16)
+    except ValueError:
+        raise Wrong(f"undefined: {digits}") from None
+
+
+def check(name: str, lines: Sequence[str]) -> int:
+    """Hold what left against the law; returns how many boots came to their end."""
+    writes, clocks = SETUPS[name].writes, stimulus(name)
+    if len(lines) != len(clocks):
+        raise Wrong("a capture of another length")
+    ended = at = idle = 0
+    for asked, line in zip(clocks, lines, strict=True):
+        flags, *where = line.split()
+        booting, write, commit = (hexadecimal(flags) >> bit & 1 for bit in (2, 1, 0))
+        if not booting:
+            if at < len(writes):
+                raise Wrong(f"the host at word {at}")
+            got = (write, commit, *map(hexadecimal, where))
+            if got != (asked.host_write, asked.host_commit, *asked.host):
+                raise Wrong("the host is not heard")
+        elif write or commit:
+            region, address, data = (-1, 0, 0) if commit else map(hexadecimal, where)
+            if write and commit:
+                raise Wrong("two things at once")
+            if not asked.writable:
+                raise Wrong(f"refused word {at}")
+            if at == len(writes) or (region, address, data) != writes[at]:
+                raise Wrong(f"word {at}")
+            at += 1
+            ended += at == len(writes)
+        # A clock without a word is one that was held up, the first one, or after the commit, held up or not, the last.
+        elif asked.writable or at == len(writes):
+            idle += 1
+            if idle > AT_BOTH_ENDS:
+                raise Wrong(f"nothing at word {at}")
+        if asked.reset:
+            at = idle = 0
+    if at != len(writes):
+        raise Wrong("the last boot has no end")
+    return ended
+
+
+@pytest.fixture(scope="module")
+def captured(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[str]]:
+    return play(tmp_path_factory.mktemp("boot") / "boot", {name: (name, None) for name in SETUPS})
+
+
+@pytest.mark.parametrize("name", SETUPS)
+def test_a_boot_is_the_program_wherever_it_waits_or_begins_again(captured: dict[str, list[str]], name: str) -> None:
+    ended = check(name, captured[name])
+    assert ended == 1 if name == "longest" else ended > len(SETUPS[name].writes)
+
+
+def test_the_stimulus_does_what_it_is_for() -> None:
+    """Hosts, waits and resets, on every clock of a boot; and words of either sign."""
+    for name in SETUPS:
+        if name == "longest":
+            continue
+        clocks, since, waits, resets = len(SETUPS[name].writes) + AT_BOTH_ENDS, 0, set(), set()
+        for clock in stimulus(name):
+            if not clock.writable:
+                waits.add(since)
+            if clock.reset:
+                resets.add(since)
+            since = 0 if clock.reset else since + 1
+        assert set(range(clocks)) <= waits & resets
+    assert {(region, data >> 31) for region, _, data in SETUPS["interpolated"].writes if region > 0} == {
+        (region, sign) for region in (1, 2) for sign in (0, 1)
+    }
+
+
+@pytest.fixture(scope="module")
+def mutants_captured(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[str]]:
+    benches = {name: (mutant.where, mutant) for name, mutant in MUTANTS.items()}
+    return play(tmp_path_factory.mktemp("boot") / "mutants", benches)
+
+
+@pytest.mark.parametrize("name", MUTANTS)
+def test_a_mutant_is_found(mutants_captured: dict[str, list[str]], name: str) -> None:
+    with pytest.raises(Wrong):
+        check(MUTANTS[name].where, mutants_captured[name])
+
+
+def test_the_documentation_counts_them() -> None:
+    page = (REPOSITORY / "docs" / "verilog.md").read_text("utf-8")
+    assert f"with {len(MUTANTS)} mutants" in page

@@ -1,0 +1,154 @@
+"""The C sequencer on processors that it is for, emulated: by unicorn in process, MIPS by QEMU.
+
+The scripts that the Verilog sequencer and the C one on this machine play are played by Cortex-M0+ to M7, by 64-bit
+RISC-V and by 32-bit MIPS with the other byte order.
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from building import run_clean
+from c_benches import words_of
+from c_mutants import Mutant, runtime_with
+from c_scripts import IN_C, LONG, long_play, renderings, shape_in_c
+from programs import random_dual
+from stream_scripts import sweep
+
+from tablegen.verify.bench import Shape
+from tablegen.verify.c_bench import OPTIONS, CBench, CPlayed
+from tablegen.verify.emulate import CortexMBench, Processor, compile_bare
+from tablegen.verify.simulate import SimulationFailed
+from tablegen.verify.stream import Script, compare
+
+CORTEX_M = ("cortex-m0plus", "cortex-m3", "cortex-m4", "cortex-m7")
+SHAPE = Shape(16, 1, 5, 16, 1, 4, 16)
+SHAPES = (SHAPE, Shape(24, 1, 3, 8, 0, 4, 24))  # so many bits that tables and words are kept in 16, and in 32
+FILL = 40
+WITHOUT_FAULTS = (1 << 56) - 1
+
+
+def zig(core: str) -> str:
+    """The other compiler, for a Cortex-M; without -g it leaves no symbols."""
+    return f"{sys.executable} -m ziglang cc -g -target thumb-freestanding-eabi -mcpu={core.replace('-', '_')}"
+
+
+def options(level: str) -> tuple[str, ...]:
+    return tuple(level if option == "-O2" else option for option in OPTIONS)
+
+
+def hold(played: CPlayed, script: Script, fill: int) -> None:
+    """Every tick and every count as the model has them; a fill tells faults at its end."""
+    expected = [word & WITHOUT_FAULTS for word in script.expected] if fill else script.expected
+    mismatch = compare(expected, played.record)
+    assert mismatch is None, mismatch
+    assert played.counts == [*script.counts, 0, 0]
+
+
+@pytest.fixture(scope="module")
+def sweeps() -> dict[Shape, Script]:
+    """Everything that a host may ask, the same for all processors."""
+    return {shape: sweep(np.random.default_rng(7), shape, 1500) for shape in SHAPES}
+
+
+@pytest.mark.parametrize("fill", [0, FILL], ids=["step", "fill"])
+@pytest.mark.parametrize("level", ["-O2", "-Os"])
+@pytest.mark.parametrize("compiler", ["gcc", "zig"])
+@pytest.mark.parametrize("core", CORTEX_M)
+def test_cortex_m_plays_everything_that_a_host_may_ask(
+    sweeps: dict[Shape, Script], core: str, compiler: str, level: str, fill: int, tmp_path: Path
+) -> None:
+    for shape in SHAPES:
+        script = sweeps[shape]
+        bench = CortexMBench(
+            shape, tmp_path, zig(core) if compiler == "zig" else None, options(level), fill=fill, core=core
+        )
+        hold(bench.run(words_of(script, shape)), script, fill)
+
+
+@pytest.mark.parametrize("name", IN_C)
+def test_cortex_m_plays_the_random_programs_of_the_other_sequencers(name: str, tmp_path: Path) -> None:
+    configuration = IN_C[name]
+    script = configuration.script(name)
+    words = words_of(script, configuration.shape)
+    for core, fill in (("cortex-m0plus", 0), ("cortex-m4", FILL)):
+        hold(CortexMBench(configuration.shape, tmp_path, fill=fill, core=core).run(words), script, fill)
+
+
+@pytest.mark.parametrize("name", LONG)
+def test_cortex_m_plays_long_lines(name: str, tmp_path: Path) -> None:
+    """Those that are played many ticks at once."""
+    shape, script = LONG[name][0], long_play(name, 8000)
+    words = words_of(script, shape)
+    for core in ("cortex-m0plus", "cortex-m4"):
+        hold(CortexMBench(shape, tmp_path, fill=200, core=core).run(words), script, 200)
+
+
+@pytest.mark.parametrize("core", [*CORTEX_M, "riscv64"])
+def test_tables_are_rendered_from_fourier_words(core: str, tmp_path: Path) -> None:
+    shape = shape_in_c(SHAPE)
+    script = renderings(shape, 12, 9)
+    hold(CortexMBench(shape, tmp_path, core=core).run(words_of(script, shape, fourier=True)), script, 0)
+
+
+@pytest.mark.parametrize("fill", [0, FILL], ids=["step", "fill"])
+@pytest.mark.parametrize("level", ["-O2", "-Os"])
+def test_64_bit_risc_v(sweeps: dict[Shape, Script], level: str, fill: int, tmp_path: Path) -> None:
+    for shape, script in sweeps.items():
+        bench = CortexMBench(shape, tmp_path, options=options(level), fill=fill, core="riscv64")
+        hold(bench.run(words_of(script, shape)), script, fill)
+
+
+@pytest.mark.parametrize("fill", [0, FILL], ids=["step", "fill"])
+def test_big_endian_mips(sweeps: dict[Shape, Script], fill: int, tmp_path: Path) -> None:
+    for shape, script in sweeps.items():
+        bench = CBench(shape, tmp_path, "mips-linux-gnu-gcc", (*OPTIONS, "-static"), fill=fill)
+        assert bench.program.read_bytes()[5] == 2, "the executable's bytes are in the other order"
+        executable = bench.program.rename(tmp_path / "bench.elf")
+        run_clean(["qemu-mips", "-version"])
+        bench.program.write_text(f'#!/bin/sh\nexec qemu-mips "{executable}"\n')
+        bench.program.chmod(0o755)
+        hold(bench.run(words_of(script, shape)), script, fill)
+
+
+# A sum rounded down, which few programs show; a swap that does not wait for the end of a line.
+BREAKS = {
+    "half an LSB": ("dac_program.c", "p->offset_word + ((int64_t)1 << (p->gain_q - 1))", "p->offset_word"),
+    "mid-line": ("dac_sequencer.c", "(s->running && s->tick != 0)", "false"),
+}
+
+
+@pytest.mark.parametrize("name", BREAKS)
+def test_a_broken_sequencer_is_found(sweeps: dict[Shape, Script], name: str, tmp_path: Path) -> None:
+    """A negative control of all of the above."""
+    bench = CortexMBench(SHAPE, tmp_path, sources=runtime_with(Mutant(name, *BREAKS[name]), tmp_path / "broken"))
+    with pytest.raises((AssertionError, SimulationFailed)):
+        hold(bench.run(words_of(sweeps[SHAPE], SHAPE)), sweeps[SHAPE], 0)
+
+
+def test_a_bench_that_is_refused_says_what(tmp_path: Path) -> None:
+    script = Script()
+    script.request("commit", program=random_dual(np.random.default_rng(1), SHAPE))
+    with pytest.raises(SimulationFailed, match="load"):
+        CortexMBench(SHAPE, tmp_path).play(script)
+
+
+def test_instructions_and_stack_of_a_call_are_counted(tmp_path: Path) -> None:
+    """Held against a function whose assembly is known."""
+    source = tmp_path / "known.c"
+    source.write_text(
+        "void bench_main(void);\nvoid bench_main(void) { }\n"
+        "unsigned __attribute__((naked, used)) loop(unsigned n);\n"
+        "unsigned __attribute__((naked, used)) loop(unsigned n)\n{\n"
+        '    __asm__("push {r4, r5, r6, lr}\\n"\n'
+        '            "1: subs r0, #1\\n"\n'
+        '            "bne 1b\\n"\n'
+        '            "pop {r4, r5, r6, pc}\\n");\n'
+        "}\n"
+    )
+    executable = compile_bare(tmp_path / "known.elf", [source], "cortex-m4", options=("-O2",))
+    processor = Processor(executable, "cortex-m4")
+    for times in (1, 2, 50):
+        called = processor.call("loop", times)
+        assert (called.result, called.instructions, called.stack) == (0, 2 + 2 * times, 16)
