@@ -73,6 +73,9 @@ CASES = {
     "spi": Case("SPI, two converters in parallel", "dac_spi", "HX8K"),
     "spi_20": Case("SPI, 20 bits in frames of 24", "dac_spi", "HX8K", {"WORD_BITS": 20, "FRAME_BITS": 24}),
     "axi": Case("AXI-Stream", "dac_axi_stream", "HX8K"),
+    "loader": Case(
+        "serial link", "program_loader", "HX8K", {**_TOP, "FOURIER": 1, "HARMONICS": 63}, most_cells=900, least_mhz=77
+    ),
     **{
         f"axis_{family}_{name}": Case(
             f"one axis, {words}-bit words, {converter}-bit codes",
@@ -117,11 +120,11 @@ def measure(case: Case, seeds: Sequence[int] = SEEDS) -> Result:
             # Without contents the memory would be synthesised away.
             index_bits = max((value for name, value in case.parameters.items() if "INDEX" in name), default=11)
             Path(folder, "sine.mem").write_text(_quarter_sine(index_bits), "utf-8")
-        for path in MODULES.glob("dac_*.v"):
+        for path in MODULES.glob("*.v"):
             text = path.read_text("utf-8")
             Path(folder, path.name).write_text(text.replace('SINE_FILE = ""', 'SINE_FILE = "sine.mem"'), "utf-8")
         script = (
-            f"read_verilog -defer dac_*.v; hierarchy -check -top {case.top} {parameters}; "
+            f"read_verilog -defer *.v; hierarchy -check -top {case.top} {parameters}; "
             f"{SYNTHESIS[case.family].format(top=case.top, netlist=netlist)}; tee -q -o {statistics} stat"
         )
         _run("yosys", "-q", "-p", script, folder=folder)

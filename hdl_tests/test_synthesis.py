@@ -36,13 +36,18 @@ CHECKED: dict[str, tuple[str, Mapping[str, int]]] = {
     "fourier_renderer": ("dac_fourier", {"MULTIPLIER": 1}),
     "coding": ("dac_coding", {}),
     "boot": ("dac_boot", {}),
+    "loader": ("program_loader", {"FOURIER": 1}),
+    "loader_direct": (
+        "program_loader",
+        {"X_INTERPOLATED": 0, "Y_INTERPOLATED": 0, "DAC_BITS": 24, "MEMORY_BYTES": 8192},
+    ),
 }
 
 
 def check(top: str, parameters: Mapping[str, int], folder: Path = MODULES) -> subprocess.CompletedProcess[str]:
     values = " ".join(f"-chparam {name} {value}" for name, value in parameters.items())
     script = (
-        f"read_verilog -defer {folder}/dac_*.v; hierarchy -check -top {top} {values}; proc; opt; check -assert; "
+        f"read_verilog -defer {folder}/*.v; hierarchy -check -top {top} {values}; proc; opt; check -assert; "
         "select -assert-none t:$dlatch t:$adlatch t:$dlatchsr t:$sr t:$_DLATCH_* t:$_SR_*"
     )
     return subprocess.run(["yosys", "-q", "-p", script], capture_output=True, text=True)
@@ -111,7 +116,7 @@ def pinned() -> bool:
 
 
 @pytest.mark.parametrize(
-    "name", ["axis", "axis_serial", "axis_ECP5_16", "axis_ECP5_24", "axis_7-series_16", "axis_7-series_24"]
+    "name", ["axis", "axis_serial", "loader", "axis_ECP5_16", "axis_ECP5_24", "axis_7-series_16", "axis_7-series_24"]
 )
 def test_meets_the_requirements(name: str) -> None:
     """At the first seed: the cells are near those of the page, the rate is at least that of its slowest seed."""

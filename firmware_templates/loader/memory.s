@@ -1,0 +1,107 @@
+; Where things are in the loader's memory. What has a name here and an address elsewhere: program_loader.v writes it.
+
+.equ INFO, 0x00           ; what BEGIN announced, 48 bytes
+.equ info_bytes, 0x20
+.equ info_crc, 0x24
+
+; Constants of the device, by its parameters
+.equ most_ticks, 0x30     ; of a line
+.equ most_lines, 0x34     ; of a frame
+.equ most_bytes, 0x38     ; of an image
+.equ half_gain, 0x3c      ; 2^17
+.equ top_code, 0x40
+.equ steps_end, 0x44      ; 2^24
+.equ ones, 0x48
+.equ x_shape, 0x4c        ; as BEGIN has it
+.equ y_shape, 0x50
+.equ image_at, 0x54       ; IMAGE
+.equ ring_at, 0x56        ; RING
+.equ x_page, 0x58         ; PAGE_X
+.equ x_word_bytes, 0x5a
+.equ y_word_bytes, 0x5b
+.equ lengths, 0x5c        ; of payloads by type; + 0x80: acts, 0x7f: not of this device
+
+; Inputs
+.equ IN_BOOT, 0xe0
+.equ IN_SWAP_LINE, 0xe4   ; 2 bytes, as IN_LINE
+.equ IN_LINE, 0xe6
+.equ IN_COUNTS, 0xe8      ; 4 times 2 bytes
+.equ IN_FAULTS, 0xf0
+.equ IN_RING, 0xf1        ; where the receiver writes next
+.equ IN_PERMIT, 0xf2      ; 0 or 1, as the next three
+.equ IN_READY, 0xf3       ; to send
+.equ IN_SWAPPED, 0xf4     ; and not SEEN yet
+.equ IN_WRITABLE, 0xf5
+.equ IN_STATE, 0xf6       ; of STATUS, but for 0
+
+; Requests
+.equ COMMIT, 1
+.equ WITHDRAW, 2
+.equ ARM, 4
+.equ TRIGGER, 8
+.equ PARK, 16
+.equ CLEAR, 32
+.equ SEEN, 64
+
+.equ DEVICE, 0x100        ; as HELLO tells it, 56 bytes
+.equ LIMITS_X, 0x114
+.equ LIMITS_Y, 0x124
+.equ HASH, 0x138          ; of what plays, 32 bytes
+.equ AXIS, 0x158          ; of x and y: half of the offset's range >> 18, words of a table (0: as many as the period
+                          ; has), most words, most harmonics, half of the range of a word; 20 bytes each
+.equ FRAME, 0x201         ; a frame, in front of it the 0 that COBS does not end with
+.equ PAYLOAD, 0x207
+.equ IMAGE, 0x300
+.equ PAGE_X, 0x340
+
+.equ Y_STEPS, 0x334
+
+; Variables
+.at 0x6a
+.var has_session 1
+.var ring 1               ; the next byte that is read
+.var session 4            ; the host's
+.var asker 4              ; session of the request
+.var pending_asker 4      ; of the COMMIT at work
+.var received 4
+.var generation 4
+.var bad_frames 4
+.var done_generation 4    ; of the last upload that was taken, 0: none
+.var done_line 4
+.var done_crc 4
+.var done_bytes 4         ; 0: the image is not there any more
+.var answer 8
+.var kind 1               ; its type
+.var answer_length 1
+.var type 1
+.var seq 1
+.var last 8               ; answer to the last request that acts
+.var last_kind 1          ; 0: at work
+.var last_length 1
+.var last_type 1          ; 0: none
+.var last_seq 1
+.var detail 4
+.var y_at 4               ; bytes of x
+.var t0 4
+.var t1 4
+.var t2 4
+.var t3 4
+.var t4 4
+.var count 2              ; up to 0
+.var at 2
+.var frame_at 2           ; the next byte from the line
+.var left 1               ; bytes to the next zero
+.var too_long 1
+.var length 1             ; of the payload
+.var size 1               ; bytes of a word: 4 of Fourier words
+.var byte 1
+.var distance 1
+.var rest 1
+.var reason 1
+.var upload 1             ; as STATUS tells it
+.var acts 1
+.var pending_seq 1
+.var pending_acts 1       ; its answer is to be remembered
+.var aborting 1
+.var check 1
+.var stop 1               ; how many checks

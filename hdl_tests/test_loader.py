@@ -1,0 +1,289 @@
+"""program_loader against what was written by hand from docs/protocol.md, and against the model of a device."""
+
+import json
+import struct
+from binascii import crc32
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from dialogues import GOLDEN, boot_program, dialogues, hold
+from link_talk import Talk
+from loader_bridge import BREAK, NO_STOP_BIT, PULSE, Simulation, assembler
+from loader_device import Loader, LoaderDevice, limited, told_to_be
+from loader_dialogues import Dialogue, Differs
+from loader_mutants import MUTANTS, Mutant
+
+from tablegen.link.frames import FrameReader
+from tablegen.link.image import Image, take_apart
+from tablegen.link.messages import AxisLimits, DeviceInfo, DeviceStatus, ImageInfo, Reason, Refusal, Request
+from tablegen.verify.bench import Shape
+
+MADE = GOLDEN["devices"]["open"]
+TOLD = DeviceInfo.unpack(bytes.fromhex(MADE["device"]))
+FRAMES = json.loads((Path(__file__).parents[1] / "tests" / "golden_frames.json").read_text("utf-8"))
+SHAPE = Shape(16, 1, 4, 16, 1, 4, 12)
+TOP = (1 << 16) - 1
+CLOCKS_PER_BIT = 8
+SHORTER = "Shorter tables: BEGIN"  # from there on the dialogue is for devices that take them
+# Not for this device: it has no key and no limits to narrow, keeps images, checks less, and waits for no tick to act.
+LACKS = ("key", "narrows", "keeps tables", "checks", "plays", "queue of 8")
+
+
+@pytest.fixture(scope="module")
+def loader(tmp_path_factory: pytest.TempPathFactory) -> Loader:
+    """Of the device of the golden dialogues."""
+    x, y = ((limits.code_min, limits.code_max, limits.max_step) for limits in (TOLD.x_limits, TOLD.y_limits))
+    folder = tmp_path_factory.mktemp("loader")
+    return Loader(folder, boot_program(MADE), (x, y), TOLD.harmonics, TOLD.update_rate_hz, LOW_AREA=1)
+
+
+def golden(dialogue: dict[str, Any], loader: Loader, words: list[int]) -> None:
+    """A whole golden dialogue, with a loader that says of itself what the dialogue wants, but for its features."""
+    info = replace(TOLD, features=loader.info.features)
+    notes = [step["note"] for step in dialogue["steps"]]
+    if SHORTER in notes:
+        dialogue = {**dialogue, "steps": dialogue["steps"][: notes.index(SHORTER)]}
+    with Simulation(loader.compiled, words, told_to_be(info)) as simulation:
+        hold(dialogue, LoaderDevice(simulation, info, MADE["boot"], TOLD))
+
+
+@pytest.mark.parametrize("dialogue", dialogues(*LACKS), ids=lambda dialogue: dialogue["name"])
+def test_golden_dialogues(dialogue: dict[str, Any], loader: Loader) -> None:
+    golden(dialogue, loader, [])
+
+
+def random_dialogue(loader: Loader, seed: int, steps: int, words: list[int]) -> Dialogue:
+    """Raises ``Differs``."""
+    wide = AxisLimits(0, TOP, TOP, TOP)
+    narrow = AxisLimits(3000, 60000, 9000, TOP)
+    info, memory = limited(loader.info, wide if seed % 3 else narrow, wide)
+    with Simulation(loader.compiled, words, memory) as simulation:
+        dialogue = Dialogue(LoaderDevice(simulation, info, seed), info, boot_program(MADE), SHAPE, seed)
+        dialogue.play(steps)
+    return dialogue
+
+
+@pytest.mark.parametrize("seed", [*range(2), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(2, 40))])
+def test_random_dialogues(seed: int, loader: Loader) -> None:
+    dialogue = random_dialogue(loader, seed, 120, [])
+    assert len(dialogue.seen) > 10
+
+
+def checked_uploads(loader: Loader, seed: int, uploads: int, words: list[int]) -> Dialogue:
+    """Whole uploads, most of them with something wrong. Raises ``Differs``."""
+    rng = np.random.default_rng(seed)
+    most = 3000 if seed % 4 == 3 else 1  # most programs use the whole range
+    limits = [AxisLimits(int(rng.integers(0, most)), TOP - int(rng.integers(0, most)), TOP, TOP) for _ in range(2)]
+    info, memory = limited(loader.info, limits[0], limits[1])
+    with Simulation(loader.compiled, words, memory) as simulation:
+        dialogue = Dialogue(LoaderDevice(simulation, info, seed), info, boot_program(MADE), SHAPE, seed)
+        dialogue.upload(uploads)
+    return dialogue
+
+
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 20))])
+def test_every_check_is_that_of_the_model(seed: int, loader: Loader) -> None:
+    seen = checked_uploads(loader, seed, 40, []).seen
+    reasons = {key[1] for key in seen if isinstance(key, tuple) and key[0] == Request.COMMIT}
+    assert len(reasons) >= 4
+
+
+def exact_limits(loader: Loader, words: list[int]) -> None:
+    """Programs at the limits are taken, and one beyond them refused."""
+    image = take_apart(bytes.fromhex(MADE["boot_image"]), TOLD.x, TOLD.y)
+    for page, axis in ((1, 0), (2, 1)):
+        code_min, code_max, max_step = (image.axis(page, name) for name in ("code_min", "code_max", "max_step"))
+        for low, high, step, reason in (
+            (code_min, code_max, max_step, None),
+            (code_min + 1, code_max, max_step, Reason.CODES),
+            (code_min, code_max - 1, max_step, Reason.CODES),
+            (code_min, code_max, max_step - 1, Reason.STEP),
+        ):
+            own, other = AxisLimits(low, high, step, TOP), AxisLimits(0, TOP, TOP, TOP)
+            _, memory = limited(loader.info, *((own, other) if axis == 0 else (other, own)))
+            with Simulation(loader.compiled, words, memory) as simulation:
+                talk = Talk()
+                device = LoaderDevice(simulation, loader.info, 1)
+                device.tick(50)
+                simulation.talk(talk.hello())
+                wire = upload(simulation, talk)
+                simulation.ticks(20)
+                answer = talk.answers(wire + simulation.talk())[-1]
+                expected = struct.pack("<II", 2, 0) if reason is None else Refusal(Request.COMMIT, reason, axis).pack()
+                assert answer.payload == expected
+
+
+@pytest.mark.slow
+def test_limits_are_exact(loader: Loader) -> None:
+    exact_limits(loader, [])
+
+
+# Frames
+
+
+def bad_frames(simulation: Simulation) -> int:
+    """What STATUS counts; ends whatever has been begun."""
+    talk = Talk()
+    answers = talk.answers(simulation.talk(b"\0" + talk.hello() + talk.request(Request.STATUS)))
+    assert talk.reader.bad_frames == 0
+    return DeviceStatus.unpack(answers[-1].payload).bad_frames
+
+
+def test_golden_frames(loader: Loader) -> None:
+    golden_frames(loader, [])
+
+
+def golden_frames(loader: Loader, words: list[int]) -> None:
+    """Every frame of the file."""
+    with Simulation(loader.compiled, words) as simulation:
+        for frame in FRAMES["good"]:
+            answers = FrameReader().feed(simulation.talk(bytes.fromhex(frame["wire"])))
+            assert len(answers) == (0 if frame["type"] & 0x80 else 1), frame["name"]
+            for answer in answers:
+                assert (answer.seq, answer.session) == (frame["seq"], frame["session"]), frame["name"]
+        assert bad_frames(simulation) == 0
+        for count, frame in enumerate(FRAMES["bad"], 1):
+            assert simulation.talk(bytes.fromhex(frame["wire"])) == b"", frame["name"]
+            assert bad_frames(simulation) == count, frame["name"]
+        status = bytearray.fromhex(FRAMES["good"][1]["wire"])
+        status[0] += 1  # its only distance: past the end, though all the bytes are there
+        assert simulation.talk(status) == b""
+        for frame in FRAMES["empty"]:
+            assert simulation.talk(bytes.fromhex(frame["wire"])) == b""
+        assert bad_frames(simulation) == len(FRAMES["bad"]) + 1
+
+
+def upload(simulation: Simulation, talk: Talk, before_commit: Callable[[], None] = lambda: None) -> bytes:
+    """The boot program once more; the answer to COMMIT."""
+    image = bytes.fromhex(MADE["boot_image"])
+    info = ImageInfo(bytes(32), len(image), crc32(image), TOLD.x, TOLD.y)
+    for wire in talk.upload(Image(info, image)):
+        simulation.talk(wire)
+    before_commit()
+    return simulation.talk(talk.commit(Image(info, image)))
+
+
+# The line
+
+
+def test_a_baud_rate_may_be_off_by_three_per_cent(loader: Loader) -> None:
+    talk = Talk()
+    with Simulation(loader.compiled) as simulation:
+        for per_cent in (-3, 3):
+            # at 8 clocks a bit the grid of the clock itself takes a part of the margin
+            simulation.set(bit_time=round(16 * CLOCKS_PER_BIT * (1 + per_cent / 100)))
+            for _ in range(3):
+                (answer,) = talk.answers(simulation.talk(talk.hello()))
+                assert answer.type == Request.HELLO | 0x80
+        simulation.set(bit_time=round(16 * CLOCKS_PER_BIT * 1.1))
+        assert simulation.talk(talk.hello()) == b"", "negative control: 10 % are too much"
+
+
+def test_what_is_no_byte_spoils_at_most_a_frame(loader: Loader) -> None:
+    talk = Talk()
+    with Simulation(loader.compiled) as simulation:
+        status = [0, *talk.hello(), *talk.request(Request.STATUS)]
+        simulation.talk(status)
+        for noise in ([PULSE], [BREAK], [BREAK, BREAK], [NO_STOP_BIT | 0x55], [0x55, PULSE, 0], [1, 2, 3]):
+            answers = talk.answers(simulation.talk([*noise, *status]))
+            assert [answer.type for answer in answers] == [Request.HELLO | 0x80, Request.STATUS | 0x80], noise
+        inside = [status[0], status[1], NO_STOP_BIT | status[2], *status[3:]]
+        assert [answer.type for answer in talk.answers(simulation.talk(inside))] == [Request.STATUS | 0x80]
+
+
+def test_a_backlog_of_requests_is_answered(loader: Loader) -> None:
+    """As many bytes as the ring holds, while the loader is still answering."""
+    talk = Talk()
+    with Simulation(loader.compiled) as simulation:
+        simulation.talk(talk.hello())
+        answers = talk.answers(simulation.talk(talk.hello() + talk.request(Request.STATUS) * 5))
+        assert len(answers) == 6
+
+
+def test_a_reset_forgets_session_and_upload_but_not_what_plays(loader: Loader) -> None:
+    talk = Talk()
+    with Simulation(loader.compiled) as simulation:
+        device = LoaderDevice(simulation, loader.info, 1)
+        device.tick(50)
+        before = DeviceStatus.unpack(talk.answers(simulation.talk(talk.hello()))[0].payload[56:])
+        simulation.talk([5, 1, 2])
+        simulation.set(reset=1)
+        simulation.run(3)
+        simulation.set(reset=0)
+        simulation.run(200)
+        (refusal,) = talk.answers(simulation.talk(talk.request(Request.STATUS)))
+        assert refusal.payload[1] == 4
+        assert DeviceStatus.unpack(talk.answers(simulation.talk(talk.hello()))[0].payload[56:]) == before
+
+
+# Negative controls
+
+FINDERS: dict[str, Callable[[Loader, list[int]], object]] = {
+    "random": lambda loader, words: [random_dialogue(loader, seed, 120, words) for seed in range(5)],
+    "frames": golden_frames,
+    "limits": lambda loader, words: exact_limits(loader, words),
+    "uploads": lambda loader, words: [checked_uploads(loader, seed, 40, words) for seed in range(8)],
+    **{
+        dialogue["name"]: lambda loader, words, dialogue=dialogue: golden(dialogue, loader, words)  # type: ignore[misc]
+        for dialogue in dialogues(*LACKS)
+    },
+}
+
+
+@pytest.mark.parametrize(
+    "mutant",
+    [pytest.param(mutant, marks=[] if mutant.quick else [pytest.mark.slow], id=mutant.breaks) for mutant in MUTANTS],
+)
+def test_a_program_with_a_fault_is_found(mutant: Mutant, loader: Loader) -> None:
+    words = mutant.words()
+    with pytest.raises((AssertionError, Differs)):
+        FINDERS[mutant.by](loader, words)
+
+
+def test_no_processor_commits_against_the_interlock(loader: Loader) -> None:
+    """Even one that does not ask."""
+    (mutant,) = (mutant for mutant in MUTANTS if mutant.breaks == "the interlock is ignored")
+    talk = Talk()
+    with Simulation(loader.compiled, mutant.words()) as simulation:
+        device = LoaderDevice(simulation, loader.info, 1)
+        device.tick(50)
+        (hello,) = talk.answers(simulation.talk(talk.hello()))
+        upload(simulation, talk, lambda: setattr(device, "permits", False))
+        device.tick(200)
+        (status,) = talk.answers(simulation.talk(talk.request(Request.STATUS)))
+        assert DeviceStatus.unpack(status.payload).generation == DeviceStatus.unpack(hello.payload[56:]).generation == 1
+
+
+# The program
+
+
+def test_the_module_is_what_its_sources_make() -> None:
+    """Run ``python firmware_templates/loader/assembler.py --write`` after a change."""
+    assert assembler.MODULE.read_text("ascii") == assembler.assemble()
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("ld1 nowhere", "what is nowhere"),
+        ("jump 3", "what is jump 3"),
+        ("ld #256", "beyond"),
+        ("st4 0xe0", "not there"),
+        ("ld4 0x31", "not there"),
+        ("a: ret\na: ret", "twice"),
+        (".at 1\n.var b 4", "crosses"),
+        (".at 0xdf\n.var b 2\n", "crosses"),
+    ],
+)
+def test_the_assembler_refuses(text: str, why: str) -> None:
+    with pytest.raises(assembler.Wrong, match=why):
+        assembler.read({"a.s": text}).words()
+
+
+def test_calls_that_are_too_deep_are_seen() -> None:
+    text = "\n".join(f"f{i}: call f{i + 1}\nret" for i in range(5)) + "\nf5: ret"
+    assert assembler.depth(assembler.read({"a.s": text})) == 5
