@@ -7,10 +7,11 @@ from pathlib import Path
 import pytest
 from building import run, run_clean
 
-from tablegen.resources import c_runtime
+from tablegen.resources import c_link, c_runtime
 
-SOURCES = [path for path in c_runtime() if path.suffix == ".c"]
-HEADERS = {path.name: path for path in c_runtime() if path.suffix == ".h"}
+EVERYTHING = [*c_runtime(), *c_link()]
+SOURCES = [path for path in EVERYTHING if path.suffix == ".c"]
+HEADERS = {path.name: path for path in EVERYTHING if path.suffix == ".h"}
 WARNINGS = [
     "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wsign-conversion", "-Wshadow", "-Wcast-qual", "-Wundef",
     "-Wstrict-prototypes", "-Wmissing-prototypes", "-Wdouble-promotion", "-Werror",
@@ -91,21 +92,22 @@ def declared(*headers: str) -> set[str]:
     """Functions that headers declare, but for those that they define themselves."""
     text = "".join(HEADERS[name].read_text("utf-8") for name in headers)
     text = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
-    return set(re.findall(r"^(?!static|#)[\w ]+?[ *](dac_\w+)\([^;{]*\);", text, flags=re.MULTILINE))
+    return set(re.findall(r"^(?!static|#)\w[\w ]*?[ *](dac_\w+)\([^;{]*\);", text, flags=re.MULTILINE))
 
 
 @pytest.mark.parametrize("options", [["-O0"], ["-O2"], ["-Os"], ["-O2", *CHOICES["wide"]]], ids=" ".join)
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
 def test_symbols(compiler: str, options: list[str], tmp_path: Path) -> None:
-    """Exported is what headers declare; asked for are its own functions, memcpy and memset. It has no variables."""
+    """Exported is what headers declare, asked for are their own functions, memcpy and memset; no variables."""
     run_clean([compiler, "-std=c99", "-ffreestanding", "-fno-pic", *options, "-c", *SOURCES], tmp_path)
     found: dict[str, set[str]] = {}
     for path in sorted(tmp_path.glob("*.o")):
         for line in run_clean(["nm", path]).splitlines():
             *_, kind, name = line.split()
             found.setdefault(kind, set()).add(name)
-    assert found.pop("T") == declared("dac_sequencer.h", "dac_axis.h") >= {"dac_sequencer_step", "dac_axis_run"}
-    assert found.pop("U", set()) <= declared("dac_axis.h", "dac_sequencer.h") | {"memcpy", "memset"}
+    own = declared(*HEADERS)
+    assert found.pop("T") == own >= {"dac_sequencer_step", "dac_axis_run", "dac_link_work"}
+    assert found.pop("U", set()) <= own | {"memcpy", "memset"}
     assert set(found) <= {"t", "r"}, found
 
 
@@ -114,3 +116,26 @@ def test_public_names_have_the_prefix_of_the_sequencer() -> None:
     assert len(public) >= 17
     assert {name for name in public if not name.startswith("dac_sequencer_")} == {"dac_synthesize"}
     assert all(name.startswith("dac_axis_") for name in declared("dac_axis.h"))
+    link = [name for name in HEADERS if name.startswith("dac_link")]
+    assert len(declared("dac_link.h")) == 4
+    assert all(name.startswith("dac_link_") for name in declared(*link))
+
+
+@pytest.mark.parametrize("header", ["dac_link.h", "dac_link_parts.h"])
+def test_headers_of_the_link_stand_alone(header: str, tmp_path: Path) -> None:
+    """As C, and what an application includes as C++."""
+    unit = tmp_path / "unit.c"
+    unit.write_text(f'#include "{header}"\ntypedef int unit;\n')
+    folder = f"-I{HEADERS[header].parent}"
+    run_clean(["gcc", "-std=c99", *WARNINGS, folder, "-c", unit, "-o", tmp_path / "unit.o"])
+    if header == "dac_link.h":
+        warnings = [each for each in WARNINGS if "prototypes" not in each]
+        run_clean(["g++", "-std=c++17", "-x", "c++", *warnings, folder, "-c", unit, "-o", tmp_path / "unit.o"])
+
+
+def test_a_ring_that_is_no_power_of_two_does_not_compile(tmp_path: Path) -> None:
+    source = next(path for path in SOURCES if path.name == "dac_link.c")
+    for size in (500, 256, 65536):
+        done = run(["gcc", "-std=c99", f"-DDAC_LINK_RING={size}", "-c", source, "-o", tmp_path / "link.o"])
+        assert done.returncode != 0
+        assert "a power of two" in done.stderr

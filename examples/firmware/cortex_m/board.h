@@ -1,4 +1,4 @@
-/* What the firmware asks of a board: a console, a timer, and a place for the log of what left the converters. */
+/* What the firmware asks of a board: a UART, a timer, and a place for the log of what left the converters. */
 #ifndef BOARD_H
 #define BOARD_H
 
@@ -10,8 +10,8 @@
 void board_start(void);
 void board_start_timer(uint32_t hz); /* its interrupt calls player_timer() */
 
-int board_getc(void); /* a character that was received, or -1 */
-void board_putc(char c);
+bool board_can_put(void); /* whether board_putc() would not wait */
+void board_putc(char c);  /* what comes goes to control_received() */
 
 bool board_log_ready(void); /* whether board_log_putc() would not wait */
 void board_log_putc(char c);

@@ -2,8 +2,16 @@
 
 #include "board.h"
 #include "console.h"
+#include "receive.h"
 
 enum { LINE = 80 };
+
+static receive_queue input;
+
+void console_received(char c)
+{
+    received(&input, c);
+}
 
 char *console_line(void)
 {
@@ -11,7 +19,7 @@ char *console_line(void)
     static unsigned length;
     int c;
 
-    while ((c = board_getc()) >= 0) {
+    while ((c = receive(&input)) >= 0) {
         if (c == '\n' || c == '\r') {
             if (length == 0)
                 continue; /* of "\r\n" the second */

@@ -1,9 +1,11 @@
-/* Lines to and from a human, or a test. This is all that the firmware knows of its link. */
+/* Lines to and from a human, or a test. */
 #ifndef CONSOLE_H
 #define CONSOLE_H
 
 #include <stdbool.h>
 #include <stdint.h>
+
+void console_received(char c); /* from the interrupt of the UART */
 
 /* A whole line that has come in, without its end, or NULL. */
 char *console_line(void);

@@ -2,8 +2,8 @@
  * LM3S6965): System Control, GPIO, UART; SysTick and NVIC in the chapter on the Cortex-M3 peripherals. 12 MHz internal
  * oscillator. */
 #include "board.h"
+#include "control.h"
 #include "player.h"
-#include "receive.h"
 
 enum { CLOCK_HZ = 12000000, BAUD = 115200 };
 enum { RECEIVE_EMPTY = 1 << 4, TRANSMIT_FULL = 1 << 5 };         /* UARTFR */
@@ -30,8 +30,6 @@ enum { RECEIVE_INTERRUPT = 1 << 4, RECEIVE_TIMEOUT = 1 << 6 };   /* UARTIM, UART
 #define PORT_D UINT32_C(0x40007000) /* 2 and 3: UART 1 */
 #define CONSOLE UINT32_C(0x4000C000)
 #define LOG UINT32_C(0x4000D000)
-
-static receive_queue input;
 
 static void start_uart(uint32_t uart)
 {
@@ -76,17 +74,17 @@ void board_uart_interrupt(void)
 {
     UART_ICR(CONSOLE) = RECEIVE_INTERRUPT | RECEIVE_TIMEOUT; /* first: what comes after it asks again */
     while ((UART_FR(CONSOLE) & RECEIVE_EMPTY) == 0)
-        received(&input, (char)UART_DR(CONSOLE));
+        control_received((uint8_t)UART_DR(CONSOLE));
 }
 
-int board_getc(void)
+bool board_can_put(void)
 {
-    return receive(&input);
+    return (UART_FR(CONSOLE) & TRANSMIT_FULL) == 0;
 }
 
 void board_putc(char c)
 {
-    while ((UART_FR(CONSOLE) & TRANSMIT_FULL) != 0)
+    while (!board_can_put())
         ;
     UART_DR(CONSOLE) = (unsigned char)c;
 }

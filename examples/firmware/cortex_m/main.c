@@ -1,15 +1,6 @@
-/* Plays a build of tablegen: commands come in lines, samples leave in an interrupt.
- *
- *     status           what the sequencer does, its faults and their counts
- *     arm N            the next trigger starts N frames; 0 is without end
- *     trigger, park, reset, clear
- *     swap             the other program, from the next line on: the whole scan, or the half one
- *     withdraw         the program that waits is not to be taken
- *
- * Each is answered by one line: ok, or error and why.
- */
+/* Plays a build of tablegen: what is to be done comes over a UART, samples leave in an interrupt. */
 #include "board.h"
-#include "console.h"
+#include "control.h"
 #include "dac.h"
 #include "player.h"
 #include "scan.h"
@@ -20,92 +11,18 @@
 
 dac_sequencer sequencer;
 
-static bool loaded_half; /* what was loaded last */
-
-static void answer(bool done)
-{
-    console_text(done ? "ok\n" : "error: too many requests wait\n");
-}
-
-static void tell_status(void)
-{
-    const dac_status status = dac_sequencer_status(&sequencer);
-
-    console_text(status.markers & DAC_PLAYING ? "playing" : status.markers & DAC_PARKED ? "parked" : "parking");
-    console_number("line", status.line);
-    console_number("swaps", status.swaps);
-    console_number("writable", dac_sequencer_writable(&sequencer));
-    console_number("faults", status.faults);
-    console_number("slew", status.fault_counts[0]);
-    console_number("clamp", status.fault_counts[1]);
-    console_number("overrun", status.fault_counts[2]);
-    console_number("underrun", status.fault_counts[3]);
-    console_text("\n");
-}
-
-static bool load(bool half)
-{
-    dac_program program = scan_whole;
-
-    if (half && !scan_half(&program, dac_sequencer_idle(&sequencer)))
-        return false;
-    return dac_sequencer_load(&sequencer, &program) == DAC_LOADED;
-}
-
-static void swap(void)
-{
-    if (!dac_sequencer_writable(&sequencer)) {
-        console_text("error: a program waits\n");
-        return;
-    }
-    if (!load(!loaded_half)) {
-        console_text("error: the program is refused\n");
-        return;
-    }
-    loaded_half = !loaded_half;
-    answer(dac_sequencer_commit(&sequencer));
-}
-
-static void obey(char *line)
-{
-    uint32_t frames;
-
-    if (console_word(&line, "status"))
-        tell_status();
-    else if (console_word(&line, "arm")) {
-        if (console_decimal(line, &frames))
-            answer(dac_sequencer_arm(&sequencer, frames));
-        else
-            console_text("error: arm N, a number of frames; 0 is without end\n");
-    } else if (console_word(&line, "trigger"))
-        answer(dac_sequencer_trigger(&sequencer));
-    else if (console_word(&line, "park"))
-        answer(dac_sequencer_park(&sequencer));
-    else if (console_word(&line, "reset"))
-        answer(dac_sequencer_reset(&sequencer));
-    else if (console_word(&line, "clear"))
-        answer(dac_sequencer_clear_faults(&sequencer));
-    else if (console_word(&line, "withdraw"))
-        answer(dac_sequencer_withdraw(&sequencer));
-    else if (console_word(&line, "swap"))
-        swap();
-    else
-        console_text("error: status, arm N, trigger, park, reset, clear, swap or withdraw\n");
-}
-
 int main(void)
 {
-    char *line;
-
-    board_start();
     dac_sequencer_init(&sequencer, &scan_x_converter, &scan_y_converter);
-    console_text(load(false) && dac_sequencer_commit(&sequencer) ? "ready\n" : "error: the scan is refused\n");
+    const bool good = control_start();
+    board_start();
     player_start();
     board_start_timer(UPDATE_RATE_HZ);
+    while (good && dac_sequencer_status(&sequencer).swaps == 0) /* before it no trigger would be heard */
+        dac_work();
+    control_ready(good);
     for (;;) {
         dac_work();
-        line = console_line();
-        if (line != NULL)
-            obey(line);
+        control_work();
     }
 }

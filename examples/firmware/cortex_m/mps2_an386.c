@@ -2,8 +2,8 @@
  * as in its technical reference manual (DDI 0479), chapters on the APB UART and the APB timer; addresses as in AN386,
  * memory map. 25 MHz. */
 #include "board.h"
+#include "control.h"
 #include "player.h"
-#include "receive.h"
 
 enum { CLOCK_HZ = 25000000, BAUD = 115200 };
 enum { TRANSMIT_FULL = 1, RECEIVE_FULL = 2 };                          /* STATE */
@@ -24,8 +24,6 @@ enum { UART0_RECEIVES = 0, TIMER0 = 8 };                               /* interr
 
 #define CONSOLE UINT32_C(0x40004000)
 #define LOG UINT32_C(0x40005000)
-
-static receive_queue input;
 
 void board_start(void)
 {
@@ -54,17 +52,17 @@ void board_uart_interrupt(void)
 {
     UART_INTCLEAR(CONSOLE) = RECEIVED_ONE; /* first: what comes after it asks again */
     while ((UART_STATE(CONSOLE) & RECEIVE_FULL) != 0)
-        received(&input, (char)UART_DATA(CONSOLE));
+        control_received((uint8_t)UART_DATA(CONSOLE));
 }
 
-int board_getc(void)
+bool board_can_put(void)
 {
-    return receive(&input);
+    return (UART_STATE(CONSOLE) & TRANSMIT_FULL) == 0;
 }
 
 void board_putc(char c)
 {
-    while ((UART_STATE(CONSOLE) & TRANSMIT_FULL) != 0)
+    while (!board_can_put())
         ;
     UART_DATA(CONSOLE) = (unsigned char)c;
 }

@@ -1,13 +1,8 @@
-/* The only file that knows the names of a build: SCAN and SCAN_UPPER, SCAN_HEADER, from the Makefile. */
+/* The programs of a build. */
 #include "scan.h"
-#include SCAN_HEADER
 
-#define JOIN_(a, b) a##b
-#define JOIN(a, b) JOIN_(a, b)
-#define NAMED(suffix) JOIN(SCAN, suffix)
-#define CONSTANT(suffix) JOIN(SCAN_UPPER, suffix)
-#define PROGRAM(NAME, name) DAC_PROGRAM(NAME, name)
-#define CONVERTER(AXIS) DAC_CONVERTER(AXIS, 0)
+#include SCAN_HEADER
+#include "names.h"
 
 const dac_program scan_whole = PROGRAM(SCAN_UPPER, SCAN);
 const dac_converter scan_x_converter = CONVERTER(CONSTANT(_X));

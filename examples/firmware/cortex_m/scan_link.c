@@ -1,0 +1,78 @@
+/* The link of a build. Its tables may be as long as those of the scan that was built, its limits are those of that scan.
+ * To be given with -D: LINK_X_INDEX_BITS and LINK_Y_INDEX_BITS for longer tables, LINK_HARMONICS, LINK_MAX_JUMP in codes,
+ * LINK_KEY as the bytes of an array; DAC_LINK_RING.
+ */
+#include "scan_link.h"
+
+#include SCAN_HEADER
+#include "names.h"
+
+/* The length of a table that is not interpolated is none of 2^n. */
+#define BITS_FOR(n) ((n) <= 8 ? 3 : (n) <= 16 ? 4 : (n) <= 32 ? 5 : (n) <= 64 ? 6 : (n) <= 128 ? 7 : (n) <= 256 ? 8 \
+    : (n) <= 512 ? 9 : (n) <= 1024 ? 10 : (n) <= 2048 ? 11 : (n) <= 4096 ? 12 : (n) <= 8192 ? 13 : (n) <= 16384 ? 14 \
+    : (n) <= 32768 ? 15 : 16)
+#ifndef LINK_X_INDEX_BITS
+#define LINK_X_INDEX_BITS BITS_FOR(CONSTANT(_X_TABLE_LENGTH))
+#endif
+#ifndef LINK_Y_INDEX_BITS
+#define LINK_Y_INDEX_BITS BITS_FOR(CONSTANT(_Y_TABLE_LENGTH))
+#endif
+#ifndef LINK_HARMONICS
+#define LINK_HARMONICS 64
+#endif
+#ifndef LINK_MAX_JUMP
+#define LINK_MAX_JUMP UINT32_C(0xFFFFFF)
+#endif
+#ifdef SCAN_SINE
+#define SINE NAMED(_sine)
+#define SINE_BITS CONSTANT(_SINE_INDEX_BITS)
+#define HARMONICS LINK_HARMONICS
+#else /* a build without interpolated tables has no sine: nothing can be rendered */
+#define SINE NULL
+#define SINE_BITS 0
+#define HARMONICS 0
+#endif
+
+static dac_word x_tables[2][1 << LINK_X_INDEX_BITS], y_tables[2][1 << LINK_Y_INDEX_BITS];
+static int32_t x_fourier[2 * HARMONICS + 1], y_fourier[2 * HARMONICS + 1];
+static uint8_t hash[32];
+#ifdef LINK_KEY
+static const uint8_t key[] = {LINK_KEY};
+#define KEY key
+#define KEY_BYTES sizeof key
+#else
+#define KEY NULL
+#define KEY_BYTES 0
+#endif
+
+#define AXIS(NAME, bits, tables, words)                                                                               \
+    {                                                                                                                 \
+        CONVERTER(CONSTANT(NAME)), {CONSTANT(NAME##_CODE_MIN), CONSTANT(NAME##_CODE_MAX),                             \
+        CONSTANT(NAME##_MAX_STEP), LINK_MAX_JUMP}, CONSTANT(NAME##_TABLE_BITS), bits, {tables[0], tables[1]}, words   \
+    }
+
+static const dac_link_config config = {
+    .x = AXIS(_X, LINK_X_INDEX_BITS, x_tables, x_fourier),
+    .y = AXIS(_Y, LINK_Y_INDEX_BITS, y_tables, y_fourier),
+    .harmonics = HARMONICS,
+    .sine_index_bits = SINE_BITS,
+    .sine = SINE,
+    .update_rate_hz = UPDATE_RATE_HZ,
+    .key_bytes = KEY_BYTES,
+    .key = KEY,
+    .hash = hash,
+};
+
+static uint8_t digit(char c)
+{
+    return (uint8_t)(c <= '9' ? c - '0' : c - 'a' + 10);
+}
+
+const dac_link_config *scan_link(void)
+{
+    const char *text = CONSTANT(_HASH);
+
+    for (unsigned i = 0; i < sizeof hash; i++, text += 2)
+        hash[i] = (uint8_t)(digit(text[0]) << 4 | digit(text[1]));
+    return &config;
+}

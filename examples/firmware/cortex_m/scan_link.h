@@ -1,0 +1,9 @@
+/* What this firmware lets a host do: memory for two programs, limits, a key. */
+#ifndef SCAN_LINK_H
+#define SCAN_LINK_H
+
+#include "dac_link.h"
+
+const dac_link_config *scan_link(void);
+
+#endif

@@ -1,0 +1,327 @@
+/* Bytes in, bytes out, and what every request has to pass: docs/protocol.md. */
+#include "dac_link.h"
+
+#include "dac_axis.h"
+#include "dac_link_parts.h"
+
+enum { VERSION = 1, MOST_READ = 240, LIMITS = 32 };
+#define MOST_FRAMES (UINT32_C(1) << 31)
+#define BLOCK (DAC_LINK_RING / 128) /* bytes of the ring that are given back at once */
+
+#if DAC_LINK_RING < 512 || DAC_LINK_RING > 32768 || (DAC_LINK_RING & (DAC_LINK_RING - 1)) != 0
+#error "DAC_LINK_RING is a power of two, 512..32768"
+#endif
+
+void dac_link_init(dac_link *l, const dac_link_config *config, dac_sequencer *sequencer, uint32_t boot)
+{
+    unsigned char *const bytes = (unsigned char *)l;
+
+    for (size_t i = 0; i < sizeof *l; i++)
+        bytes[i] = 0;
+    l->config = config;
+    l->sequencer = sequencer;
+    l->boot = boot;
+    l->x_limits = config->x.limits;
+    l->y_limits = config->y.limits;
+}
+
+/* The ring. `freed` is one byte, which an 8-bit processor reads at once; its `head` may change while it is read. */
+
+bool dac_link_receive(dac_link *l, uint8_t byte)
+{
+    const uint16_t head = l->head;
+
+    if ((uint8_t)(head / BLOCK - l->freed) >= 128) {
+        l->lost = l->lost + 1;
+        return false;
+    }
+    DAC_ACQUIRE();
+    l->ring[head % DAC_LINK_RING] = byte;
+    DAC_RELEASE();
+    l->head = (uint16_t)(head + 1u);
+    return true;
+}
+
+static uint16_t received(const dac_link *l)
+{
+    uint16_t first, second = l->head;
+    do {
+        first = second;
+        second = l->head;
+    } while (first != second);
+    DAC_ACQUIRE();
+    return (uint16_t)(first - l->tail);
+}
+
+static uint8_t next_byte(dac_link *l)
+{
+    const uint8_t byte = l->ring[l->tail % DAC_LINK_RING];
+
+    l->tail = (uint16_t)(l->tail + 1u);
+    DAC_RELEASE();
+    l->freed = (uint8_t)(l->tail / BLOCK);
+    return byte;
+}
+
+int dac_link_transmit(dac_link *l)
+{
+    if (!l->sending)
+        return -1;
+    DAC_ACQUIRE();
+    const uint8_t byte = l->out[l->out_at];
+    if (++l->out_at == l->out_length) {
+        DAC_RELEASE();
+        l->sending = 0;
+    }
+    return byte;
+}
+
+static void send(dac_link *l, const dac_link_answer *a)
+{
+    l->out[1] = a->type;
+    l->out[2] = a->seq;
+    dac_link_put(l->out + 3, a->session);
+    l->out_length = dac_link_seal(l->out, (uint16_t)(a->length + DAC_LINK_HEADER));
+    l->out_at = 0;
+    DAC_RELEASE();
+    l->sending = 1;
+}
+
+/* Requests. */
+
+void dac_link_remember(dac_link *l, uint8_t type, const uint8_t *payload, uint8_t length)
+{
+    l->last.type = type;
+    l->last.length = length;
+    dac_link_copy(l->last.payload, payload, length);
+}
+
+void dac_link_refuse(dac_link_answer *a, uint8_t request, dac_link_finding why)
+{
+    a->type = DAC_LINK_REFUSAL;
+    a->length = 6;
+    a->payload[0] = request;
+    a->payload[1] = why.reason;
+    dac_link_put(a->payload + 2, why.detail);
+}
+
+static bool in(unsigned set, uint8_t request)
+{
+    return (set >> request & 1u) != 0;
+}
+
+#define TAGGED (1u << DAC_LINK_COMMIT | 1u << DAC_LINK_PARK | 1u << DAC_LINK_ARM | 1u << DAC_LINK_TRIGGER \
+                | 1u << DAC_LINK_CLEAR | 1u << DAC_LINK_LIMITS)
+
+/* Bytes of a payload without tag, but for those whose length varies. */
+static uint8_t plain_bytes(uint8_t request, uint8_t length)
+{
+    switch (request) {
+    case DAC_LINK_HELLO:
+        return 1;
+    case DAC_LINK_BEGIN:
+        return sizeof ((dac_link_image *)0)->info;
+    case DAC_LINK_READ:
+        return 5;
+    case DAC_LINK_COMMIT:
+    case DAC_LINK_ARM:
+        return 4;
+    case DAC_LINK_LIMITS:
+        return length == 0 ? 0 : LIMITS;
+    default:
+        return 0;
+    }
+}
+
+static dac_link_finding check_payload(const dac_link *l, uint8_t request, const uint8_t *payload, uint8_t length)
+{
+    const uint8_t plain = plain_bytes(request, length);
+    const bool may_be_tagged = l->config->key_bytes != 0 && in(TAGGED, request);
+    bool good = length == plain || (may_be_tagged && length == plain + DAC_LINK_TAG);
+
+    if (request == DAC_LINK_HELLO && length != 0 && payload[0] != VERSION)
+        return dac_link_because(DAC_LINK_VERSION, VERSION);
+    if (request == DAC_LINK_DATA)
+        good = length > 4;
+    else if (good && request == DAC_LINK_READ)
+        good = payload[4] >= 1 && payload[4] <= MOST_READ;
+    else if (good && request == DAC_LINK_ARM)
+        good = dac_link_get(payload) <= MOST_FRAMES;
+    return good ? dac_link_fine() : dac_link_because(DAC_LINK_PAYLOAD, 0);
+}
+
+bool dac_link_tagged(const dac_link *l, const uint8_t *nonce, const uint8_t *request, uint8_t bytes,
+                     const uint8_t *digest, const uint8_t *tag)
+{
+    uint8_t right[DAC_LINK_TAG];
+    dac_link_mac m;
+
+    dac_link_mac_begin(&m, DAC_LINK_TAG, l->config->key, l->config->key_bytes);
+    dac_link_mac_add(&m, nonce, sizeof l->nonce);
+    dac_link_mac_add(&m, request, bytes);
+    if (digest != NULL)
+        dac_link_mac_add(&m, digest, 32);
+    dac_link_mac_end(&m, right);
+    return dac_link_same(right, tag, DAC_LINK_TAG);
+}
+
+/* Of a request that acts, but for COMMIT, whose tag covers the image. The challenge is used up, right or wrong. */
+static bool good_tag(dac_link *l, const uint8_t *frame, uint8_t length)
+{
+    const uint8_t bytes = (uint8_t)(DAC_LINK_HEADER + plain_bytes(frame[0], length));
+    const bool challenged = l->challenged;
+
+    l->challenged = false;
+    return challenged && DAC_LINK_HEADER + length == bytes + DAC_LINK_TAG
+        && dac_link_tagged(l, l->nonce, frame, bytes, NULL, frame + bytes);
+}
+
+static dac_link_finding passed_on(bool passed)
+{
+    return passed ? dac_link_fine() : dac_link_because(DAC_LINK_TICKS, 0);
+}
+
+static dac_link_finding obey(dac_link *l, uint8_t request, const uint8_t *payload, uint8_t length,
+                             dac_link_answer *a)
+{
+    switch (request) {
+    case DAC_LINK_HELLO:
+        return dac_link_hello(l, a->session, a);
+    case DAC_LINK_BEGIN:
+        return dac_link_begin(l, payload, a);
+    case DAC_LINK_DATA:
+        return dac_link_data(l, payload, length, a);
+    case DAC_LINK_COMMIT:
+        return dac_link_commit(l, payload, length, a);
+    case DAC_LINK_ABORT:
+        return dac_link_abort(l, a);
+    case DAC_LINK_STATUS:
+        return dac_link_status(l, a);
+    case DAC_LINK_READ:
+        return dac_link_readback(l, payload, a);
+    case DAC_LINK_PARK:
+        return passed_on(dac_sequencer_park(l->sequencer));
+    case DAC_LINK_ARM:
+        return passed_on(dac_sequencer_arm(l->sequencer, dac_link_get(payload)));
+    case DAC_LINK_TRIGGER:
+        return passed_on(dac_sequencer_trigger(l->sequencer));
+    case DAC_LINK_CLEAR:
+        return passed_on(dac_sequencer_clear_faults(l->sequencer));
+    case DAC_LINK_CHALLENGE:
+        return dac_link_challenge(l, a);
+    default:
+        return dac_link_set_limits(l, payload, length, a);
+    }
+}
+
+/* What a request has to pass before anybody looks at what it wants; *again: it was answered before. */
+static dac_link_finding admit(dac_link *l, const uint8_t *frame, uint8_t length, bool acts, bool *again)
+{
+    const uint8_t request = frame[0], seq = frame[1];
+
+    if (request != DAC_LINK_HELLO && (!l->opened || dac_link_get(frame + 2) != l->session))
+        return dac_link_because(DAC_LINK_SESSION, 0);
+    if (request < DAC_LINK_HELLO || request > DAC_LINK_LIMITS
+        || (request == DAC_LINK_CHALLENGE && l->config->key_bytes == 0))
+        return dac_link_because(DAC_LINK_TYPE, 0);
+    const dac_link_finding found = check_payload(l, request, frame + DAC_LINK_HEADER, length);
+    if (found.reason != DAC_LINK_NO_REASON || !acts)
+        return found;
+    if (l->last.known) {
+        const uint8_t behind = (uint8_t)(l->last.seq - seq);
+        *again = behind == 0 && request == l->last.request;
+        if (*again)
+            return dac_link_fine();
+        if (behind < 128)
+            return dac_link_because(DAC_LINK_OLD, 0);
+    }
+    if (in(TAGGED, request) && request != DAC_LINK_COMMIT && l->config->key_bytes != 0 && !good_tag(l, frame, length))
+        return dac_link_because(DAC_LINK_KEY, 0);
+    return dac_link_fine();
+}
+
+/* A frame is complete. */
+static void judge(dac_link *l)
+{
+    const uint8_t *const frame = l->reader.bytes;
+    const uint8_t request = frame[0], length = (uint8_t)(l->reader.length - DAC_LINK_HEADER);
+    const bool acts = request == DAC_LINK_ABORT || (request <= DAC_LINK_LIMITS && in(TAGGED, request)
+                                                    && (request != DAC_LINK_LIMITS || length != 0));
+    dac_link_answer a = {(uint8_t)(request | DAC_LINK_ANSWER), frame[1], 0, 0, l->out + 1 + DAC_LINK_HEADER};
+    bool again = false;
+
+    if ((request & DAC_LINK_ANSWER) != 0)
+        return; /* an echo */
+    a.session = dac_link_get(frame + 2);
+    dac_link_finding found = admit(l, frame, length, acts, &again);
+    if (again) {
+        a.type = l->last.type;
+        a.length = l->last.length;
+        dac_link_copy(a.payload, l->last.payload, a.length);
+    } else if (found.reason != DAC_LINK_NO_REASON) {
+        dac_link_refuse(&a, request, found);
+    } else {
+        if (acts) {
+            l->before_commit = l->last;
+            l->last.known = true;
+            l->last.request = request;
+            l->last.seq = frame[1];
+            l->last.type = DAC_LINK_SILENT;
+            l->commit_is_last = l->abort_is_last = false;
+        }
+        found = obey(l, request, frame + DAC_LINK_HEADER, length, &a);
+        if (found.reason != DAC_LINK_NO_REASON)
+            dac_link_refuse(&a, request, found);
+        if (acts && a.type != DAC_LINK_SILENT)
+            dac_link_remember(l, a.type, a.payload, a.length);
+    }
+    if (a.type != DAC_LINK_SILENT)
+        send(l, &a);
+}
+
+/* Answers that had to wait, one a call. */
+static void answer_late(dac_link *l)
+{
+    dac_link_answer a = {l->commit_type, l->commit_seq, l->commit_length, l->commit_session,
+                         l->out + 1 + DAC_LINK_HEADER};
+
+    if (l->commit_due) {
+        dac_link_copy(a.payload, l->commit_payload, a.length);
+        l->commit_due = false;
+    } else {
+        a.type = DAC_LINK_ABORT | DAC_LINK_ANSWER;
+        a.seq = l->abort_seq[l->aborts_said];
+        a.session = l->abort_session[l->aborts_said];
+        a.length = 4;
+        dac_link_put(a.payload, l->abort_generation);
+        l->aborts_said++;
+        if (l->aborts_said == l->aborts) {
+            l->aborts = l->aborts_said = 0;
+            l->aborts_due = false;
+        }
+    }
+    send(l, &a);
+}
+
+bool dac_link_work(dac_link *l)
+{
+    if (l->upload == DAC_LINK_WAITING)
+        dac_link_settle(l);
+    if (l->upload == DAC_LINK_CHECKING)
+        dac_link_check_on(l);
+    /* While an answer leaves, what comes stays in the ring: each finds its place. */
+    if (!l->sending && (l->commit_due || l->aborts_due)) {
+        answer_late(l);
+    } else if (!l->sending) {
+        for (unsigned left = DAC_LINK_SLICE; left != 0 && received(l) != 0; left--) {
+            const dac_link_read read = dac_link_read_byte(&l->reader, next_byte(l));
+            if (read == DAC_LINK_BAD)
+                l->bad_frames++;
+            if (read == DAC_LINK_GOOD) {
+                judge(l);
+                break;
+            }
+        }
+    }
+    return l->upload == DAC_LINK_CHECKING || (!l->sending && (l->commit_due || l->aborts_due || received(l) != 0));
+}

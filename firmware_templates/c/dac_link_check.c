@@ -1,0 +1,429 @@
+/* What a device looks at before it takes a program, in slices. tablegen/link/acceptance.py is the same for hosts. */
+#include "dac_axis.h"
+#include "dac_link_parts.h"
+
+enum { CRC, PROGRAM, FOURIER, RENDER, WORD, RANGE, SLEW, JUMP };
+
+#define OUTSIDE 1 /* codes: ticks need not visit a word, and rounding may carry it over a limit that no tick crosses */
+
+/* From a word to its code. */
+struct output {
+    const dac_word *table;
+    uint32_t length;
+    unsigned guard, gain_q;
+    int32_t gain, code_min, code_max, park_code;
+    int64_t offset; /* and half an LSB */
+};
+
+static const dac_link_finding nothing = {DAC_LINK_NO_REASON, 0};
+
+static dac_link_finding finding(uint8_t reason, unsigned axis, uint32_t word)
+{
+    const dac_link_finding found = {reason, axis + 2 * word};
+    return found;
+}
+
+static struct output output_of(const dac_link *l, unsigned axis)
+{
+    dac_program program;
+    struct output o;
+
+    dac_link_program_of(l, &program);
+    const dac_axis_program *const p = axis == 0 ? &program.x : &program.y;
+    o.table = p->table;
+    o.length = p->length;
+    o.guard = p->bits > 21 ? 25u - p->bits : 4u;
+    o.gain_q = p->gain_q;
+    o.gain = p->gain_word;
+    o.code_min = p->code_min;
+    o.code_max = p->code_max;
+    o.park_code = p->park_code;
+    o.offset = p->offset_word + ((int64_t)1 << (p->gain_q - 1));
+    return o;
+}
+
+/* Of the program that plays, from its bank: the consumer reads that too, and nobody writes it. */
+static struct output playing_of(const dac_link *l, unsigned axis)
+{
+    const dac_bank *const bank = &l->sequencer->bank[l->sequencer->playing];
+    const dac_bank_axis *const b = axis == 0 ? &bank->x : &bank->y;
+    struct output o;
+
+    o.table = b->table;
+    o.length = b->last + 1;
+    o.guard = b->guard;
+    o.gain_q = b->gain_q;
+    o.gain = b->gain;
+    o.code_min = b->code_min;
+    o.code_max = b->code_max;
+    o.park_code = b->park_code;
+    o.offset = b->offset;
+    return o;
+}
+
+static int64_t unclamped(const struct output *o, int32_t sample)
+{
+    return ((int64_t)o->gain * sample + o->offset) >> o->gain_q;
+}
+
+static int32_t code(const struct output *o, int32_t sample)
+{
+    const int64_t wide = unclamped(o, sample);
+    return wide < o->code_min ? o->code_min : wide > o->code_max ? o->code_max : (int32_t)wide;
+}
+
+static int32_t sample_of(const struct output *o, int32_t word)
+{
+    return word * (INT32_C(1) << o->guard);
+}
+
+static uint32_t distance(int32_t a, int32_t b)
+{
+    return a < b ? (uint32_t)b - (uint32_t)a : (uint32_t)a - (uint32_t)b;
+}
+
+/* The program words. */
+
+static bool inside(const dac_link_image *image, unsigned window, uint32_t length)
+{
+    const uint32_t first = dac_link_program_word(image, 0, window), count = dac_link_program_word(image, 0, window + 1);
+    return first <= length && count <= length - first;
+}
+
+static bool good_schedule(const dac_link_image *image)
+{
+    const uint32_t ticks = dac_link_program_word(image, 0, DAC_LINK_LINE_TICKS);
+    const uint32_t lines = dac_link_program_word(image, 0, DAC_LINK_FRAME_LINES);
+
+    return ticks >= 1 && ticks <= UINT32_C(1) << 24 && lines >= 1 && lines <= INT32_MAX / ticks
+        && inside(image, DAC_LINK_FORWARD, ticks) && inside(image, DAC_LINK_BACKWARD, ticks)
+        && inside(image, DAC_LINK_UP, lines) && inside(image, DAC_LINK_DOWN, lines)
+        && dac_link_program_word(image, 0, DAC_LINK_TURN_TICK) <= ticks
+        && dac_link_program_word(image, 0, DAC_LINK_PIXELS) <= ticks
+        && dac_link_program_word(image, 0, DAC_LINK_Y_STEPS) <= 1;
+}
+
+static bool good_period(const dac_link_image *image, unsigned axis)
+{
+    const uint32_t ticks = dac_link_program_word(image, 0, DAC_LINK_LINE_TICKS);
+    const uint32_t lines = dac_link_program_word(image, 0, DAC_LINK_FRAME_LINES);
+    const bool steps = dac_link_program_word(image, 0, DAC_LINK_Y_STEPS) != 0;
+    const uint32_t wanted = axis == 0 ? ticks : steps ? lines : ticks * lines;
+    uint32_t step = UINT32_MAX / wanted, remainder = UINT32_MAX % wanted + 1; /* of 2^32 */
+
+    if (remainder == wanted) {
+        step++;
+        remainder = 0;
+    }
+    return dac_link_program_word(image, axis + 1, DAC_LINK_PHASE_PERIOD) == wanted
+        && dac_link_program_word(image, axis + 1, DAC_LINK_PHASE_STEP) == step
+        && dac_link_program_word(image, axis + 1, DAC_LINK_PHASE_REMAINDER) == remainder;
+}
+
+static bool good_output(const dac_link *l, const dac_link_image *image, unsigned axis)
+{
+    const uint32_t code_min = dac_link_program_word(image, axis + 1, DAC_LINK_CODE_MIN);
+    const uint32_t code_max = dac_link_program_word(image, axis + 1, DAC_LINK_CODE_MAX);
+    const uint32_t park_code = dac_link_program_word(image, axis + 1, DAC_LINK_PARK_CODE);
+    dac_program program;
+
+    dac_link_program_of(l, &program);
+    const dac_axis_program *const p = axis == 0 ? &program.x : &program.y;
+    const int64_t reach = INT64_C(2) << (p->dac_bits + p->gain_q);
+    return p->gain_word >= -(INT32_C(1) << 17) && p->gain_word < INT32_C(1) << 17
+        && p->offset_word > -reach && p->offset_word < reach
+        && dac_link_program_word(image, axis + 1, DAC_LINK_OFFSET_LOW) < UINT32_C(1) << 18
+        && code_min <= park_code && park_code <= code_max && code_max < UINT32_C(1) << p->dac_bits
+        && p->max_step >= 1 && p->max_step < INT32_C(1) << 24;
+}
+
+static dac_link_finding check_program(const dac_link *l)
+{
+    const dac_link_image *const image = &l->image[l->idle];
+
+    if (!good_schedule(image))
+        return finding(DAC_LINK_SCHEDULE, 0, 0);
+    for (unsigned axis = 0; axis < 2; axis++)
+        if (!good_period(image, axis))
+            return finding(DAC_LINK_PERIOD, axis, 0);
+    for (unsigned axis = 0; axis < 2; axis++)
+        if (!good_output(l, image, axis))
+            return finding(DAC_LINK_OUTPUT, axis, 0);
+    for (unsigned axis = 0; axis < 2; axis++) {
+        const dac_link_limits *const limits = axis == 0 ? &l->x_limits : &l->y_limits;
+        if (dac_link_program_word(image, axis + 1, DAC_LINK_CODE_MIN) < limits->code_min
+            || dac_link_program_word(image, axis + 1, DAC_LINK_CODE_MAX) > limits->code_max)
+            return finding(DAC_LINK_CODES, axis, 0);
+    }
+    for (unsigned axis = 0; axis < 2; axis++)
+        if (dac_link_program_word(image, axis + 1, DAC_LINK_MAX_STEP)
+            > (axis == 0 ? l->x_limits.max_step : l->y_limits.max_step))
+            return finding(DAC_LINK_STEP, axis, 0);
+    return nothing;
+}
+
+/* The words, a slice at a time. Each of these says by *done that it has seen all of an axis. */
+
+static const dac_link_part *part_of(const dac_link *l, unsigned axis)
+{
+    return axis == 0 ? &l->x_part : &l->y_part;
+}
+
+/* From check.at to the end of this slice. */
+static uint32_t slice(const dac_link *l, uint32_t length)
+{
+    const uint32_t left = length - l->check.at;
+    return l->check.at + (left < DAC_LINK_SLICE ? left : DAC_LINK_SLICE);
+}
+
+static dac_link_finding check_fourier(dac_link *l, unsigned axis, bool *done)
+{
+    const dac_link_part *const part = part_of(l, axis);
+    dac_link_check *const c = &l->check;
+    const int32_t *const words = dac_link_axis_of(l, axis)->fourier;
+
+    *done = true;
+    if (part->harmonics == 0)
+        return nothing;
+    for (const uint32_t end = slice(l, part->words); c->at != end; c->at++)
+        c->sum += words[c->at] < 0 ? 0u - (uint32_t)words[c->at] : (uint32_t)words[c->at];
+    *done = c->at == part->words;
+    return *done && c->sum >= UINT64_C(1) << 32 ? finding(DAC_LINK_FOURIER, axis, 0) : nothing;
+}
+
+/* All at once: what dac_synthesize() has begun it ends. It refuses nothing that check_fourier() lets pass. */
+static void render(const dac_link *l, unsigned axis)
+{
+    const dac_link_axis *const here = dac_link_axis_of(l, axis);
+    const uint8_t *const shape = dac_link_shape(&l->image[l->idle], axis);
+
+    if (part_of(l, axis)->harmonics != 0)
+        (void)dac_synthesize(here->table[l->idle], shape[0], shape[1], here->fourier, part_of(l, axis)->harmonics,
+                             l->config->sine, l->config->sine_index_bits);
+}
+
+static dac_link_finding check_words(dac_link *l, unsigned axis, bool *done)
+{
+    const dac_link_part *const part = part_of(l, axis);
+    const int32_t half = INT32_C(1) << (dac_link_shape(&l->image[l->idle], axis)[1] - 1);
+    const dac_word *const table = dac_link_axis_of(l, axis)->table[l->idle];
+    dac_link_check *const c = &l->check;
+
+    *done = true;
+    if (part->harmonics != 0)
+        return nothing;
+    for (const uint32_t end = slice(l, part->words); c->at != end; c->at++)
+        if (table[c->at] < -half || table[c->at] >= half)
+            return finding(DAC_LINK_WORD, axis, c->at);
+    *done = c->at == part->words;
+    return nothing;
+}
+
+static dac_link_finding check_range(dac_link *l, unsigned axis, bool *done)
+{
+    const struct output o = output_of(l, axis);
+    dac_link_check *const c = &l->check;
+
+    for (const uint32_t end = slice(l, o.length); c->at != end; c->at++) {
+        const int64_t at = unclamped(&o, sample_of(&o, o.table[c->at]));
+        if (at < o.code_min - OUTSIDE || at > o.code_max + OUTSIDE)
+            return finding(DAC_LINK_RANGE, axis, c->at);
+    }
+    *done = c->at == o.length;
+    return nothing;
+}
+
+/* The code of an advance, by the phase of `check`. */
+static int32_t advance_code(const dac_link *l, const struct output *o, unsigned index_bits)
+{
+    const uint32_t phase = l->check.phase;
+    if (index_bits == 0)
+        return code(o, sample_of(o, o->table[l->check.at]));
+    const uint32_t index = phase >> (32 - index_bits);
+    const int32_t here = o->table[index], there = o->table[(index + 1) & (o->length - 1)];
+    return code(o, dac_between(here, there, phase << index_bits >> 17, o->guard, DAC_HALF(o->guard)));
+}
+
+/* Every advance of a period that is not much longer than its table. */
+static dac_link_finding check_advances(dac_link *l, unsigned axis, uint32_t advances, bool *done)
+{
+    const dac_link_image *const image = &l->image[l->idle];
+    const uint32_t step = dac_link_program_word(image, axis + 1, DAC_LINK_PHASE_STEP);
+    const uint32_t remainder = dac_link_program_word(image, axis + 1, DAC_LINK_PHASE_REMAINDER);
+    const uint32_t max_step = dac_link_program_word(image, axis + 1, DAC_LINK_MAX_STEP);
+    const unsigned index_bits = dac_link_shape(image, axis)[0];
+    const struct output o = output_of(l, axis);
+    dac_link_check *const c = &l->check;
+
+    for (const uint32_t end = slice(l, advances); c->at != end; c->at++) {
+        const int32_t now = advance_code(l, &o, index_bits);
+        if (c->at == 0)
+            c->first = now;
+        else if (distance(now, c->before) > max_step)
+            return finding(DAC_LINK_SLEW, axis, c->at - 1);
+        c->before = now;
+        c->phase += step;
+        c->remainder += remainder;
+        if (c->remainder >= advances) {
+            c->remainder -= advances;
+            c->phase++;
+        }
+    }
+    *done = c->at == advances;
+    return *done && distance(c->first, c->before) > max_step ? finding(DAC_LINK_SLEW, axis, advances - 1) : nothing;
+}
+
+/* Of a longer period the steepest segment. */
+static dac_link_finding check_segments(dac_link *l, unsigned axis, uint32_t advances, bool *done)
+{
+    const struct output o = output_of(l, axis);
+    dac_link_check *const c = &l->check;
+
+    for (const uint32_t end = slice(l, o.length); c->at != end; c->at++) {
+        const uint32_t after = c->at + 1 == o.length ? 0 : c->at + 1;
+        const uint32_t rise = distance(o.table[after], o.table[c->at]);
+        if (rise > c->rise) {
+            c->rise = rise;
+            c->steepest = c->at;
+        }
+    }
+    *done = c->at == o.length;
+    if (!*done)
+        return nothing;
+    const uint64_t gain = distance(o.gain, 0), rise = (uint64_t)c->rise << o.guard;
+    const uint64_t max_step = dac_link_program_word(&l->image[l->idle], axis + 1, DAC_LINK_MAX_STEP);
+    const uint64_t slack = 2 + (gain * (2 + (rise >> 14)) >> o.gain_q);
+    return (gain * rise * o.length) >> o.gain_q <= advances * (max_step + slack)
+        ? nothing : finding(DAC_LINK_SLEW, axis, c->steepest);
+}
+
+static dac_link_finding check_slew(dac_link *l, unsigned axis, bool *done)
+{
+    const dac_link_image *const image = &l->image[l->idle];
+    const uint32_t advances = dac_link_program_word(image, axis + 1, DAC_LINK_PHASE_PERIOD);
+
+    return advances <= 2 * dac_link_table_words(image, axis) ? check_advances(l, axis, advances, done)
+                                                     : check_segments(l, axis, advances, done);
+}
+
+/* Codes rise with words, or fall with them: the least and the greatest word have the codes that are furthest away. */
+static dac_link_finding check_jump(dac_link *l, bool *done)
+{
+    const dac_sequencer *const s = l->sequencer;
+    dac_link_check *const c = &l->check;
+    struct output y;
+    uint32_t jump[2];
+
+    *done = true;
+    if (dac_sequencer_status(s).swaps == 0)
+        return nothing;
+    y = playing_of(l, 1);
+    for (const uint32_t end = slice(l, y.length); c->at != end; c->at++) {
+        const int32_t word = y.table[c->at];
+        c->lowest = c->at == 0 || word < c->lowest ? word : c->lowest;
+        c->highest = c->at == 0 || word > c->highest ? word : c->highest;
+    }
+    *done = c->at == y.length;
+    if (!*done)
+        return nothing;
+    for (unsigned axis = 0; axis < 2; axis++) {
+        const struct output old = playing_of(l, axis), next = output_of(l, axis);
+        const int32_t begin = code(&next, sample_of(&next, next.table[0]));
+        if ((dac_sequencer_status(s).markers & DAC_PLAYING) == 0) {
+            jump[axis] = distance(next.park_code, old.park_code);
+        } else if (axis == 0) {
+            jump[0] = distance(code(&old, sample_of(&old, old.table[0])), begin);
+        } else {
+            const uint32_t low = distance(code(&old, sample_of(&old, c->lowest)), begin);
+            const uint32_t high = distance(code(&old, sample_of(&old, c->highest)), begin);
+            jump[1] = low > high ? low : high;
+        }
+    }
+    return jump[0] > l->x_limits.max_jump ? finding(DAC_LINK_JUMP, 0, 0)
+         : jump[1] > l->y_limits.max_jump ? finding(DAC_LINK_JUMP, 1, 0) : nothing;
+}
+
+/* What memory holds, and not what came by the line. */
+static dac_link_finding check_crc(dac_link *l, bool *done)
+{
+    dac_link_check *const c = &l->check;
+
+    if (c->place.part == 0 && c->place.word == 0) {
+        c->crc = DAC_LINK_CRC;
+        dac_link_mac_begin(&l->digest, 32, NULL, 0);
+    }
+    for (unsigned i = 0; i < 2 * DAC_LINK_SLICE && c->place.part != 3; i++) {
+        const uint8_t byte = dac_link_load_byte(l, &c->place);
+        c->crc = dac_link_crc(c->crc, byte);
+        if (l->config->key_bytes != 0)
+            dac_link_mac_byte(&l->digest, byte);
+    }
+    *done = c->place.part == 3;
+    const bool wrong = *done && ~c->crc != dac_link_get(l->image[l->idle].info + DAC_LINK_IMAGE_CRC);
+    return wrong ? finding(DAC_LINK_IMAGE, 0, 0) : nothing;
+}
+
+static bool good_tag(dac_link *l)
+{
+    uint8_t request[10], digest[32];
+
+    if (l->config->key_bytes == 0)
+        return true;
+    request[0] = DAC_LINK_COMMIT;
+    request[1] = l->commit_seq;
+    dac_link_put(request + 2, l->commit_session);
+    dac_link_put(request + 6, dac_link_get(l->image[l->idle].info + DAC_LINK_IMAGE_CRC));
+    dac_link_mac_end(&l->digest, digest);
+    return l->commit_challenged && l->commit_tagged
+        && dac_link_tagged(l, l->commit_nonce, request, sizeof request, digest, l->commit_tag);
+}
+
+/* One slice of the check of a stage. */
+static dac_link_finding check(dac_link *l, bool *done)
+{
+    const unsigned axis = l->check.axis;
+
+    switch (l->check.stage) {
+    case CRC:
+        return check_crc(l, done);
+    case PROGRAM:
+        *done = true;
+        return good_tag(l) ? check_program(l) : finding(DAC_LINK_KEY, 0, 0);
+    case FOURIER:
+        return check_fourier(l, axis, done);
+    case RENDER:
+        *done = true;
+        render(l, axis);
+        return nothing;
+    case WORD:
+        return check_words(l, axis, done);
+    case RANGE:
+        return check_range(l, axis, done);
+    case SLEW:
+        return check_slew(l, axis, done);
+    default:
+        return check_jump(l, done);
+    }
+}
+
+dac_link_finding dac_link_check_work(dac_link *l, bool *passed)
+{
+    dac_link_check *const c = &l->check;
+    bool done = false;
+    const dac_link_finding found = check(l, &done);
+
+    *passed = found.reason == DAC_LINK_NO_REASON && done && c->stage == JUMP;
+    if (!done)
+        return found;
+    if (c->axis == 0 && c->stage != CRC && c->stage != PROGRAM && c->stage != JUMP) {
+        c->axis = 1;
+    } else {
+        c->axis = 0;
+        c->stage++;
+    }
+    c->at = 0;
+    c->phase = c->remainder = 0;
+    c->rise = c->steepest = 0;
+    c->sum = 0;
+    return found;
+}

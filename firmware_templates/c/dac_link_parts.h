@@ -1,0 +1,165 @@
+/* Private to the link: what is asked and answered, an image in memory, and its checks. */
+#ifndef DAC_LINK_PARTS_H
+#define DAC_LINK_PARTS_H
+
+#include "dac_link.h"
+
+enum { DAC_LINK_HELLO = 1, DAC_LINK_BEGIN, DAC_LINK_DATA, DAC_LINK_COMMIT, DAC_LINK_ABORT, DAC_LINK_STATUS,
+       DAC_LINK_READ, DAC_LINK_PARK, DAC_LINK_ARM, DAC_LINK_TRIGGER, DAC_LINK_CLEAR, DAC_LINK_CHALLENGE,
+       DAC_LINK_LIMITS };
+enum { DAC_LINK_ANSWER = 0x80, DAC_LINK_REFUSAL = 0xFF };
+
+/* Why a request is refused; docs/protocol.md, "Reasons". */
+enum {
+    DAC_LINK_NO_REASON,
+    DAC_LINK_TYPE,
+    DAC_LINK_PAYLOAD,
+    DAC_LINK_VERSION,
+    DAC_LINK_SESSION,
+    DAC_LINK_OLD,
+    DAC_LINK_KEY,
+    DAC_LINK_BUSY,
+    DAC_LINK_UPLOAD,
+    DAC_LINK_SHAPE,
+    DAC_LINK_LENGTH,
+    DAC_LINK_HARMONICS,
+    DAC_LINK_INCOMPLETE,
+    DAC_LINK_INTERLOCK,
+    DAC_LINK_IMAGE,
+    DAC_LINK_SCHEDULE,
+    DAC_LINK_PERIOD,
+    DAC_LINK_OUTPUT,
+    DAC_LINK_CODES,
+    DAC_LINK_STEP,
+    DAC_LINK_FOURIER,
+    DAC_LINK_WORD,
+    DAC_LINK_RANGE,
+    DAC_LINK_SLEW,
+    DAC_LINK_JUMP,
+    DAC_LINK_WITHDRAWN,
+    DAC_LINK_READBACK,
+    DAC_LINK_TICKS,
+    DAC_LINK_REFUSED
+};
+
+typedef struct {
+    uint8_t reason; /* or DAC_LINK_NO_REASON */
+    uint32_t detail;
+} dac_link_finding;
+
+/* An answer that is being made. */
+typedef struct {
+    uint8_t type, seq, length;
+    uint32_t session;
+    uint8_t *payload; /* up to 244 bytes */
+} dac_link_answer;
+#define DAC_LINK_SILENT 0 /* in place of its type: it comes later */
+#define DAC_LINK_TAG 16   /* bytes */
+
+static inline dac_link_finding dac_link_because(uint8_t reason, uint32_t detail)
+{
+    const dac_link_finding found = {reason, detail};
+    return found;
+}
+
+static inline dac_link_finding dac_link_fine(void)
+{
+    return dac_link_because(DAC_LINK_NO_REASON, 0);
+}
+
+static inline void dac_link_copy(uint8_t *to, const uint8_t *from, unsigned count)
+{
+    for (unsigned i = 0; i < count; i++)
+        to[i] = from[i];
+}
+
+/* All bytes are looked at, always: how long it takes tells nothing. */
+static inline bool dac_link_same(const uint8_t *a, const uint8_t *b, unsigned count)
+{
+    unsigned differ = 0;
+    for (unsigned i = 0; i < count; i++)
+        differ |= (unsigned)(a[i] ^ b[i]);
+    return differ == 0;
+}
+
+/* Upload, as STATUS has it. */
+enum { DAC_LINK_NONE, DAC_LINK_RECEIVING, DAC_LINK_CHECKING, DAC_LINK_WAITING };
+
+/* What BEGIN says of an image. */
+enum { DAC_LINK_HASH = 0, DAC_LINK_BYTES = 32, DAC_LINK_IMAGE_CRC = 36, DAC_LINK_SHAPES = 40 };
+#define DAC_LINK_PROGRAM 192 /* bytes of the program words */
+
+/* Words of the pages. */
+enum { DAC_LINK_LINE_TICKS, DAC_LINK_FRAME_LINES, DAC_LINK_SETTLE_LINES, DAC_LINK_TURN_TICK, DAC_LINK_FORWARD,
+       DAC_LINK_BACKWARD = 6, DAC_LINK_UP = 8, DAC_LINK_DOWN = 10, DAC_LINK_PIXELS = 12, DAC_LINK_Y_STEPS };
+enum { DAC_LINK_PHASE_STEP, DAC_LINK_PHASE_REMAINDER, DAC_LINK_PHASE_PERIOD, DAC_LINK_GAIN, DAC_LINK_OFFSET_LOW,
+       DAC_LINK_OFFSET_HIGH, DAC_LINK_CODE_MIN, DAC_LINK_CODE_MAX, DAC_LINK_MAX_STEP, DAC_LINK_PARK_CODE,
+       DAC_LINK_ORDER };
+
+static inline bool dac_link_permits(const dac_link *l)
+{
+    return l->config->permits == NULL || l->config->permits();
+}
+
+static inline const dac_link_axis *dac_link_axis_of(const dac_link *l, unsigned axis)
+{
+    return axis == 0 ? &l->config->x : &l->config->y;
+}
+
+/* A program word: page 0 is the scan's, 1 and 2 are those of x and y. */
+static inline uint32_t dac_link_program_word(const dac_link_image *image, unsigned page, unsigned word)
+{
+    return dac_link_get(image->program + 64 * page + 4 * word);
+}
+
+/* index_bits, word_bits, dac_bits of an axis, and a zero. */
+static inline const uint8_t *dac_link_shape(const dac_link_image *image, unsigned axis)
+{
+    return image->info + DAC_LINK_SHAPES + 4 * axis;
+}
+
+/* Words of a table. */
+uint32_t dac_link_table_words(const dac_link_image *image, unsigned axis);
+
+/* Most bytes of an image. */
+uint32_t dac_link_most_bytes(const dac_link_config *config);
+
+/* The next byte of the upload goes to its place. What is found is found once the program words are complete. */
+dac_link_finding dac_link_store(dac_link *l, uint8_t byte);
+
+/* The next byte of the upload from where it stands in memory. */
+uint8_t dac_link_load_byte(const dac_link *l, dac_link_place *at);
+
+/* Bytes of the image of the tables that play, by offset; returns how many there are up to its end. */
+uint8_t dac_link_read_back(const dac_link *l, uint32_t offset, uint8_t *bytes, uint8_t count);
+
+/* The checks of a commit, a slice a call, from a check of all zeros on: a reason, or whether all have *passed. */
+dac_link_finding dac_link_check_work(dac_link *l, bool *passed);
+
+/* Whether a tag is that of a request under the key. `digest`: the 32 bytes of a COMMIT, or NULL. */
+bool dac_link_tagged(const dac_link *l, const uint8_t *nonce, const uint8_t *request, uint8_t bytes,
+                     const uint8_t *digest, const uint8_t *tag);
+
+/* The program as the sequencer wants it. */
+void dac_link_program_of(const dac_link *l, dac_program *program);
+
+/* Requests, by what they do: a finding, or an answer's payload in *a. */
+dac_link_finding dac_link_hello(dac_link *l, uint32_t session, dac_link_answer *a);
+dac_link_finding dac_link_status(const dac_link *l, dac_link_answer *a);
+dac_link_finding dac_link_begin(dac_link *l, const uint8_t *info, dac_link_answer *a);
+dac_link_finding dac_link_data(dac_link *l, const uint8_t *payload, uint8_t length, dac_link_answer *a);
+dac_link_finding dac_link_commit(dac_link *l, const uint8_t *payload, uint8_t length, dac_link_answer *a);
+dac_link_finding dac_link_abort(dac_link *l, dac_link_answer *a);
+dac_link_finding dac_link_readback(const dac_link *l, const uint8_t *payload, dac_link_answer *a);
+dac_link_finding dac_link_challenge(dac_link *l, dac_link_answer *a);
+dac_link_finding dac_link_set_limits(dac_link *l, const uint8_t *payload, uint8_t length, dac_link_answer *a);
+
+void dac_link_refuse(dac_link_answer *a, uint8_t request, dac_link_finding why);
+/* What the last request that acted was told. */
+void dac_link_remember(dac_link *l, uint8_t type, const uint8_t *payload, uint8_t length);
+/* A slice of the checks; behind the last the program is loaded and committed. */
+void dac_link_check_on(dac_link *l);
+/* What became of a program that waits. */
+void dac_link_settle(dac_link *l);
+
+#endif

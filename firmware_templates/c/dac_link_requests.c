@@ -1,0 +1,142 @@
+/* Requests that are answered at once. */
+#include "dac_link_parts.h"
+
+enum { VERSION = 1, MOST_DATA = 240, NONCE = 16, PROGRAM_HASH = 32, LIMITS = 32, DEVICE = 56, STATUS = 76 };
+enum { TAKES_TABLES = 1, TAKES_FOURIER = 2, HAS_KEY = 4, READS_BACK = 8, HAS_INTERLOCK = 16, NARROWS = 32 };
+enum { TWOS_COMPLEMENT = 64, LEFT_ALIGNED = 128 };
+enum { NO_PROGRAM, PARKED, PARKING, PLAYING };
+
+/* What is told of the device. */
+
+static void put_limits(uint8_t *at, const dac_link_limits *limits)
+{
+    dac_link_put(at, limits->code_min);
+    dac_link_put(at + 4, limits->code_max);
+    dac_link_put(at + 8, limits->max_step);
+    dac_link_put(at + 12, limits->max_jump);
+}
+
+static void put_shape(uint8_t *at, const dac_link_axis *axis)
+{
+    const dac_converter *const c = &axis->converter;
+
+    at[0] = axis->index_bits;
+    at[1] = axis->word_bits;
+    at[2] = c->bits;
+    at[3] = (uint8_t)(c->word_bits | (c->twos_complement ? TWOS_COMPLEMENT : 0) | (c->left_aligned ? LEFT_ALIGNED : 0));
+}
+
+static void put_device(const dac_link *l, uint8_t *at)
+{
+    const dac_link_config *const c = l->config;
+
+    at[0] = VERSION;
+    at[1] = (uint8_t)(TAKES_TABLES | READS_BACK | NARROWS | (c->harmonics ? TAKES_FOURIER : 0)
+                      | (c->key_bytes ? HAS_KEY : 0) | (c->permits != NULL ? HAS_INTERLOCK : 0));
+    at[2] = c->window != 0 ? c->window : DAC_LINK_RING / 256;
+    at[3] = MOST_DATA;
+    at[4] = (uint8_t)c->harmonics;
+    at[5] = (uint8_t)(c->harmonics >> 8);
+    at[6] = at[7] = 0;
+    dac_link_put(at + 8, dac_link_most_bytes(c));
+    put_shape(at + 12, &c->x);
+    put_shape(at + 16, &c->y);
+    put_limits(at + 20, &c->x.limits);
+    put_limits(at + 36, &c->y.limits);
+    dac_link_put(at + 52, c->update_rate_hz);
+}
+
+static void put_status(const dac_link *l, uint8_t *at)
+{
+    const dac_status s = dac_sequencer_status(l->sequencer);
+    /* A swap that was not looked at yet has come into force all the same. */
+    const bool swapped = l->upload == DAC_LINK_WAITING && s.swaps != l->swaps;
+    const bool uploaded = swapped || l->uploaded;
+    const uint8_t upload = swapped ? (uint8_t)DAC_LINK_NONE : l->upload;
+    const uint8_t *const hash = uploaded ? l->image[swapped ? l->idle : l->playing].info : l->config->hash;
+
+    at[0] = s.swaps == 0 ? NO_PROGRAM : s.markers & DAC_PLAYING ? PLAYING : s.markers & DAC_PARKED ? PARKED : PARKING;
+    at[1] = upload;
+    at[2] = s.faults;
+    at[3] = dac_link_permits(l);
+    dac_link_put(at + 4, l->boot);
+    dac_link_put(at + 8, s.swaps);
+    dac_link_put(at + 12, s.line);
+    dac_link_put(at + 16, upload == DAC_LINK_NONE ? 0 : l->received);
+    dac_link_put(at + 20, upload == DAC_LINK_NONE ? 0 : dac_link_get(l->image[l->idle].info + DAC_LINK_IMAGE_CRC));
+    for (unsigned i = 0; i < DAC_FAULTS; i++)
+        dac_link_put(at + 24 + 4 * i, s.fault_counts[i]);
+    dac_link_put(at + 40, l->bad_frames);
+    for (unsigned i = 0; i < PROGRAM_HASH; i++)
+        at[44 + i] = hash == NULL || s.swaps == 0 ? 0 : hash[i];
+}
+
+/* Requests. */
+
+dac_link_finding dac_link_hello(dac_link *l, uint32_t session, dac_link_answer *a)
+{
+    if (!l->opened || session != l->session) {
+        l->opened = true;
+        l->session = session;
+        l->last.known = false;
+        l->commit_is_last = l->abort_is_last = false;
+    }
+    a->length = DEVICE + STATUS;
+    put_device(l, a->payload);
+    put_status(l, a->payload + DEVICE);
+    return dac_link_fine();
+}
+
+dac_link_finding dac_link_status(const dac_link *l, dac_link_answer *a)
+{
+    a->length = STATUS;
+    put_status(l, a->payload);
+    return dac_link_fine();
+}
+
+/* Without a source of random numbers: nobody without the key knows the next, and none comes twice if no `boot` does. */
+dac_link_finding dac_link_challenge(dac_link *l, dac_link_answer *a)
+{
+    if (l->config->random != NULL) {
+        l->config->random(l->nonce);
+    } else {
+        uint8_t count[8];
+        dac_link_mac m;
+        dac_link_put(count, l->boot);
+        dac_link_put(count + 4, ++l->challenges);
+        dac_link_mac_begin(&m, NONCE, l->config->key, l->config->key_bytes);
+        dac_link_mac_add(&m, count, sizeof count);
+        dac_link_mac_end(&m, l->nonce);
+    }
+    l->challenged = true;
+    a->length = NONCE;
+    dac_link_copy(a->payload, l->nonce, NONCE);
+    return dac_link_fine();
+}
+
+static uint32_t least(uint32_t a, uint32_t b)
+{
+    return a < b ? a : b;
+}
+
+static void narrow(dac_link_limits *limits, const dac_link_limits *most, const uint8_t *asked)
+{
+    const uint32_t code_min = dac_link_get(asked);
+
+    limits->code_min = code_min > most->code_min ? code_min : most->code_min;
+    limits->code_max = least(dac_link_get(asked + 4), most->code_max);
+    limits->max_step = least(dac_link_get(asked + 8), most->max_step);
+    limits->max_jump = least(dac_link_get(asked + 12), most->max_jump);
+}
+
+dac_link_finding dac_link_set_limits(dac_link *l, const uint8_t *payload, uint8_t length, dac_link_answer *a)
+{
+    if (length != 0) {
+        narrow(&l->x_limits, &l->config->x.limits, payload);
+        narrow(&l->y_limits, &l->config->y.limits, payload + LIMITS / 2);
+    }
+    a->length = LIMITS;
+    put_limits(a->payload, &l->x_limits);
+    put_limits(a->payload + LIMITS / 2, &l->y_limits);
+    return dac_link_fine();
+}

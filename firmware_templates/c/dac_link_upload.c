@@ -1,0 +1,222 @@
+/* Uploads: from BEGIN to the line on which the new program plays. */
+#include "dac_link_parts.h"
+
+dac_link_finding dac_link_begin(dac_link *l, const uint8_t *info, dac_link_answer *a)
+{
+    const dac_link_config *const c = l->config;
+    const uint32_t bytes = dac_link_get(info + DAC_LINK_BYTES), most = dac_link_most_bytes(c);
+
+    if (l->upload > DAC_LINK_RECEIVING || !dac_sequencer_writable(l->sequencer))
+        return dac_link_because(DAC_LINK_BUSY, 0);
+    for (unsigned axis = 0; axis < 2; axis++) {
+        const dac_link_axis *const here = dac_link_axis_of(l, axis);
+        const uint8_t *const shape = info + DAC_LINK_SHAPES + 4 * axis;
+        const bool fits = shape[0] == 0 || (shape[0] >= 3 && shape[0] <= here->index_bits);
+        if (!fits || shape[1] != here->word_bits || shape[2] != here->converter.bits)
+            return dac_link_because(DAC_LINK_SHAPE, axis);
+    }
+    if (bytes < DAC_LINK_PROGRAM || bytes > most)
+        return dac_link_because(DAC_LINK_LENGTH, most);
+    if (l->upload == DAC_LINK_NONE || !dac_link_same(info, l->image[l->idle].info, sizeof l->image[0].info)) {
+        const dac_link_place start = {0, 0, 0, 0};
+        l->idle = (uint8_t)dac_sequencer_idle(l->sequencer);
+        dac_link_copy(l->image[l->idle].info, info, sizeof l->image[0].info);
+        l->place = start;
+        l->received = 0;
+        l->upload = DAC_LINK_RECEIVING;
+    }
+    a->length = 4;
+    dac_link_put(a->payload, l->received);
+    return dac_link_fine();
+}
+
+dac_link_finding dac_link_data(dac_link *l, const uint8_t *payload, uint8_t length, dac_link_answer *a)
+{
+    const uint8_t count = (uint8_t)(length - 4);
+
+    if (l->upload == DAC_LINK_NONE)
+        return dac_link_because(DAC_LINK_UPLOAD, 0);
+    const uint32_t bytes = dac_link_get(l->image[l->idle].info + DAC_LINK_BYTES);
+    if (dac_link_get(payload) == l->received && count <= bytes - l->received)
+        for (uint8_t i = 0; i < count; i++) {
+            const dac_link_finding found = dac_link_store(l, payload[4 + i]);
+            if (found.reason != DAC_LINK_NO_REASON) {
+                l->upload = DAC_LINK_NONE;
+                return found;
+            }
+        }
+    a->length = 4;
+    dac_link_put(a->payload, l->received);
+    return dac_link_fine();
+}
+
+static void say_taken(const dac_link *l, uint8_t *payload)
+{
+    dac_link_put(payload, l->taken_generation);
+    dac_link_put(payload + 4, l->taken_line);
+}
+
+static void start_check(dac_link_check *c)
+{
+    unsigned char *const bytes = (unsigned char *)c;
+
+    for (size_t i = 0; i < sizeof *c; i++)
+        bytes[i] = 0;
+}
+
+dac_link_finding dac_link_commit(dac_link *l, const uint8_t *payload, uint8_t length, dac_link_answer *a)
+{
+    const uint32_t crc = dac_link_get(payload);
+
+    if (l->upload == DAC_LINK_NONE) {
+        if (!l->uploaded || dac_link_get(l->image[l->playing].info + DAC_LINK_IMAGE_CRC) != crc)
+            return dac_link_because(DAC_LINK_UPLOAD, 0);
+        a->length = 8;
+        say_taken(l, a->payload);
+        return dac_link_fine();
+    }
+    if (dac_link_get(l->image[l->idle].info + DAC_LINK_IMAGE_CRC) != crc)
+        return dac_link_because(DAC_LINK_UPLOAD, 0);
+    if (l->upload != DAC_LINK_RECEIVING)
+        return dac_link_because(DAC_LINK_BUSY, 0);
+    if (l->received != dac_link_get(l->image[l->idle].info + DAC_LINK_BYTES))
+        return dac_link_because(DAC_LINK_INCOMPLETE, l->received);
+    if (!dac_link_permits(l))
+        return dac_link_because(DAC_LINK_INTERLOCK, 0);
+    l->upload = DAC_LINK_CHECKING;
+    l->committing = l->commit_is_last = true;
+    l->commit_seq = l->last.seq;
+    l->commit_session = l->session;
+    l->commit_challenged = l->challenged;
+    l->challenged = false;
+    dac_link_copy(l->commit_nonce, l->nonce, sizeof l->nonce);
+    l->commit_tagged = length == 4 + DAC_LINK_TAG;
+    if (l->commit_tagged)
+        dac_link_copy(l->commit_tag, payload + 4, DAC_LINK_TAG);
+    start_check(&l->check);
+    a->type = DAC_LINK_SILENT;
+    return dac_link_fine();
+}
+
+/* The COMMIT at work has an answer; the upload stays or is forgotten. */
+static void conclude(dac_link *l, uint8_t upload, uint8_t type, const uint8_t *payload, uint8_t length)
+{
+    l->upload = upload;
+    l->committing = false;
+    l->commit_due = true;
+    l->commit_type = type;
+    l->commit_length = length;
+    dac_link_copy(l->commit_payload, payload, length);
+    if (l->commit_is_last)
+        dac_link_remember(l, type, payload, length);
+    l->commit_is_last = false;
+}
+
+static void conclude_refused(dac_link *l, dac_link_finding why)
+{
+    const bool stays = why.reason == DAC_LINK_INTERLOCK || why.reason == DAC_LINK_KEY || why.reason == DAC_LINK_TICKS;
+    uint8_t payload[6];
+    dac_link_answer a = {0, 0, 0, 0, payload};
+
+    if (why.reason == DAC_LINK_KEY && l->commit_is_last) { /* its number is still free */
+        l->last = l->before_commit;
+        l->commit_is_last = false;
+    }
+    dac_link_refuse(&a, DAC_LINK_COMMIT, why);
+    conclude(l, stays ? DAC_LINK_RECEIVING : DAC_LINK_NONE, a.type, payload, a.length);
+}
+
+/* A slice of the checks; behind the last the program is loaded and committed. */
+void dac_link_check_on(dac_link *l)
+{
+    bool passed = false;
+    dac_program program;
+    dac_link_finding found = dac_link_check_work(l, &passed);
+
+    if (passed) {
+        dac_link_program_of(l, &program);
+        const dac_loaded loaded = dac_sequencer_load(l->sequencer, &program);
+        const dac_status status = dac_sequencer_status(l->sequencer);
+        l->swaps = status.swaps;
+        l->line = status.line;
+        if (!dac_link_permits(l))
+            found = dac_link_because(DAC_LINK_INTERLOCK, 0);
+        else if (loaded != DAC_LOADED)
+            found = dac_link_because(DAC_LINK_REFUSED, (uint32_t)loaded);
+        else if (!dac_sequencer_commit(l->sequencer))
+            found = dac_link_because(DAC_LINK_TICKS, 0);
+        else
+            l->upload = DAC_LINK_WAITING;
+    }
+    if (found.reason != DAC_LINK_NO_REASON)
+        conclude_refused(l, found);
+}
+
+static void say_aborted(dac_link *l, uint32_t generation)
+{
+    l->aborts_due = true;
+    l->abort_generation = generation;
+    if (l->abort_is_last) {
+        uint8_t payload[4];
+        dac_link_put(payload, generation);
+        dac_link_remember(l, DAC_LINK_ABORT | DAC_LINK_ANSWER, payload, sizeof payload);
+    }
+    l->abort_is_last = false;
+}
+
+/* What became of a program that waits. */
+void dac_link_settle(dac_link *l)
+{
+    const dac_status status = dac_sequencer_status(l->sequencer);
+
+    /* Another look: if there was no swap even now, the line was one of the old program. */
+    if (dac_sequencer_status(l->sequencer).swaps != l->swaps) {
+        uint8_t payload[8];
+        l->taken_generation = l->swaps + 1;
+        l->taken_line = l->line;
+        l->playing = l->idle;
+        l->uploaded = true;
+        say_taken(l, payload);
+        conclude(l, DAC_LINK_NONE, DAC_LINK_COMMIT | DAC_LINK_ANSWER, payload, sizeof payload);
+    } else if (dac_sequencer_writable(l->sequencer) && dac_sequencer_status(l->sequencer).swaps == l->swaps) {
+        conclude_refused(l, dac_link_because(DAC_LINK_WITHDRAWN, 0));
+    } else {
+        l->line = status.line;
+        return;
+    }
+    if (l->aborts != 0)
+        say_aborted(l, dac_sequencer_status(l->sequencer).swaps);
+}
+
+dac_link_finding dac_link_abort(dac_link *l, dac_link_answer *a)
+{
+    if (l->upload == DAC_LINK_CHECKING || l->upload == DAC_LINK_WAITING) {
+        if (l->upload == DAC_LINK_WAITING && (l->aborts == DAC_LINK_ABORTS || !dac_sequencer_withdraw(l->sequencer)))
+            return dac_link_because(DAC_LINK_TICKS, 0);
+        l->abort_seq[l->aborts] = l->last.seq;
+        l->abort_session[l->aborts] = l->session;
+        l->aborts++;
+        l->abort_is_last = true;
+        a->type = DAC_LINK_SILENT;
+        if (l->upload == DAC_LINK_CHECKING) {
+            conclude_refused(l, dac_link_because(DAC_LINK_WITHDRAWN, 0));
+            say_aborted(l, dac_sequencer_status(l->sequencer).swaps);
+        }
+        return dac_link_fine();
+    }
+    l->upload = DAC_LINK_NONE;
+    a->length = 4;
+    dac_link_put(a->payload, dac_sequencer_status(l->sequencer).swaps);
+    return dac_link_fine();
+}
+
+dac_link_finding dac_link_readback(const dac_link *l, const uint8_t *payload, dac_link_answer *a)
+{
+    const uint32_t offset = dac_link_get(payload);
+
+    if (!l->uploaded)
+        return dac_link_because(DAC_LINK_READBACK, 0);
+    dac_link_put(a->payload, offset);
+    a->length = (uint8_t)(4 + dac_link_read_back(l, offset, a->payload + 4, payload[4]));
+    return dac_link_fine();
+}

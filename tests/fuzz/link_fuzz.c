@@ -1,0 +1,372 @@
+/* A whole device for libFuzzer: bytes from the line, ticks in between, and what has to hold whatever comes.
+ *
+ * An input is a byte of options and then commands:
+ *     0x00..0x3f           so many ticks
+ *     0x40 + type, n       a well-formed frame of this type with n bytes of payload, of the next number
+ *     0x50 + type, n       the same with the number of the last one
+ *     0x60, n              n bytes as they are
+ *     0x61, n              an upload of a good image with changes (place, difference) in n bytes; table or Fourier words
+ *     0x62                 its COMMIT
+ *     0x63, n              n times the main loop, and no more for the bytes that follow
+ *     0x64                 the interlock changes
+ *     0x65                 a reset
+ * Frames get their tags, so that a key keeps nobody from the states behind it.
+ */
+#include <stdlib.h>
+#include <string.h>
+
+#include "dac_link_parts.h"
+
+enum { X_BITS = 4, Y_BITS = 3, X_WORDS = 1 << X_BITS, Y_WORDS = 1 << Y_BITS, HARMONICS = 3 };
+enum { LINE_TICKS = 24, LINES = 3 };
+enum { WITH_KEY = 1, WITH_INTERLOCK = 2, WITHOUT_BOOT = 4, HURRIED = 8, FOURIER = 16 };
+enum { MOST_TICKS = 1500, CODE_MIN = 1000, CODE_MAX = 60000, MAX_STEP = 9000, MAX_JUMP = 60000, POWER_UP = 2000 };
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+
+#define REQUIRE(condition)                                                                                            \
+    do {                                                                                                              \
+        if (!(condition))                                                                                             \
+            abort();                                                                                                  \
+    } while (0)
+
+static dac_sequencer sequencer;
+static dac_link link_;
+static dac_word x_tables[2][X_WORDS], y_tables[2][Y_WORDS];
+static int32_t x_words[2 * HARMONICS + 1], y_words[2 * HARMONICS + 1];
+static int32_t sine[5 * X_WORDS / 4];
+static const uint8_t key[16] = {1, 2, 3};
+static const uint8_t hash[32] = {9};
+static bool permits;
+
+static dac_word boot_x[X_WORDS], boot_y[Y_WORDS];
+static dac_program boot;
+static uint8_t image[DAC_LINK_PROGRAM + 2 * (X_WORDS + Y_WORDS)];
+static uint8_t fourier[DAC_LINK_PROGRAM + 8 * (2 * HARMONICS + 1)];
+
+static bool permitted(void)
+{
+    return permits;
+}
+
+static dac_link_config config = {
+    .x = {{16, 16, false, false, POWER_UP}, {CODE_MIN, CODE_MAX, MAX_STEP, MAX_JUMP}, 16, X_BITS,
+          {x_tables[0], x_tables[1]}, x_words},
+    .y = {{16, 16, false, false, POWER_UP}, {CODE_MIN, CODE_MAX, MAX_STEP, MAX_JUMP}, 16, Y_BITS,
+          {y_tables[0], y_tables[1]}, y_words},
+    .harmonics = HARMONICS,
+    .sine_index_bits = X_BITS,
+    .sine = sine,
+    .key = key,
+    .hash = hash,
+};
+
+/* A good program and its two images, made once. */
+
+static void put_words(uint8_t *at, const uint32_t *words, unsigned count)
+{
+    for (unsigned i = 0; i < count; i++)
+        dac_link_put(at + 4 * i, words[i]);
+}
+
+static void put_axis(uint8_t *page, uint32_t period, uint32_t harmonics)
+{
+    const uint64_t whole = UINT64_C(1) << 32, offset = UINT64_C(30000) << 20;
+    const uint32_t words[] = {(uint32_t)(whole / period), (uint32_t)(whole % period), period, 40000,
+                              (uint32_t)(offset & 0x3FFFF), (uint32_t)(offset >> 18), 2000, 58000, 8000, 20000, harmonics};
+    put_words(page, words, sizeof words / sizeof words[0]);
+}
+
+static void put_program(uint8_t *bytes, uint32_t harmonics)
+{
+    const uint32_t scan[] = {LINE_TICKS, LINES, 1, 12, 2, 8, 14, 8, 0, 2, 0, 0, 4, 0};
+    put_words(bytes, scan, sizeof scan / sizeof scan[0]);
+    put_axis(bytes + 64, LINE_TICKS, harmonics);
+    put_axis(bytes + 128, LINE_TICKS * LINES, harmonics);
+}
+
+static void furnish(void)
+{
+    /* sin(2 pi k / 16) in Q2.30 */
+    static const int32_t quarter[] = {0, 410903207, 759250125, 992008094, 1073741824};
+    for (int k = 0; k < 5 * X_WORDS / 4; k++) {
+        const int at = k % 8 <= 4 ? k % 8 : 8 - k % 8;
+        sine[k] = k % 16 < 8 ? quarter[at] : -quarter[at];
+    }
+    for (int k = 0; k < X_WORDS; k++)
+        boot_x[k] = (dac_word)(1500 * (k < 8 ? k : 16 - k) - 6000);
+    for (int k = 0; k < Y_WORDS; k++)
+        boot_y[k] = (dac_word)(1000 * k - 4000);
+    put_program(image, 0);
+    put_program(fourier, HARMONICS);
+    for (int k = 0; k < X_WORDS + Y_WORDS; k++) {
+        const uint16_t word = (uint16_t)(k < X_WORDS ? boot_x[k] / 2 : boot_y[k - X_WORDS]);
+        image[DAC_LINK_PROGRAM + 2 * k] = (uint8_t)word;
+        image[DAC_LINK_PROGRAM + 2 * k + 1] = (uint8_t)(word >> 8);
+    }
+    for (int k = 0; k < 2 * (2 * HARMONICS + 1); k++)
+        dac_link_put(fourier + DAC_LINK_PROGRAM + 4 * k, (uint32_t)(80000000 - 11000000 * k));
+}
+
+/* What has to hold. */
+
+static struct {
+    int32_t x, y; /* the codes of the last tick */
+    uint8_t markers;
+    uint32_t ticks, line_ticks; /* of the line so far, and of the whole line */
+    uint32_t swaps;
+    dac_word x_table[X_WORDS], y_table[Y_WORDS]; /* of the program that plays, as it was taken */
+    dac_link_reader reader;
+} watched;
+
+static void keep_table(dac_word *copy, const dac_bank_axis *axis)
+{
+    memcpy(copy, axis->table, (axis->last + 1) * sizeof *copy);
+}
+
+static void watch_memory(void)
+{
+    const dac_bank *const bank = sequencer.now;
+
+    if (bank == NULL)
+        return;
+    REQUIRE(bank->x.last < X_WORDS && bank->y.last < Y_WORDS);
+    if (sequencer.swaps != watched.swaps) {
+        watched.swaps = sequencer.swaps;
+        REQUIRE(bank->x.code_min >= CODE_MIN && bank->x.code_max <= CODE_MAX && bank->x.max_step <= MAX_STEP);
+        REQUIRE(bank->y.code_min >= CODE_MIN && bank->y.code_max <= CODE_MAX && bank->y.max_step <= MAX_STEP);
+        keep_table(watched.x_table, &bank->x);
+        keep_table(watched.y_table, &bank->y);
+    }
+    REQUIRE(memcmp(watched.x_table, bank->x.table, (bank->x.last + 1) * sizeof(dac_word)) == 0);
+    REQUIRE(memcmp(watched.y_table, bank->y.table, (bank->y.last + 1) * sizeof(dac_word)) == 0);
+}
+
+/* `requests`: that acted before it. */
+static void watch_tick(const dac_tick *tick, unsigned requests)
+{
+    const int32_t x = tick->x, y = tick->y;
+
+    REQUIRE(x >= CODE_MIN && x <= CODE_MAX && y >= CODE_MIN && y <= CODE_MAX);
+    REQUIRE(abs(x - watched.x) <= MAX_STEP && abs(y - watched.y) <= MAX_STEP);
+    REQUIRE((tick->markers & (DAC_SWAPPED | DAC_PLAYING | DAC_LINE)) != (DAC_SWAPPED | DAC_PLAYING));
+    /* A line is whole, and of one program, unless the scan was stopped and started again. */
+    if ((tick->markers & DAC_LINE) != 0) {
+        REQUIRE((watched.markers & DAC_PLAYING) == 0 || requests > 1 || watched.ticks == watched.line_ticks);
+        watched.ticks = 0;
+        watched.line_ticks = sequencer.now->schedule.line_ticks;
+    }
+    watched.ticks++;
+    watched.markers = tick->markers;
+    watched.x = x;
+    watched.y = y;
+    watch_memory();
+}
+
+static void work(unsigned most)
+{
+    int byte;
+
+    for (bool more = true; more && most != 0; most--) {
+        more = dac_link_work(&link_);
+        watch_memory();
+        while ((byte = dac_link_transmit(&link_)) >= 0) {
+            REQUIRE(dac_link_read_byte(&watched.reader, (uint8_t)byte) != DAC_LINK_BAD);
+            more = true;
+        }
+    }
+}
+
+static unsigned tick(unsigned ticks)
+{
+    for (unsigned i = 0; i < ticks; i++) {
+        const unsigned requests = (uint8_t)(sequencer.head - sequencer.tail);
+        dac_tick one;
+        dac_sequencer_step(&sequencer, &one);
+        watch_tick(&one, requests);
+        work(4);
+    }
+    return ticks;
+}
+
+/* What is said. */
+
+static void start(uint8_t options, uint32_t count)
+{
+    config.key_bytes = options & WITH_KEY ? sizeof key : 0;
+    config.permits = options & WITH_INTERLOCK ? permitted : NULL;
+    dac_sequencer_init(&sequencer, &config.x.converter, &config.y.converter);
+    dac_link_init(&link_, &config, &sequencer, count);
+    memset(&watched, 0, sizeof watched);
+    watched.x = watched.y = POWER_UP;
+    permits = true;
+    if (!(options & WITHOUT_BOOT))
+        REQUIRE(dac_sequencer_load(&sequencer, &boot) == DAC_LOADED && dac_sequencer_commit(&sequencer));
+}
+
+static bool hurried;
+
+static void feed(const uint8_t *bytes, size_t count)
+{
+    for (size_t i = 0; i < count; i++) {
+        dac_link_receive(&link_, bytes[i]);
+        if (!hurried && i % 64 == 63)
+            work(UINT32_MAX);
+    }
+    work(hurried ? 1 : UINT32_MAX);
+}
+
+static void say(uint8_t type, uint8_t seq, const uint8_t *payload, uint8_t count)
+{
+    uint8_t wire[260];
+
+    wire[1] = type;
+    wire[2] = seq;
+    dac_link_put(wire + 3, 77);
+    memcpy(wire + 7, payload, count);
+    feed(wire, dac_link_seal(wire, (uint16_t)(6 + count)));
+}
+
+static void hello(void)
+{
+    static const uint8_t version = 1;
+    say(DAC_LINK_HELLO, 0, &version, 1);
+}
+
+/* With the tag that it needs. */
+static void say_tagged(uint8_t type, uint8_t seq, const uint8_t *payload, uint8_t count, const uint8_t *digest)
+{
+    uint8_t whole[6 + 244 + 16];
+    dac_link_mac m;
+
+    if (config.key_bytes == 0 || count > 200) {
+        say(type, seq, payload, count);
+        return;
+    }
+    say(DAC_LINK_CHALLENGE, 0, payload, 0);
+    whole[0] = type;
+    whole[1] = seq;
+    dac_link_put(whole + 2, 77);
+    memcpy(whole + 6, payload, count);
+    dac_link_mac_begin(&m, 16, key, sizeof key);
+    dac_link_mac_add(&m, link_.nonce, 16);
+    dac_link_mac_add(&m, whole, (uint8_t)(6 + count));
+    if (digest != NULL)
+        dac_link_mac_add(&m, digest, 32);
+    dac_link_mac_end(&m, whole + 6 + count);
+    say(type, seq, whole + 6, (uint8_t)(count + 16));
+}
+
+static uint8_t sent[sizeof fourier > sizeof image ? sizeof fourier : sizeof image];
+static size_t sent_bytes;
+
+static void upload(bool as_fourier, const uint8_t *changes, size_t count)
+{
+    uint8_t info[48] = {0}, part[4 + 240];
+    const uint8_t shapes[] = {X_BITS, 16, 16, 0, Y_BITS, 16, 16, 0};
+    uint32_t crc = DAC_LINK_CRC;
+
+    sent_bytes = as_fourier ? sizeof fourier : sizeof image;
+    memcpy(sent, as_fourier ? fourier : image, sent_bytes);
+    for (size_t i = 0; i + 1 < count; i += 2)
+        sent[changes[i] % sent_bytes] = (uint8_t)(sent[changes[i] % sent_bytes] + changes[i + 1]);
+    for (size_t i = 0; i < sent_bytes; i++)
+        crc = dac_link_crc(crc, sent[i]);
+    dac_link_put(info + 32, (uint32_t)sent_bytes);
+    dac_link_put(info + 36, ~crc);
+    memcpy(info + 40, shapes, sizeof shapes);
+    say(DAC_LINK_BEGIN, 0, info, sizeof info);
+    for (size_t at = 0; at < sent_bytes; at += 101) {
+        const uint8_t some = (uint8_t)(sent_bytes - at < 101 ? sent_bytes - at : 101);
+        dac_link_put(part, (uint32_t)at);
+        memcpy(part + 4, sent + at, some);
+        say(DAC_LINK_DATA, 0, part, (uint8_t)(4 + some));
+    }
+}
+
+static void commit(uint8_t seq)
+{
+    uint8_t payload[4], digest[32];
+    uint32_t crc = DAC_LINK_CRC;
+    dac_link_mac m;
+
+    dac_link_mac_begin(&m, 32, NULL, 0);
+    for (size_t i = 0; i < sent_bytes; i++) {
+        crc = dac_link_crc(crc, sent[i]);
+        dac_link_mac_byte(&m, sent[i]);
+    }
+    dac_link_mac_end(&m, digest);
+    dac_link_put(payload, ~crc);
+    say_tagged(DAC_LINK_COMMIT, seq, payload, 4, digest);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    static bool furnished;
+    uint8_t seq = 0, options;
+    unsigned ticks = 0;
+    uint32_t starts = 0;
+
+    if (size == 0)
+        return 0;
+    options = *data++;
+    size--;
+    if (!furnished) {
+        furnish();
+        /* The program of the firmware is what an upload of the good image would be. */
+        start(WITHOUT_BOOT, 0);
+        hurried = false;
+        hello();
+        upload(false, NULL, 0);
+        dac_link_program_of(&link_, &boot);
+        boot.x.table = boot_x;
+        boot.y.table = boot_y;
+        furnished = true;
+    }
+    start(options, starts++);
+    hurried = (options & HURRIED) != 0;
+    sent_bytes = 0;
+    hello();
+    while (size != 0 && ticks < MOST_TICKS) {
+        const uint8_t command = *data++;
+        size_t count;
+        size--;
+        if (command < 0x40) {
+            ticks += tick(command);
+            continue;
+        }
+        if (command == 0x62) {
+            commit(++seq);
+            continue;
+        }
+        if (command == 0x64) {
+            permits = !permits;
+            continue;
+        }
+        if (command == 0x65) {
+            start(options, starts++);
+            hello();
+            continue;
+        }
+        if (size == 0)
+            break;
+        count = *data++;
+        size--;
+        if (command == 0x63) {
+            work((unsigned)count);
+            continue;
+        }
+        count = count < size ? count : size;
+        if (command < 0x60)
+            say_tagged(command & 15, command < 0x50 ? ++seq : seq, data, (uint8_t)(count < 228 ? count : 228), NULL);
+        else if (command == 0x61)
+            upload((options & FOURIER) != 0, data, count);
+        else
+            feed(data, count);
+        data += count;
+        size -= count;
+    }
+    tick(40);
+    work(UINT32_MAX);
+    return 0;
+}

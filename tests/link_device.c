@@ -1,0 +1,197 @@
+/* A whole device on this machine. */
+#include "link_device.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* Interlocks have no argument: that of the device which works now. */
+static bool permits_now;
+
+static bool permits(void)
+{
+    return permits_now;
+}
+
+static void *place(size_t count, size_t size)
+{
+    void *const memory = calloc(count, size);
+    if (memory == NULL)
+        abort();
+    return memory;
+}
+
+static void furnish(dac_link_axis *axis, const dac_converter *converter, const uint32_t *limits, uint8_t word_bits,
+                    uint8_t index_bits, uint16_t harmonics)
+{
+    axis->converter = *converter;
+    axis->limits.code_min = limits[0];
+    axis->limits.code_max = limits[1];
+    axis->limits.max_step = limits[2];
+    axis->limits.max_jump = limits[3];
+    axis->word_bits = word_bits;
+    axis->index_bits = index_bits;
+    for (unsigned i = 0; i < 2; i++)
+        axis->table[i] = place((size_t)1 << index_bits, sizeof(dac_word));
+    axis->fourier = place(2u * harmonics + 1, sizeof(int32_t));
+}
+
+device *device_new(const device_setup *setup, uint32_t boot)
+{
+    device *const d = place(1, sizeof *d);
+    dac_link_config *const c = &d->config;
+
+    d->setup = *setup;
+    furnish(&c->x, &setup->x_converter, setup->x_limits, setup->x_word_bits, setup->x_index_bits, setup->harmonics);
+    furnish(&c->y, &setup->y_converter, setup->y_limits, setup->y_word_bits, setup->y_index_bits, setup->harmonics);
+    c->harmonics = setup->harmonics;
+    c->sine = setup->sine;
+    c->sine_index_bits = setup->sine_index_bits;
+    c->update_rate_hz = setup->update_rate_hz;
+    c->window = setup->window;
+    c->key = d->setup.key;
+    c->key_bytes = setup->key_bytes;
+    c->hash = setup->knows_hash ? d->setup.hash : NULL;
+    c->permits = setup->has_interlock ? permits : NULL;
+    c->random = setup->random;
+    d->permits = true;
+    device_start(d, boot);
+    return d;
+}
+
+void device_delete(device *d)
+{
+    for (unsigned i = 0; i < 2; i++) {
+        free(d->config.x.table[i]);
+        free(d->config.y.table[i]);
+    }
+    free(d->config.x.fourier);
+    free(d->config.y.fourier);
+    free(d->record);
+    free(d);
+}
+
+void device_start(device *d, uint32_t boot)
+{
+    memset(&d->log, 0, sizeof d->log);
+    d->sent = 0;
+    d->boot = boot;
+    dac_sequencer_init(&d->sequencer, &d->config.x.converter, &d->config.y.converter);
+    dac_link_init(&d->link, &d->config, &d->sequencer, boot);
+    if (d->setup.boot_program == NULL)
+        return;
+    if (dac_sequencer_load(&d->sequencer, d->setup.boot_program) != DAC_LOADED || !dac_sequencer_commit(&d->sequencer))
+        abort();
+}
+
+void device_permit(device *d, bool permitted)
+{
+    d->permits = permitted;
+}
+
+/* Nothing leaves. */
+void device_stall(device *d, bool stalled)
+{
+    d->stalled = stalled;
+}
+
+/* Into the ring; returns how many had room. */
+size_t device_feed(device *d, const uint8_t *bytes, size_t count)
+{
+    size_t taken = 0;
+    for (size_t i = 0; i < count; i++)
+        taken += dac_link_receive(&d->link, bytes[i]);
+    return taken;
+}
+
+/* The main loop, so many times, or until there is nothing to do; returns how many times it went round. */
+unsigned device_run(device *d, unsigned most)
+{
+    unsigned times = 0;
+    int byte;
+
+    permits_now = d->permits;
+    for (bool more = true; more && times != most; times++) {
+        more = dac_link_work(&d->link);
+        while (!d->stalled && (byte = dac_link_transmit(&d->link)) >= 0) {
+            if (d->sent == OUT)
+                abort();
+            d->out[d->sent++] = (uint8_t)byte;
+            more = true;
+        }
+    }
+    return times;
+}
+
+/* So many samples, after each of them the main loop at most `work` times. */
+void device_tick(device *d, uint32_t ticks, unsigned work)
+{
+    for (; ticks != 0; ticks--) {
+        dac_tick tick;
+        line_record ended;
+        const uint8_t faults = dac_sequencer_status(&d->sequencer).faults;
+        dac_sequencer_step(&d->sequencer, &tick);
+        if (line_tick(&d->log, tick.x, tick.y, tick.markers, faults, &ended)) {
+            if (d->records == d->room) {
+                d->room = 2 * d->room + 64;
+                d->record = realloc(d->record, d->room * sizeof *d->record);
+                if (d->record == NULL)
+                    abort();
+            }
+            d->record[d->records++] = ended;
+        }
+        device_run(d, work);
+    }
+}
+
+size_t device_take(device *d, uint8_t *bytes)
+{
+    const size_t sent = d->sent;
+    if (bytes != NULL) {
+        memcpy(bytes, d->out, sent);
+        d->sent = 0;
+    }
+    return sent;
+}
+
+size_t device_records(device *d, line_record *records)
+{
+    const size_t count = d->records;
+    if (records != NULL && count != 0) {
+        memcpy(records, d->record, count * sizeof *records);
+        d->records = 0;
+    }
+    return count;
+}
+
+/* Damage to the memory of the upload in hand. */
+void device_poke(device *d, unsigned axis, uint32_t word, int32_t value)
+{
+    const dac_link_part *const part = axis == 0 ? &d->link.x_part : &d->link.y_part;
+    const dac_link_axis *const here = dac_link_axis_of(&d->link, axis);
+    if (part->harmonics != 0)
+        here->fourier[word] = value;
+    else
+        here->table[d->link.idle][word] = (dac_word)value;
+}
+
+void device_report(device *d, uint8_t fault)
+{
+    dac_sequencer_report(&d->sequencer, fault);
+}
+
+uint32_t device_lost(const device *d)
+{
+    return d->link.lost;
+}
+
+int32_t device_table(const device *d, unsigned axis, unsigned which, uint32_t word)
+{
+    return dac_link_axis_of(&d->link, axis)->table[which][word];
+}
+
+size_t device_sizes(unsigned which)
+{
+    const size_t sizes[] = {sizeof(line_record), sizeof(device_setup), sizeof(dac_link), DAC_LINK_RING,
+                            sizeof(dac_link_mac)};
+    return sizes[which];
+}

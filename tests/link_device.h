@@ -1,0 +1,54 @@
+/* A whole device on this machine, for tests: sequencer, link, memory for two programs, and a record of every line. */
+#ifndef LINK_DEVICE_H
+#define LINK_DEVICE_H
+
+#include "dac_link_parts.h"
+#include "lines.h"
+
+enum { OUT = 1 << 20 };
+
+typedef struct {
+    dac_converter x_converter, y_converter;
+    uint32_t x_limits[4], y_limits[4];
+    uint8_t x_word_bits, x_index_bits, y_word_bits, y_index_bits;
+    uint16_t harmonics;
+    uint8_t sine_index_bits, window;
+    uint32_t update_rate_hz;
+    uint8_t key_bytes, key[32];
+    uint8_t knows_hash, hash[32];
+    uint8_t has_interlock;
+    void (*random)(uint8_t bytes[16]); /* or NULL */
+    const int32_t *sine;
+    const dac_program *boot_program; /* or NULL */
+} device_setup;
+
+typedef struct {
+    device_setup setup;
+    dac_link_config config;
+    dac_sequencer sequencer;
+    dac_link link;
+    line_log log;
+    uint32_t boot;
+    bool permits, stalled;
+    size_t records, room, sent;
+    line_record *record;
+    uint8_t out[OUT];
+} device;
+
+device *device_new(const device_setup *setup, uint32_t boot);
+void device_delete(device *d);
+void device_start(device *d, uint32_t boot);
+void device_permit(device *d, bool permits);
+size_t device_feed(device *d, const uint8_t *bytes, size_t count);
+unsigned device_run(device *d, unsigned most);
+void device_tick(device *d, uint32_t ticks, unsigned work);
+size_t device_take(device *d, uint8_t *bytes);
+size_t device_records(device *d, line_record *records);
+void device_poke(device *d, unsigned axis, uint32_t word, int32_t value);
+void device_report(device *d, uint8_t fault);
+uint32_t device_lost(const device *d);
+size_t device_sizes(unsigned which);
+int32_t device_table(const device *d, unsigned axis, unsigned place, uint32_t word);
+void device_stall(device *d, bool stalled);
+
+#endif

@@ -1,0 +1,300 @@
+"""The C link and sequencer as a whole device on this machine: bytes in, bytes out, ticks, and the lines that it plays.
+
+``HostDevice`` is firmware without wires: ``tests/link_device.c`` around the shipped runtime, compiled once a process.
+"""
+
+import atexit
+import ctypes
+import shutil
+import tempfile
+from collections.abc import Callable, Iterable, Sequence
+from ctypes import CFUNCTYPE, POINTER, Structure, c_bool, c_int32, c_size_t, c_uint8, c_uint16, c_uint32, c_void_p
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from building import REPOSITORY
+from c_library import OPTIONS, Converter, CProgram, Library, compile_library, converter_of
+from link_talk import Talk
+
+from tablegen.fixedpoint.output import Output
+from tablegen.fixedpoint.synthesis import sine_periods
+from tablegen.link.image import make_image
+from tablegen.link.messages import AxisLimits
+from tablegen.resources import c_link, c_runtime
+from tablegen.sequencer import DualProgram
+
+HERE = Path(__file__).parent
+LINES = REPOSITORY / "examples" / "firmware" / "cortex_m"
+SANITIZED = ("-std=c99", "-O1", "-g", "-fsanitize=undefined,address", "-fno-sanitize-recover=all")
+_UNTIL_IDLE = 0xFFFFFFFF
+
+
+class Line(NamedTuple):
+    """A line that was played. ``crc`` is CRC-32 over x u32, y u32, markers u8 of every tick; ``markers`` are or-ed."""
+
+    generation: int
+    line: int
+    ticks: int
+    crc: int
+    markers: int
+    faults: int
+
+
+class _Record(Structure):
+    _fields_ = (
+        *((name, c_uint32) for name in ("generation", "line", "ticks", "crc")),
+        *((name, c_uint8) for name in ("markers", "faults")),
+    )
+
+
+_Random = CFUNCTYPE(None, POINTER(c_uint8))
+
+
+class _Setup(Structure):
+    _fields_ = (
+        ("x_converter", Converter),
+        ("y_converter", Converter),
+        ("x_limits", c_uint32 * 4),
+        ("y_limits", c_uint32 * 4),
+        *((name, c_uint8) for name in ("x_word_bits", "x_index_bits", "y_word_bits", "y_index_bits")),
+        ("harmonics", c_uint16),
+        ("sine_index_bits", c_uint8),
+        ("window", c_uint8),
+        ("update_rate_hz", c_uint32),
+        ("key_bytes", c_uint8),
+        ("key", c_uint8 * 32),
+        ("knows_hash", c_uint8),
+        ("hash", c_uint8 * 32),
+        ("has_interlock", c_uint8),
+        ("random", _Random),
+        ("sine", POINTER(c_int32)),
+        ("boot_program", POINTER(CProgram)),
+    )
+
+
+def compile_device(
+    path: Path,
+    bits: int = 16,
+    options: Sequence[str] = OPTIONS,
+    compiler: Sequence[str] = ("gcc",),
+    sources: Iterable[Path] | None = None,
+    more: Sequence[str] = (),
+) -> Path:
+    """The device as a shared library; ``bits`` of storage, ``sources`` in place of the shipped runtime and link.
+
+    ``options=SANITIZED`` needs the sanitizer's runtime in LD_PRELOAD of the process that loads it.
+    """
+    runtime = list(sources) if sources is not None else [*c_runtime(), *c_link()]
+    probe = HERE / "link_device.c"
+    return compile_library(
+        path, bits, bits, compiler=compiler, options=options, runtime=runtime, more=[f"-I{LINES}", probe, *more]
+    )
+
+
+class DeviceLibrary(Library):
+    """A compiled device."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        self.dll.device_new.restype = c_void_p
+        for name in ("device_feed", "device_take", "device_records", "device_sizes"):
+            getattr(self.dll, name).restype = c_size_t
+        self.dll.device_run.restype = self.dll.device_lost.restype = c_uint32
+        self.dll.device_table.restype = c_int32
+        assert self.dll.device_sizes(0) == ctypes.sizeof(_Record)
+        assert self.dll.device_sizes(1) == ctypes.sizeof(_Setup)
+
+    @property
+    def ring(self) -> int:
+        """Bytes that wait for the main loop."""
+        return int(self.dll.device_sizes(3))
+
+
+@cache
+def device_library(bits: int = 16) -> DeviceLibrary:
+    """The device as it ships, compiled once a process; for words of up to 16 bits, or of up to 24 (``bits=32``)."""
+    folder = Path(tempfile.mkdtemp(prefix="link_device_"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return DeviceLibrary(compile_device(folder / "device.so", bits))
+
+
+def widest(output: Output) -> AxisLimits:
+    """Limits that let every program of a converter pass."""
+    return AxisLimits(0, (1 << output.dac_bits) - 1, (1 << 24) - 1, (1 << 24) - 1)
+
+
+class HostDevice:
+    """A device whose converters are those of ``like`` and which boots into ``boot``, if that is not None.
+
+    ``index_bits`` of the longest tables of x and y default to those of ``like``, ``limits`` to all that its converters
+    can do, ``library`` to ``device_library()``. Nonces come from key and boot count, or from ``nonces``.
+    ``permits`` is the input of the interlock, if it has one.
+    """
+
+    def __init__(
+        self,
+        like: DualProgram,
+        boot: DualProgram | None = None,
+        *,
+        library: DeviceLibrary | None = None,
+        limits: tuple[AxisLimits, AxisLimits] | None = None,
+        index_bits: tuple[int, int] | None = None,
+        harmonics: int = 64,
+        window: int = 0,
+        update_rate_hz: int = 0,
+        key: bytes = b"",
+        boot_hash: bytes | None = None,
+        interlock: bool = False,
+        boot_count: int = 0,
+        power_up: tuple[int, int] = (0, 0),
+        nonces: Callable[[], bytes] | None = None,
+    ) -> None:
+        bits = 16 if max(like.x.bits, like.y.bits, like.x.output.word_bits, like.y.output.word_bits) <= 16 else 32
+        self.library = library or device_library(bits)
+        self._dll = self.library.dll
+        self.boot_count = boot_count
+        self._permits = True
+        self._boot = boot
+        self.notes: list[str] | None = None
+        x_limits, y_limits = limits or (widest(like.x.output), widest(like.y.output))
+        x_index, y_index = index_bits or (like.x.index_bits, like.y.index_bits)
+        sine_bits = max(x_index, y_index, 3)
+        sine = sine_periods(sine_bits)
+        self._sine = (c_int32 * len(sine))(*sine.tolist())
+        setup = _Setup(
+            x_converter=converter_of(like.x.output, power_up[0]),
+            y_converter=converter_of(like.y.output, power_up[1]),
+            x_limits=_four(x_limits),
+            y_limits=_four(y_limits),
+            x_word_bits=like.x.bits,
+            x_index_bits=x_index,
+            y_word_bits=like.y.bits,
+            y_index_bits=y_index,
+            harmonics=harmonics,
+            sine_index_bits=sine_bits,
+            window=window,
+            update_rate_hz=update_rate_hz,
+            key_bytes=len(key),
+            knows_hash=boot_hash is not None,
+            has_interlock=interlock,
+            sine=self._sine,
+        )
+        setup.key[: len(key)] = key
+        if boot_hash is not None:
+            setup.hash[:] = boot_hash
+        if boot is not None:
+            program, self._axes = self.library.program(boot)
+            setup.boot_program = ctypes.pointer(program)
+        if nonces is not None:
+            self._random = setup.random = _Random(lambda to: ctypes.memmove(to, nonces(), 16))
+        self._setup = setup
+        self._device = c_void_p(self._dll.device_new(ctypes.byref(setup), c_uint32(boot_count)))
+
+    def __del__(self) -> None:
+        if hasattr(self, "_device"):
+            self._dll.device_delete(self._device)
+
+    def receive(self, data: bytes) -> None:
+        """Bytes from the line, each of them with time enough for the main loop."""
+        for at in range(0, len(data), 256):
+            part = data[at : at + 256]
+            assert self._feed(part) == len(part)
+            self._work()
+            self._note(f"r {part.hex()}")
+
+    def feed(self, data: bytes) -> int:
+        """Bytes from the line while the main loop is elsewhere; returns how many the ring had room for."""
+        self._note(f"f {data.hex()}")
+        return self._feed(data)
+
+    def work(self, most: int = _UNTIL_IDLE) -> int:
+        """The main loop, until it has nothing to do or has gone round so often; returns how often."""
+        self._note(f"w {most}")
+        return self._work(most)
+
+    def stall(self, stalled: bool) -> None:
+        """Whether nothing can leave."""
+        self._note(f"s {int(stalled)}")
+        self._dll.device_stall(self._device, c_bool(stalled))
+
+    def _feed(self, data: bytes) -> int:
+        return int(self._dll.device_feed(self._device, data, c_size_t(len(data))))
+
+    def _work(self, most: int = _UNTIL_IDLE) -> int:
+        return int(self._dll.device_run(self._device, c_uint32(most)))
+
+    def _note(self, what: str) -> None:
+        if self.notes is not None:
+            self.notes.append(what)
+
+    def take_notes(self) -> None:
+        """From now on write down what is done with the device, in ``notes``, as ``link_replay.c`` reads it."""
+        setup = self._setup
+        numbers: list[int] = []
+        for name, *_ in _Setup._fields_[:-3]:
+            value = getattr(setup, name)
+            fields = [getattr(value, each) for each, *_ in value._fields_] if isinstance(value, Structure) else value
+            numbers += [fields] if isinstance(fields, int) else list(fields)
+        self.notes = [
+            " ".join(map(str, ["S", *map(int, numbers), self.boot_count])),
+            " ".join(map(str, ["Q", *self._sine])),
+        ]
+        if self._boot is not None:
+            talk = Talk()
+            upload = b"".join([talk.hello(), *talk.upload(make_image(self._boot, bytes(32).hex()))])
+            self.notes.append(f"B {upload.hex()}")
+
+    def transmit(self) -> bytes:
+        """What has left since the last call."""
+        buffer = ctypes.create_string_buffer(max(int(self._dll.device_take(self._device, None)), 1))
+        count = int(self._dll.device_take(self._device, buffer))
+        return buffer.raw[:count]
+
+    def tick(self, ticks: int = 1, work: int = _UNTIL_IDLE) -> None:
+        """So many samples, after each of them the main loop."""
+        self._note(f"t {ticks} {work}")
+        self._dll.device_tick(self._device, c_uint32(ticks), c_uint32(work))
+
+    def lines(self) -> list[Line]:
+        """The lines that ended since the last call."""
+        count = int(self._dll.device_records(self._device, None))
+        records = (_Record * max(count, 1))()
+        self._dll.device_records(self._device, records)
+        return [Line(*(getattr(record, name) for name in Line._fields)) for record in records[:count]]
+
+    def reboot(self) -> None:
+        """Reset: nothing is left but what is in the firmware, and the next boot count."""
+        self.boot_count = (self.boot_count + 1) & 0xFFFFFFFF
+        self._note(f"b {self.boot_count}")
+        self._dll.device_start(self._device, c_uint32(self.boot_count))
+
+    def poke(self, axis: int, word: int, value: int) -> None:
+        """Damage a word of the upload in hand: of its table, or of its Fourier words."""
+        self._note(f"k {axis} {word} {value}")
+        self._dll.device_poke(self._device, axis, c_uint32(word), c_int32(value))
+
+    @property
+    def permits(self) -> bool:
+        """The input of the interlock."""
+        return self._permits
+
+    @permits.setter
+    def permits(self, permits: bool) -> None:
+        self._permits = permits
+        self._note(f"p {int(permits)}")
+        self._dll.device_permit(self._device, c_bool(permits))
+
+    def report(self, fault: int) -> None:
+        """A fault that the driver of the converters saw."""
+        self._dll.device_report(self._device, c_uint8(fault))
+
+    @property
+    def lost(self) -> int:
+        """Bytes that the ring had no room for."""
+        return int(self._dll.device_lost(self._device))
+
+
+def _four(limits: AxisLimits) -> Any:
+    return (c_uint32 * 4)(*np.array([limits.code_min, limits.code_max, limits.max_step, limits.max_jump]).tolist())

@@ -1,0 +1,154 @@
+/* Does with a device what link_device.py wrote down that it did with one, and prints what leaves it. For other
+ * processors and compilers. Each line of the input is a letter and what belongs to it:
+ *     S numbers    what the device is: the fields of device_setup, the boot count last
+ *     Q numbers    the sine
+ *     B hex        what uploads the program that it boots with
+ *     r hex        bytes from the line; f hex  the same, and the main loop does not go round
+ *     w n, t n k   the main loop n times; n ticks, after each the main loop at most k times
+ *     p, s, b, k   interlock, line stalled, reset with a boot count, a damaged word
+ */
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "link_device.h"
+
+enum { LONGEST = 1 << 18, SINES = 5 << 14 };
+
+static char line[LONGEST];
+static uint8_t bytes[LONGEST];
+static int32_t sine[SINES];
+static dac_word boot_x[1 << 16], boot_y[1 << 16];
+static dac_program boot;
+static char *at;
+
+static long number(void)
+{
+    return strtol(at, &at, 10);
+}
+
+static size_t hexadecimal(void)
+{
+    size_t count = 0;
+    unsigned byte;
+
+    for (at++; sscanf(at, "%2x", &byte) == 1; at += 2)
+        bytes[count++] = (uint8_t)byte;
+    return count;
+}
+
+static void read_converter(dac_converter *c)
+{
+    c->bits = (uint8_t)number();
+    c->word_bits = (uint8_t)number();
+    c->twos_complement = number() != 0;
+    c->left_aligned = number() != 0;
+    c->power_up_code = (int32_t)number();
+}
+
+static uint32_t read_setup(device_setup *s)
+{
+    read_converter(&s->x_converter);
+    read_converter(&s->y_converter);
+    for (int i = 0; i < 4; i++)
+        s->x_limits[i] = (uint32_t)strtoul(at, &at, 10);
+    for (int i = 0; i < 4; i++)
+        s->y_limits[i] = (uint32_t)strtoul(at, &at, 10);
+    s->x_word_bits = (uint8_t)number();
+    s->x_index_bits = (uint8_t)number();
+    s->y_word_bits = (uint8_t)number();
+    s->y_index_bits = (uint8_t)number();
+    s->harmonics = (uint16_t)number();
+    s->sine_index_bits = (uint8_t)number();
+    s->window = (uint8_t)number();
+    s->update_rate_hz = (uint32_t)number();
+    s->key_bytes = (uint8_t)number();
+    for (int i = 0; i < 32; i++)
+        s->key[i] = (uint8_t)number();
+    s->knows_hash = (uint8_t)number();
+    for (int i = 0; i < 32; i++)
+        s->hash[i] = (uint8_t)number();
+    s->has_interlock = (uint8_t)number();
+    s->sine = sine;
+    return (uint32_t)strtoul(at, &at, 10);
+}
+
+/* The program that an upload brings becomes that of the firmware. */
+static void keep_boot(device *d, size_t count)
+{
+    for (size_t i = 0; i < count; i += 256) {
+        device_feed(d, bytes + i, count - i < 256 ? count - i : 256);
+        device_run(d, UINT32_MAX);
+    }
+    device_take(d, bytes);
+    dac_link_program_of(&d->link, &boot);
+    memcpy(boot_x, boot.x.table, boot.x.length * sizeof(dac_word));
+    memcpy(boot_y, boot.y.table, boot.y.length * sizeof(dac_word));
+    boot.x.table = boot_x;
+    boot.y.table = boot_y;
+    d->setup.boot_program = &boot;
+    device_start(d, d->boot);
+}
+
+int main(void)
+{
+    static device_setup setup;
+    device *d = NULL;
+    uint32_t count = 0;
+
+    while (fgets(line, sizeof line, stdin) != NULL) {
+        const char what = line[0];
+        at = line + 1;
+        if (what == 'S') {
+            count = read_setup(&setup);
+        } else if (what == 'Q') {
+            for (size_t i = 0; i < SINES && *at == ' '; i++)
+                sine[i] = (int32_t)number();
+            d = device_new(&setup, count);
+        } else if (d == NULL) {
+            return 1;
+        } else if (what == 'B') {
+            keep_boot(d, hexadecimal());
+        } else if (what == 'r' || what == 'f') {
+            device_feed(d, bytes, hexadecimal());
+            if (what == 'r')
+                device_run(d, UINT32_MAX);
+        } else if (what == 'w') {
+            device_run(d, (unsigned)number());
+        } else if (what == 't') {
+            const uint32_t ticks = (uint32_t)number();
+            device_tick(d, ticks, (unsigned)strtoul(at, &at, 10));
+        } else if (what == 'p') {
+            device_permit(d, number() != 0);
+        } else if (what == 's') {
+            device_stall(d, number() != 0);
+        } else if (what == 'b') {
+            device_start(d, (uint32_t)strtoul(at, &at, 10));
+        } else if (what == 'k') {
+            const unsigned axis = (unsigned)number();
+            const uint32_t word = (uint32_t)number();
+            device_poke(d, axis, word, (int32_t)number());
+        } else {
+            return 1;
+        }
+        const size_t sent = d == NULL ? 0 : device_take(d, bytes);
+        for (size_t i = 0; i < sent; i++)
+            printf("%02x", bytes[i]);
+        if (sent != 0)
+            printf("\n");
+    }
+    if (d == NULL)
+        return 1;
+    const size_t records = device_records(d, NULL);
+    line_record *const record = calloc(records + 1, sizeof *record);
+    if (record == NULL)
+        return 1;
+    device_records(d, record);
+    for (size_t i = 0; i < records; i++)
+        printf("%" PRIu32 " %" PRIu32 " %" PRIu32 " %08" PRIx32 " %02x %02x\n", record[i].generation, record[i].line,
+               record[i].ticks, record[i].crc, record[i].markers, record[i].faults);
+    free(record);
+    device_delete(d);
+    return 0;
+}

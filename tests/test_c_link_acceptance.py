@@ -1,0 +1,112 @@
+"""``dac_link_check.c`` against ``tablegen.link.acceptance``: the same reason and the same detail for every program."""
+
+import os
+from collections import Counter
+from functools import cache
+
+import numpy as np
+import pytest
+from link_device import HostDevice
+from link_images import damaged, random_image, random_limits
+from link_talk import Talk, is_answer
+
+from tablegen.link.acceptance import Playing, first_objection
+from tablegen.link.frames import Frame
+from tablegen.link.image import Image, make_image, take_apart
+from tablegen.link.messages import REFUSAL, AxisLimits, Reason, Refusal, Request
+from tablegen.sequencer import DualProgram
+from tablegen.verify.bench import Shape
+
+SHAPES = {
+    "16 bits": Shape(16, 1, 5, 16, 1, 4, 16),
+    "24 bits": Shape(24, 1, 4, 21, 1, 3, 24),
+    "8 bits": Shape(8, 1, 4, 8, 1, 4, 8),
+    "12 bits, wide codes": Shape(12, 1, 4, 12, 1, 5, 20),
+    "direct": Shape(16, 0, 5, 10, 0, 5, 14),
+}
+HARMONICS = 5
+STATES = ("nothing plays", "parked", "playing")
+PROGRAMS = int(os.environ.get("LINK_PROGRAMS", "400"))  # of each shape and state
+CHECKED = {reason for reason in Reason if Reason.SCHEDULE <= reason <= Reason.JUMP}
+
+
+class Bench:
+    """A device in some state that stays the same: what it accepts is withdrawn before it is taken."""
+
+    def __init__(self, program: DualProgram, state: str, limits: tuple[AxisLimits, AxisLimits], shape: Shape) -> None:
+        boot = None if state == "nothing plays" else program
+        bits = max(shape.x_index_bits, 3), max(shape.y_index_bits, 3)
+        self.device = HostDevice(program, boot, limits=limits, index_bits=bits, harmonics=HARMONICS)
+        self.talk = Talk()
+        self.ask(self.talk.hello())
+        self.device.tick(3)
+        self.playing = None
+        if boot is not None:
+            self.playing = Playing(program.x, program.y, state == "playing")
+        if state == "playing":
+            self.ask(self.talk.acting(Request.ARM, bytes(4)))
+            self.ask(self.talk.acting(Request.TRIGGER))
+            self.device.tick(2)
+
+    def ask(self, wire: bytes) -> list[Frame]:
+        """What is answered."""
+        self.device.receive(wire)
+        return self.talk.answers(self.device.transmit())
+
+    def objection(self, image: Image) -> tuple[int, int] | None:
+        """To an image; None if it waits to be taken."""
+        for wire in self.talk.upload(image):
+            (answer,) = self.ask(wire)
+            assert answer.type != REFUSAL, Refusal.unpack(answer.payload)
+        answers = self.ask(self.talk.commit(image))
+        if answers:
+            refusal = Refusal.unpack(answers[0].payload)
+            assert refusal.type == Request.COMMIT
+            return refusal.reason, refusal.detail
+        assert self.ask(self.talk.acting(Request.ABORT)) == []
+        self.device.tick()
+        refused, aborted = self.talk.answers(self.device.transmit())
+        assert Refusal.unpack(refused.payload).reason == Reason.WITHDRAWN
+        assert is_answer(aborted, Request.ABORT)
+        return None
+
+
+@pytest.mark.parametrize("state", STATES)
+@pytest.mark.parametrize("name", SHAPES)
+def test_a_device_objects_to_what_its_specification_objects_to(name: str, state: str) -> None:
+    assert compare(SHAPES[name], state, PROGRAMS, 1)[None] > PROGRAMS // 20
+
+
+def test_every_check_was_met() -> None:
+    """A control of the test above: it is about programs of all kinds."""
+    seen: Counter[Reason | None] = Counter()
+    for shape in SHAPES.values():
+        for state in STATES:
+            seen += compare(shape, state, PROGRAMS, 1)
+    assert {reason for reason in CHECKED if seen[reason] > 3} == CHECKED, seen
+
+
+@cache
+def compare(shape: Shape, state: str, count: int, seed: int) -> Counter[Reason | None]:
+    """Hold so many programs against the specification; returns how often each reason came."""
+    rng = np.random.default_rng([seed, *map(ord, state)])
+    seen: Counter[Reason | None] = Counter()
+    for at in range(count):
+        if at % 40 == 0:
+            _, program = random_image(rng, shape)
+            limits = random_limits(rng, program) if at % 80 else (AxisLimits(0, 1 << 24, 1 << 24, 1 << 24),) * 2
+            bench = Bench(program, state, limits, shape)
+        image, _ = random_image(rng, shape, HARMONICS)
+        if rng.random() < 0.3:  # as what plays, so that it may be near enough
+            image = make_image(program, image.info.hash.hex())
+        if rng.random() < 0.85:
+            image = damaged(rng, image)
+        try:
+            contents = take_apart(image.data, image.info.x, image.info.y)
+        except ValueError:
+            continue  # refused before it is complete
+        expected = first_objection(contents, *limits, bench.playing)
+        got = bench.objection(image)
+        assert got == (None if expected is None else (int(expected[0]), expected[1])), (at, expected, got)
+        seen[None if expected is None else expected[0]] += 1
+    return seen

@@ -1,0 +1,47 @@
+"""The C link by other compilers, with sanitizers, without a long multiplication, and in the other byte order."""
+
+from pathlib import Path
+
+import pytest
+from link_replay import Replay, compile_replay, differs, random_replay
+
+from tablegen.verify.bench import Shape
+
+SANITIZED = ("-std=c99", "-O1", "-g", "-fsanitize=undefined,address", "-fno-sanitize-recover=all")
+WAYS = {
+    "gcc": (("gcc",), SANITIZED),
+    "clang": (("clang",), SANITIZED),
+    "small": (("gcc",), ("-std=c99", "-Os")),
+    "no long multiplication, small slices": (
+        ("clang",),
+        ("-std=c11", "-O3", "-DDAC_LONG_MULTIPLY=0", "-DDAC_LINK_SLICE=5"),
+    ),
+}
+
+
+@pytest.fixture(scope="module")
+def replays() -> list[Replay]:
+    """Of tables in 16 bits and in 32, with a key and without."""
+    kinds = [Shape(16, 1, 5, 16, 1, 4, 16), Shape(12, 1, 4, 16, 0, 4, 14), Shape(24, 1, 4, 18, 1, 3, 24)]
+    return [random_replay(shape, seed, keyed) for shape in kinds for seed, keyed in ((1, False), (2, True), (3, False))]
+
+
+def hold(replays: list[Replay], folder: Path, emulator: str | None = None, **how: tuple[str, ...]) -> None:
+    programs = {bits: compile_replay(folder / f"replay_{bits}", bits, **how) for bits in (16, 32)}
+    for replay in replays:
+        assert len(replay.heard) > 2000
+        found = differs(programs[replay.bits], replay, emulator)
+        assert found is None, found
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_compilers_and_sanitizers(way: str, replays: list[Replay], tmp_path: Path) -> None:
+    compiler, options = WAYS[way]
+    hold(replays, tmp_path, compiler=compiler, options=options)
+
+
+def test_the_other_byte_order(replays: list[Replay], tmp_path: Path) -> None:
+    """And a processor of 32 bits."""
+    options = ("-std=c99", "-O2", "-static")
+    hold(replays, tmp_path, "qemu-mips", compiler=("mips-linux-gnu-gcc",), options=options)
+    assert (tmp_path / "replay_16").read_bytes()[4:6] == b"\1\2"
