@@ -1,0 +1,53 @@
+"""The columns that measurements have: a quantity, its unit in the name, and the range that it can have."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from math import degrees, inf
+
+Conversion = Callable[[float], float]
+
+
+def _times(factor: float) -> Conversion:
+    return lambda value: value * factor
+
+
+_VOLTS = {"v": _times(1.0), "mv": _times(1e-3), "kv": _times(1e3)}
+_NANOMETRES = {"nm": _times(1.0), "pm": _times(1e-3), "um": _times(1e3), "mm": _times(1e6)}
+_SECONDS = {"s": _times(1.0), "ms": _times(1e-3), "us": _times(1e-6)}
+_HERTZ = {"hz": _times(1.0), "khz": _times(1e3), "mhz": _times(1e6)}
+_GAIN = {"": _times(1.0), "db": lambda value: 10.0 ** (value / 20.0)}
+_DEGREES = {"deg": _times(1.0), "rad": degrees}
+_NUMBER = {"": _times(1.0)}
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One quantity: its units, the first of which is what the fits take, and the open range of its values there."""
+
+    quantity: str
+    units: Mapping[str, Conversion]
+    above: float = -inf
+    below: float = inf
+
+    @property
+    def name(self) -> str:
+        """The column as the fits take it, such as ``offset_v``."""
+        return self.spelt(next(iter(self.units)))
+
+    def spelt(self, unit: str) -> str:
+        """The name of the column in one of its units."""
+        return f"{self.quantity}_{unit}" if unit else self.quantity
+
+
+OFFSET = Column("offset", _VOLTS, -1e6, 1e6)
+APPARENT = Column("apparent", _NANOMETRES, 0.0, 1e12)
+TRUE = Column("true", _NANOMETRES, 0.0, 1e12)
+NOMINAL = Column("nominal", _NANOMETRES, 0.0, 1e12)
+ACTUAL = Column("actual", _NANOMETRES, 0.0, 1e12)
+DRIVE = Column("drive", _VOLTS, -1e6, 1e6)
+TIME = Column("time", _SECONDS, -1e12, 1e12)
+DISPLACEMENT = Column("displacement", _NANOMETRES, -1e12, 1e12)
+FREQUENCY = Column("frequency", _HERTZ, 0.0, 1e12)
+GAIN = Column("gain", _GAIN, 0.0, 1e12)
+PHASE = Column("phase", _DEGREES, -1e6, 1e6)
+TRACE = Column("trace", _NUMBER, -1e9, 1e9)

@@ -1,0 +1,69 @@
+"""What a calibration returns: estimates with standard errors, residuals, remarks, and curves to draw."""
+
+from dataclasses import dataclass
+from math import isfinite, nan
+
+from tablegen.numerics.arrays import Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """A value and its standard error: twice of it covers the truth in 95 % of measurements, however few the points.
+
+    The error is nan where it is not known, since there are no more points than parameters, or since the value was
+    given and not fitted.
+    """
+
+    value: float
+    standard_error: float = nan
+
+    @property
+    def rounded(self) -> float:
+        """The value in as many digits as mean something: rounded by at most a hundredth of its standard error."""
+        digits = 9
+        if isfinite(self.standard_error) and self.standard_error > 0.0 and self.value:
+            while digits > 3 and abs(_significant(self.value, digits - 1) - self.value) <= 0.01 * self.standard_error:
+                digits -= 1
+        return _significant(self.value, digits)
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Points and the fitted line through them, for a plot; as (x, y)."""
+
+    title: str
+    x_label: str
+    y_label: str
+    measured: tuple[Floats, Floats]
+    fitted: tuple[Floats, Floats]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fit:
+    """What all calibrations have in common.
+
+    ``residual_percent`` is in the paper's metric: scale error of each point in percent for sizes and gains, position
+    error in percent of the scan for hysteresis. ``before_percent`` is the largest error without the correction.
+    ``outliers`` are the rows, counted from 0, that do not fit to the others; they were kept.
+    """
+
+    points: int
+    residual_percent: Floats
+    before_percent: float
+    remarks: tuple[str, ...]
+    outliers: tuple[int, ...]
+    curves: tuple[Curve, ...]
+
+    @property
+    def rms_percent(self) -> float:
+        """Root mean square of the residuals."""
+        return float((self.residual_percent**2).mean() ** 0.5)
+
+    @property
+    def largest_percent(self) -> float:
+        """The largest residual."""
+        return float(abs(self.residual_percent).max())
+
+
+def _significant(value: float, digits: int) -> float:
+    return float(f"{value:.{digits}g}")

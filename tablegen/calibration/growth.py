@@ -1,0 +1,124 @@
+"""Growth of one branch's residual with the amplitude -> beta_max and rho, equation (22), and one u_peak."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import expm1, sqrt
+
+import numpy as np
+from scipy.special import chdtrc
+
+from tablegen.calibration.estimate import Estimate
+from tablegen.calibration.least_squares import few_points, solve
+from tablegen.calibration.trace import MeasuredBranch
+from tablegen.numerics.arrays import Floats
+from tablegen.problems import Unphysical
+
+_SIGNIFICANT = 0.01
+_NEAR_ZERO = 1e-9  # below it (22) is a straight line to the last place
+_LARGEST_RHO, _OPEN_RHO = 60.0, 5.0  # beyond the first (22) is a step; a larger error than the second tells nothing
+_ROUNDING = 1e-9  # least error of a measured beta: that of the fit's own arithmetic
+
+
+@dataclass(frozen=True)
+class Growth:
+    """One branch: beta_max (of the scan), rho and u_peak; remarks on what they rest on."""
+
+    beta_max: Estimate
+    rho: Estimate
+    u_peak: Estimate
+    remarks: tuple[str, ...]
+
+    def beta(self, v: Floats) -> Floats:
+        """Equation (22) at normalised amplitudes."""
+        return self.beta_max.value * _share(v, self.rho.value)
+
+
+def fit_growth(v: Floats, branches: Sequence[MeasuredBranch], rho: float) -> Growth:
+    """(22) through the residuals of one direction at normalised amplitudes, weighted by their standard errors.
+
+    ``rho`` is kept where the amplitudes do not determine it. Raises ``Unphysical``.
+    """
+    remarks: list[str] = []
+    beta = np.array([branch.beta.value for branch in branches])
+    error = np.maximum([branch.beta.standard_error for branch in branches], _ROUNDING)
+    found = None
+    if float(np.max(v)) - float(np.min(v)) > 0.05:
+        found = _both(v, beta, error, rho, remarks)
+    if found is None:
+        found = _height(v, beta, error, rho, remarks)
+        remarks.append(
+            f"rho is not determined by these amplitudes and was left at {rho:g}; it takes two or "
+            f"more, best from 0.2 to 1 of v_max"
+        )
+    beta_max, estimate = found
+    if beta_max.value <= 0.0:
+        raise Unphysical(
+            f"the residual has the wrong sign (beta_max = {beta_max.value:.3g}): the displacement leads the drive; "
+            f"is the delay of the drive's channel larger than the sensor's?"
+        )
+    top = float(np.max(v))
+    if top < 0.6:
+        remarks.append(f"beta_max is extrapolated from {top:.2g} of v_max; it holds up to about there")
+    return Growth(beta_max, estimate, _peak(branches, beta, error, remarks), tuple(remarks))
+
+
+def _both(v: Floats, beta: Floats, error: Floats, rho: float, remarks: list[str]) -> tuple[Estimate, Estimate] | None:
+    """beta_max and rho, or None where rho stays open."""
+
+    def residuals(x: Floats) -> Floats:
+        left: Floats = (x[0] * _share(v, float(x[1])) - beta) / error
+        return left
+
+    start = [float(beta[np.argmax(v)]) / float(_share(np.array(np.max(v)), rho)), rho]
+    found = solve(residuals, start, ("beta_max", "rho"), [0.5, 5.0], ([-1.0, 1e-6], [1.0, 100.0]))
+    value, spread = found.values, np.sqrt(np.diag(found.unit_covariance))
+    if not 2e-6 < value[1] < _LARGEST_RHO or not spread[1] < _OPEN_RHO:
+        return None
+    spread = spread * sqrt(_variance(found.residuals, found.freedom, "(22) misses the measured residuals", remarks))
+    return Estimate(float(value[0]), float(spread[0])), Estimate(float(value[1]), float(spread[1]))
+
+
+def _height(v: Floats, beta: Floats, error: Floats, rho: float, remarks: list[str]) -> tuple[Estimate, Estimate]:
+    """beta_max alone."""
+    share = _share(v, rho) / error
+    value = float(share @ (beta / error)) / float(share @ share)
+    left = value * share - beta / error
+    variance = _variance(left, len(v) - 1, f"(22) with rho = {rho:g} misses the measured residuals", remarks)
+    return Estimate(value, sqrt(variance / float(share @ share))), Estimate(rho)
+
+
+def _peak(branches: Sequence[MeasuredBranch], beta: Floats, error: Floats, remarks: list[str]) -> Estimate:
+    """The mean of u_peak over the amplitudes, each weighted by its error: the paper finds it the same at all."""
+    seen = [branch.u_peak for branch, b, e in zip(branches, beta, error, strict=True) if b > 3.0 * e]
+    if not seen:
+        raise Unphysical(
+            'no hysteresis can be told from noise, and hence no u_peak; model = "triangle" does, or average more'
+        )
+    value = np.array([estimate.value for estimate in seen])
+    spread = np.maximum([estimate.standard_error for estimate in seen], _ROUNDING)
+    weight = 1.0 / spread**2
+    mean = float(value @ weight) / float(np.sum(weight))
+    left = (value - mean) / spread
+    low, high = float(np.min(value)), float(np.max(value))
+    what = f"u_peak differs from amplitude to amplitude, {low:.3g} to {high:.3g}, where the scanner file has one,"
+    variance = _variance(left, len(seen) - 1, what, remarks)
+    if variance > 1.0:
+        remarks[-1] += "; where it matters leave out amplitudes that you do not scan with"
+    return Estimate(mean, sqrt(variance / float(np.sum(weight))))
+
+
+def _variance(left: Floats, freedom: int, what: str, remarks: list[str]) -> float:
+    """1 where errors explain what is left; otherwise by how much they have to be widened, which is remarked."""
+    total = float(left @ left)
+    if freedom < 1 or chdtrc(freedom, total) > _SIGNIFICANT:
+        return 1.0
+    remarks.append(f"{what} by {sqrt(total / freedom):.3g} times their standard errors; these were widened")
+    return total / freedom * few_points(freedom) ** 2
+
+
+def _share(v: Floats, rho: float) -> Floats:
+    """(1 - exp(-rho v)) / (1 - exp(-rho))."""
+    if rho < _NEAR_ZERO:
+        return np.asarray(v, dtype=np.float64)
+    share: Floats = np.expm1(-rho * np.asarray(v)) / expm1(-rho)
+    return share

@@ -1,0 +1,153 @@
+"""Traces at several amplitudes and turns -> beta_max, rho and u_peak of each branch, equations (17)-(22)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tablegen.calibration.estimate import Curve, Estimate, Fit
+from tablegen.calibration.growth import Growth, fit_growth
+from tablegen.calibration.trace import TraceFit, fit_trace
+from tablegen.compensation.hysteresis import BranchShape
+from tablegen.numerics.arrays import Floats
+from tablegen.problems import Unphysical
+
+TYPICAL_RHO = 1.5  # the paper's backward scan, and the default of the scanner file
+SAME_TURN = 0.02  # turns that differ by less are one calibration
+_POOR_PERCENT = 1.0
+_CROOKED = 0.01  # rms departure of the drive from a triangle
+
+
+@dataclass(frozen=True)
+class Trace:
+    """What one record holds: times in s, the drive at the piezo in V, displacements in any unit; and its name."""
+
+    name: str
+    time_s: Floats
+    drive_v: Floats
+    displacement_nm: Floats
+
+
+@dataclass(frozen=True)
+class TurnFit:
+    """Both directions at one turning point, and the traces that they rest on, by ascending amplitude."""
+
+    turn: Estimate
+    forward: Growth
+    backward: Growth
+    traces: tuple[TraceFit, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class HysteresisFit(Fit):
+    """One entry for each turning point, ascending.
+
+    Residuals are position errors in percent of the scan, averaged over periods and twentieths of a line.
+    """
+
+    branches: tuple[TurnFit, ...]
+
+
+def fit_hysteresis(
+    traces: Sequence[Trace],
+    v_max: float,
+    rho: float = TYPICAL_RHO,
+    settle_periods: int | None = None,
+    drift_order: int | None = None,
+    delay_s: float | None = 0.0,
+) -> HysteresisFit:
+    """Both branches at each turn that was measured; see ``fit_trace`` for what is done to a trace.
+
+    ``rho`` is kept where a turn was measured at one amplitude only. Raises ``Unphysical``, with the trace's name.
+    """
+    fits: list[TraceFit] = []
+    remarks: list[str] = []
+    for trace in traces:
+        try:
+            fit = fit_trace(trace.time_s, trace.drive_v, trace.displacement_nm, settle_periods, drift_order, delay_s)
+            if fit.triangle.v_low < -0.02 * v_max or fit.triangle.v_high > 1.02 * v_max:
+                low, high = fit.triangle.v_low, fit.triangle.v_high
+                raise Unphysical(f"a drive of {low:.4g}..{high:.4g} V is outside the driver's 0..{v_max:g} V")
+        except Unphysical as reason:
+            raise Unphysical(f"{trace.name}: {reason}" if trace.name else str(reason)) from None
+        fits.append(fit)
+        remarks += [f"{trace.name}: {text}" if trace.name else text for text in _remarks(fit)]
+    groups: list[list[TraceFit]] = []
+    for fit in sorted(fits, key=lambda fit: fit.triangle.turn):
+        if groups and fit.triangle.turn - groups[-1][0].triangle.turn < SAME_TURN:
+            groups[-1].append(fit)
+        else:
+            groups.append([fit])
+    branches = []
+    for group in groups:
+        group.sort(key=lambda fit: fit.v_scan)
+        v = np.array([fit.v_scan / v_max for fit in group])
+        turn = float(np.mean([fit.triangle.turn for fit in group]))
+        spread = float(np.sqrt(np.sum([fit.triangle.timing_covariance[2, 2] for fit in group])) / len(group))
+        sides = []
+        for name in ("forward", "backward"):
+            try:
+                sides.append(fit_growth(v, [getattr(fit, name) for fit in group], rho))
+                _check_shape(sides[-1], float(v[-1]))
+            except Unphysical as reason:
+                raise Unphysical(f"turn {turn:.4g}, {name}: {reason}") from None
+            remarks += [f"turn {turn:.4g}, {name}: {text}" for text in sides[-1].remarks]
+        branches.append(TurnFit(Estimate(turn, spread), sides[0], sides[1], tuple(group)))
+    return HysteresisFit(
+        points=sum(fit.samples for fit in fits),
+        residual_percent=np.concatenate([fit.residual_percent for fit in fits]),
+        before_percent=100.0 * max(abs(side.beta.value) for fit in fits for side in (fit.forward, fit.backward)),
+        remarks=tuple(dict.fromkeys(remarks)),
+        outliers=(),
+        curves=tuple(_curves(branches, v_max)),
+        branches=tuple(branches),
+    )
+
+
+def _check_shape(growth: Growth, v: float) -> None:
+    """The drive that a build would make of it, at the largest amplitude that was measured."""
+    BranchShape.harmonic(float(growth.beta(np.array(v))), growth.u_peak.value)
+
+
+def _remarks(fit: TraceFit) -> list[str]:
+    found = []
+    if fit.triangle.departure > _CROOKED:
+        found.append(
+            f"the drive departs from a triangle by {100.0 * fit.triangle.departure:.2g} % rms; the fit takes it for one"
+        )
+    if fit.inverted:
+        found.append("the displacement falls where the drive rises; its sign was turned")
+    worst = float(np.max(np.abs(fit.residual_percent)))
+    if worst > _POOR_PERCENT:
+        found.append(
+            f"the harmonic model leaves {worst:.2g} % of the scan; is the drive the triangle itself, the delay of the "
+            f"sensor known, and the record settled?"
+        )
+    if fit.correlated > 3.0:
+        found.append(
+            f"residuals are alike over {fit.correlated:.0f} samples: a part is no noise but what model and drift "
+            f"leave; standard errors were widened by {fit.correlated**0.5:.2g}"
+        )
+    if fit.strays:
+        shown = ", ".join(str(i + 1) for i in fit.strays[:5]) + (", ..." if len(fit.strays) > 5 else "")
+        found.append(f"{len(fit.strays)} samples are far off the curve (number {shown}); they were kept")
+    for name, side in (("forward", fit.forward), ("backward", fit.backward)):
+        if side.u_peak.standard_error > 0.1:
+            found.append(f"u_peak {name} is not determined by this trace; average more periods or drive it further")
+    return found
+
+
+def _curves(branches: Sequence[TurnFit], v_max: float) -> list[Curve]:
+    """Of each turn the residual at the largest amplitude, figure 5a, and its growth, figure 5k."""
+    curves = []
+    line = np.linspace(0.0, 1.0, 101)
+    for branch in branches:
+        curves.append(branch.traces[-1].curve)
+        for name in ("forward", "backward"):
+            growth: Growth = getattr(branch, name)
+            v = np.array([fit.v_scan for fit in branch.traces])
+            beta = np.array([getattr(fit, name).beta.value for fit in branch.traces])
+            title = f"peak residual {name}, turn {branch.turn.value:.3g}"
+            fitted = (line * v_max, 100.0 * growth.beta(line))
+            curves.append(Curve(title, "scan voltage [V]", "% of scan", (v, 100.0 * beta), fitted))
+    return curves

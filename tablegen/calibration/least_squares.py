@@ -1,0 +1,100 @@
+"""Least squares with standard errors that can be believed, and with the parameters that data cannot determine."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import nan, sqrt
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.special import stdtrit
+
+from tablegen.calibration.estimate import Estimate
+from tablegen.numerics.arrays import Floats
+from tablegen.problems import Unphysical
+
+_NORMAL_2 = 0.9772498680518208  # the normal distribution's at 2: what two standard errors cover, on one side
+_SINGULAR = 1e-10  # of the largest singular value; what finite differences leave of a zero is below it
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Values, their covariance for a unit variance of the residuals, and what is left.
+
+    ``undetermined`` names the parameters that can move by their whole scale without the data noticing.
+    """
+
+    names: tuple[str, ...]
+    values: Floats
+    unit_covariance: Floats
+    residuals: Floats
+    jacobian: Floats
+    undetermined: tuple[str, ...]
+
+    @property
+    def freedom(self) -> int:
+        """Points less parameters."""
+        return len(self.residuals) - len(self.values)
+
+    @property
+    def variance(self) -> float:
+        """Of the residuals; nan where there are no more points than parameters."""
+        return float(self.residuals @ self.residuals) / self.freedom if self.freedom > 0 else nan
+
+    def estimate(self, name: str) -> Estimate:
+        """One parameter, its error widened for few points."""
+        i = self.names.index(name)
+        error = sqrt(self.unit_covariance[i, i] * self.variance) if self.freedom > 0 else nan
+        return Estimate(float(self.values[i]), error * few_points(self.freedom))
+
+
+def few_points(freedom: int) -> float:
+    """By how much Student's distribution widens what two standard errors have to be; nan where nothing is left."""
+    return float(stdtrit(freedom, _NORMAL_2)) / 2.0 if freedom > 0 else nan
+
+
+def solve(
+    residuals: Callable[[Floats], Floats],
+    start: Sequence[float] | Floats,
+    names: Sequence[str],
+    scales: Sequence[float] | Floats,
+    bounds: tuple[Sequence[float], Sequence[float]] | None = None,
+    jacobian: Callable[[Floats], Floats] | None = None,
+) -> Solution:
+    """Minimise the sum of squares of ``residuals``.
+
+    ``scales`` says of each parameter by how much it could at most differ from scanner to scanner: one whose standard
+    error is larger was not determined. Raises ``Unphysical`` where no minimum is found.
+    """
+    start = np.asarray(start, dtype=np.float64)
+    scales = np.asarray(scales, dtype=np.float64)
+    low, high = (np.full(len(start), -np.inf), np.full(len(start), np.inf)) if bounds is None else map(np.array, bounds)
+    found = least_squares(
+        residuals,
+        np.clip(start, low + 1e-9 * scales, high - 1e-9 * scales),
+        jac="3-point" if jacobian is None else jacobian,
+        bounds=(low, high),
+        x_scale=scales,
+        xtol=1e-13,
+        ftol=1e-13,
+        gtol=1e-13,
+        max_nfev=200,
+    )
+    if not found.success or not np.all(np.isfinite(found.x)):
+        raise Unphysical("the fit does not settle; look at the data for gaps, steps and wrong units")
+    values, left = found.x, found.fun
+    jac = np.asarray(found.jac)
+    _, size, directions = np.linalg.svd(jac * scales, full_matrices=False)
+    size = np.append(size, np.zeros(len(values) - len(size)))
+    weak = size <= _SINGULAR * size[0]
+    inverse = np.where(weak, 0.0, 1.0 / np.where(weak, 1.0, size)) ** 2
+    rows = directions[: len(size)]
+    covariance = (rows.T * inverse[: len(rows)]) @ rows * np.outer(scales, scales)
+    blind = np.sqrt(np.sum(rows[weak[: len(rows)]] ** 2, axis=0)) > 0.1
+    if len(rows) < len(values):  # fewer points than parameters: what no row sees
+        blind |= np.sum(rows**2, axis=0) < 0.99
+    freedom = len(left) - len(values)
+    if freedom > 0:
+        errors = np.sqrt(np.diag(covariance) * float(left @ left) / freedom)
+        blind |= errors * few_points(freedom) > scales
+    undetermined = tuple(name for name, is_blind in zip(names, blind, strict=True) if is_blind)
+    return Solution(tuple(names), values, covariance, left, jac, undetermined)

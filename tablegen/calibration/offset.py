@@ -1,0 +1,85 @@
+"""Apparent sizes of one object at several offset voltages -> m_minus and m_plus, equations (1)-(4)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tablegen.calibration.estimate import Curve, Estimate, Fit
+from tablegen.calibration.least_squares import Solution, solve
+from tablegen.calibration.outliers import outliers
+from tablegen.compensation.offset import OffsetLaw, normalised_offset
+from tablegen.numerics.arrays import Floats
+from tablegen.problems import Unphysical
+
+_NAMES = ("m_minus", "m_plus", "centre_nm")
+_LEAST_SPREAD = 1e-7  # relative scatter that is rounding of the file, not of the microscope
+
+
+@dataclass(frozen=True, kw_only=True)
+class OffsetFit(Fit):
+    """The amplitude factors at 0 V and at v_max, dimensionless, and the apparent size at the centre in nm."""
+
+    m_minus: Estimate
+    m_plus: Estimate
+    centre_nm: Estimate
+
+
+def fit_offset(offset_v: Floats, apparent_nm: Floats, v_max: float) -> OffsetFit:
+    """The law of (1) through apparent sizes (nm, of one object, or lattice constants) at three or more offsets (V).
+
+    Least squares, the same as ``OffsetLaw.fit``; exact for three different offsets. Raises ``Unphysical``.
+    """
+    outside = (offset_v < 0.0) | (offset_v > v_max)
+    if outside.any():
+        wrong = float(offset_v[outside][0])
+        raise Unphysical(f"an offset of {wrong:g} V is outside the driver's 0..{v_max:g} V; is v_max right?")
+    p = np.array([normalised_offset(v, v_max) for v in offset_v.tolist()])
+    law = OffsetLaw.fit(p.tolist(), apparent_nm.tolist())
+    shape = _shape(p)
+    factors = np.array([law.factor(one) for one in p.tolist()])
+    start = [law.factor(-1.0), law.factor(1.0), float(np.mean(apparent_nm) / np.mean(factors))]
+
+    def residuals(x: Floats) -> Floats:
+        left: Floats = (x[2] * (shape @ np.array([1.0, x[0], x[1]])) - apparent_nm) / scale
+        return left
+
+    scale = float(np.mean(apparent_nm))
+    solution = solve(residuals, start, _NAMES, [0.5, 0.5, scale])
+    centre = float(solution.values[2])
+    expected = centre * (shape @ np.array([1.0, *solution.values[:2]]))
+    found = outliers(solution.jacobian, solution.residuals, _LEAST_SPREAD)
+    line = np.linspace(0.0, v_max, 101)
+    curve = _shape(2.0 * line / v_max - 1.0) @ np.array([1.0, *solution.values[:2]])
+    return OffsetFit(
+        points=len(p),
+        residual_percent=100.0 * (apparent_nm / expected - 1.0),
+        before_percent=float(np.max(np.abs(100.0 * (apparent_nm / centre - 1.0)))),
+        remarks=tuple(_remarks(p, solution)),
+        outliers=found,
+        curves=(Curve("amplitude factor", "offset [V]", "m", (offset_v, apparent_nm / centre), (line, curve)),),
+        m_minus=solution.estimate("m_minus"),
+        m_plus=solution.estimate("m_plus"),
+        centre_nm=solution.estimate("centre_nm"),
+    )
+
+
+def _shape(p: Floats) -> Floats:
+    """Columns that give m(p) when multiplied by 1, m_minus and m_plus: (1) with (3) and (4) put in."""
+    columns: Floats = np.stack([1.0 - p * p, 0.5 * (p * p - p), 0.5 * (p * p + p)], axis=1)
+    return columns
+
+
+def _remarks(p: Floats, solution: Solution) -> list[str]:
+    remarks = []
+    if solution.freedom == 0:
+        remarks.append("three points fit exactly: nothing is left to tell errors from; measure at two more")
+    low, high = float(np.min(p)), float(np.max(p))
+    for name, gap, volts in (("m_minus", low + 1.0, "0 V"), ("m_plus", 1.0 - high, "v_max")):
+        if gap > 0.4:
+            remarks.append(
+                f"{name} is extrapolated over {50.0 * gap:.0f} % of the range; measure at some 7 % from {volts}"
+            )
+    for name in ("m_minus", "m_plus"):
+        if name in solution.undetermined:
+            remarks.append(f"{name} is not determined by these points; spread the offsets over most of 0..v_max")
+    return remarks

@@ -1,0 +1,195 @@
+"""A calibration into a scanner file: values in place, comments and order kept, a comment on where they came from."""
+
+import re
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import tomlkit
+from tomlkit.items import AoT, InlineTable, Table
+
+from tablegen.calibration.hysteresis import SAME_TURN
+from tablegen.config.decode import decode
+from tablegen.config.schema import Scanner
+from tablegen.config.toml import parse_toml
+from tablegen.problems import Problem, Problems, Rejected
+
+_MARK = "# calibrate "
+_FIRST_MARK = re.compile(r"# calibrate (\w+)(?:, turn ([\d.]+))?: ")
+_FILE_MARK = re.compile(r"# from .*, sha256 [0-9a-f]{16}$")
+
+
+@dataclass(frozen=True)
+class Change:
+    """What one calibration writes into ``[AXIS.KIND]``.
+
+    ``values`` replace keys or add them, ``removed`` keys go since they would contradict. ``branches`` are for
+    ``[[AXIS.hysteresis.branches]]``: an entry of the same turn is updated, another one added. ``provenance`` holds the
+    lines of the comment above, for the table or for each of the branches: a summary, then "from FILE, sha256 DIGITS".
+    """
+
+    kind: str
+    values: Mapping[str, Any]
+    removed: Sequence[str] = ()
+    branches: Sequence[Mapping[str, Any]] = ()
+    provenance: Sequence[Sequence[str]] = ()
+
+
+def new_file(name: str, v_max: float) -> str:
+    """A scanner file with nothing calibrated yet."""
+    document = tomlkit.document()
+    document["name"] = name
+    document["v_max"] = v_max
+    document["v_max"].comment("V, maximum output of the piezo driver")
+    return tomlkit.dumps(document)
+
+
+def updated(text: str, name: str, axis: str, change: Change) -> str:
+    """The text with a calibration put in; ``name`` is what messages call it.
+
+    Raises ``Rejected`` where the text is no TOML or where a value that was put in is outside what the file can hold.
+    """
+    before, _ = parse_toml(text, name)
+    windows = "\r\n" in text
+    text = text.replace("\r\n", "\n")
+    document = tomlkit.parse(text)
+    _put(document, before, axis, change, name)
+    expected = document.unwrap()
+    try:
+        changed = _spaced(_with_provenance(tomlkit.dumps(document), name, axis, change), text)
+        kept = tomllib.loads(changed) == expected
+    except (Rejected, ValueError):  # what came out is no TOML
+        changed, kept = text, False
+    if not kept:
+        why = "its layout is too unusual to be edited in place; write the values by hand, or one table below the other"
+        raise Rejected([Problem(name, 0, axis, why)])
+    _check(text, changed, name)
+    return changed.replace("\n", "\r\n") if windows else changed
+
+
+def _put(document: tomlkit.TOMLDocument, before: Mapping[str, Any], axis: str, change: Change, name: str) -> None:
+    """Put the values into the parsed document."""
+    outer = before.get(axis, {})
+    inner = outer.get(change.kind, {}) if isinstance(outer, dict) else {}
+    for path, value in ((axis, outer), (f"{axis}.{change.kind}", inner)):
+        if not isinstance(value, dict):
+            raise Rejected([Problem(name, 0, path, "is not a table")])
+    if axis not in document:
+        document[axis] = tomlkit.table(is_super_table=True)
+    parent: Any = document[axis]
+    if change.kind not in parent:
+        parent[change.kind] = tomlkit.inline_table() if isinstance(parent, InlineTable) else tomlkit.table()
+    table: Any = parent[change.kind]
+    for key in change.removed:
+        table.pop(key, None)
+    for key, value in change.values.items():
+        _set(table, key, value)
+    if change.branches:
+        _put_branches(table, change.branches)
+
+
+def _put_branches(table: Any, branches: Sequence[Mapping[str, Any]]) -> None:
+    if "branches" not in table:
+        table["branches"] = tomlkit.array() if isinstance(table, InlineTable) else tomlkit.aot()
+    entries: Any = table["branches"]
+    for branch in branches:
+        same = [i for i, entry in enumerate(entries) if abs(_number(entry.get("turn")) - branch["turn"]) < SAME_TURN]
+        if not same:
+            entry: Any = tomlkit.table() if isinstance(entries, AoT) else tomlkit.inline_table()
+            entries.append(entry)
+            entry = entries[len(entries) - 1]
+        else:
+            entry = entries[same[0]]
+        for key, value in branch.items():
+            if not isinstance(value, Mapping):
+                _set(entry, key, value)
+                continue
+            if not isinstance(entry.get(key), Mapping):
+                entry[key] = tomlkit.inline_table()
+            for inner_key, inner in value.items():
+                _set(entry[key], inner_key, inner)
+
+
+def _set(table: Any, key: str, value: Any) -> None:
+    """Put a value, unless it is there; a comment behind it stays in its column."""
+    if table.get(key) == value:
+        return
+    before: Any = table.item(key) if isinstance(table, Table) and key in table else None
+    table[key] = value
+    if before is not None and before.trivia.comment:
+        after: Any = table.item(key)
+        room = len(before.trivia.comment_ws) + len(before.as_string()) - len(after.as_string())
+        after.trivia.comment_ws = " " * max(room, 1)
+
+
+def _with_provenance(text: str, name: str, axis: str, change: Change) -> str:
+    """The text with comments above the tables, in place of those of an earlier calibration."""
+    for index, lines in enumerate(change.provenance):
+        key, turn = f"{axis}.{change.kind}", None
+        if change.branches:
+            turn = change.branches[index]["turn"]
+            key = _entry(text, key, turn)
+        at = parse_toml(text, name)[1].line_of(key) - 1
+        rows = text.split("\n")
+        first, end = _old(rows, at, change.kind, turn)
+        indent = rows[at][: len(rows[at]) - len(rows[at].lstrip())]
+        title = f"{_MARK}{change.kind}" + ("" if turn is None else f", turn {turn:g}")
+        rows[first:end] = [f"{indent}{title}: {lines[0]}", *(f"{indent}# {line}" for line in lines[1:])]
+        text = "\n".join(rows)
+    return text
+
+
+def _spaced(text: str, before: str) -> str:
+    """A blank line above the tables that are new, as between the others."""
+    known = set(pairwise(before.split("\n")))
+    rows: list[str] = []
+    for row in text.split("\n"):
+        starts = row.startswith(("[", _MARK))
+        if starts and rows and rows[-1] and not rows[-1].startswith("#") and (rows[-1], row) not in known:
+            rows.append("")
+        rows.append(row)
+    return "\n".join(rows)
+
+
+def _old(rows: list[str], at: int, kind: str, turn: float | None) -> tuple[int, int]:
+    """First and last line of an earlier calibration's comment above a line; without one, nothing just above it."""
+    end = at
+    while end > 0:
+        first = end
+        while first > 0 and _FILE_MARK.match(rows[first - 1].strip()):
+            first -= 1
+        found = _FIRST_MARK.match(rows[first - 1].strip()) if first > 0 else None
+        if not found:
+            break
+        if found[1] == kind and (turn is None or (found[2] and abs(float(found[2]) - turn) < SAME_TURN)):
+            return first - 1, end
+        end = first - 1
+    return at, at
+
+
+def _entry(text: str, key: str, turn: float) -> str:
+    entries = tomllib.loads(text)
+    for part in key.split("."):
+        entries = entries[part]
+    turns = [_number(entry.get("turn")) for entry in entries["branches"]]
+    return f"{key}.branches[{min(range(len(turns)), key=lambda i: abs(turns[i] - turn))}]"
+
+
+def _check(old: str, new: str, name: str) -> None:
+    """Refuse what the new text has wrong and the old one had not; a file may be incomplete while it is calibrated."""
+    found = []
+    for text in (old, new):
+        problems = Problems()
+        values, document = parse_toml(text, name)
+        decode(Scanner, values, document, problems, lambda *_: None)
+        found.append(problems.found)
+    known = {(problem.key, problem.why) for problem in found[0]}
+    added = [p for p in found[1] if (p.key, p.why) not in known and not p.why.startswith("missing")]
+    if added:  # at lines that are not in the file
+        raise Rejected([Problem(name, 0, p.key, f"{p.why}; nothing was written") for p in added])
+
+
+def _number(value: Any) -> float:
+    return float(value) if isinstance(value, int | float) else -1.0

@@ -1,0 +1,148 @@
+"""Calibrations as lines of parameters, as plain data, and as what goes into the scanner file."""
+
+from collections.abc import Sequence
+from math import isfinite
+from typing import Any
+
+from tablegen.calibration.estimate import Estimate, Fit
+from tablegen.calibration.frequency import FrequencyFit
+from tablegen.calibration.hysteresis import HysteresisFit, TurnFit
+from tablegen.calibration.offset import OffsetFit
+from tablegen.calibration.resonance import ResonanceFit
+from tablegen.calibration.scanner_file import Change
+from tablegen.calibration.size import SizeFit
+from tablegen.calibration.table import Source
+
+_DIRECTIONS = ("forward", "backward")
+
+
+def parameters(fit: Fit) -> list[tuple[str, Estimate, str]]:
+    """Key, estimate and meaning of each parameter; of hysteresis under the turn, which is a row of its own."""
+    match fit:
+        case OffsetFit():
+            return [
+                ("m_minus", fit.m_minus, "amplitude factor at an offset of 0 V"),
+                ("m_plus", fit.m_plus, "amplitude factor at an offset of v_max"),
+                ("(centre_nm)", fit.centre_nm, "apparent size at the centre"),
+            ]
+        case SizeFit():
+            return [
+                ("k_nm_per_v", fit.k_nm_per_v, f"at base_nm = {fit.base_nm:g}"),
+                ("beta", fit.beta, "0 is the linear scanner"),
+                ("v_threshold", fit.v_threshold, "of v_max; linear above"),
+            ]
+        case FrequencyFit():
+            return [
+                ("alpha", fit.alpha, "amplitude lost per decade"),
+                ("reference_hz", Estimate(fit.reference_hz), "where g is 1"),
+            ]
+        case ResonanceFit():
+            return [
+                ("frequency_hz", fit.frequency_hz, "undamped resonance"),
+                ("quality", fit.quality, "quality factor"),
+                ("delay_s", fit.delay_s, "dead time"),
+            ]
+        case HysteresisFit():
+            return [row for branch in fit.branches for row in _branch_parameters(branch)]
+    raise NotImplementedError(type(fit))
+
+
+def _branch_parameters(branch: TurnFit) -> list[tuple[str, Estimate, str]]:
+    amplitudes = ", ".join(f"{trace.v_scan:.4g}" for trace in branch.traces)
+    rows = [("turn", branch.turn, f"from {amplitudes} V")]
+    for direction in _DIRECTIONS:
+        growth = getattr(branch, direction)
+        rows += [
+            (f"{direction}.beta_max", growth.beta_max, "peak residual at full scale"),
+            (f"{direction}.rho", growth.rho, "decay constant of (22)"),
+            (f"{direction}.u_peak", growth.u_peak, "where it peaks, along the sweep"),
+        ]
+    return rows
+
+
+def change(fit: Fit, sources: Sequence[Source]) -> Change:
+    """What the fit writes into the scanner file, and the comment that says where it came from."""
+    residual = f"{fit.points} points, residual {fit.rms_percent:.2g} % rms"
+    files = [f"from {_printable(source.name)}, sha256 {source.sha256}" for source in sources]
+    if isinstance(fit, HysteresisFit):
+        branches, comments = [], []
+        for branch in fit.branches:
+            entry: dict[str, Any] = {"turn": float(f"{branch.turn.value:.3g}")}
+            for direction in _DIRECTIONS:
+                growth = getattr(branch, direction)
+                entry[direction] = {key: getattr(growth, key).rounded for key in ("beta_max", "rho", "u_peak")}
+            branches.append(entry)
+            count = sum(trace.samples for trace in branch.traces)
+            comments.append(
+                [f"{len(branch.traces)} traces, {count} samples, residual {fit.rms_percent:.2g} % rms", *files]
+            )
+        return Change("hysteresis", {"model": "harmonic"}, (), branches, comments)
+    values = {key: estimate.rounded for key, estimate, _ in parameters(fit) if not key.startswith("(")}
+    match fit:
+        case OffsetFit():
+            return Change("offset", values, ("alpha", "beta", "points"), (), [[residual, *files]])
+        case SizeFit():
+            return Change("size", {**values, "base_nm": fit.base_nm}, (), (), [[residual, *files]])
+        case FrequencyFit():
+            return Change("frequency", values, (), (), [[residual, *files]])
+        case ResonanceFit():
+            return Change("resonance", values, ("response",), (), [[residual, *files]])
+    raise NotImplementedError(type(fit))
+
+
+def record(fit: Fit, axis: str, sources: Sequence[Source]) -> dict[str, Any]:
+    """Plain data for JSON; a standard error that is not known is null."""
+    kind = change(fit, sources)
+    data: dict[str, Any] = {
+        "kind": kind.kind,
+        "axis": axis,
+        "points": fit.points,
+        "sources": [{"name": source.name, "sha256": source.sha256} for source in sources],
+        "residual_percent": {
+            "before": fit.before_percent,
+            "rms": fit.rms_percent,
+            "largest": fit.largest_percent,
+            "each": fit.residual_percent.tolist(),
+        },
+        "remarks": list(fit.remarks),
+        "outliers": list(fit.outliers),
+    }
+    if isinstance(fit, HysteresisFit):
+        data["branches"] = [_branch_record(branch) for branch in fit.branches]
+    else:
+        data["parameters"] = {key.strip("()"): _plain(estimate) for key, estimate, _ in parameters(fit)}
+    return data
+
+
+def _branch_record(branch: TurnFit) -> dict[str, Any]:
+    data: dict[str, Any] = {"turn": _plain(branch.turn)}
+    for direction in _DIRECTIONS:
+        growth = getattr(branch, direction)
+        data[direction] = {key: _plain(getattr(growth, key)) for key in ("beta_max", "rho", "u_peak")}
+    data["traces"] = [
+        {
+            "v_scan": trace.v_scan,
+            "rate_hz": 1.0 / trace.triangle.period_s,
+            "periods": trace.periods,
+            "samples": trace.samples,
+            "delay_s": _plain(trace.delay_s),
+            "drift_percent": trace.drift_percent,
+            "noise_percent": trace.noise_percent,
+            "scaling_percent": dict(zip(_DIRECTIONS, trace.scaling_percent, strict=True)),
+            **{
+                direction: {key: _plain(getattr(getattr(trace, direction), key)) for key in ("beta", "u_peak")}
+                for direction in _DIRECTIONS
+            },
+        }
+        for trace in branch.traces
+    ]
+    return data
+
+
+def _plain(estimate: Estimate) -> dict[str, float | None]:
+    error = estimate.standard_error
+    return {"value": estimate.value, "standard_error": error if isfinite(error) else None}
+
+
+def _printable(name: str) -> str:
+    return name if name.isprintable() else ascii(name)

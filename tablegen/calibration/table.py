@@ -1,0 +1,196 @@
+"""CSV files of measurements: a header with units in the names, then numbers; every fault at its line and column."""
+
+import hashlib
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+
+import numpy as np
+
+from tablegen.calibration.columns import Column, Conversion
+from tablegen.config.figures import shown_path
+from tablegen.numerics.arrays import Floats, Ints
+from tablegen.problems import Problem, Rejected
+
+_MAXIMUM_BYTES = 256 << 20
+_MOST_PROBLEMS = 20
+
+
+@dataclass(frozen=True)
+class Source:
+    """Which bytes numbers came from: the file's name without its folder, and the first 16 digits of its SHA-256."""
+
+    name: str
+    sha256: str
+
+
+@dataclass(frozen=True)
+class Table:
+    """Columns of numbers in the units of the fits, by name, and the line on which each row stands."""
+
+    file: str
+    source: Source
+    columns: dict[str, Floats]
+    lines: Ints
+
+    def __len__(self) -> int:
+        return len(self.lines)
+
+    def __contains__(self, column: Column) -> bool:
+        return column.name in self.columns
+
+    def __getitem__(self, column: Column) -> Floats:
+        return self.columns[column.name]
+
+
+def read_table(path: Path, needed: Sequence[Column], optional: Sequence[Column] = ()) -> Table:
+    """Read the columns that are needed, and the optional ones that are there; others are passed over.
+
+    Commas, semicolons or tabs separate, whichever the header has; with the latter two a decimal comma is understood.
+    Lines that are blank or begin with # count for nothing. Raises ``Rejected`` with file, line and column.
+    """
+    name = shown_path(path)
+    content = _content(path, name)
+    rows = _rows(_text(content, name))
+    if not rows:
+        raise Rejected([Problem(name, 0, "", f"is empty; a header with {_list(needed)} is needed")])
+    header_line, header = rows[0]
+    separator = next((mark for mark in (";", "\t") if mark in header), ",")
+    wanted = [*needed, *optional]
+    places = _places(name, header_line, _cells(header, separator), wanted, needed)
+    reader = _Reader(name, separator, len(_cells(header, separator)), places)
+    values = [reader.row(line, text) for line, text in rows[1:]]
+    if reader.problems:
+        more = len(reader.problems) - _MOST_PROBLEMS
+        found = reader.problems[:_MOST_PROBLEMS]
+        if more > 0:
+            found.append(Problem(name, found[-1].line, "", f"and {more} more"))
+        raise Rejected(found)
+    if not values:
+        raise Rejected([Problem(name, header_line, "", "no numbers follow the header")])
+    array = np.array(values, dtype=np.float64)
+    columns = {column.name: array[:, i] for i, (_, column, _, _) in enumerate(places)}
+    source = Source(path.name, hashlib.sha256(content).hexdigest()[:16])
+    return Table(name, source, columns, np.array([line for line, _ in rows[1:]], dtype=np.int64))
+
+
+_Place = tuple[int, Column, Conversion, str]  # where it stands, what it is, how it converts, how it is spelt
+
+
+class _Reader:
+    """Rows of text to rows of numbers; notes what is wrong and goes on."""
+
+    def __init__(self, name: str, separator: str, width: int, places: list[_Place]) -> None:
+        self.problems: list[Problem] = []
+        self._name, self._separator, self._width, self._places = name, separator, width, places
+
+    def row(self, line: int, text: str) -> list[float]:
+        """The numbers of one row."""
+        cells = _cells(text, self._separator)
+        if len(cells) != self._width:
+            why = f"{len(cells)} fields where the header has {self._width}"
+            self.problems.append(Problem(self._name, line, "", why))
+            return []
+        return [self._number(line, cells[at], column, convert, spelt) for at, column, convert, spelt in self._places]
+
+    def _number(self, line: int, cell: str, column: Column, convert: Conversion, spelt: str) -> float:
+        plain = cell
+        if self._separator != "," and cell.count(",") == 1 and "." not in cell:
+            plain = cell.replace(",", ".")
+        try:
+            if "_" in plain:  # Python would take 1_000
+                raise ValueError
+            written = float(plain)
+        except ValueError:
+            why = f"{cell[:40]!r} is not a number" if cell else "is empty"
+            self.problems.append(Problem(self._name, line, spelt, why))
+            return 0.0
+        if not isfinite(written):
+            self.problems.append(Problem(self._name, line, spelt, f"{cell[:40]} is not finite"))
+            return 0.0
+        try:
+            value = convert(written)
+        except OverflowError:
+            value = column.below
+        if not column.above < value < column.below:
+            side = f"above {column.above:g}" if value <= column.above else f"below {column.below:g}"
+            self.problems.append(Problem(self._name, line, spelt, f"{cell[:40]} is not {side} ({column.name})"))
+        return value
+
+
+def _places(
+    name: str, line: int, header: list[str], wanted: Sequence[Column], needed: Sequence[Column]
+) -> list[_Place]:
+    header = [cell.lower() for cell in header]
+    if all(_is_number(cell) for cell in header):
+        why = f"the first line has numbers; a header with {_list(needed)} has to stand above them"
+        raise Rejected([Problem(name, line, "", why)])
+    places: list[_Place] = []
+    problems: list[Problem] = []
+    for column in wanted:
+        spelt = {column.spelt(unit): convert for unit, convert in column.units.items()}
+        found = [(at, cell) for at, cell in enumerate(header) if cell in spelt]
+        if len(found) > 1:
+            both = " and ".join(cell for _, cell in found[:2])
+            problems.append(Problem(name, line, found[1][1], f"the header has both {both}; keep one of them"))
+        elif found:
+            at, cell = found[0]
+            places.append((at, column, spelt[cell], cell))
+        elif column in needed:
+            others = [cell for cell in spelt if cell != column.name]
+            shown = ", ".join(cell[:40] for cell in header)
+            instead = f" (or {', '.join(others)})" if others else ""
+            why = f"missing{instead}; the header has {shown}"
+            problems.append(Problem(name, line, column.name, why))
+    if problems:
+        raise Rejected(problems)
+    return places
+
+
+def _content(path: Path, name: str) -> bytes:
+    if not os.path.isfile(path):  # a pipe would be waited for
+        raise Rejected([Problem(name, 0, "", "is not a file")])
+    try:
+        with path.open("rb") as file:
+            content = file.read(_MAXIMUM_BYTES + 1)
+    except OSError as error:
+        raise Rejected([Problem(name, 0, "", f"cannot be read: {error.strerror or error}")]) from None
+    if len(content) > _MAXIMUM_BYTES:
+        raise Rejected([Problem(name, 0, "", f"above {_MAXIMUM_BYTES >> 20} MiB; thin it out")])
+    return content
+
+
+def _text(content: bytes, name: str) -> str:
+    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
+        raise Rejected([Problem(name, 1, "", "is UTF-16; save it as UTF-8")])
+    try:
+        return content.decode("utf-8-sig")  # spreadsheets write a byte order mark
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        why = f"byte 0x{content[error.start]:02x} is not UTF-8"
+        raise Rejected([Problem(name, line, "", why)]) from None
+
+
+def _rows(text: str) -> list[tuple[int, str]]:
+    """What counts, with line numbers from 1; ends of lines as Unix, Windows or old Macintosh have them."""
+    lines = enumerate(text.replace("\r\n", "\n").replace("\r", "\n").split("\n"), 1)
+    return [(n, line) for n, line in lines if line.strip(" \t;,") and not line.lstrip().startswith("#")]
+
+
+def _cells(line: str, separator: str) -> list[str]:
+    cells = (cell.strip() for cell in line.split(separator))
+    return [cell[1:-1].strip() if len(cell) >= 2 and cell[0] == cell[-1] == '"' else cell for cell in cells]
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell.replace(",", "."))
+    except ValueError:
+        return False
+    return True
+
+
+def _list(columns: Sequence[Column]) -> str:
+    return ", ".join(column.name for column in columns)

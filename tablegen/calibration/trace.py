@@ -1,0 +1,306 @@
+"""One trace, displacement against a triangular drive over one or more periods -> both branches of the model."""
+
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+
+from tablegen.calibration.estimate import Curve, Estimate
+from tablegen.calibration.least_squares import Solution, solve
+from tablegen.calibration.triangle import Triangle, find_triangle
+from tablegen.compensation.hysteresis import HIGHEST_PEAK, LOWEST_PEAK, BranchShape
+from tablegen.numerics.arrays import Bools, Floats
+from tablegen.problems import Unphysical
+
+_BINS = 20  # of a branch: the baseline of the scaling error
+_WINDOW = slice(2, 18)  # x = 0.1 .. 0.9
+_LEAST_SAMPLES = 40  # a period
+_TOO_FAR = 1e3  # the residual of a branch that runs backwards
+
+
+@dataclass(frozen=True)
+class MeasuredBranch:
+    """The peak residual and where it is, (17), as a fraction of the scan, in sweep-aligned coordinates."""
+
+    beta: Estimate
+    u_peak: Estimate
+
+
+@dataclass(frozen=True)
+class TraceFit:
+    """What one trace says.
+
+    ``v_scan`` is peak to peak in V. ``residual_percent`` is the position error that the model leaves, in percent of
+    the scan, averaged over the periods in bins of a twentieth of the line, forward then backward; ``scaling_percent``
+    the local scaling error that it leaves, peak to peak over x = 0.1..0.9, of each direction. ``correlated`` is over
+    how many samples residuals depend on each other; ``strays`` are samples far off the curve, counted from 0.
+    """
+
+    triangle: Triangle
+    v_scan: float
+    periods: float
+    samples: int
+    left_out: int
+    forward: MeasuredBranch
+    backward: MeasuredBranch
+    delay_s: Estimate
+    drift_percent: float
+    noise_percent: float
+    residual_percent: Floats
+    scaling_percent: tuple[float, float]
+    correlated: float
+    inverted: bool
+    strays: tuple[int, ...]
+    curve: Curve
+
+
+def fit_trace(
+    time_s: Floats,
+    drive_v: Floats,
+    displacement_nm: Floats,
+    settle_periods: int | None = None,
+    drift_order: int | None = None,
+    delay_s: float | None = 0.0,
+) -> TraceFit:
+    """Both branches of one trace: times ascending (s), drive at the piezo (V), displacement (any unit).
+
+    Every sample is fitted at its own phase, so that periods are aligned to a fraction of a sample and averaged,
+    whatever the sampling rate. The first ``settle_periods`` are left out (of three periods or more the first, if not
+    given). Drift is a polynomial of ``drift_order`` over the record: a line, a parabola from two periods on, a cubic
+    from four; creep goes with it as far as these follow it. ``delay_s`` is that of the sensor against the drive;
+    None fits it.
+    Raises ``Unphysical``.
+    """
+    if len(time_s) < _LEAST_SAMPLES:
+        raise Unphysical(f"{len(time_s)} samples are no trace; at least {_LEAST_SAMPLES} a period are needed")
+    if not np.all(np.diff(time_s) > 0.0):
+        at = int(np.argmin(np.diff(time_s) > 0.0))
+        raise Unphysical(f"time does not ascend after {time_s[at]:g} s; give every trace its own file or trace number")
+    triangle = find_triangle(time_s, drive_v)
+    periods = float(time_s[-1] - time_s[0]) * (1.0 + 1.0 / (len(time_s) - 1)) / triangle.period_s
+    per_period = len(time_s) / periods
+    if per_period < _LEAST_SAMPLES:
+        raise Unphysical(f"{per_period:.3g} samples a period are too few; at least {_LEAST_SAMPLES} are needed")
+    if periods < 0.99:
+        raise Unphysical(f"{periods:.3g} of a period are recorded; at least one whole period is needed")
+    settle = settle_periods if settle_periods is not None else (1 if periods >= 2.99 else 0)
+    if periods - settle < 0.99:
+        raise Unphysical(f"{periods:.3g} periods are recorded, and {settle} to settle leave no whole one")
+    used = (
+        time_s >= time_s[0] + (settle - 0.5 / per_period) * triangle.period_s if settle else np.ones(len(time_s), bool)
+    )
+    periods -= settle
+    order = drift_order if drift_order is not None else (1 if periods < 1.99 else 2 if periods < 3.99 else 3)
+    model = _Model(triangle, time_s[used], displacement_nm[used], order, delay_s)
+    solution = model.solve()
+    return _result(model, solution, triangle, periods, int(np.sum(~used)))
+
+
+class _Model:
+    """displacement = low + height tau(t - delay) + drift.
+
+    Of the branches xi and xi gamma are fitted, in which (17) is linear, and not their peaks, which have poles.
+    """
+
+    def __init__(self, triangle: Triangle, time_s: Floats, measured: Floats, order: int, delay_s: float | None) -> None:
+        self.triangle, self.time_s = triangle, time_s
+        self.low, self.height = float(np.min(measured)), float(np.ptp(measured))
+        if not self.height > 0.0:
+            raise Unphysical("the displacement does not move")
+        self.measured = (measured - self.low) / self.height
+        self.fits_delay = delay_s is None
+        self.given_delay = (delay_s or 0.0) / triangle.period_s  # in periods from here on
+        s = 2.0 * (time_s - time_s[0]) / (time_s[-1] - time_s[0]) - 1.0
+        self.drift = np.stack([s**n for n in range(1, order + 1)], axis=1) if order else np.zeros((len(s), 0))
+        shape = ["xi_f", "xi_gamma_f", "xi_b", "xi_gamma_b"]
+        drifts = [f"drift_{n}" for n in range(1, order + 1)]
+        self._last: tuple[Floats, tuple[Floats, Floats, Bools, Floats]] | None = None
+        self.names = (*shape, "low", "height", *drifts, *(["delay"] if self.fits_delay else []))
+
+    def delay(self, x: Floats) -> float:
+        """In periods."""
+        return float(x[-1]) if self.fits_delay else self.given_delay
+
+    def position(self, x: Floats) -> tuple[Floats, Floats, Bools, Floats]:
+        """u and tau along the sweep, whether it rises, and the normalised displacement."""
+        if self._last is None or not np.array_equal(self._last[0], x):  # residuals and their derivatives ask in turn
+            self._last = x.copy(), self._position(x)
+        return self._last[1]
+
+    def _position(self, x: Floats) -> tuple[Floats, Floats, Bools, Floats]:
+        delayed = self.time_s - self.delay(x) * self.triangle.period_s
+        rising = self.triangle.phase(delayed) < self.triangle.turn
+        drive = self.triangle.value(delayed)
+        u = np.where(rising, drive, 1.0 - drive)
+        forward, backward = (BranchShape(float(x[i]), float(x[i + 1])) for i in (0, 2))
+        tau = np.empty_like(u)
+        tau[rising], tau[~rising] = forward.inverse(u[rising]), backward.inverse(u[~rising])
+        return u, tau, rising, np.where(rising, tau, 1.0 - tau)
+
+    def expected(self, x: Floats) -> Floats:
+        """Of the normalised displacement, with drift."""
+        _, _, _, position = self.position(x)
+        return float(x[4]) + float(x[5]) * position + self.drift @ x[6 : 6 + self.drift.shape[1]]
+
+    def residuals(self, x: Floats) -> Floats:
+        """Model less measurement; far off where a branch would run backwards."""
+        if min(BranchShape(float(x[i]), float(x[i + 1])).least_slope() for i in (0, 2)) < 0.02:
+            return np.full(len(self.measured), _TOO_FAR)
+        return self.expected(x) - self.measured
+
+    def jacobian(self, x: Floats) -> Floats:
+        """Of ``residuals``: tau moves by -(du/dparameter) / (du/dtau)."""
+        columns, steep = self._shape_columns(x)
+        if self.fits_delay:
+            columns.append(-steep * self._by_delay(x))
+        return np.column_stack(columns)
+
+    def timing_jacobian(self, x: Floats) -> Floats:
+        """By the period, start and turn of the drive."""
+        _, steep = self._shape_columns(x)
+        delayed = self.time_s - self.delay(x) * self.triangle.period_s
+        return self.triangle.timing_slopes(delayed) * steep[:, None]
+
+    def _by_delay(self, x: Floats) -> Floats:
+        rising = self.position(x)[2]
+        return np.where(rising, 1.0 / self.triangle.turn, -1.0 / (1.0 - self.triangle.turn))
+
+    def _shape_columns(self, x: Floats) -> tuple[list[Floats], Floats]:
+        _, tau, rising, position = self.position(x)
+        s, c = np.sin(pi * tau), np.cos(pi * tau)
+        columns = []
+        steep = np.empty_like(tau)
+        for i, side in ((0, rising), (2, ~rising)):
+            slope = BranchShape(float(x[i]), float(x[i + 1])).slope(tau)
+            sign = np.where(side, float(x[5]) / slope, 0.0) * (1.0 if i == 0 else -1.0)
+            columns += [-sign * s, -sign * (2.0 * tau + c - 1.0)]
+            steep = np.where(side, float(x[5]) / slope, steep)
+        return [*columns, np.ones_like(tau), position, *self.drift.T], steep
+
+    def solve(self) -> Solution:
+        """From a linear first guess: in u = tau + xi sin + ... the displacement itself is near enough to tau."""
+        start = np.zeros(len(self.names))
+        start[5] = 1.0
+        u, _, rising, _ = self.position(start)
+        upright = float(np.corrcoef(np.where(rising, u, 1.0 - u), self.measured)[0, 1]) > 0.0
+        if not upright:
+            start[4], start[5] = 1.0, -1.0
+        position = self.measured if upright else 1.0 - self.measured
+        tau = np.clip(np.where(rising, position, 1.0 - position), 0.0, 1.0)
+        basis = np.stack([np.sin(pi * tau), 2.0 * tau + np.cos(pi * tau) - 1.0], axis=1)
+        for i, side in ((0, rising), (2, ~rising)):
+            guess = np.linalg.lstsq(basis[side], (u - tau)[side], rcond=None)[0]
+            while BranchShape(*guess.tolist()).least_slope() < 0.1:
+                guess = 0.7 * guess
+            start[i : i + 2] = guess
+        scales = np.full(len(start), 0.3)
+        if self.fits_delay:
+            scales[-1] = 0.05
+        return solve(self.residuals, start, self.names, scales, jacobian=self.jacobian)
+
+
+def _result(model: _Model, solution: Solution, triangle: Triangle, periods: float, left_out: int) -> TraceFit:
+    x, left = solution.values, solution.residuals
+    correlated = correlation_length(left)
+    freedom = max(len(left) / correlated - len(x), 1.0)
+    covariance = solution.unit_covariance * float(left @ left) / freedom
+    # Errors of the drive's timing move the branches too.
+    moved = solution.unit_covariance @ solution.jacobian.T @ model.timing_jacobian(x)
+    covariance = covariance + moved @ triangle.timing_covariance @ moved.T
+    forward, backward = (_branch(x[i : i + 2], covariance[i : i + 2, i : i + 2]) for i in (0, 2))
+    delay = Estimate(model.given_delay * triangle.period_s)
+    if model.fits_delay:
+        delay = Estimate(float(x[-1]) * triangle.period_s, float(covariance[-1, -1]) ** 0.5 * triangle.period_s)
+    residual, scaling, curve = _averaged(model, x, left)
+    drift = model.drift @ x[6 : 6 + model.drift.shape[1]]
+    spread = 1.4826 * float(np.median(np.abs(left - np.median(left))))
+    return TraceFit(
+        triangle=triangle,
+        v_scan=triangle.v_high - triangle.v_low,
+        periods=periods,
+        samples=len(left),
+        left_out=left_out,
+        forward=forward,
+        backward=backward,
+        delay_s=delay,
+        drift_percent=100.0 * float(np.ptp(drift)) / abs(float(x[5])) if drift.size else 0.0,
+        noise_percent=100.0 * float(np.sqrt(np.mean(np.diff(left) ** 2) / 2.0)) / abs(float(x[5])),
+        residual_percent=residual,
+        scaling_percent=scaling,
+        correlated=correlated,
+        inverted=bool(x[5] < 0.0),
+        strays=tuple((left_out + np.flatnonzero(np.abs(left) > max(7.0 * spread, 1e-6))).tolist()),
+        curve=curve,
+    )
+
+
+def correlation_length(residuals: Floats) -> float:
+    """Over how many samples residuals depend on each other: 1 for white noise.
+
+    The integrated autocorrelation, summed up to five times itself: far enough for what it finds, not for noise.
+    """
+    power = float(residuals @ residuals)
+    total = 1.0
+    if power <= 0.0:
+        return total
+    for lag in range(1, len(residuals) // 4):
+        if lag > 5.0 * total:
+            break
+        total += 2.0 * float(residuals[lag:] @ residuals[:-lag]) / power
+    return max(total, 1.0)
+
+
+def peak(shape: Floats) -> tuple[float, float]:
+    """beta and u_peak of (xi, xi gamma): u - tau turns once between the poles of (20)."""
+    xi, xi_gamma = float(shape[0]), float(shape[1])
+    tau = np.linspace(LOWEST_PEAK, HIGHEST_PEAK, 257)
+    slope = pi * xi * np.cos(pi * tau) + xi_gamma * (2.0 - pi * np.sin(pi * tau))
+    turning = np.flatnonzero(np.sign(slope[1:]) != np.sign(slope[:-1]))
+    if not len(turning):  # no hysteresis at all
+        return 0.0, 0.5
+    at = int(turning[0])
+    low, high = float(tau[at]), float(tau[at + 1])
+    rising = slope[at] > 0.0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        value = pi * xi * np.cos(pi * middle) + xi_gamma * (2.0 - pi * np.sin(pi * middle))
+        low, high = (middle, high) if (value > 0.0) == rising else (low, middle)
+    beta = xi * np.sin(pi * low) + xi_gamma * (np.cos(pi * low) - 1.0 + 2.0 * low)
+    return float(beta), float(low + beta)
+
+
+def _branch(shape: Floats, covariance: Floats) -> MeasuredBranch:
+    beta, u_peak = peak(shape)
+    step = 1e-6 * max(float(np.max(np.abs(shape))), 1e-3)
+    steps = step * np.eye(2)
+    slopes = np.stack([np.subtract(peak(shape + by), peak(shape - by)) / (2.0 * step) for by in steps], axis=1)
+    spread = np.sqrt(np.diag(slopes @ covariance @ slopes.T))
+    return MeasuredBranch(Estimate(beta, float(spread[0])), Estimate(u_peak, float(spread[1])))
+
+
+def _averaged(model: _Model, x: Floats, left: Floats) -> tuple[Floats, tuple[float, float], Curve]:
+    """What is left over, averaged over the periods, and the measured residual to draw."""
+    u, tau, rising, _ = model.position(x)
+    height = float(x[5])
+    residuals, scaling, drawn = [], [], []
+    for side, sign, shape in ((rising, 1.0, x[:2]), (~rising, -1.0, x[2:4])):
+        errors = -left[side] / height * sign  # along the sweep, measured less model
+        place = np.minimum((tau[side] * _BINS).astype(np.int64), _BINS - 1)
+        count = np.maximum(np.bincount(place, minlength=_BINS), 1)
+        mean = np.bincount(place, errors, minlength=_BINS) / count
+        residuals.append(100.0 * mean)
+        scaling.append(100.0 * float(np.ptp(np.diff(mean)[_WINDOW]) * _BINS))
+        at = np.bincount(place, u[side], minlength=_BINS) / count
+        fitted = BranchShape(*shape.tolist()).inverse(at)
+        drawn.append((at, 100.0 * (mean + fitted - at), 100.0 * (fitted - at)))
+    # As figure 5a has it: against the drive, the backward branch mirrored.
+    (f_at, f_measured, f_fitted), (b_at, b_measured, b_fitted) = drawn
+    along = np.concatenate([f_at, 1.0 - b_at])
+    curve = Curve(
+        "position less that of a straight line, against the normalised drive",
+        "drive",
+        "% of scan",
+        (along, np.concatenate([f_measured, -b_measured])),
+        (along, np.concatenate([f_fitted, -b_fitted])),
+    )
+    return np.concatenate(residuals), (scaling[0], scaling[1]), curve

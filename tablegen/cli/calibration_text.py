@@ -1,0 +1,84 @@
+"""A calibration for the terminal: parameters with errors, what they leave, a plot, and what to look at."""
+
+from collections.abc import Sequence
+from math import floor, isfinite, log10
+
+from tablegen.calibration.estimate import Estimate, Fit
+from tablegen.calibration.hysteresis import HysteresisFit
+from tablegen.calibration.summary import change, parameters
+from tablegen.calibration.table import Table
+from tablegen.calibration.trace import MeasuredBranch
+from tablegen.cli.scatter import scatter
+
+
+def calibration_text(fit: Fit, axis: str, tables: Sequence[Table]) -> list[str]:
+    """Lines of text; ``tables`` are what was fitted, for the places of outliers."""
+    hysteresis = isinstance(fit, HysteresisFit)
+    rows = [(name, *figures(estimate), meaning) for name, estimate, meaning in parameters(fit)]
+    widths = [max(len(row[i]) for row in rows) for i in range(3)]
+    files = ", ".join(table.source.name for table in tables)
+    lines = [f"{change(fit, []).kind} of {axis}, {fit.points} {'samples' if hysteresis else 'points'} of {files}", ""]
+    lines += [
+        f"{name:<{widths[0]}}  {value:>{widths[1]}} {error:<{widths[2]}}  {meaning}"
+        for name, value, error, meaning in rows
+    ]
+    metric = "position error [% of the scan]" if hysteresis else "scale error [%]"
+    lines += [
+        "",
+        f"{metric}: up to {fit.before_percent:.2f} without correction; left {fit.rms_percent:.2g} rms, "
+        f"{fit.largest_percent:.2g} at most",
+        "",
+    ]
+    if isinstance(fit, HysteresisFit):
+        lines += [*_traces(fit), ""]
+    for curve in fit.curves:
+        lines += [*scatter(curve), ""]
+    for row in fit.outliers:
+        place = f"{tables[0].file}:{tables[0].lines[row]}"
+        lines.append(
+            f"outlier: {place}: far from what the other points say; kept. Remove the row if it was measured wrongly"
+        )
+    return lines + [f"note: {remark}" for remark in fit.remarks]
+
+
+def _traces(fit: HysteresisFit) -> list[str]:
+    """What each trace says by itself, and how good it is."""
+    head = (
+        "turn",
+        "V_scan",
+        "rate [Hz]",
+        "periods",
+        "noise [%]",
+        "drift [%]",
+        "direction",
+        "beta",
+        "u_peak",
+        "left [% p-p]",
+    )
+    rows = [head]
+    for branch in fit.branches:
+        for trace in branch.traces:
+            shape = f"{trace.triangle.turn:.3f}", f"{trace.v_scan:.4g}", f"{1.0 / trace.triangle.period_s:.4g}"
+            record = f"{trace.periods:.3g}", f"{trace.noise_percent:.2g}", f"{trace.drift_percent:.2g}"
+            for side, left in zip(("forward", "backward"), trace.scaling_percent, strict=True):
+                measured: MeasuredBranch = getattr(trace, side)
+                start = (*shape, *record) if side == "forward" else ("",) * 6
+                branch_figures = (" ".join(figures(measured.beta)), " ".join(figures(measured.u_peak)))
+                rows.append((*start, side, *branch_figures, f"{left:.2g}"))
+    widths = [max(len(row[i]) for row in rows) for i in range(len(head))]
+    lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+    return [*lines, "left: scaling error that the model does not describe, over x = 0.1..0.9"]
+
+
+def figures(estimate: Estimate) -> tuple[str, str]:
+    """Value and error, as far as two digits of the error; without an error six digits."""
+    value, error = estimate.value, estimate.standard_error
+    if not isfinite(error):
+        return f"{value:.6g}", ""
+    if error <= 1e-8 * abs(value):
+        return f"{value:.9g}", "± 0"
+    digits = 1 - floor(log10(error))
+    if 0 <= digits <= 6:
+        return f"{value:.{digits}f}", f"± {error:.{digits}f}"
+    significant = max(2 + floor(log10(max(abs(value), error))) - floor(log10(error)), 2)
+    return f"{value:.{significant}g}", f"± {error:.2g}"

@@ -1,0 +1,192 @@
+"""Find the parameters of the default virtual scanner from the numbers that the paper prints.
+
+    python -m tablegen.virtual.identify > tablegen/virtual/default.toml
+
+Displacement is linear in the coefficients of the hysteresis, creep included, so that one least squares with
+coefficients >= 0 fits them to sizes and shapes of triangles at once. What the offset does beyond that is the
+sensitivity's. Needs scipy.
+"""
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.optimize import nnls
+
+from tablegen.compensation.hysteresis import BranchShape, beta_at
+from tablegen.compensation.offset import OffsetLaw, normalised_offset
+from tablegen.compensation.size import SizeLaw
+from tablegen.numerics.arrays import Floats
+from tablegen.virtual.creep import logarithmic_creep
+from tablegen.virtual.preisach import Preisach
+
+DEGREE, REVERSIBLE, SENSITIVITY = 8, 2, 4  # degrees of the polynomials
+TICKS = 2000  # of a triangle
+SIZES = (0.07, 0.13, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
+OFFSETS_V = (7.0, 20.0, 35.0, 50.0, 65.0, 80.0, 93.0)
+V_MAX = 100.0
+OFFSET_SIZE = 0.13  # of v_max, 200 nm in figure 2 of the paper
+LOSS = 0.03
+FASTEST_S, SLOWEST_S, PER_DECADE = 1e-6, 1e3, 2
+# Sizes and middles, normalised, at which the size nonlinearity shall be what it is in the middle of the range.
+ELSEWHERE = tuple((v, middle) for v in (0.05, 0.2, 0.4, 0.6) for middle in (0.3, 0.4, 0.6, 0.7))
+# The largest loop is what the paper prints most of; the offset's curvature, which the sensitivity can take over, least.
+SIZE_WEIGHT, LARGEST_WEIGHT, SMALLER_WEIGHT, OFFSET_WEIGHT, ELSEWHERE_WEIGHT = 20.0, 60.0, 10.0, 1.0, 1.0
+
+
+@dataclass(frozen=True)
+class Targets:
+    """What a scanner shall measure like, at the rate at which its gain is 1."""
+
+    size: SizeLaw
+    offset: OffsetLaw
+    rate_hz: float
+
+    @staticmethod
+    def shapes(v: float) -> tuple[BranchShape, BranchShape]:
+        """Hysteresis at a normalised size: section 8 at full scale, (22) with figure 5k's parameters below."""
+        forward, backward = (0.035, 0.085) if v == 1.0 else (beta_at(v, 0.037, 4.0), beta_at(v, 0.08, 1.5))
+        return BranchShape.harmonic(forward, 0.37), BranchShape.harmonic(backward, 0.48)
+
+
+@dataclass(frozen=True)
+class Identified:
+    """Coefficients of one axis."""
+
+    hysteresis: Preisach
+    sensitivity: tuple[float, ...]
+
+
+def paper_targets(beta: float, at: Sequence[float], apparent: Sequence[float], rate_hz: float) -> Targets:
+    """``apparent`` sizes, relative to the middle, at offsets ``at`` of (2); ``beta`` of (6), 10 nm/V at 200 nm."""
+    return Targets(SizeLaw.calibrated(10.0, V_MAX, beta, 200.0, 0.5), OffsetLaw.fit([*at], [*apparent]), rate_hz)
+
+
+# Figure 2: 17.7 nm at 50 V, +25 % at 93 V and -8 % at 7 V; the y axis as in the example's scanner file.
+X_TARGETS = paper_targets(0.53, (-0.86, 0.0, 0.86), (0.92, 1.0, 1.25), 100.0)
+Y_TARGETS = paper_targets(0.60, (-1.0, 0.0, 1.0), (0.90, 1.0, 1.22), 1.0)
+
+
+def identify(targets: Targets) -> Identified:
+    """Fit hysteresis and sensitivity to the targets."""
+    units = _units()
+    rows: list[Floats] = []
+    wanted: list[Floats] = []
+
+    def add(row: Floats, value: Floats, weight: float) -> None:
+        rows.append(weight * row)
+        wanted.append(weight * value)
+
+    half, sparse = TICKS // 2, slice(0, TICKS // 2, 10)
+    tau = np.arange(half) / half
+    for v in SIZES:
+        relative = _triangles(units, v, 0.5, targets.rate_hz) / targets.size.size_nm(v)
+        relative = relative - relative[0]
+        add(relative[half : half + 1], np.ones(1), SIZE_WEIGHT)
+        forward, backward = targets.shapes(v)
+        weight = (LARGEST_WEIGHT if v == 1.0 else SMALLER_WEIGHT) / np.sqrt(half / 10)
+        add(relative[:half][sparse], forward.inverse(tau)[sparse], weight)
+        add(relative[half:][sparse], 1.0 - backward.inverse(tau)[sparse], weight)
+    factors = np.array([targets.offset.factor(normalised_offset(volts, V_MAX)) for volts in OFFSETS_V])
+    ends = [_triangles(units, OFFSET_SIZE, volts / V_MAX, targets.rate_hz)[[0, half]] for volts in OFFSETS_V]
+    sizes = np.array([b - a for a, b in ends]) / targets.size.size_nm(OFFSET_SIZE)
+    add(sizes * factors[:, None], np.ones(len(factors)), OFFSET_WEIGHT)
+
+    small = targets.size.size_nm(OFFSET_SIZE)
+    for v, middle in ELSEWHERE:
+        start, end = _triangles(units, v, middle, targets.rate_hz)[[0, half]] / targets.size.size_nm(v)
+        start_small, end_small = _triangles(units, OFFSET_SIZE, middle, targets.rate_hz)[[0, half]] / small
+        add((end - start - end_small + start_small)[None, :], np.zeros(1), ELSEWHERE_WEIGHT)
+
+    found, _ = nnls(np.vstack(rows), np.concatenate(wanted), maxiter=20000)
+    found = np.array([float(f"{value:.6g}") for value in found])
+    middle = float(sizes[OFFSETS_V.index(50.0)] @ found)
+    p = np.array([normalised_offset(volts, V_MAX) for volts in OFFSETS_V])
+    missing = middle / (sizes @ found * factors) - 1.0
+    powers = p[:, None] ** np.arange(1, SENSITIVITY + 1)
+    sensitivity = np.linalg.lstsq(powers, missing, rcond=None)[0]
+    density = found[REVERSIBLE + 1 :]
+    starts = np.cumsum([0, *range(DEGREE + 1, 0, -1)])
+    return Identified(
+        Preisach(
+            tuple(map(float, found[: REVERSIBLE + 1])),
+            tuple(tuple(map(float, density[a:b])) for a, b in pairwise(starts)),
+        ),
+        tuple(float(f"{value:.5g}") for value in sensitivity),
+    )
+
+
+def _units() -> list[Preisach]:
+    """One operator for each coefficient."""
+    places = [(i, j) for i in range(DEGREE + 1) for j in range(DEGREE + 1 - i)]
+    rest = tuple(0.0 for _ in range(REVERSIBLE + 1))
+    empty = [[0.0] * (DEGREE + 1 - i) for i in range(DEGREE + 1)]
+    units = [Preisach(tuple(float(k == n) for k in range(REVERSIBLE + 1)), ()) for n in range(REVERSIBLE + 1)]
+    for i, j in places:
+        rows = [[*row] for row in empty]
+        rows[i][j] = 1.0
+        units.append(Preisach(rest, tuple(map(tuple, rows))))
+    return units
+
+
+def _triangles(units: list[Preisach], v: float, middle: float, rate_hz: float) -> Floats:
+    """Settled displacement of every operator under a triangle, shape (ticks, operators), in nm."""
+    low, high = middle - 0.5 * v, middle + 0.5 * v
+    tau = np.arange(TICKS // 2) / (TICKS // 2)
+    creep = logarithmic_creep(LOSS, rate_hz, FASTEST_S, SLOWEST_S, PER_DECADE)
+    out = np.empty((TICKS, len(units)))
+    for n, unit in enumerate(units):
+        up = unit.branch(low + v * tau, np.full_like(tau, low))
+        down = unit.branch(high, low) - unit.branch(np.full_like(tau, high), high - v * tau)
+        out[:, n] = creep.settled(np.concatenate((up, down)), 1.0 / (rate_hz * TICKS))
+    return out
+
+
+def _rows(values: Sequence[float]) -> str:
+    return "[" + ", ".join(f"{value:g}" for value in values) + "]"
+
+
+def _axis_text(axis: str, found: Identified, rate_hz: float) -> str:
+    density = ",\n".join(f"    {_rows(row)}" for row in found.hysteresis.density)
+    return f"""
+[{axis}]
+# Factor on the displacement, 1 + c1 p + c2 p^2 + ..., with p = 2 V / v_max - 1 of the mean voltage.
+sensitivity = {_rows(found.sensitivity)}
+
+[{axis}.hysteresis]
+reversible_nm = {_rows(found.hysteresis.reversible)}
+density_nm = [
+{density},
+]
+
+[{axis}.creep]
+loss_per_decade = {LOSS:g}
+reference_hz = {rate_hz:g}
+fastest_s = {FASTEST_S:g}
+slowest_s = {SLOWEST_S:g}
+terms_per_decade = {PER_DECADE}
+
+[{axis}.resonance]
+frequency_hz = 50e3
+quality = 20
+"""
+
+
+def default_text() -> str:
+    """The file of the default scanner."""
+    head = f"""# The default virtual scanner: a simulation, identified from the numbers that the paper prints.
+# docs/virtual.md says where each comes from; tablegen/virtual/identify.py makes this file.
+name = "virtual"
+v_max = {V_MAX:g}
+
+[amplifier]
+bandwidth_hz = 250e3
+"""
+    axes = (("x", X_TARGETS), ("y", Y_TARGETS))
+    return head + "".join(_axis_text(axis, identify(targets), targets.rate_hz) for axis, targets in axes)
+
+
+if __name__ == "__main__":
+    sys.stdout.write(default_text())

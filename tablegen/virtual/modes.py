@@ -1,0 +1,92 @@
+"""Linear dynamics as a sum of first-order terms, exact for a drive that is held from tick to tick.
+
+H(s) = direct + sum of r / (s - p), each complex pole standing for its conjugate as well. Values belong to the end of
+their tick, just before the next one begins: a scanner without inertia is then where its drive has been put.
+"""
+
+from dataclasses import dataclass
+from math import pi, sqrt
+
+import numpy as np
+import numpy.typing as npt
+
+from tablegen.numerics.arrays import Floats, FloatsLike
+
+_BLOCK = 64  # ticks that are computed as one product of matrices
+
+
+@dataclass(frozen=True)
+class Modes:
+    """Poles in rad/s, in the left half-plane, those with an imaginary part above 0 with their conjugate."""
+
+    direct: float
+    poles: tuple[complex, ...] = ()
+    residues: tuple[complex, ...] = ()
+
+    def response(self, f_hz: FloatsLike) -> npt.NDArray[np.complex128]:
+        """H at frequencies in Hz, one for each."""
+        s = 2j * pi * np.asarray(f_hz, dtype=np.float64)
+        out = np.full(s.shape, complex(self.direct))
+        for p, r in zip(self.poles, self.residues, strict=True):
+            out += r / (s - p)
+            if p.imag:
+                out += r.conjugate() / (s - p.conjugate())
+        return out
+
+    def settled(self, drive: Floats, tick_s: float) -> Floats:
+        """The periodic response to one period of a drive."""
+        if not self.poles:
+            return self.direct * drive
+        # The response of each recursion, taken at the harmonics of the period: the steady state without waiting for it.
+        z = np.exp(2j * pi * np.arange(len(drive) // 2 + 1) / len(drive))
+        factor = np.full(z.shape, complex(self.direct))
+        change, weight = self._held(tick_s)
+        for gone, w, p in zip(-change, weight, self.poles, strict=True):
+            factor += w * z / (z - 1.0 + gone)
+            if p.imag:
+                factor += np.conj(w) * z / (z - 1.0 + np.conj(gone))
+        return np.fft.irfft(np.fft.rfft(drive) * factor, len(drive))
+
+    def follow(self, drive: Floats, tick_s: float, at_rest: float | None = None) -> Floats:
+        """The response to a drive that follows a long rest at ``at_rest``, or at its own first value."""
+        if not self.poles:
+            return self.direct * drive
+        change, weight = self._held(tick_s)
+        decay = 1.0 + change
+        doubled = np.where(np.array(self.poles).imag != 0.0, 2.0, 1.0)  # a pole and its conjugate
+        ticks = len(drive)
+        blocks = np.pad(drive, (0, -ticks % _BLOCK)).reshape(-1, _BLOCK)
+        k = np.arange(_BLOCK)
+        powers = decay[:, None] ** k
+        impulse = np.sum((doubled * weight)[:, None] * powers, axis=0).real
+        impulse[0] += self.direct
+        kernel = np.where(k[:, None] <= k, impulse[np.maximum(k - k[:, None], 0)], 0.0)
+        fed = blocks @ powers[:, ::-1].T
+        state = (drive[0] if at_rest is None else at_rest) / -change
+        states = np.empty((len(blocks), len(decay)), dtype=np.complex128)
+        over = decay**_BLOCK
+        for i, feed in enumerate(fed):
+            states[i] = state
+            state = over * state + feed
+        carried = (states @ ((doubled * weight * decay)[:, None] * powers)).real
+        return (blocks @ kernel + carried).reshape(-1)[:ticks]
+
+    def _held(self, tick_s: float) -> tuple[npt.NDArray[np.complex128], npt.NDArray[np.complex128]]:
+        """Of each term over a tick: the share by which its state changes, and the weight of the drive held."""
+        p, r = np.array(self.poles, dtype=np.complex128), np.array(self.residues, dtype=np.complex128)
+        change = np.expm1(p * tick_s)
+        return change, r * change / p
+
+
+def low_pass(bandwidth_hz: float) -> Modes:
+    """One pole: half the power at ``bandwidth_hz``."""
+    w = 2.0 * pi * bandwidth_hz
+    return Modes(0.0, (complex(-w),), (complex(w),))
+
+
+def second_order(frequency_hz: float, quality: float) -> Modes:
+    """A resonance: 1 / (1 - r^2 + i r / Q) with r = f / frequency_hz; ``quality`` above 0.5."""
+    w = 2.0 * pi * frequency_hz
+    damped = w * sqrt(1.0 - 0.25 / quality**2)
+    pole = complex(-0.5 * w / quality, damped)
+    return Modes(0.0, (pole,), (w * w / (2j * damped),))

@@ -1,0 +1,160 @@
+"""Hysteresis: a Preisach operator with a smooth density over the triangle 0 <= beta <= alpha <= 1 of switching drives.
+
+The density and the slope of the reversible part are Bernstein polynomials with coefficients >= 0: no branch runs
+backwards, and the Everett function, the change along a branch since its turning point, is a polynomial. A drive is
+therefore played exactly, one polynomial for each piece of a branch, without a grid of relays.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from math import comb, factorial
+
+import numpy as np
+
+from tablegen.numerics.arrays import Floats, FloatsLike
+
+# Drives this far outside 0..1 are the last bits of a voltage, not a voltage.
+_TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Memory:
+    """Turning points that are not wiped out, from 0 on, lows and highs by turns, and the displacement at each, in nm.
+
+    The last one is where the drive is now.
+    """
+
+    drives: tuple[float, ...] = (0.0,)
+    displacements: tuple[float, ...] = (0.0,)
+
+
+@dataclass(frozen=True)
+class Preisach:
+    """The operator; drive normalised to 0..1, displacement in nm above that at drive 0 after rest.
+
+    ``reversible``: Bernstein coefficients of the reversible slope over 0..1, in nm per full drive. ``density[i][j]``:
+    of (1 - alpha)^i (alpha - beta)^j beta^(n - i - j), in nm per full drive squared, in n + 1 rows of n + 1, n, ... 1.
+    """
+
+    reversible: tuple[float, ...]
+    density: tuple[tuple[float, ...], ...]
+
+    def __post_init__(self) -> None:
+        if not self.reversible or [len(row) for row in self.density] != list(range(len(self.density), 0, -1)):
+            raise ValueError("a density of degree n has n + 1 rows of n + 1, n, ..., 1 coefficients")
+        if min(min(self.reversible), min(map(min, self.density), default=0.0)) < 0.0:
+            raise ValueError("a coefficient below 0 would let a branch run backwards")
+
+    @cached_property
+    def everett(self) -> Floats:
+        """Coefficients e[p, q] of alpha^p beta^q of the Everett function, in nm."""
+        n, m = len(self.density) - 1, len(self.reversible)
+        size = max(n + 3, m + 1)
+        out = np.zeros((size, size))
+        slope = np.zeros(m)
+        for i, weight in enumerate(self.reversible):
+            slope[i:] += weight * comb(m - 1, i) * _one_minus(m - 1 - i)
+        integral = slope / np.arange(1, m + 1)
+        out[1 : m + 1, 0] += integral
+        out[0, 1 : m + 1] -= integral
+        for i, row in enumerate(self.density):
+            for j, weight in enumerate(row):
+                if weight:
+                    out[: n + 3, : n + 3] += weight * _twice_integrated(_monomials(n, i, j))
+        return out
+
+    def branch(self, high: FloatsLike, low: FloatsLike) -> Floats:
+        """E(high, low): nm between the drives ``low`` and ``high`` along the branch that turned at one of them."""
+        return np.asarray(np.polynomial.polynomial.polyval2d(high, low, self.everett), dtype=np.float64)
+
+    def play(self, drive: Floats, memory: Memory | None = None) -> tuple[Floats, Memory]:
+        """Displacement in nm at each drive of a sequence, and what is remembered after it."""
+        drive = np.asarray(drive, dtype=np.float64)
+        if drive.size and max(-float(drive.min()), float(drive.max()) - 1.0) > _TOLERANCE:
+            raise ValueError(f"a drive of {drive.min():g}..{drive.max():g} leaves 0..1, for which the operator is made")
+        drive = np.clip(drive, 0.0, 1.0)
+        memory = memory or Memory()
+        turning, reached = list(memory.drives), list(memory.displacements)
+        out = np.empty_like(drive)
+        for first, stop in _monotonic(np.concatenate(([turning[-1]], drive))):
+            self._sweep(drive[first:stop], out[first:stop], turning, reached)
+        return out, Memory(tuple(turning), tuple(reached))
+
+    def settled(self, drive: Floats) -> Floats:
+        """Displacement in nm over one period of a periodic drive: one period has wiped out what it can."""
+        _, memory = self.play(drive)
+        return self.play(drive, memory)[0]
+
+    def _sweep(self, drive: Floats, out: Floats, turning: list[float], reached: list[float]) -> None:
+        """One monotonic piece of a drive; the end of the piece before it is the last turning point."""
+        end = float(drive[-1])
+        if end == drive[0] == turning[-1]:
+            out[:] = reached[-1]
+            return
+        up = end > turning[-1]
+        if len(turning) > 1 and (turning[-1] > turning[-2]) == up:  # it goes on where it went before
+            del turning[-1], reached[-1]
+        done = 0
+        while done < len(drive):
+            # One branch holds up to the turning point before its own; from there on both are wiped out.
+            limit = turning[-2] if len(turning) > 1 else 1.0
+            free = len(turning) == 1 or limit == 0.0
+            inside = len(drive) if free else int(np.count_nonzero(drive < limit if up else drive > limit))
+            out[done:inside] = reached[-1] + self._from(turning[-1], drive[done:inside], up)
+            done = max(done, inside)
+            if done < len(drive):
+                del turning[-2:], reached[-2:]
+        if end == 0.0:
+            turning[:], reached[:] = [0.0], [0.0]
+        else:
+            turning.append(end)
+            reached.append(float(out[-1]))
+
+    def _from(self, turned: float, drive: Floats, up: bool) -> Floats:
+        """Change in nm since the turning point, along the branch that starts there."""
+        powers = turned ** np.arange(len(self.everett))
+        coefficients = self.everett @ powers if up else -(powers @ self.everett)
+        value = np.full_like(drive, coefficients[-1])
+        for coefficient in coefficients[-2::-1]:
+            value = value * drive + coefficient
+        return value
+
+
+def _monotonic(drive: Floats) -> list[tuple[int, int]]:
+    """Ranges of drive[1:] along which the sequence neither rises and falls; flat parts belong to what is before."""
+    steps = np.sign(np.diff(drive))
+    moving = np.flatnonzero(steps)
+    if not len(moving):
+        return [(0, len(steps))] if len(steps) else []
+    turns = moving[1:][steps[moving[1:]] != steps[moving[:-1]]]
+    ends = [0, *map(int, turns), len(steps)]
+    return list(pairwise(ends))
+
+
+def _one_minus(n: int) -> Floats:
+    """Coefficients of (1 - x)^n."""
+    return np.array([(-1.0) ** k * comb(n, k) for k in range(n + 1)])
+
+
+def _monomials(n: int, i: int, j: int) -> Floats:
+    """Bernstein polynomial n!/(i! j! k!) (1 - alpha)^i (alpha - beta)^j beta^k as coefficients of alpha^p beta^q."""
+    k = n - i - j
+    out = np.zeros((n + 1, n + 1))
+    for s, first in enumerate(_one_minus(i)):
+        for t, second in enumerate(_one_minus(j)):
+            out[s + j - t, t + k] += first * second
+    return out * (factorial(n) // (factorial(i) * factorial(j) * factorial(k)))
+
+
+def _twice_integrated(density: Floats) -> Floats:
+    """The integral of a density over beta <= b <= a <= alpha."""
+    n = len(density) - 1
+    out = np.zeros((n + 3, n + 3))
+    for p in range(n + 1):
+        for q in range(n + 1 - p):
+            weight, whole = density[p, q] / (q + 1), p + q + 2
+            out[whole, 0] += weight / whole
+            out[0, whole] += weight * (1.0 / (p + 1) - 1.0 / whole)
+            out[p + 1, q + 1] -= weight / (p + 1)
+    return out

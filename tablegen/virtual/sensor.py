@@ -1,0 +1,21 @@
+"""A displacement sensor: white noise and a slow drift on what is true."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tablegen.numerics.arrays import Floats
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """``noise_nm`` rms a reading, ``drift_nm_per_s``; the same seed gives the same readings."""
+
+    noise_nm: float = 0.0
+    drift_nm_per_s: float = 0.0
+    seed: int = 0
+
+    def read(self, displacement_nm: Floats, time_s: Floats) -> Floats:
+        """Readings of a displacement at times in s."""
+        noise = np.random.default_rng(self.seed).standard_normal(displacement_nm.shape)
+        return displacement_nm + self.drift_nm_per_s * time_s + self.noise_nm * noise

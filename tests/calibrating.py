@@ -1,0 +1,169 @@
+"""Synthetic measurements with a known truth, from the paper's equations as printed and not from the package's laws.
+
+Each case makes one noisy measurement from a generator of random numbers and fits it. A trial counts as a hit where the
+truth lies within two standard errors.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from math import cos, exp, log10, pi, sin, tan
+
+import numpy as np
+
+from tablegen.calibration.estimate import Estimate
+from tablegen.calibration.frequency import fit_frequency
+from tablegen.calibration.hysteresis import Trace, fit_hysteresis
+from tablegen.calibration.offset import fit_offset
+from tablegen.calibration.resonance import fit_resonance
+from tablegen.calibration.size import fit_size
+from tablegen.numerics.arrays import Floats
+
+NOISE = 0.002  # rms, of the issue
+V_MAX = 100.0
+OFFSETS = np.array([7.0, 25.0, 50.0, 75.0, 93.0])
+DRIVES = np.array([5.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0, 100.0])
+FREQUENCIES = np.geomspace(1.0, 3000.0, 15)
+RESPONSE = np.concatenate([np.geomspace(100.0, 36e3, 20), np.linspace(36.5e3, 44e3, 30), np.geomspace(45e3, 60e3, 8)])
+AMPLITUDES = (30.0, 60.0, 100.0)
+
+Found = dict[str, tuple[Estimate, float]]  # each parameter with its truth
+Case = Callable[[np.random.Generator, float], Found]
+
+
+def apparent(offset_v: Floats, m_minus: float, m_plus: float, centre_nm: float) -> Floats:
+    """Equations (1)-(4)."""
+    p = 2.0 * offset_v / V_MAX - 1.0
+    return centre_nm * (1.0 + (m_plus - m_minus) / 2.0 * p + ((m_plus + m_minus) / 2.0 - 1.0) * p**2)
+
+
+def actual(drive_v: Floats, k: float, beta: float, threshold: float, base_nm: float) -> Floats:
+    """Equations (6), (8), (10), for a base size below the threshold."""
+    full = k * V_MAX
+    alpha = full / (1.0 + beta * base_nm / full)
+    v = drive_v / V_MAX
+    linear = alpha * ((1.0 + 2.0 * beta * threshold) * v - beta * threshold**2)
+    return np.where(v > threshold, linear, alpha * v * (1.0 + beta * v))
+
+
+def branch(beta: float, u_peak: float) -> Callable[[Floats], Floats]:
+    """u(tau) of a forward branch, equations (17)-(21) as printed."""
+    at = u_peak - beta
+    t = tan(pi * at / 2.0)
+    gamma = pi / 2.0 * (t * t - 1.0) / (t * t - pi * t + 1.0)
+    xi = beta / (gamma * (cos(pi * at) + 2.0 * at - 1.0) + sin(pi * at))
+    lam = 1.0 + 2.0 * xi * gamma
+    return lambda tau: lam * tau + xi * (np.sin(pi * tau) + gamma * (np.cos(pi * tau) - 1.0))
+
+
+def inverse(law: Callable[[Floats], Floats], u: Floats) -> Floats:
+    """tau with law(tau) = u, by bisection."""
+    low, high = np.zeros_like(u), np.ones_like(u)
+    for _ in range(54):
+        middle = 0.5 * (low + high)
+        below = law(middle) < u
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    return 0.5 * (low + high)
+
+
+def grown(v_scan: float, beta_max: float, rho: float) -> float:
+    """Equation (22)."""
+    return beta_max * (1.0 - exp(-rho * v_scan / V_MAX)) / (1.0 - exp(-rho))
+
+
+@dataclass(frozen=True)
+class Scanner:
+    """Section 9's scanner, and how its traces are taken."""
+
+    forward: tuple[float, float, float] = (0.037, 4.0, 0.37)  # beta_max, rho, u_peak
+    backward: tuple[float, float, float] = (0.080, 1.5, 0.48)
+    turn: float = 0.5
+    period_s: float = 0.01
+    begins: float = 0.137  # in periods after a minimum of the drive
+    delay_s: float = 0.0
+    drift: float = 0.01  # of the scan, over the record
+    sign: float = 1.0
+
+    def trace(self, v_scan: float, periods: float = 3.3, samples: int = 1000, noise: Floats | None = None) -> Trace:
+        """A record; ``noise`` is that of displacement and drive, two rows, of the scan."""
+        time = np.arange(samples) / samples * periods * self.period_s
+        drive = self._triangle(time)
+        moved = self._moved(time - self.delay_s, v_scan) + self.drift * time / time[-1]
+        noise = np.zeros((2, samples)) if noise is None else noise
+        volts = 50.0 + v_scan * (drive - 0.5 + noise[1])
+        return Trace(f"{v_scan:g} V", time, volts, 3.0 + self.sign * 10.0 * v_scan * (moved + noise[0]))
+
+    def _triangle(self, time: Floats) -> Floats:
+        phase = (time / self.period_s + self.begins) % 1.0
+        return np.where(phase <= self.turn, phase / self.turn, (1.0 - phase) / (1.0 - self.turn))
+
+    def _moved(self, time: Floats, v_scan: float) -> Floats:
+        drive = self._triangle(time)
+        rising = (time / self.period_s + self.begins) % 1.0 <= self.turn
+        laws = [branch(grown(v_scan, beta_max, rho), u) for beta_max, rho, u in (self.forward, self.backward)]
+        # The backward branch is the forward one turned by half a turn: it begins where drive and position are 1.
+        return np.where(rising, inverse(laws[0], drive), 1.0 - inverse(laws[1], 1.0 - drive))
+
+
+def offset_case(random: np.random.Generator, noise: float) -> Found:
+    sizes = apparent(OFFSETS, 0.92, 1.25, 17.7) + 17.7 * noise * random.standard_normal(len(OFFSETS))
+    fit = fit_offset(OFFSETS, sizes, V_MAX)
+    return {"m_minus": (fit.m_minus, 0.92), "m_plus": (fit.m_plus, 1.25)}
+
+
+def size_case(random: np.random.Generator, noise: float) -> Found:
+    sizes = actual(DRIVES, 10.0, 0.53, 0.5, 200.0) * (1.0 + noise * random.standard_normal(len(DRIVES)))
+    fit = fit_size(DRIVES, sizes, V_MAX)
+    truth = {"k_nm_per_v": 10.0, "beta": 0.53, "v_threshold": 0.5}
+    return {name: (getattr(fit, name), value) for name, value in truth.items()}
+
+
+def frequency_case(random: np.random.Generator, noise: float) -> Found:
+    gain = np.array([2.5 * (1.0 - 0.03 * log10(f / 100.0)) for f in FREQUENCIES])
+    fit = fit_frequency(FREQUENCIES, gain * (1.0 + noise * random.standard_normal(len(gain))), 100.0)
+    return {"alpha": (fit.alpha, 0.03)}
+
+
+def resonance_case(random: np.random.Generator, noise: float) -> Found:
+    r = RESPONSE / 40e3
+    h = 3.0 * np.exp(-2j * pi * RESPONSE * 3e-6) / (1.0 - r**2 + 1j * r / 20.0)
+    gain = np.abs(h) * (1.0 + noise * random.standard_normal(len(r)))
+    phase = np.degrees(np.angle(h) + noise * random.standard_normal(len(r)))
+    fit = fit_resonance(RESPONSE, gain, phase)
+    truth = {"frequency_hz": 40e3, "quality": 20.0, "delay_s": 3e-6}
+    return {name: (getattr(fit, name), value) for name, value in truth.items()}
+
+
+def hysteresis_case(random: np.random.Generator, noise: float) -> Found:
+    scanner = Scanner()
+    traces = [scanner.trace(v, noise=noise * random.standard_normal((2, 1000))) for v in AMPLITUDES]
+    (fit,) = fit_hysteresis(traces, V_MAX).branches
+    return {
+        f"{side}.{name}": (getattr(getattr(fit, side), name), truth)
+        for side, truths in (("forward", scanner.forward), ("backward", scanner.backward))
+        for name, truth in zip(("beta_max", "rho", "u_peak"), truths, strict=True)
+    }
+
+
+CASES: dict[str, Case] = {
+    "offset": offset_case,
+    "size": size_case,
+    "hysteresis": hysteresis_case,
+    "frequency": frequency_case,
+    "resonance": resonance_case,
+}
+
+
+def trials(kind: str, count: int, noise: float = NOISE, seed: int = 20) -> Iterator[Found]:
+    """So many fits, each of its own noise."""
+    random = np.random.default_rng(seed)
+    for _ in range(count):
+        yield CASES[kind](random, noise)
+
+
+def distances(kind: str, count: int, seed: int = 20) -> dict[str, Floats]:
+    """How many standard errors each estimate is from its truth."""
+    found: dict[str, list[float]] = {}
+    for one in trials(kind, count, seed=seed):
+        for name, (estimate, truth) in one.items():
+            found.setdefault(name, []).append((estimate.value - truth) / estimate.standard_error)
+    return {name: np.array(values) for name, values in found.items()}
