@@ -4,6 +4,8 @@
 # make test-slow a hundred thousand random swaps
 # make resources what the Verilog takes on FPGAs, into docs/resources.md
 # make instructions what the C takes on Cortex-M, into docs/instructions.md
+# make link      what an upload takes, into docs/upload.md
+# make fuzz      a million inputs for the C link, with sanitizers, on from the kept corpus
 # make bench     what a build costs, against importing numpy
 # make figures   the pictures of the README and the docs
 # make clean     remove what these made
@@ -21,7 +23,7 @@ TOOLS := $(FIRMWARE_TOOLS) gcc clang libclang-rt-dev cppcheck cmake ninja-build 
 # A file of tests goes to one process: what its tests share is made once.
 PYTEST := $(BIN)/python -m pytest --numprocesses auto --dist loadfile
 
-.PHONY: demo test test-hdl test-slow resources instructions bench figures clean
+.PHONY: demo test test-hdl test-slow resources instructions link fuzz bench figures clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/installed
@@ -49,12 +51,31 @@ resources: $(VENV)/installed-test
 instructions: $(VENV)/installed-test
 	@.ci/system-packages gcc-arm-none-eabi
 	$(BIN)/python benchmarks/firmware.py --write
+	$(BIN)/python benchmarks/firmware_link.py --write
+
+link: $(VENV)/installed-test
+	@.ci/system-packages gcc-arm-none-eabi
+	$(BIN)/python benchmarks/link.py --write
+
+# What is found goes into build/fuzz; what reaches something new may go into the corpus: build/fuzz/link -merge=1.
+FUZZ_RUNS ?= 1000000
+FUZZED := $(wildcard firmware_templates/c/dac_*.[ch]) tests/fuzz/link_fuzz.c
+build/fuzz/link: $(FUZZED)
+	@.ci/system-packages clang libclang-rt-dev
+	@mkdir -p $(@D)/found
+	clang -std=c99 -O1 -g -fsanitize=fuzzer,address,undefined -fno-sanitize-recover=all -Wall -Wextra -Werror \
+	    -Ifirmware_templates/c $(filter %.c,$(FUZZED)) -o $@
+
+fuzz: build/fuzz/link
+	build/fuzz/link -runs=$(FUZZ_RUNS) -seed=1 -max_len=400 -timeout=10 -artifact_prefix=build/fuzz/ \
+	    build/fuzz/found tests/fuzz/corpus
 
 bench: $(VENV)/installed
 	$(BIN)/python benchmarks/build_cost.py
 
 figures: $(VENV)/installed-plot
 	$(BIN)/python docs/figures/make_figures.py
+	$(BIN)/python docs/figures/make_virtual.py
 
 # The stamps depend on what decides an installation, so that the second run finds nothing to do.
 $(VENV)/installed: pyproject.toml

@@ -11,13 +11,18 @@ def resource_folder(name: Literal["examples", "firmware_templates"]) -> Path:
 
 
 def verilog_runtime() -> list[Path]:
-    """The Verilog sequencer, one module a file, in order of name; every build copies it."""
-    return sorted((resource_folder("firmware_templates") / "verilog").glob("dac_*.v"))
+    """The Verilog sequencer and its link, one module a file, in order of name; every build copies them."""
+    return sorted((resource_folder("firmware_templates") / "verilog").glob("*.v"))
 
 
 def c_runtime() -> list[Path]:
     """The C sequencer, headers and sources, in order of name; every build copies it."""
-    return sorted((resource_folder("firmware_templates") / "c").glob("dac_*.[ch]"))
+    return sorted(set((resource_folder("firmware_templates") / "c").glob("dac_*.[ch]")) - set(c_link()))
+
+
+def c_link() -> list[Path]:
+    """The device's end of the serial link in C, which needs the sequencer; every build copies it too."""
+    return sorted((resource_folder("firmware_templates") / "c").glob("dac_link*.[ch]"))
 
 
 def deciding_files() -> list[Path]:
@@ -27,8 +32,9 @@ def deciding_files() -> list[Path]:
     files the times of an archive would otherwise hide a change of version from make.
     """
     package = Path(str(import_module("tablegen").__file__)).parent
-    others = {package / name for name in ("cli", "verify", "examples", "firmware_templates")}
-    modules = {path for path in package.rglob("*.py") if not others.intersection(path.parents)}
+    apart = ("calibration", "cli", "link", "verify", "virtual", "examples", "firmware_templates", "recorded.py")
+    others = {package / name for name in apart}
+    modules = {path for path in package.rglob("*.py") if not others.intersection((path, *path.parents))}
     templates = resource_folder("firmware_templates")
     emitted = {path for language in ("c", "verilog") for path in (templates / language).iterdir() if path.is_file()}
     return sorted({*modules, *emitted, *package.parent.glob("tablegen-*.dist-info/RECORD")})

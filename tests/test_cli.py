@@ -22,6 +22,7 @@ from jsonschema import Draft202012Validator
 from tablegen import __version__
 
 COMMANDS = ("build", "check", "show", "verify", "init", "paths", "schema")
+COMMANDS += ("upload", "status", "readback", "park", "trigger", "clear", "ports")
 OWN_FILES = [
     "annexin_200nm.c",
     "annexin_200nm.h",
@@ -34,7 +35,7 @@ OWN_FILES = [
     "annexin_200nm_y_fourier.mem",
     "manifest.json",
 ]
-RUNTIME = [path.name for path in (REPOSITORY / "firmware_templates").glob("*/dac_*.[chv]")]
+RUNTIME = [path.name for path in (REPOSITORY / "firmware_templates").glob("*/*.[chv]")]
 FILES = sorted(OWN_FILES + RUNTIME)
 
 
@@ -83,6 +84,7 @@ def test_help_names_every_command_and_every_exit_status() -> None:
     for command in COMMANDS:
         assert re.search(rf"^  {command} +\S.*\.$", shown, re.MULTILINE), command
     statuses = "0 done|1 output is stale|2 wrong input|3 a limit|4 cannot write|5 a build|6 a simulator|130 interrupted"
+    statuses += "|7 no port|8 no answer|9 refused|10 link lost"
     for status in statuses.split("|"):
         assert status in shown
     assert run("-h").out == shown
@@ -121,7 +123,8 @@ def test_help_of_each_command_teaches_it(command: str, taught: tuple[str, ...]) 
 
 def test_the_version_is_printed_without_numpy() -> None:
     code = "import sys; sys.argv = ['tablegen', '--version']; from tablegen.cli import _run; s = _run()"
-    heavy = "sorted({'numpy', 'jinja2', 'msgspec', 'tomllib', 'decimal', 'cocotb', 'cocotb_tools'} & set(sys.modules))"
+    modules = "'numpy jinja2 msgspec tomllib decimal cocotb cocotb_tools serial tablegen.link'.split()"
+    heavy = f"sorted(set({modules}) & set(sys.modules))"
     done = subprocess.run(
         [sys.executable, "-c", f"{code}; print(s, {heavy})"], capture_output=True, text=True, check=True
     )

@@ -16,6 +16,7 @@ def shipped_files() -> set[str]:
     found |= {f"tablegen/examples/{path.name}" for path in REPOSITORY.glob("examples/*.toml")}
     found |= {f"tablegen/verify/{path.name}" for path in REPOSITORY.glob("tablegen/verify/*.[chv]")}
     found |= {f"tablegen/verify/{path.name}" for path in REPOSITORY.glob("tablegen/verify/*.ld")}
+    found |= {f"tablegen/virtual/{path.name}" for path in REPOSITORY.glob("tablegen/virtual/*.toml")}
     for language in (REPOSITORY / "firmware_templates").iterdir():
         if language.is_dir() and language.name != "__pycache__":
             found |= {f"tablegen/firmware_templates/{language.name}/{path.name}" for path in language.iterdir()}

@@ -10,13 +10,20 @@ import click
 
 from tablegen import __version__
 from tablegen.cli.build import build
+from tablegen.cli.calibrate import calibrate
 from tablegen.cli.check import check
 from tablegen.cli.common import Failure
+from tablegen.cli.control import clear, park, trigger
+from tablegen.cli.device_status import device_status
 from tablegen.cli.init import init
 from tablegen.cli.paths import paths
+from tablegen.cli.ports import ports
+from tablegen.cli.readback import readback
 from tablegen.cli.schema import schema
 from tablegen.cli.show import show
+from tablegen.cli.simulate import simulate
 from tablegen.cli.status import Status
+from tablegen.cli.upload import upload
 from tablegen.cli.verify import verify
 
 
@@ -28,11 +35,13 @@ A first minute:
   tablegen show demo/annexin_200nm.toml     what would be played, and how well
   tablegen build demo/annexin_200nm.toml -o build
   tablegen verify build                     play its sequencer, against all of it
+  tablegen upload build --port COM3         put it into a running instrument
 
 \b
 Exit status: 0 done, 1 output is stale (build --check), 2 wrong input or usage,
-3 a limit of the certificate is broken, 4 cannot write, 5 a build does not verify,
-6 a simulator or compiler is missing, 130 interrupted.""",
+3 a limit of the certificate is broken, 4 cannot write, 5 a build does not verify or
+a device plays something else, 6 a simulator, compiler or library is missing,
+7 no port, 8 no answer, 9 refused by the device, 10 link lost, 130 interrupted.""",
 )
 @click.version_option(__version__, prog_name="tablegen", message="%(prog)s %(version)s")
 def cli() -> None:
@@ -43,7 +52,8 @@ def cli() -> None:
     """
 
 
-for command in (build, check, show, verify, init, paths, schema):
+instrument = (upload, device_status, readback, park, trigger, clear, ports)
+for command in (build, check, show, calibrate, simulate, verify, *instrument, init, paths, schema):
     cli.add_command(command)
 
 

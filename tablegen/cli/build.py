@@ -35,10 +35,11 @@ from tablegen.cli.status import Status
 def build(
     scan: Path, output: Path, only_check: bool, depfile: Path | None, depfile_target: str | None, quiet: bool
 ) -> int:
-    """Build a scan: NAME.h, NAME.c, NAME.vh, .mem files, the Verilog sequencer dac_*.v, and manifest.json.
+    """Build a scan: NAME.h, NAME.c, NAME.vh, .mem files, and manifest.json.
 
-    The same input gives the same bytes on every machine. Files that are already right are not touched, and
-    if anything is wrong nothing is written.
+    Beside them go the sequencers that play it: in C, dac_*.c and dac_*.h, and in Verilog, dac_*.v. The same input
+    gives the same bytes on every machine. Files that are already right are not touched, and if anything is wrong
+    nothing is written.
 
     \b
       tablegen build annexin_200nm.toml -o build

@@ -7,7 +7,7 @@ import click
 from tablegen.cli.status import Status
 
 
-@click.command(short_help="Print where the Make include, the CMake package and the runtime are.")
+@click.command(short_help="Print where the files for make, CMake and simulators are.")
 @click.option("--make", is_flag=True, help="The Make include, tablegen.mk.")
 @click.option("--cmake", is_flag=True, help="The directory of the CMake package, TablegenConfig.cmake.")
 @click.option("--runtime-c", is_flag=True, help="The directory of the C sequencer, dac_*.h and dac_*.c.")

@@ -13,4 +13,8 @@ class Status(IntEnum):
     CANNOT_WRITE = 4
     MISMATCH = 5
     TOOL_MISSING = 6
+    NO_PORT = 7
+    NO_ANSWER = 8
+    REFUSED = 9
+    LINK_LOST = 10
     INTERRUPTED = 130

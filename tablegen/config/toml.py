@@ -36,6 +36,11 @@ def read_toml(path: Path, name: str) -> tuple[dict[str, Any], Document]:
     if text.startswith("\ufeff"):
         why = "begins with a byte order mark, which TOML does not have; save it as UTF-8 without one"
         raise Rejected([Problem(name, 1, "", why)])
+    return parse_toml(text, name)
+
+
+def parse_toml(text: str, name: str) -> tuple[dict[str, Any], Document]:
+    """What ``read_toml`` does once it has the text."""
     text = text.replace("\r\n", "\n")
     try:
         values = tomllib.loads(text)

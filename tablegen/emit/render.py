@@ -11,7 +11,7 @@ from tablegen.emit.manifest import MANIFEST, manifest_file
 from tablegen.emit.memory import memory_files
 from tablegen.plan import Plan
 from tablegen.record import content_hash, plan_record
-from tablegen.resources import c_runtime, resource_folder, verilog_runtime
+from tablegen.resources import c_link, c_runtime, resource_folder, verilog_runtime
 
 
 def render(plan: Plan, certificates: dict[str, Certificate]) -> dict[str, bytes]:
@@ -32,8 +32,8 @@ def render(plan: Plan, certificates: dict[str, Certificate]) -> dict[str, bytes]
 
 @cache
 def runtime_files() -> dict[str, bytes]:
-    """The sequencers in C and in Verilog, the same in every build."""
-    return {path.name: path.read_bytes() for path in (*c_runtime(), *verilog_runtime())}
+    """The sequencers in C and in Verilog with their links, the same in every build."""
+    return {path.name: path.read_bytes() for path in (*c_runtime(), *c_link(), *verilog_runtime())}
 
 
 @cache

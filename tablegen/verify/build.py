@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Protocol
 
 from tablegen import __version__
+from tablegen.recorded import NotABuild, Recorded, read_manifest
 from tablegen.verify.checks import Check
 from tablegen.verify.directory import some, wrong_files
-from tablegen.verify.recorded import NotABuild, Recorded, read_manifest
 from tablegen.verify.session import Session, needed_ticks
 
 Progress = Callable[[str | Callable[[], str]], None]

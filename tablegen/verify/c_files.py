@@ -8,8 +8,8 @@ import numpy as np
 from tablegen.emit.constants import axis_constants, sequence_constants
 from tablegen.fixedpoint.synthesis import sine_periods
 from tablegen.numerics.arrays import Ints
+from tablegen.recorded import Recorded
 from tablegen.verify.directory import differing
-from tablegen.verify.recorded import Recorded
 
 _NUMBER = re.compile(r"(?:U?INT(?:32|64)_C)?\(?(-?\d{1,40})\)?")
 _ARRAY = re.compile(r"\b(\w+)\[\w*\] = \{(.*?)\};", re.DOTALL)

@@ -13,6 +13,7 @@ from typing import Any, Literal
 import numpy as np
 
 from tablegen.fixedpoint.output import Output
+from tablegen.recorded import NotABuild, Recorded
 from tablegen.verify import worker
 from tablegen.verify.bench import RECORD, SCRIPT, Shape
 from tablegen.verify.build import Outcome, Progress, differing_check
@@ -29,7 +30,6 @@ from tablegen.verify.checks import (
 )
 from tablegen.verify.directory import copies, some
 from tablegen.verify.placement import Placement
-from tablegen.verify.recorded import NotABuild, Recorded
 from tablegen.verify.session import make_session
 from tablegen.verify.simulate import SimulationFailed
 from tablegen.verify.stream import Words, read_record

@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 
 from tablegen.numerics.arrays import Bools, Floats, Ints
-from tablegen.verify.recorded import Axis, Recorded
+from tablegen.recorded import Axis, Recorded
 from tablegen.verify.stream import FLAGS, Sample, Words
 
 _UNDEFINED = np.uint64((1 << 64) - 1)  # how a record is read where the simulator has an unknown bit

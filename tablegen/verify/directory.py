@@ -8,7 +8,7 @@ from pathlib import Path
 
 from tablegen.emit.constants import axis_constants, sequence_constants
 from tablegen.emit.memory import memory_files
-from tablegen.verify.recorded import Recorded
+from tablegen.recorded import Recorded
 
 _LOCALPARAM = re.compile(r"^localparam\s[^=]*?(\w+)\s*=\s*(.*?)\s*;", re.MULTILINE)
 _NUMBER = re.compile(r"(-?)(?:\d+'s?([dh]))?([0-9a-fA-F]+)")

@@ -55,7 +55,7 @@ _PACKAGES = {"arm-none-eabi-gcc": "gcc-arm-none-eabi", "riscv64-unknown-elf-gcc"
 
 
 def require_emulator(compiler: str = COMPILERS["arm"]) -> list[str]:
-    """The words of a compiler's command; ``ToolMissing`` unless it and unicorn are there."""
+    """The words of a compiler's command; ``ToolMissing`` unless it, unicorn and elftools are there."""
     try:
         import elftools  # noqa: F401
         import unicorn  # noqa: F401

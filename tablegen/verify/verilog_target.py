@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from tablegen.recorded import NotABuild, Recorded
 from tablegen.registers import program_words
 from tablegen.verify import worker
 from tablegen.verify.bench import RECORD, SCRIPT, SequencerBench, Shape
@@ -19,7 +20,6 @@ from tablegen.verify.checks import (
 )
 from tablegen.verify.directory import copies, memory_words, some, wrong_constants, wrong_memories
 from tablegen.verify.placement import Placement
-from tablegen.verify.recorded import NotABuild, Recorded
 from tablegen.verify.session import Memories, make_session
 from tablegen.verify.simulate import SimulationFailed, require
 from tablegen.verify.stream import read_record

@@ -1,0 +1,54 @@
+"""How far an upload is, on a terminal."""
+
+import sys
+import time
+from collections.abc import Callable
+
+import click
+
+_BAR = 24
+_WIDTH = 76
+_EVERY_S = 0.1
+
+
+class Bar:
+    """A line on stderr with rate and time left; nothing where stderr is no terminal.
+
+    Call it with the bytes that are done and with all.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._shows = sys.stderr is not None and sys.stderr.isatty()
+        self._start: tuple[float, int] | None = None
+        self._shown_at = 0.0
+
+    def __call__(self, done: int, total: int) -> None:
+        """So many bytes are there."""
+        if not self._shows:
+            return
+        now = self._clock()
+        if self._start is None:
+            self._start = now, done  # an upload that goes on has some bytes from the start
+        elif now - self._shown_at < _EVERY_S and done < total:
+            return
+        self._shown_at = now
+        click.echo(f"\r{self._text(now, done, total):<{_WIDTH}}", err=True, nl=False)
+
+    def close(self) -> None:
+        """Take the line away again."""
+        if self._start is not None:
+            click.echo("\r" + " " * _WIDTH + "\r", err=True, nl=False)
+            self._start = None
+
+    def _text(self, now: float, done: int, total: int) -> str:
+        assert self._start is not None
+        full = _BAR * done // total
+        text = f"[{'#' * full}{'.' * (_BAR - full)}] {done}/{total} bytes"
+        if done == total:
+            return f"{text}  waiting for the start of a line"
+        seconds, first = now - self._start[0], self._start[1]
+        if seconds <= 0.0 or done <= first:
+            return text
+        rate = (done - first) / seconds
+        return f"{text}  {rate / 1000.0:.1f} kB/s  {(total - done) / rate:.1f} s left"

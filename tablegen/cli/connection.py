@@ -1,0 +1,112 @@
+"""What the commands that talk to a device share: options, the way to it, and how its errors end a command."""
+
+import binascii
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from tablegen.cli.common import fail, planned
+from tablegen.cli.status import Status
+
+if TYPE_CHECKING:
+    from tablegen.link.device import Device
+    from tablegen.link.prepare import Scan
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+INTERRUPTED = "interrupted; the device goes on as it was"
+_KEY_BYTES = range(16, 33)
+
+baud_option = click.option(
+    "--baud",
+    type=click.IntRange(min=300, max=100_000_000),
+    default=115200,
+    show_default=True,
+    envvar="TABLEGEN_BAUD",
+    show_envvar=True,
+    metavar="RATE",
+    help="Bits a second on the line; where there is none (socket://), for time-outs.",
+)
+key_option = click.option(
+    "--key-file",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE",
+    help="The key of a device that has one: 16 to 32 bytes in hexadecimal.",
+)
+source_argument = click.argument("source", type=click.Path(path_type=Path), metavar="SCAN.TOML|DIR")
+
+
+def port_option(required: bool = True) -> Callable[[Command], Command]:
+    """``--port``."""
+    return click.option(
+        "--port",
+        required=required,
+        envvar="TABLEGEN_PORT",
+        show_envvar=True,
+        metavar="URL",
+        help="A serial port, or any URL of pyserial: /dev/ttyUSB0, COM3, socket://host:port, rfc2217://host:port; "
+        "`tablegen ports` lists those of this machine.",
+    )
+
+
+def timeout_option(what: str) -> Callable[[Command], Command]:
+    """``--timeout``; ``what`` is bounded, and by how much if it is not given."""
+    return click.option("--timeout", type=click.FloatRange(min=0.1, max=1e6), metavar="S", help=what)
+
+
+@contextmanager
+def connected(
+    port: str, baud: int, key_file: Path | None, interrupted: Callable[[], str] = lambda: INTERRUPTED
+) -> "Iterator[Device]":
+    """A device, until the end of the block; whatever goes wrong there ends the command with its status."""
+    key = None if key_file is None else _read_key(key_file)
+    from tablegen.link import errors
+    from tablegen.link.device import Device
+
+    # The first that fits.
+    statuses = (
+        (errors.SerialMissing, Status.TOOL_MISSING),
+        (errors.NoPort, Status.NO_PORT),
+        (errors.NoAnswer, Status.NO_ANSWER),
+        (errors.NotUnderstood, Status.NO_ANSWER),
+        (errors.Refused, Status.REFUSED),
+        (errors.Unsuitable, Status.REFUSED),
+        (errors.NotPlaying, Status.MISMATCH),
+        (errors.LinkError, Status.LINK_LOST),
+    )
+    try:
+        with Device(port, baud=baud, key=key) as device:
+            yield device
+    except errors.LinkError as error:
+        fail([error], next(status for kind, status in statuses if isinstance(error, kind)))
+    except KeyboardInterrupt:
+        fail([interrupted()], Status.INTERRUPTED)
+
+
+def _read_key(path: Path) -> bytes:
+    try:
+        key = binascii.unhexlify("".join(path.read_text("ascii").split()))
+    except OSError as error:
+        fail([f"{path}: cannot be read: {error.strerror or error}"], Status.WRONG_INPUT)
+    except ValueError:  # what is no ASCII as well
+        fail([f"{path}: a key is 32 to 64 hexadecimal digits, and nothing else"], Status.WRONG_INPUT)
+    if len(key) not in _KEY_BYTES:
+        fail([f"{path}: a key of {len(key)} bytes; devices have 16 to 32"], Status.WRONG_INPUT)
+    return key
+
+
+def read_scan(source: Path) -> "Scan":
+    """The scan of a TOML file, or of a directory that ``tablegen build`` wrote."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    from tablegen.link.prepare import Scan
+    from tablegen.recorded import NotABuild
+
+    if not source.is_dir():
+        return Scan.of_plan(planned(source)[1])
+    try:
+        return Scan.of_build(source)
+    except NotABuild as error:
+        fail([error], Status.WRONG_INPUT)

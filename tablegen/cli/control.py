@@ -1,0 +1,78 @@
+"""``tablegen park``, ``trigger`` and ``clear``: what a scan in a device does."""
+
+from pathlib import Path
+
+import click
+
+from tablegen.cli.common import fail
+from tablegen.cli.connection import baud_option, connected, key_option, port_option, timeout_option
+from tablegen.cli.status import Status
+
+_WAIT_S = 60.0
+_STARTS_S = 1.0
+
+
+@click.command(short_help="End the scan of a device, and ramp to the park codes.")
+@port_option()
+@baud_option
+@key_option
+@click.option("--wait", is_flag=True, help="Until the outputs are there.")
+@timeout_option("Of --wait.  [default: 60]")
+def park(port: str, baud: int, key_file: Path | None, wait: bool, timeout: float | None) -> int:
+    """Park: no more frames, ramp to the park codes within the slew limit, and hold them."""
+    from tablegen.link.messages import State
+
+    with connected(port, baud, key_file) as device:
+        device.park()
+        if wait:
+            device.wait_for(State.PARKED, _WAIT_S if timeout is None else timeout)
+    click.echo("parked" if wait else "on its way to park")
+    return Status.OK
+
+
+@click.command(short_help="Start the scan of a device.")
+@port_option()
+@baud_option
+@key_option
+@click.option("--frames", type=click.IntRange(min=0, max=1 << 31), default=0, metavar="N", help="0 is without end.")
+def trigger(port: str, baud: int, key_file: Path | None, frames: int) -> int:
+    """Arm and trigger: play N frames (without end if not given) of the scan in force, and say whether it plays."""
+    from tablegen.link.errors import OutOfTime
+    from tablegen.link.messages import State
+
+    with connected(port, baud, key_file) as device:
+        before = device.status()
+        if before.state == State.NO_PROGRAM:
+            fail(["the device has no scan yet; `tablegen upload` brings one"], Status.REFUSED)
+        if before.state == State.PLAYING:
+            if frames:
+                fail(["it plays already, and would not count frames; `tablegen park --wait` first"], Status.REFUSED)
+            click.echo(f"plays already, line {before.line}")
+            return Status.OK
+        device.arm(frames)
+        device.trigger()
+        try:
+            device.wait_for(State.PLAYING, _STARTS_S)
+        except OutOfTime:
+            if not frames:
+                fail(["triggered, but it does not play; `tablegen status` tells what it does"], Status.REFUSED)
+            click.echo(f"triggered; {_frames(frames)} over, or it did not start: `tablegen status` tells")
+            return Status.OK
+    click.echo(f"plays {_frames(frames)}" if frames else "plays until it is parked")
+    return Status.OK
+
+
+def _frames(count: int) -> str:
+    return "1 frame" if count == 1 else f"{count} frames"
+
+
+@click.command(short_help="Forget the faults of a device.")
+@port_option()
+@baud_option
+@key_option
+def clear(port: str, baud: int, key_file: Path | None) -> int:
+    """Forget sticky faults and their counts; `valid` goes high again with the next line that is free of them."""
+    with connected(port, baud, key_file) as device:
+        device.clear()
+    click.echo("faults forgotten")
+    return Status.OK

@@ -1,0 +1,33 @@
+"""``tablegen ports``: the serial ports of this machine."""
+
+import click
+
+from tablegen.cli.common import fail
+from tablegen.cli.status import Status
+
+
+@click.command(short_help="List the serial ports of this machine.")
+@click.option("--json", "as_json", is_flag=True, help="JSON instead of text.")
+def ports(as_json: bool) -> int:
+    """List the serial ports of this machine with what they say of themselves; status 7 if there is none."""
+    try:
+        from serial.tools.list_ports import comports
+    except ImportError:
+        fail(["pyserial is missing; pip install 'tablegen[serial]'"], Status.TOOL_MISSING)
+    found = sorted(comports(), key=lambda port: port.device)
+    if as_json:
+        import json
+
+        click.echo(
+            json.dumps([{"port": p.device, "description": p.description, "id": p.hwid} for p in found], indent=2)
+        )
+    width = max((len(port.device) for port in found), default=0)
+    for port in [] if as_json else found:
+        told = "" if port.description in (None, "n/a") else port.description
+        click.echo(f"{port.device:<{width}}  {told}".rstrip())
+    if not found:
+        fail(
+            ["this machine has no serial port; is the cable in? URLs like socket://host:port work as well"],
+            Status.NO_PORT,
+        )
+    return Status.OK

@@ -1,0 +1,165 @@
+"""``tablegen upload``: a new scan into a running instrument."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from tablegen.cli.bar import Bar
+from tablegen.cli.connection import (
+    baud_option,
+    connected,
+    key_option,
+    port_option,
+    read_scan,
+    source_argument,
+    timeout_option,
+)
+from tablegen.cli.status import Status
+
+if TYPE_CHECKING:
+    from tablegen.link.device import Device
+    from tablegen.link.image import Image
+    from tablegen.link.prepare import Form, Scan
+    from tablegen.link.upload import UploadResult
+
+_DIGITS = 12  # of a hash, for people
+_OTHERS = 60 + 16  # bytes of BEGIN and COMMIT on the wire
+_FRAME = 16  # what a DATA has beside its bytes
+_BITS = 10
+
+
+@click.command(short_help="Put a scan into a running instrument, by its serial port.")
+@source_argument
+@port_option(required=False)
+@baud_option
+@click.option(
+    "--as",
+    "form",
+    type=click.Choice(("auto", "table", "fourier")),
+    default="auto",
+    show_default=True,
+    help="Send tables, or Fourier words that the device renders; auto: the smaller that it takes, for each axis.",
+)
+@click.option("--dry-run", is_flag=True, help="Send nothing: sizes and times; with --port whether it would be taken.")
+@key_option
+@click.option("--force", is_flag=True, help="Send it even if it is in force already.")
+@click.option(
+    "--any-rate", is_flag=True, help="Allow a device that makes other ticks a second than the scan is built for."
+)
+@timeout_option("Bounds everything.  [default: 15 s and 4 times what the line takes]")
+def upload(
+    source: Path,
+    port: str | None,
+    baud: int,
+    form: "Form",
+    dry_run: bool,
+    key_file: Path | None,
+    force: bool,
+    any_rate: bool,
+    timeout: float | None,
+) -> int:
+    """Upload a scan, or the build in a directory; the instrument plays its old scan until a line of the new one starts.
+
+    What the device would refuse is said before anything is sent. The device checks everything again itself. An upload
+    that was interrupted goes on where it was; a port that vanishes is opened again.
+
+    \b
+      tablegen upload annexin_200nm.toml --port /dev/ttyUSB0
+      tablegen upload build --port socket://192.168.0.7:5000
+      tablegen upload build --dry-run                          how large, how long?
+    Exit status: 0 in force, 2 wrong input, 7 no port, 8 no answer, 9 refused, 5 the device
+    plays something else, 10 link lost or out of time, 6 pyserial is missing.
+    """
+    if port is None and not dry_run:
+        raise click.UsageError("--port is missing; `tablegen ports` lists those of this machine")
+    scan = read_scan(source)
+    if dry_run:
+        click.echo("\n".join(_sizes(scan, baud)))
+    if port is None:
+        return Status.OK
+    bar, told = Bar(), [0]
+
+    def progress(done: int, total: int) -> None:
+        told[0] = done
+        bar(done, total)
+
+    def interrupted() -> str:
+        bar.close()
+        if not told[0]:
+            return "interrupted; the device goes on with its old scan"
+        return (
+            f"interrupted; the device plays its old scan and keeps {told[0]} bytes: the same command goes on from "
+            "there (`tablegen status` tells; a complete upload may still come into force)"
+        )
+
+    from tablegen.link.messages import State
+    from tablegen.link.prepare import check
+
+    with connected(port, baud, key_file, interrupted) as device:
+        limits = device.limits()
+        image = scan.image(form, device.info)
+        check(scan, image, device.info, limits, any_rate)
+        if dry_run:
+            click.echo(_verdict(device, image))
+            return Status.OK
+        try:
+            result = device.upload(image, progress, force=force, timeout_s=timeout, limits=limits)
+        finally:
+            bar.close()
+        click.echo(_summary(scan, image, result))
+        if device.hello.state == State.PARKED:
+            click.echo("it is parked; `tablegen trigger` starts it")
+    return Status.OK
+
+
+def _sizes(scan: "Scan", baud: int) -> list[str]:
+    """Bytes and seconds of both forms."""
+    from tablegen.link.errors import Unsuitable
+    from tablegen.link.messages import DATA_BYTES
+
+    lines = [f"{scan.name} {scan.digest[:_DIGITS]}", "", f"form       bytes  at {baud} baud"]
+    forms: tuple[Form, ...] = ("table", "fourier")
+    for form in forms:
+        try:
+            size = len(scan.image(form).data)
+        except Unsuitable as error:
+            lines.append(f"{form:<8}  none: {error.objections[0]}")
+            continue
+        wire = size + _FRAME * -(-size // DATA_BYTES) + _OTHERS
+        seconds = f"{wire * _BITS / baud:.3f} s"
+        lines.append(f"{form:<8}  {size:>6}  {seconds:>{len(f'at {baud} baud')}}")
+    return lines
+
+
+def _verdict(device: "Device", image: "Image") -> str:
+    status = device.hello
+    if status.hash == image.info.hash:
+        return "\nthe device has it in force already"
+    text = f"\nthe device would take it: {len(image.data)} bytes as {_form(image)}"
+    return text if status.permits else f"{text}, but its interlock is open: no upload comes into force"
+
+
+def _form(image: "Image") -> str:
+    from tablegen.link.prepare import harmonics_of
+
+    rendered = [harmonics > 0 for harmonics in harmonics_of(image.data)]
+    return "Fourier words" if all(rendered) else "tables and Fourier words" if any(rendered) else "tables"
+
+
+def _summary(scan: "Scan", image: "Image", result: "UploadResult") -> str:
+    name = f"{scan.name} {scan.digest[:_DIGITS]}"
+    if result.already_running:
+        return f"{name} is in force already, generation {result.generation}: nothing sent (--force sends it again)"
+    text = f"{name} in force, generation {result.generation}"
+    if result.line is not None:
+        text += f", after line {result.line} of the old scan"
+    rate = (
+        f" ({result.bytes / result.seconds / 1000.0:.1f} kB/s)" if result.seconds > 0.0 and not result.resumed else ""
+    )
+    text += f"\n{result.bytes} bytes as {_form(image)} in {result.seconds:.2f} s{rate}"
+    if result.resumed:
+        text += f", of which the device had {result.resumed} already"
+    if result.retransmissions:
+        text += f"; {result.retransmissions} frames sent again"
+    return text

@@ -1,0 +1,245 @@
+"""``Device``: an instrument at the end of a serial line, for control software. It prints nothing."""
+
+import math
+import random as random_module
+import time
+from collections.abc import Callable
+from functools import partial
+from random import Random
+from types import TracebackType
+from typing import TYPE_CHECKING, Self
+
+from tablegen.link.errors import NotPlaying, NotUnderstood, OutOfTime, Refused
+from tablegen.link.exchange import LATENCY_S
+from tablegen.link.messages import (
+    AxisLimits,
+    DeviceInfo,
+    DeviceStatus,
+    Reason,
+    Request,
+    State,
+)
+from tablegen.link.readback import read_back
+from tablegen.link.reasons import Limits
+from tablegen.link.session import Session
+from tablegen.link.transport import Opener, Transport, byte_s, open_port
+from tablegen.link.upload import ProgressCall, Uploader, UploadResult
+
+if TYPE_CHECKING:
+    from tablegen.link.image import Image
+
+TIMEOUT_S = 5.0  # of a request
+_UPLOAD_S = 15.0  # beside what an upload takes on the line
+_TIMES = 4.0  # what an upload takes on the line
+_POLL_S = 0.05
+_FRESH_S = 0.25  # a HELLO so young need not be repeated: an upload sees for itself what is not so any more
+_READINGS = 3
+_KEY_BYTES = range(16, 33)
+_NO_HASH = bytes(32)
+
+
+class Device:
+    """An instrument that speaks docs/protocol.md. Use it as a context manager, or ``close`` it; one thread at a time.
+
+    Every method ends within its time-out, in a result or a ``LinkError``: ``Refused`` tells what the device objects to,
+    ``LinkLost`` that it is gone. A port that vanishes is opened again meanwhile.
+    """
+
+    def __init__(
+        self,
+        port: "str | Opener | Transport",
+        *,
+        baud: int = 115200,
+        key: bytes | None = None,
+        latency_s: float = LATENCY_S,
+        timeout_s: float = TIMEOUT_S,
+        random: Random | None = None,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        """Open a port and say HELLO.
+
+        ``port`` is a port or URL of pyserial, a function that opens a ``Transport`` (again and again), or an open one.
+        ``key`` has 16 to 32 bytes. ``latency_s`` is that of bridges on the way, ``timeout_s`` that of a request.
+        ``random`` and ``sleep`` are for tests.
+
+        Raises ``NoPort``, ``NoAnswer``, ``Refused`` (the device speaks another version), ``SerialMissing``.
+        """
+        if key is not None and len(key) not in _KEY_BYTES:
+            raise ValueError(f"a key of {len(key)} bytes; devices have 16 to 32")
+        opener: Opener | None = None
+        if isinstance(port, str):
+            opener = partial(open_port, port, baud)
+        elif callable(port):
+            opener = port
+        transport: Transport = opener() if opener is not None else port  # type: ignore[assignment]
+        chance = random if random is not None else random_module.SystemRandom()
+        self._session = Session(transport, opener, key, latency_s, chance, sleep)
+        self._timeout_s = timeout_s
+        try:
+            self._session.hello(self._until(None))
+        except BaseException:
+            self._session.close()
+            raise
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Give the port back; the device goes on as it is."""
+        self._session.close()
+
+    @property
+    def info(self) -> DeviceInfo:
+        """What the device is."""
+        return self._session.info
+
+    @property
+    def hello(self) -> DeviceStatus:
+        """What it did at first, or at the end of the last upload; ``status`` asks again."""
+        return self._session.status
+
+    def status(self) -> DeviceStatus:
+        """What it does now."""
+        payload = self._session.ask(Request.STATUS, b"", DeviceStatus.LAYOUT.size, self._until(None))
+        try:
+            return DeviceStatus.unpack(payload)
+        except ValueError as error:
+            raise NotUnderstood(str(error)) from None
+
+    def upload(
+        self,
+        image: "Image",
+        progress: ProgressCall | None = None,
+        *,
+        force: bool = False,
+        timeout_s: float | None = None,
+        limits: Limits | None = None,
+    ) -> UploadResult:
+        """Put a new scan into the instrument, which goes on with the old one until a line of the new one starts.
+
+        ``progress`` is called with the bytes that the device has, and with all. A scan that is in force already is not
+        sent, unless ``force``. ``timeout_s`` bounds everything (default: ``upload_time_s``). ``limits`` make refusals
+        say more. What a device would refuse, ``tablegen.link.prepare.check`` says before.
+
+        Raises ``Refused``, ``LinkLost``, ``OutOfTime``, ``NotPlaying``. The old scan plays on then, and the device
+        keeps what it has received: the same upload again goes on from there.
+        """
+        deadline = self._until(self.upload_time_s(image) if timeout_s is None else timeout_s)
+        session = self._session
+        if session.now() - session.status_at > _FRESH_S:
+            session.greet(deadline)
+        status = session.status
+        if status.hash == image.info.hash and not force:
+            status = self.status()  # the device may have been reset since
+        if status.hash == image.info.hash and not force:
+            return UploadResult(True, status.generation, None, len(image.data), 0, 0, 0, 0.0)
+        session.status_at = -math.inf  # whatever comes of it, that will have changed
+        result = Uploader(session, image, deadline, progress, limits).run()
+        playing = self.status()
+        session.status, session.status_at = playing, session.now()
+        if playing.hash not in (image.info.hash, _NO_HASH):
+            raise NotPlaying(
+                f"the device took the upload, and plays {playing.hash.hex()[:12]} instead of "
+                f"{image.info.hash.hex()[:12]}; did another program upload as well, or was it reset?"
+            )
+        return result
+
+    def upload_time_s(self, image: "Image") -> float:
+        """What is allowed for an upload by default, in seconds: many times what it takes, and two long lines."""
+        rate = self.info.update_rate_hz
+        line_s = int.from_bytes(image.data[:4], "little") / rate if rate else 0.0  # line_ticks is the first word
+        return _UPLOAD_S + _TIMES * len(image.data) * byte_s(self._session.exchange.transport.baud) + 2.0 * line_s
+
+    def readback(self, *, timeout_s: float | None = None) -> bytes:
+        """The image of the scan that plays, as bytes.
+
+        Raises ``Refused`` where the device does not hold it: a scan that came with the firmware, or memory in use.
+        """
+        size = self.info.image_bytes
+        allowed = _UPLOAD_S + _TIMES * size * byte_s(self._session.exchange.transport.baud)
+        deadline = self._until(allowed if timeout_s is None else timeout_s)
+        for _ in range(_READINGS):
+            before = self.status()
+            image = read_back(self._session, deadline)
+            after = self.status()
+            if (before.boot, before.generation) == (after.boot, after.generation):
+                return image
+        raise OutOfTime("the scan changes while it is read; does another program upload?")
+
+    def park(self) -> None:
+        """End the scan: ramp to the park codes, and hold them. ``wait_for(State.PARKED)`` waits for that."""
+        self._act(Request.PARK)
+
+    def arm(self, frames: int = 0) -> None:
+        """Let the next trigger play so many frames; 0 is without end."""
+        if not 0 <= frames < 1 << 32:
+            raise ValueError(f"{frames} frames; 0 (without end) to 2^32 - 1")
+        self._act(Request.ARM, frames.to_bytes(4, "little"))
+
+    def trigger(self) -> None:
+        """Start the frames that were armed."""
+        self._act(Request.TRIGGER)
+
+    def clear(self) -> None:
+        """Forget faults and their counts."""
+        self._act(Request.CLEAR)
+
+    def abort(self) -> int:
+        """Forget an upload, and withdraw a program that waits; the generation that plays."""
+        return int.from_bytes(self._act(Request.ABORT, plain=True)[:4], "little")
+
+    def limits(self) -> Limits:
+        """The limits in force, of x and of y."""
+        size = 2 * AxisLimits.LAYOUT.size
+        try:
+            return _limits(self._session.ask(Request.LIMITS, b"", size, self._until(None)))
+        except Refused as refusal:
+            if refusal.reason != Reason.TYPE:
+                raise
+            return self.info.x_limits, self.info.y_limits  # it has no others
+
+    def narrow(self, x: AxisLimits, y: AxisLimits) -> Limits:
+        """Narrow the limits until the device's next start, or until this is called again; returns those in force then.
+
+        They are cut to those of the device's build.
+
+        Raises ``Refused`` for a device that cannot (``Feature.NARROWS``).
+        """
+        return _limits(self._act(Request.LIMITS, x.pack() + y.pack(), 2 * AxisLimits.LAYOUT.size))
+
+    def wait_for(self, state: State, timeout_s: float) -> DeviceStatus:
+        """Wait until the sequencer is in a state. Raises ``OutOfTime``."""
+        deadline = self._until(timeout_s)
+        while True:
+            status = self.status()
+            if status.state == state:
+                return status
+            if self._session.now() >= deadline:
+                raise OutOfTime(
+                    f"the device is {status.state.name.lower()} and did not become {state.name.lower()} within "
+                    f"{timeout_s:g} s"
+                )
+            self._sleep(min(_POLL_S, deadline - self._session.now()))
+
+    def _sleep(self, seconds: float) -> None:
+        """On the clock of the port, and emptying it."""
+        self._session.exchange.receive(self._session.now() + seconds)
+
+    def _act(self, kind: Request, payload: bytes = b"", answer_bytes: int = 16, plain: bool = False) -> bytes:
+        return self._session.act(kind, payload, answer_bytes, self._until(None), tagged=not plain)
+
+    def _until(self, timeout_s: float | None) -> float:
+        return self._session.now() + (self._timeout_s if timeout_s is None else timeout_s)
+
+
+def _limits(payload: bytes) -> Limits:
+    size = AxisLimits.LAYOUT.size
+    try:
+        return AxisLimits.unpack(payload), AxisLimits.unpack(payload[size:])
+    except ValueError as error:
+        raise NotUnderstood(str(error)) from None

@@ -1,0 +1,371 @@
+"""A device in Python: bytes in, bytes out. What docs/protocol.md says that a device answers, as a program.
+
+Devices in C and Verilog are held against it, and hosts are tested with it. What plays is a ``Player``.
+"""
+
+import hashlib
+import hmac
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from tablegen.link import messages
+from tablegen.link.frames import Frame, FrameReader
+from tablegen.link.messages import (
+    ANSWER,
+    NONCE_BYTES,
+    PERMITS,
+    TAG_BYTES,
+    AxisLimits,
+    DeviceInfo,
+    DeviceStatus,
+    Feature,
+    ImageInfo,
+    Reason,
+    Refusal,
+    Request,
+    State,
+    Upload,
+)
+from tablegen.link.model_bank import Bank, Held, Refused, Taken
+from tablegen.link.players import Player
+
+_TAGGED = {Request.COMMIT, Request.PARK, Request.ARM, Request.TRIGGER, Request.CLEAR, Request.LIMITS}
+_ACTING = _TAGGED | {Request.ABORT}
+_PLAIN: dict[int, int] = {  # bytes of a payload without its tag
+    Request.BEGIN: ImageInfo.LAYOUT.size,
+    Request.COMMIT: 4,
+    Request.ARM: 4,
+    Request.LIMITS: 2 * AxisLimits.LAYOUT.size,
+}
+_MOST_FRAMES = 1 << 31
+
+
+@dataclass
+class _Remembered:
+    """The last request that acts; ``answer`` is None while it is at work."""
+
+    seq: int
+    type: int
+    answer: bytes | None = None
+
+
+@dataclass
+class _AtWork:
+    """A COMMIT, or an ABORT, that has not been answered yet."""
+
+    request: Frame
+    memory: _Remembered
+    before: _Remembered | None = None
+    nonce: bytes | None = None
+    ticks: int = 0
+    swaps: int = 0
+
+
+def tag(key: bytes, nonce: bytes, request: Frame, image: bytes | None = None) -> bytes:
+    """The 16 bytes that end the payload of ``request``, given without them; ``image`` is that of a COMMIT."""
+    header = struct.pack("<BBI", request.type, request.seq, request.session)
+    digest = b"" if image is None else hashlib.blake2s(image).digest()
+    message = nonce + header + request.payload + digest
+    return hashlib.blake2s(message, key=key, digest_size=TAG_BYTES).digest()
+
+
+class ModelDevice:
+    """A device with this ``info`` in front of ``player``; ``boot_hash`` is that of the program it starts with.
+
+    ``key``: 16 to 32 bytes, with the feature KEY. ``staged``: the image is kept, as in Verilog, and not its tables.
+    ``checking``: ticks that the checks take. ``nonces`` makes those of CHALLENGE, by default from key and boot.
+    ``most_frames``: of an ARM. ``permits`` is the interlock, ``memory`` the image in hand, which a COMMIT checks.
+    """
+
+    def __init__(
+        self,
+        info: DeviceInfo,
+        player: Player,
+        *,
+        key: bytes = b"",
+        boot: int = 0,
+        boot_hash: bytes = bytes(messages.HASH_BYTES),
+        nonces: Callable[[], bytes] | None = None,
+        staged: bool = False,
+        checking: int = 0,
+        most_frames: int = _MOST_FRAMES,
+    ) -> None:
+        if bool(key) != (Feature.KEY in info.features):
+            raise ValueError("a key and the feature go together")
+        self.info, self.player, self.boot = info, player, boot
+        self.permits = True
+        self._key, self._boot_hash = key, boot_hash
+        self._bank = Bank(info, player, staged)
+        self._nonces = nonces or self._counted_nonce
+        self._checking, self._most_frames = checking, most_frames
+        self._requests: dict[int, Callable[[Frame], bytes | None]] = {
+            Request.HELLO: self._hello,
+            Request.BEGIN: lambda frame: self._bank.begin(frame.payload),
+            Request.DATA: lambda frame: self._bank.data(frame.payload),
+            Request.COMMIT: self._commit,
+            Request.ABORT: self._abort,
+            Request.STATUS: lambda frame: self.status().pack(),
+            Request.READBACK: self._readback,
+            Request.PARK: lambda frame: self._passed_on(self.player.park()),
+            Request.ARM: lambda frame: self._passed_on(self.player.arm(*struct.unpack_from("<I", frame.payload))),
+            Request.TRIGGER: lambda frame: self._passed_on(self.player.trigger()),
+            Request.CLEAR: lambda frame: self._passed_on(self.player.clear()),
+            Request.CHALLENGE: self._challenge,
+            Request.LIMITS: lambda frame: self._bank.limit(frame.payload),
+        }
+        if not key:
+            del self._requests[Request.CHALLENGE]
+        if Feature.READBACK not in info.features:
+            del self._requests[Request.READBACK]
+        self._power_up()
+
+    def _power_up(self) -> None:
+        self._reader = FrameReader()
+        self._out = bytearray()
+        self._session: int | None = None
+        self._last: _Remembered | None = None
+        self._nonce: bytes | None = None
+        self._at_work: _AtWork | None = None
+        self._aborts: list[_AtWork] = []
+        self._challenges = 0
+        self._before: _Remembered | None = None  # what a COMMIT that is being looked at replaces
+
+    def reboot(self) -> None:
+        """Start again, with nothing but what is in the firmware, and the next boot count."""
+        self.boot = (self.boot + 1) & 0xFFFFFFFF
+        self.player.restart()
+        self._bank.power_up()
+        self._power_up()
+
+    @property
+    def memory(self) -> bytearray:
+        """The image in hand, as the memory has it; empty without one."""
+        return bytearray() if self._bank.held is None else self._bank.held.data
+
+    def receive(self, data: bytes) -> None:
+        """Bytes from the host."""
+        for frame in self._reader.feed(data):
+            if not frame.type & ANSWER:
+                self._judge(frame)
+
+    def transmit(self) -> bytes:
+        """What the host gets since the last call."""
+        sent = bytes(self._out)
+        self._out.clear()
+        return sent
+
+    def tick(self, ticks: int = 1) -> None:
+        """Play so many ticks, and answer what waited for them."""
+        commit, held = self._at_work, self._bank.held
+        if commit is not None and held is not None and held.state is Upload.CHECKING:
+            first = min(ticks, commit.ticks)
+            self.player.advance(first)
+            commit.ticks -= first
+            ticks -= first
+            if commit.ticks == 0:
+                self._check(commit, held)
+        self.player.advance(ticks)
+        self._settle()
+
+    def status(self) -> DeviceStatus:
+        """What STATUS answers."""
+        player, held, taken = self.player, self._bank.held, self._bank.taken
+        known = bytes(messages.HASH_BYTES) if player.state is State.NO_PROGRAM else self._boot_hash
+        return DeviceStatus(
+            state=player.state,
+            upload=Upload.NONE if held is None else held.state,
+            faults=player.faults,
+            flags=PERMITS if self.permits else 0,
+            boot=self.boot,
+            generation=player.swaps,
+            line=player.line,
+            received=0 if held is None else len(held.data),
+            image_crc=0 if held is None else held.info.image_crc,
+            fault_counts=player.fault_counts,
+            bad_frames=self._reader.bad_frames,
+            hash=known if taken is None else taken.info.hash,
+        )
+
+    # What every request passes
+
+    def _judge(self, frame: Frame) -> None:
+        memory: _Remembered | None = None
+        try:
+            if frame.type != Request.HELLO and frame.session != self._session:
+                raise Refused(Reason.SESSION)
+            if frame.type not in self._requests:
+                raise Refused(Reason.TYPE)
+            self._check_payload(frame)
+            if _acts(frame):
+                if self._is_repeated(frame):
+                    return
+                if frame.type in _TAGGED and frame.type != Request.COMMIT:
+                    self._check_tag(frame, self._use_nonce())
+                memory = _Remembered(frame.seq, frame.type)
+                self._before, self._last = self._last, memory
+            answer = self._requests[frame.type](frame)
+            if answer is not None:
+                self._answer(frame, answer, memory)
+        except Refused as refused:
+            self._refuse(frame, refused, memory)
+
+    def _is_repeated(self, frame: Frame) -> bool:
+        """Whether it was dealt with by the answer of last time. Raises ``Refused`` if it was overtaken."""
+        if self._last is None:
+            return False
+        behind = (self._last.seq - frame.seq) & 0xFF
+        if behind == 0 and frame.type == self._last.type:
+            self._out += self._last.answer or b""
+            return True
+        if behind < 128:
+            raise Refused(Reason.OLD)
+        return False
+
+    def _check_payload(self, frame: Frame) -> None:
+        payload, size = frame.payload, len(frame.payload)
+        kind = Request(frame.type)
+        if kind == Request.HELLO:
+            if payload and payload[0] != messages.VERSION:
+                raise Refused(Reason.VERSION, messages.VERSION)
+            good = size == 1
+        elif kind == Request.DATA:
+            good = 5 <= size <= 4 + self.info.data_bytes
+        elif kind == Request.READBACK:
+            good = size == 5 and 1 <= payload[4] <= messages.DATA_BYTES
+        else:
+            good = size in self._sizes(kind)
+        if good and kind == Request.ARM:
+            good = int(struct.unpack_from("<I", payload)[0]) <= self._most_frames
+        if not good:
+            raise Refused(Reason.PAYLOAD)
+
+    def _sizes(self, kind: Request) -> set[int]:
+        """What the payload of a request may have."""
+        plain = _PLAIN.get(kind, 0)
+        sizes = {plain, plain + TAG_BYTES} if self._key and kind in _TAGGED else {plain}
+        if kind == Request.LIMITS:
+            return sizes | {0} if Feature.NARROWS in self.info.features else {0}
+        return sizes
+
+    def _use_nonce(self) -> bytes | None:
+        nonce, self._nonce = self._nonce, None
+        return nonce
+
+    def _check_tag(self, frame: Frame, nonce: bytes | None, image: bytes | None = None) -> None:
+        if not self._key:
+            return
+        plain = _PLAIN.get(frame.type, 0)
+        given = frame.payload[plain:]
+        bare = Frame(frame.type, frame.seq, frame.session, frame.payload[:plain])
+        if nonce is None or not hmac.compare_digest(tag(self._key, nonce, bare, image), given):
+            raise Refused(Reason.KEY)
+
+    def _answer(self, frame: Frame, payload: bytes, memory: _Remembered | None) -> None:
+        self._send(Frame(frame.type | ANSWER, frame.seq, frame.session, payload), memory)
+
+    def _refuse(self, frame: Frame, refused: Refused, memory: _Remembered | None) -> None:
+        payload = Refusal(frame.type, refused.reason, refused.detail).pack()
+        self._send(Frame(messages.REFUSAL, frame.seq, frame.session, payload), memory)
+
+    def _send(self, answer: Frame, memory: _Remembered | None) -> None:
+        wire = answer.encode()
+        if memory is not None:
+            memory.answer = wire
+        self._out += wire
+
+    # Requests
+
+    def _hello(self, frame: Frame) -> bytes:
+        if frame.session != self._session:
+            self._session, self._last = frame.session, None
+        return self.info.pack() + self.status().pack()
+
+    def _commit(self, frame: Frame) -> bytes | None:
+        found = self._bank.find(*struct.unpack_from("<I", frame.payload))
+        if isinstance(found, Taken):
+            return struct.pack("<II", found.generation, found.line)
+        if not self.permits:
+            raise Refused(Reason.INTERLOCK)
+        assert self._last is not None
+        found.state = Upload.CHECKING
+        self._at_work = _AtWork(frame, self._last, self._before, self._use_nonce(), self._checking)
+        if self._checking == 0:
+            self._check(self._at_work, found)
+        return None
+
+    def _check(self, commit: _AtWork, held: Held) -> None:
+        """The checks of an image, and its way into the idle bank."""
+        try:
+            program = self._bank.accept(held, lambda image: self._check_tag(commit.request, commit.nonce, image))
+            if not self.permits:
+                raise Refused(Reason.INTERLOCK)
+            if not self.player.commit(program):
+                raise Refused(Reason.TICKS)
+        except Refused as refused:
+            self._at_work = None
+            if refused.reason in (Reason.INTERLOCK, Reason.KEY, Reason.TICKS):
+                held.state = Upload.RECEIVING
+            else:
+                self._bank.held = None
+            is_used = refused.reason != Reason.KEY
+            if not is_used and self._last is commit.memory:
+                self._last = commit.before
+            self._refuse(commit.request, refused, commit.memory if is_used else None)
+            return
+        held.state = Upload.WAITING
+        commit.swaps = self.player.swaps
+
+    def _settle(self) -> None:
+        """Answer a COMMIT and its ABORTs once the sequencer has said what became of the program that waited."""
+        commit, held, player = self._at_work, self._bank.held, self.player
+        if commit is None or held is None or held.state is not Upload.WAITING:
+            return
+        if player.swaps != commit.swaps:
+            self._bank.take(held)
+            self._answer(commit.request, struct.pack("<II", player.swaps, player.swapped_at), commit.memory)
+        elif player.writable:
+            self._bank.held = None
+            self._refuse(commit.request, Refused(Reason.WITHDRAWN), commit.memory)
+        else:
+            return
+        self._at_work = None
+        for abort in self._aborts:
+            self._answer(abort.request, struct.pack("<I", player.swaps), abort.memory)
+        self._aborts.clear()
+
+    def _abort(self, frame: Frame) -> bytes | None:
+        commit, held = self._at_work, self._bank.held
+        assert self._last is not None
+        if held is not None and held.state is Upload.WAITING:
+            if not self.player.withdraw():
+                raise Refused(Reason.TICKS)
+            self._aborts.append(_AtWork(frame, self._last))
+            return None
+        self._at_work = self._bank.held = None
+        if commit is not None:
+            self._refuse(commit.request, Refused(Reason.WITHDRAWN), commit.memory)
+        return struct.pack("<I", self.player.swaps)
+
+    def _readback(self, frame: Frame) -> bytes:
+        offset, count = struct.unpack("<IB", frame.payload)
+        return struct.pack("<I", offset) + self._bank.readback(offset, count)
+
+    def _passed_on(self, done: bool) -> bytes:
+        if not done:
+            raise Refused(Reason.TICKS)
+        return b""
+
+    def _challenge(self, frame: Frame) -> bytes:
+        self._nonce = self._nonces()
+        assert len(self._nonce) == NONCE_BYTES
+        return self._nonce
+
+    def _counted_nonce(self) -> bytes:
+        self._challenges += 1
+        count = struct.pack("<II", self.boot, self._challenges)
+        return hashlib.blake2s(count, key=self._key, digest_size=NONCE_BYTES).digest()
+
+
+def _acts(frame: Frame) -> bool:
+    return frame.type in _ACTING and (frame.type != Request.LIMITS or frame.payload != b"")

@@ -1,0 +1,348 @@
+"""What plays behind a model of a device: the integer model tick by tick, or whole lines at once for virtual time."""
+
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+
+from tablegen.link.messages import State
+from tablegen.sequencer import DualProgram, Fault, Sequencer, Tick
+
+REQUESTS = 8  # that a sequencer in C keeps until its next tick
+
+
+class Player(Protocol):
+    """A sequencer as the link sees it. Requests are False, and change nothing, where too many wait for a tick."""
+
+    @property
+    def swaps(self) -> int:
+        """Programs taken since the start."""
+
+    @property
+    def line(self) -> int:
+        """Of the frame."""
+
+    @property
+    def swapped_at(self) -> int:
+        """The line that the old program had come to when the last one was taken."""
+
+    @property
+    def state(self) -> State:
+        """Of the last tick."""
+
+    @property
+    def playing(self) -> DualProgram | None:
+        """The program in force."""
+
+    @property
+    def faults(self) -> int:
+        """Sticky, as bits: 1 slew, 2 clamp, 4 overrun, 8 underrun."""
+
+    @property
+    def fault_counts(self) -> tuple[int, int, int, int]:
+        """In the order of the bits."""
+
+    @property
+    def writable(self) -> bool:
+        """Whether no program waits, nor will."""
+
+    def commit(self, program: DualProgram) -> bool:
+        """To be taken at the next line start, or on the next tick where no scan plays."""
+
+    def withdraw(self) -> bool:
+        """What was committed and not taken is not to be."""
+
+    def arm(self, frames: int) -> bool:
+        """The next trigger starts so many frames; 0 is without end."""
+
+    def trigger(self) -> bool:
+        """Start at line 0."""
+
+    def park(self) -> bool:
+        """No more frames."""
+
+    def clear(self) -> bool:
+        """Forget faults."""
+
+    def advance(self, ticks: int) -> None:
+        """Play so many ticks."""
+
+    def restart(self) -> None:
+        """As at power-up."""
+
+
+class _Queue:
+    """Requests that wait for the next tick, as in the C runtime."""
+
+    def __init__(self, boot: DualProgram | None) -> None:
+        self._boot = boot
+        self._requests: list[Callable[[], None]] = []
+        self._commits = 0
+        self.swaps = self.swapped_at = 0
+        self.restart()
+
+    def restart(self) -> None:
+        """As at power-up: the boot program, if there is one, waits for the first tick."""
+        self._requests.clear()
+        self._commits = self.swaps = self.swapped_at = 0
+        self._power_up()
+        if self._boot is not None:
+            self.commit(self._boot)
+
+    def _power_up(self) -> None:
+        raise NotImplementedError
+
+    def _take(self, program: DualProgram) -> None:
+        raise NotImplementedError
+
+    def commit(self, program: DualProgram) -> bool:
+        """A program to be taken."""
+
+        def act() -> None:
+            self._commits -= 1
+            self._take(program)
+
+        done = self._ask(act)
+        self._commits += done
+        return done
+
+    def _ask(self, act: Callable[[], None]) -> bool:
+        if len(self._requests) == REQUESTS:
+            return False
+        self._requests.append(act)
+        return True
+
+    def _answer(self) -> None:
+        while self._requests:
+            self._requests.pop(0)()
+
+
+class SequencerPlayer(_Queue):
+    """Every tick of ``tablegen.sequencer``; ``seen`` is called with the generation and line of each, and the tick."""
+
+    def __init__(
+        self,
+        boot: DualProgram | None,
+        codes: tuple[int, int] = (0, 0),
+        seen: Callable[[int, int, Tick], None] | None = None,
+    ) -> None:
+        self._codes, self._seen = codes, seen
+        self._last: Tick | None = None
+        super().__init__(boot)
+
+    def _power_up(self) -> None:
+        self.sequencer = Sequencer(None, codes=self._codes)
+        self._last = None
+
+    def _take(self, program: DualProgram) -> None:
+        self.sequencer.commit(program)
+
+    @property
+    def line(self) -> int:
+        """Of the frame."""
+        return self.sequencer.line
+
+    @property
+    def state(self) -> State:
+        """Of the last tick."""
+        if self.swaps == 0:
+            return State.NO_PROGRAM
+        assert self._last is not None
+        return State.PLAYING if self._last.playing else State.PARKED if self._last.parked else State.PARKING
+
+    @property
+    def playing(self) -> DualProgram | None:
+        """The program in force."""
+        return self.sequencer.playing
+
+    @property
+    def faults(self) -> int:
+        """Slew and clamp; the others need a clock."""
+        return int(self.sequencer.faults)
+
+    @property
+    def fault_counts(self) -> tuple[int, int, int, int]:
+        """In the order of the bits."""
+        counts = self.sequencer.fault_counts
+        return counts[Fault.SLEW], counts[Fault.CLAMP], 0, 0
+
+    @property
+    def writable(self) -> bool:
+        """Whether no program waits, nor will."""
+        return self._commits == 0 and self.sequencer.idle is None
+
+    def withdraw(self) -> bool:
+        """What waits is not to be taken."""
+        return self._ask(self.sequencer.withdraw)
+
+    def arm(self, frames: int) -> bool:
+        """For the next trigger."""
+        return self._ask(lambda: self.sequencer.arm(frames))
+
+    def trigger(self) -> bool:
+        """Start at line 0."""
+
+        def act() -> None:
+            self.sequencer.trigger()
+
+        return self._ask(act)
+
+    def park(self) -> bool:
+        """No more frames."""
+        return self._ask(self.sequencer.park)
+
+    def clear(self) -> bool:
+        """Forget faults."""
+        return self._ask(self.sequencer.clear_faults)
+
+    def advance(self, ticks: int) -> None:
+        """Play so many ticks."""
+        for _ in range(ticks):
+            self._answer()
+            before = self.sequencer.line
+            # a swap and a trigger begin at line 0; the line of a tick is the one before it is over
+            begins = self.sequencer.idle is not None and self.sequencer.running and self.sequencer.tick == 0
+            tick = self._last = self.sequencer.step()
+            if tick.swapped:
+                self.swaps += 1
+                self.swapped_at = before
+            if self._seen is not None:
+                self._seen(self.swaps, 0 if begins else before, tick)
+
+
+class LinePlayer(_Queue):
+    """Lines, frames, swaps and requests on the ticks of ``SequencerPlayer``, but no codes: there are no faults.
+
+    How long parking takes is reckoned from the code at which it began, exactly where no swap was being caught up with.
+    """
+
+    def __init__(self, boot: DualProgram | None, codes: tuple[int, int] = (0, 0)) -> None:
+        self._codes = codes
+        super().__init__(boot)
+
+    def _power_up(self) -> None:
+        self.playing: DualProgram | None = None
+        self._waits: DualProgram | None = None
+        self._running = self._armed = self._endless = False
+        self._armed_frames = self._frames_left = 0
+        self._tick = self.line = 0
+        self._parks_for = 0  # ticks
+        self._played = False  # the last tick
+        self.faults = 0
+        self.fault_counts = 0, 0, 0, 0
+
+    def _take(self, program: DualProgram) -> None:
+        self._waits = program
+
+    @property
+    def state(self) -> State:
+        """Of the last tick."""
+        if self.swaps == 0:
+            return State.NO_PROGRAM
+        return State.PLAYING if self._played else State.PARKING if self._parks_for else State.PARKED
+
+    @property
+    def writable(self) -> bool:
+        """Whether no program waits, nor will."""
+        return self._commits == 0 and self._waits is None
+
+    def withdraw(self) -> bool:
+        """What waits is not to be taken."""
+
+        def act() -> None:
+            self._waits = None
+
+        return self._ask(act)
+
+    def arm(self, frames: int) -> bool:
+        """For the next trigger."""
+
+        def act() -> None:
+            self._armed, self._armed_frames = True, frames
+
+        return self._ask(act)
+
+    def trigger(self) -> bool:
+        """Start at line 0."""
+
+        def act() -> None:
+            if self._armed and not self._running and self.playing is not None:
+                self._armed, self._running = False, True
+                self._endless, self._frames_left = self._armed_frames == 0, self._armed_frames
+                self._tick = self.line = 0
+
+        return self._ask(act)
+
+    def park(self) -> bool:
+        """No more frames."""
+
+        def act() -> None:
+            if self._running and self.playing is not None:
+                self._parks_for = self._way_to_park(self.playing)
+            self._armed = self._running = False
+
+        return self._ask(act)
+
+    def clear(self) -> bool:
+        """There are no faults."""
+        return self._ask(lambda: None)
+
+    def advance(self, ticks: int) -> None:
+        """Play so many ticks, a line at a time."""
+        while ticks:
+            self._answer()
+            if self._waits is not None and (not self._running or self._tick == 0):
+                self._swap(self._waits)
+            if self._running and self.playing is not None:
+                ticks -= self._play(self.playing, ticks)
+            else:
+                self._played = False
+                rest = min(ticks, self._parks_for) or ticks
+                self._parks_for = max(self._parks_for - rest, 0)
+                ticks -= rest
+
+    def _swap(self, program: DualProgram) -> None:
+        old, self.playing, self._waits = self.playing, program, None
+        self.swaps += 1
+        self.swapped_at = self.line
+        if self._running:
+            self._tick = self.line = 0
+        else:
+            from_codes = self._codes if old is None else (old.x.output.park_code, old.y.output.park_code)
+            self._parks_for = max(self._parks_for, _ramp(program, from_codes))
+
+    def _play(self, program: DualProgram, most: int) -> int:
+        """Ticks of the line, at most so many; returns how many."""
+        ticks = min(most, program.schedule.ticks - self._tick)
+        self._played = True
+        self._tick += ticks
+        if self._tick == program.schedule.ticks:
+            self._tick = 0
+            self.line += 1
+            if self.line == program.schedule.lines:
+                self._end_frame(program)
+        return ticks
+
+    def _end_frame(self, program: DualProgram) -> None:
+        self.line = 0
+        if self._endless:
+            return
+        self._frames_left -= 1
+        if self._frames_left == 0:
+            self._running = False
+            self._parks_for = self._way_to_park(program)
+
+    def _way_to_park(self, program: DualProgram) -> int:
+        """From the last tick that was played."""
+        schedule = program.schedule
+        k = (self.line * schedule.ticks + self._tick - 1) % schedule.frame_ticks
+        x, y = program.x.codes(np.array([k % schedule.ticks])), program.y.codes(np.array([k]))
+        return _ramp(program, (int(x[0]), int(y[0])))
+
+
+def _ramp(program: DualProgram, codes: tuple[int, int]) -> int:
+    """Ticks from these codes to the park codes on both axes."""
+    return max(
+        -(-abs(axis.output.park_code - code) // axis.output.max_step)
+        for axis, code in zip((program.x, program.y), codes, strict=True)
+    )

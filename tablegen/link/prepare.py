@@ -1,0 +1,178 @@
+"""What is uploaded of a scan, and whether a device would take it: asked here, before anything is sent."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from tablegen.fixedpoint.output import Output
+from tablegen.fixedpoint.program import Program
+from tablegen.link.acceptance import first_objection
+from tablegen.link.errors import Unsuitable
+from tablegen.link.image import FOURIER_BYTES, PROGRAM_BYTES, Image, make_image, take_apart
+from tablegen.link.messages import AxisShape, DeviceInfo, Feature
+from tablegen.link.reasons import Limits, explain
+from tablegen.numerics.arrays import Ints
+from tablegen.plan import Plan
+from tablegen.record import content_hash, plan_record
+from tablegen.recorded import NotABuild, read_manifest
+from tablegen.registers import AXIS_WORDS, PAGE_WORDS
+from tablegen.sequencer import DualProgram
+
+Form = Literal["auto", "table", "fourier"]
+TWOS_COMPLEMENT, LEFT_ALIGNED = 64, 128  # of AxisShape.converter
+_RATE_HZ = 1.0  # a device tells its rate to the nearest whole one
+
+
+@dataclass(frozen=True, eq=False)
+class Scan:
+    """What can be uploaded: a program, the hash of its plan, and the Fourier words of both axes.
+
+    These are int64 of shape (2 H + 1,), in the order of devices.
+    """
+
+    name: str
+    digest: str
+    program: DualProgram
+    x_fourier: Ints
+    y_fourier: Ints
+
+    @classmethod
+    def of_plan(cls, plan: Plan) -> "Scan":
+        """The scan of a plan."""
+        digest = content_hash(plan_record(plan))
+        return cls(plan.name, digest, DualProgram.of(plan), plan.x.fourier.in_order, plan.y.fourier.in_order)
+
+    @classmethod
+    def of_build(cls, folder: Path) -> "Scan":
+        """The scan that ``tablegen build`` wrote into a folder. Raises ``NotABuild``."""
+        recorded = read_manifest(folder)
+        manifest = recorded.manifest
+        if recorded.own_hash != manifest.hash:
+            raise NotABuild(f"{folder}: its manifest was changed after the build; build it again")
+        axes = manifest.axes
+        return cls(manifest.name, manifest.hash, recorded.program, axes.x.fourier_words, axes.y.fourier_words)
+
+    @property
+    def axes(self) -> tuple[tuple[str, Program, Ints], tuple[str, Program, Ints]]:
+        """Name, program and Fourier words of both."""
+        return ("x", self.program.x, self.x_fourier), ("y", self.program.y, self.y_fourier)
+
+    def image(self, form: Form = "auto", info: DeviceInfo | None = None) -> Image:
+        """The image to upload: as tables, as Fourier words, or for each axis what is smaller and the device takes.
+
+        Raises ``Unsuitable`` where an axis has no Fourier words that would render its table.
+        """
+        if form == "fourier" and (direct := [name for name, axis, _ in self.axes if axis.mode == "direct"]):
+            raise Unsuitable(
+                [f"{name}: a direct table cannot be rendered from Fourier words; --as table" for name in direct]
+            )
+        chosen = [
+            words if form == "fourier" or (form == "auto" and _rendered(axis, words, info)) else None
+            for _, axis, words in self.axes
+        ]
+        return make_image(self.program, self.digest, chosen[0], chosen[1])
+
+    def like(self, image: bytes) -> Image:
+        """The image that a device which plays this scan should hold, each axis in the form that this one has."""
+        x, y = harmonics_of(image)
+        return make_image(self.program, self.digest, self.x_fourier if x else None, self.y_fourier if y else None)
+
+
+def harmonics_of(image: bytes) -> tuple[int, int]:
+    """Of x and y; 0 where a table follows, or the image is too short to tell."""
+    words = np.frombuffer(image.ljust(PROGRAM_BYTES, b"\0"), dtype="<u4", count=PROGRAM_BYTES // 4)
+    x, y = (int(words[page * PAGE_WORDS + AXIS_WORDS.index("harmonics")]) for page in (1, 2))
+    return x, y
+
+
+def _rendered(axis: Program, words: Ints, info: DeviceInfo | None) -> bool:
+    """Whether Fourier words are the smaller form of an axis that the device takes."""
+    if axis.mode == "direct":
+        return False
+    if info is not None:
+        if not info.features & Feature.FOURIER or len(words) // 2 > info.harmonics:
+            return False
+        if not info.features & Feature.TABLES:
+            return True
+    table = AxisShape(axis.index_bits, axis.bits, axis.output.dac_bits)
+    return FOURIER_BYTES * len(words) < table.word_bytes * len(axis.words)
+
+
+def check(scan: Scan, image: Image, info: DeviceInfo, limits: Limits, any_rate: bool = False) -> None:
+    """Whether a device with these limits in force would take the image, as far as can be known without it.
+
+    Raises ``Unsuitable`` with everything that is found.
+    """
+    found = [*_device(image, info, scan), *([] if any_rate else _rate(scan, info))]
+    for (name, axis, _), shape, theirs in zip(scan.axes, (image.info.x, image.info.y), (info.x, info.y), strict=True):
+        found += [f"{name}: {why}" for why in _axis(axis, shape, theirs)]
+    contents = take_apart(image.data, image.info.x, image.info.y)
+    if objection := first_objection(contents, *limits, None):
+        found.append(explain(*objection, info, contents, limits))
+    if found:
+        raise Unsuitable(found)
+
+
+def _device(image: Image, info: DeviceInfo, scan: Scan) -> list[str]:
+    found = []
+    harmonics = harmonics_of(image.data)
+    if any(harmonics) and not info.features & Feature.FOURIER:
+        found.append("the device renders no Fourier words; upload --as table")
+    elif max(harmonics) > info.harmonics:
+        found.append(
+            f"{max(harmonics)} harmonics; the device renders at most {info.harmonics}: lower band_limit.harmonics, or "
+            "upload --as table"
+        )
+    if not all(harmonics) and not info.features & Feature.TABLES:
+        found.append("the device takes no tables; upload --as fourier")
+    if len(image.data) > info.image_bytes:
+        found.append(
+            f"{len(image.data)} bytes; the device takes {info.image_bytes}: upload --as fourier, or make the tables "
+            "shorter"
+        )
+    return found
+
+
+def _rate(scan: Scan, info: DeviceInfo) -> list[str]:
+    wanted = float(scan.program.schedule.update_rate_hz)
+    if not info.update_rate_hz or abs(wanted - info.update_rate_hz) <= _RATE_HZ:
+        return []
+    return [
+        f"built for {wanted:g} ticks a second; the device makes {info.update_rate_hz}: every line would take "
+        f"{wanted / info.update_rate_hz:.4g} times as long; set dac.update_rate_hz, or allow it with --any-rate"
+    ]
+
+
+def _axis(axis: Program, shape: AxisShape, theirs: AxisShape) -> list[str]:
+    found = []
+    if shape.word_bits != theirs.word_bits:
+        found.append(f"table words of {shape.word_bits} bits; the device has {theirs.word_bits}: set table.bits")
+    if shape.dac_bits != theirs.dac_bits:
+        found.append(f"codes of {shape.dac_bits} bits; the device has {theirs.dac_bits}: set dac.bits")
+    if len(axis.words) > 1 << theirs.index_bits:
+        found.append(f"a table of {len(axis.words)} words; the device holds {1 << theirs.index_bits}: set table.length")
+    ours = _converter(axis.output)
+    if theirs.converter and ours != _converter_of(theirs):
+        found.append(
+            f"converter words {ours}; the device sends {_converter_of(theirs)}: set dac.coding, word_bits and align"
+        )
+    return found
+
+
+def _converter(output: Output) -> str:
+    return _described(output.word_bits, output.dac_bits, output.coding == "twos-complement", output.align == "left")
+
+
+def _converter_of(shape: AxisShape) -> str:
+    bits = shape.converter & (TWOS_COMPLEMENT - 1)
+    return _described(
+        bits, shape.dac_bits, bool(shape.converter & TWOS_COMPLEMENT), bool(shape.converter & LEFT_ALIGNED)
+    )
+
+
+def _described(word_bits: int, dac_bits: int, twos_complement: bool, left: bool) -> str:
+    """A code that fills its word is aligned to both sides."""
+    side = "" if word_bits == dac_bits else ", left-aligned" if left else ", right-aligned"
+    return f"of {word_bits} bits, {'twos-complement' if twos_complement else 'offset-binary'}{side}"

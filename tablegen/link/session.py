@@ -1,0 +1,202 @@
+"""A conversation with a device: HELLO, requests that are repeated until they are answered, ports that come back."""
+
+import hashlib
+from collections.abc import Callable
+from random import Random
+
+from tablegen.link.errors import LinkError, LinkLost, NoAnswer, NoPort, NotUnderstood, Refused, Silent
+from tablegen.link.exchange import Answer, Exchange
+from tablegen.link.messages import (
+    NONCE_BYTES,
+    TAG_BYTES,
+    VERSION,
+    DeviceInfo,
+    DeviceStatus,
+    Feature,
+    Reason,
+    Request,
+)
+from tablegen.link.reasons import refused
+from tablegen.link.transport import Opener, Transport
+
+HELLO_BYTES = DeviceInfo.LAYOUT.size + DeviceStatus.LAYOUT.size
+_TRIES = 12  # of a request, the wait doubling up to 8 times the first: seconds, at usual rates
+_LONGEST = 3
+_ANEW = 4  # sessions or challenges that are begun anew for one request
+_REOPEN_S = 0.25
+
+
+class Session:
+    """One host at one device. Requests end in an answer or an error before their deadline, a time of ``now``."""
+
+    def __init__(
+        self,
+        transport: Transport,
+        opener: Opener | None,
+        key: bytes | None,
+        latency_s: float,
+        random: Random,
+        sleep: Callable[[float], None],
+    ) -> None:
+        self.exchange = Exchange(transport, latency_s, random)
+        self.key = key
+        self.info: DeviceInfo
+        self.status: DeviceStatus  # when HELLO was answered last, at the time
+        self.status_at = 0.0
+        self._opener = opener
+        self._sleep = sleep
+        self._heard = False
+
+    def now(self) -> float:
+        """The clock of the port."""
+        return self.exchange.now()
+
+    def close(self) -> None:
+        """Give the port back."""
+        self.exchange.transport.close()
+
+    def hello(self, deadline: float, anew: bool = False) -> None:
+        """Begin, or go on, and learn ``info`` and ``status``; ``anew`` is with another session."""
+        if anew:
+            self.exchange.new_session()
+        payload = self._repeat(Request.HELLO, self.exchange.seq(), bytes([VERSION]), HELLO_BYTES, deadline)
+        size = DeviceInfo.LAYOUT.size
+        try:
+            self.info = DeviceInfo.unpack(payload)
+            self.status, self.status_at = DeviceStatus.unpack(payload[size:]), self.now()
+        except ValueError as error:
+            raise NotUnderstood(str(error)) from None
+        if not self.info.window or not self.info.data_bytes:
+            raise NotUnderstood(f"a window of {self.info.window}, a DATA of {self.info.data_bytes} bytes")
+        self._heard = True
+
+    def greet(self, deadline: float, anew: bool = False) -> None:
+        """HELLO again, on a port that may have gone meanwhile."""
+        try:
+            self.hello(deadline, anew)
+        except Silent:
+            raise
+        except LinkLost as lost:
+            self.reopen(deadline, lost)
+
+    def reopen(self, deadline: float, why: LinkLost) -> None:
+        """Open a port that has gone again, and HELLO; tries until the deadline. Without an opener raises ``why``."""
+        if self._opener is None:
+            raise why
+        while True:
+            self.close()
+            if self.now() + _REOPEN_S >= deadline:
+                raise why
+            self._sleep(_REOPEN_S)
+            try:
+                self.exchange.use(self._opener())
+                self._hello_patiently(deadline)
+                return
+            except (NoPort, LinkLost) as error:
+                why = LinkLost(f"the link is lost, and does not come back: {error}")
+
+    def _hello_patiently(self, deadline: float) -> None:
+        """Some devices start anew when their port is opened; to open it again would not help them."""
+        while True:
+            try:
+                return self.hello(deadline)
+            except Silent:
+                if self.now() >= deadline:
+                    raise
+
+    def ask(self, kind: Request, payload: bytes, answer_bytes: int, deadline: float) -> bytes:
+        """A request that does not act: the payload of its answer."""
+        for _ in range(_ANEW):
+            try:
+                return self._repeat(kind, self.exchange.seq(), payload, answer_bytes, deadline)
+            except Silent:
+                raise
+            except LinkLost as lost:
+                self.reopen(deadline, lost)
+            except Refused as refusal:
+                if refusal.reason != Reason.SESSION:
+                    raise
+                self.greet(deadline, anew=True)
+        raise self.contested()
+
+    def act(self, kind: Request, payload: bytes, answer_bytes: int, deadline: float, tagged: bool = True) -> bytes:
+        """A request that acts, with a tag where the device wants one; it is carried out once."""
+        number, body = self.exchange.number(), None
+        last: LinkError = self.contested()
+        for _ in range(_ANEW):
+            try:
+                if body is None:
+                    body = payload + (self.tag(kind, number, payload, deadline) if tagged else b"")
+                return self._repeat(kind, number, body, answer_bytes, deadline)
+            except Silent:
+                raise
+            except LinkLost as lost:
+                self.reopen(deadline, lost)  # same number, same bytes: a device that has acted only answers
+            except Refused as refusal:
+                if refusal.reason == Reason.KEY and self.key is not None:
+                    last, body = refusal, None  # the line may have spent the challenge
+                elif refusal.reason in (Reason.SESSION, Reason.OLD):
+                    self.greet(deadline, anew=True)
+                    last, body = self.contested(), None
+                else:
+                    raise
+        raise last
+
+    def tag(self, kind: int, number: int, payload: bytes, deadline: float) -> bytes:
+        """The tag of a request, after a CHALLENGE; nothing for a device without a key."""
+        if not self.needs_key():
+            return b""
+        nonce = self.ask(Request.CHALLENGE, b"", NONCE_BYTES, deadline)
+        return self.tag_of(nonce, kind, number, payload, b"")
+
+    def needs_key(self) -> bool:
+        """Whether the device has one; raises ``Refused`` where none was given."""
+        if not self.info.features & Feature.KEY:
+            return False
+        if self.key is None:
+            raise refused(Request.COMMIT, Reason.KEY, 0)
+        return True
+
+    def tag_of(self, nonce: bytes, kind: int, number: int, payload: bytes, digest: bytes) -> bytes:
+        """BLAKE2s of a request under the key; ``digest`` is that of the image, with COMMIT."""
+        assert self.key is not None
+        if len(nonce) < NONCE_BYTES:
+            raise NotUnderstood("a challenge that is too short")
+        head = bytes([kind, number]) + self.exchange.session.to_bytes(4, "little")
+        message = nonce[:NONCE_BYTES] + head + payload + digest
+        return hashlib.blake2s(message, key=self.key, digest_size=TAG_BYTES).digest()
+
+    def contested(self) -> LinkError:
+        """The error where sessions do not last."""
+        return LinkLost("another program talks to the device, or it is reset again and again; close the other one")
+
+    def silent(self) -> LinkError:
+        """The error where nobody answers."""
+        if self._heard:
+            return Silent("the device does not answer any more; is it still on?")
+        if self.exchange.noise:
+            why = "what comes are no frames of it: is --baud that of the device?"
+        else:
+            why = "is it on, is its firmware made with the link, do port and --baud fit, are TX and RX crossed?"
+        return NoAnswer(f"the port is open, but no device answers: {why}")
+
+    def _repeat(self, kind: Request, seq: int, payload: bytes, answer_bytes: int, deadline: float) -> bytes:
+        """Send a request until it is answered. Raises ``Refused``, ``LinkLost``, ``NoAnswer``."""
+        for count in range(_TRIES):
+            again = count > 0 or kind == Request.HELLO
+            due = self.exchange.send(kind, seq, payload, answer_bytes, again)
+            now = self.now()
+            until = min(now + (due - now) * (1 << min(count, _LONGEST)), deadline)
+            while self.now() < until:
+                for answer in self.exchange.receive(until):
+                    if answer.kind == kind and answer.seq == seq:
+                        return self._payload(answer)
+            if self.now() >= deadline:
+                break
+        raise self.silent()
+
+    def _payload(self, answer: Answer) -> bytes:
+        if answer.reason:
+            info = self.info if self._heard else None
+            raise refused(answer.kind, answer.reason, answer.detail, info)
+        return answer.payload

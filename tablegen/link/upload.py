@@ -1,0 +1,394 @@
+"""An upload: BEGIN, DATA within the device's window, and COMMIT, on their way at once; gone back where one is lost."""
+
+import hashlib
+import struct
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from tablegen.link.errors import LinkError, LinkLost, NotUnderstood, OutOfTime, Refused, Silent
+from tablegen.link.exchange import Answer
+from tablegen.link.messages import DATA_BYTES, NONCE_BYTES, DeviceStatus, Reason, Request, Upload
+from tablegen.link.reasons import Limits, refused
+from tablegen.link.session import Session
+
+if TYPE_CHECKING:
+    from tablegen.link.image import Image
+
+_SILENCE_S = 3.0  # at least, and so many waits for one answer
+_SILENCE_WAITS = 16
+_LONGEST = 3  # doublings of a wait in vain
+_POLL_S = (0.03, 0.25)  # between two STATUS while a COMMIT is at work: at first, and at most
+_BUSY_S = 0.05
+_ANEW = 4  # times that an upload is begun anew for the same reason
+_ANEW_KEY = 2
+_OF_THE_WORDS = (Reason.SHAPE, Reason.LENGTH, Reason.HARMONICS)  # when the program words are complete
+_CRC = struct.Struct("<I")
+_COMMITTED = struct.Struct("<2I")
+
+ProgressCall = Callable[[int, int], None]  # bytes that the device has, of so many
+
+
+@dataclass(frozen=True, slots=True)
+class UploadResult:
+    """What became of an upload.
+
+    ``line`` is that of the old frame which was the last, None where the answer was lost with the port. ``bytes`` of the
+    image, ``wire_bytes`` that were sent for it, ``resumed`` bytes that the device had already.
+    """
+
+    already_running: bool
+    generation: int
+    line: int | None
+    bytes: int
+    wire_bytes: int
+    resumed: int
+    retransmissions: int
+    seconds: float
+
+
+@dataclass(slots=True)
+class _Sent:
+    """A request on its way, and when it was sent; ``end`` of the bytes of a DATA."""
+
+    kind: Request
+    seq: int
+    at: float
+    due: float
+    round: int = 0
+    end: int = 0
+
+
+class _Anew(Exception):
+    """The session is another one; begin with HELLO."""
+
+
+class Uploader:
+    """One upload in a session, until it is in force or cannot be."""
+
+    def __init__(
+        self, session: Session, image: "Image", deadline: float, progress: ProgressCall | None, limits: Limits | None
+    ) -> None:
+        self._session, self._image, self._deadline = session, image, deadline
+        self._exchange = session.exchange
+        self._progress = progress
+        self._limits = limits
+        self._step = min(session.info.data_bytes, DATA_BYTES)
+        self._digest = hashlib.blake2s(image.data).digest() if session.needs_key() else b""
+        self._committed = False  # a COMMIT may have reached the device
+        self._sent_to = 0  # bytes that were sent at least once
+        self._resumed: int | None = None
+        self._retransmissions = 0
+        self._anew: dict[int, int] = {}
+        self._restart(session.status)
+
+    def run(self) -> UploadResult:
+        """Upload; the result, or a ``LinkError``."""
+        start, sent = self._session.now(), self._exchange.bytes_sent
+        while True:
+            try:
+                generation, line = self._attempt()
+            except Silent:
+                raise
+            except LinkLost as lost:
+                self._session.reopen(self._deadline, lost)
+            except _Anew:
+                self._count(Reason.SESSION, self._session.contested())
+                self._session.greet(self._deadline, anew=True)
+            else:
+                break
+            self._restart(self._session.status)
+            if self._in_force(self._session.status):
+                generation, line = self._session.status.generation, None
+                break
+        return UploadResult(
+            already_running=False,
+            generation=generation,
+            line=line,
+            bytes=len(self._image.data),
+            wire_bytes=self._exchange.bytes_sent - sent,
+            resumed=self._resumed or 0,
+            retransmissions=self._retransmissions,
+            seconds=self._session.now() - start,
+        )
+
+    # What is known of the device
+
+    def _restart(self, status: DeviceStatus) -> None:
+        """After HELLO: nothing is on its way, and the device says what it has."""
+        same = status.image_crc == self._image.info.image_crc and status.upload == Upload.RECEIVING
+        guess = min(status.received, len(self._image.data)) if same else 0
+        self._flight: dict[tuple[int, int], _Sent] = {}
+        self._begun = False  # BEGIN was answered
+        self._pipelined = True  # DATA need not wait for that
+        self._next, self._confirmed, self._round = guess, 0, 0
+        self._commit: _Sent | None = None
+        self._commit_body = b""
+        self._nonce: bytes | None = None
+        self._poll_s = _POLL_S[0]
+        self._poll_at = self._pause_until = 0.0
+        self._busy = False  # BEGIN was refused so: STATUS before the next one
+        self._heard_at = self._session.now()
+        self._longest_wait = 0.0
+        self._in_vain = 0
+
+    def _in_force(self, status: DeviceStatus) -> bool:
+        return self._committed and status.hash == self._image.info.hash
+
+    def _count(self, reason: int, error: LinkError) -> None:
+        """Some things may happen by chance, but not for ever."""
+        self._anew[reason] = self._anew.get(reason, 0) + 1
+        if self._anew[reason] > (_ANEW_KEY if reason == Reason.KEY else _ANEW):
+            raise error
+
+    # The loop
+
+    def _attempt(self) -> tuple[int, int | None]:
+        while True:
+            now = self._session.now()
+            if now >= self._deadline:
+                raise self._out_of_time()
+            self._overdue(now)
+            self._fill(now)
+            for answer in self._exchange.receive(self._wake()):
+                self._heard_at, self._in_vain = self._session.now(), 0
+                if done := self._take(answer):
+                    return done
+
+    def _fill(self, now: float) -> None:
+        """Send whatever may be on its way now."""
+        size, window = len(self._image.data), self._session.info.window
+        if now < self._pause_until:
+            return
+        while len(self._flight) < window:
+            if self._busy:
+                if self._on_way(Request.STATUS):
+                    return
+                self._send(Request.STATUS, b"", DeviceStatus.LAYOUT.size)
+            elif not self._begun and not self._on_way(Request.BEGIN):
+                self._send(Request.BEGIN, self._image.info.pack())
+            elif not self._begun and not self._pipelined:
+                return
+            elif self._digest and self._nonce is None and not self._on_way(Request.CHALLENGE):
+                self._send(Request.CHALLENGE, b"")
+            elif self._next < size:
+                self._send_data()
+            elif self._commit is None and (self._nonce is not None or not self._digest):
+                self._send_commit()
+            elif self._poll_at and now >= self._poll_at and not self._on_way(Request.STATUS):
+                self._poll_at = 0.0
+                self._send(Request.STATUS, b"", DeviceStatus.LAYOUT.size)
+            else:
+                return
+
+    def _on_way(self, kind: Request) -> bool:
+        return any(sent.kind == kind for sent in self._flight.values())
+
+    def _send(self, kind: Request, payload: bytes, answer_bytes: int = NONCE_BYTES) -> None:
+        seq = self._exchange.seq()
+        due = self._exchange.send(kind, seq, payload, answer_bytes, again=self._in_vain > 0)
+        self._note(_Sent(kind, seq, self._session.now(), due))
+
+    def _send_data(self) -> None:
+        offset = self._next
+        data = self._image.data[offset : offset + self._step]
+        seq, end = self._exchange.seq(), offset + len(data)
+        due = self._exchange.send(Request.DATA, seq, _CRC.pack(offset) + data, again=self._in_vain > 0)
+        self._note(_Sent(Request.DATA, seq, self._session.now(), due, self._round, end))
+        self._retransmissions += offset < self._sent_to
+        self._sent_to = max(self._sent_to, end)
+        self._next = end
+
+    def _send_commit(self) -> None:
+        number = self._exchange.number()
+        body = _CRC.pack(self._image.info.image_crc)
+        if self._nonce is not None:
+            body += self._session.tag_of(self._nonce, Request.COMMIT, number, body, self._digest)
+        self._commit_body = body
+        self._commit = _Sent(Request.COMMIT, number, 0.0, 0.0, self._round)
+        self._repeat_commit(again=False)
+
+    def _repeat_commit(self, again: bool = True) -> None:
+        """The same bytes: a device that is at work, or is done, does not act again."""
+        assert self._commit is not None
+        self._committed = True
+        self._commit.due = self._exchange.send(Request.COMMIT, self._commit.seq, self._commit_body, again=again)
+        self._commit.at = self._session.now()
+        self._note(self._commit)
+
+    def _note(self, sent: _Sent) -> None:
+        """It is on its way; each wait in vain doubles the next."""
+        self._longest_wait = max(self._longest_wait, sent.due - sent.at)
+        sent.due = sent.at + (sent.due - sent.at) * (1 << min(self._in_vain, _LONGEST))
+        self._flight[sent.kind, sent.seq] = sent
+
+    def _wake(self) -> float:
+        """When something is to be done without an answer."""
+        times = [self._deadline, *(sent.due for sent in self._flight.values())]
+        times += [at for at in (self._poll_at, self._pause_until) if at > self._session.now()]
+        return min(times)
+
+    def _overdue(self, now: float) -> None:
+        """What is not answered in time was lost; where nothing was heard since, so was all that is on its way."""
+        late = [sent for sent in self._flight.values() if sent.due <= now]
+        if any(sent.at >= self._heard_at for sent in late):
+            if now - self._heard_at > max(_SILENCE_S, _SILENCE_WAITS * self._longest_wait):
+                raise self._session.silent()
+            self._in_vain += 1
+            late = list(self._flight.values())
+        for sent in late:
+            del self._flight[sent.kind, sent.seq]
+            if sent.kind in (Request.COMMIT, Request.STATUS):
+                self._poll_at = now
+            elif sent.kind == Request.BEGIN:
+                self._pipelined = False
+            elif sent.kind == Request.DATA and sent.round == self._round and sent.end > self._confirmed:
+                self._go_back(self._confirmed)
+        self._go_on()
+
+    def _go_on(self) -> None:
+        """Where nothing is on its way that could confirm what was sent, it has to be sent again."""
+        sent = any(s.kind == Request.DATA and s.round == self._round for s in self._flight.values())
+        if self._begun and not sent and self._commit is None and self._confirmed < self._next:
+            self._go_back(self._confirmed)
+
+    def _go_back(self, to: int) -> None:
+        self._next = to
+        self._round += 1
+
+    # Answers
+
+    def _take(self, answer: Answer) -> tuple[int, int | None] | None:
+        sent = self._flight.pop((answer.kind, answer.seq), None)
+        if sent is None:
+            if self._commit is None or (answer.kind, answer.seq) != (Request.COMMIT, self._commit.seq):
+                return None
+            sent = self._commit  # it was late, and STATUS had been asked
+        if answer.reason in (Reason.SESSION, Reason.OLD):
+            raise _Anew
+        try:
+            if sent.kind == Request.COMMIT:
+                return self._take_commit(answer, sent)
+            if answer.reason:
+                self._take_refusal(answer, sent)
+            elif sent.kind == Request.BEGIN:
+                self._take_begin(_CRC.unpack_from(answer.payload)[0])
+            elif sent.kind == Request.DATA:
+                self._take_data(_CRC.unpack_from(answer.payload)[0], sent)
+            elif sent.kind == Request.STATUS:
+                return self._take_status(DeviceStatus.unpack(answer.payload))
+            else:
+                self._nonce = answer.payload
+        except (struct.error, ValueError) as error:
+            raise NotUnderstood(str(error)) from None
+        return None
+
+    def _take_begin(self, received: int) -> None:
+        if received > len(self._image.data):
+            raise NotUnderstood(f"{received} bytes received, of {len(self._image.data)}")
+        self._begun = True
+        if self._resumed is None:
+            self._resumed = received
+        if not self._pipelined:
+            self._go_back(received)
+        self._next = max(self._next, received)
+        self._confirm(received, lower=True)
+
+    def _take_data(self, received: int, sent: _Sent) -> None:
+        if not self._begun or received > len(self._image.data):
+            return  # it may be of what was in hand before
+        self._confirm(received)
+        if received < sent.end and sent.round == self._round:
+            self._go_back(self._confirmed)
+        self._next = max(self._next, self._confirmed)
+        self._go_on()
+
+    def _confirm(self, received: int, lower: bool = False) -> None:
+        if received > self._confirmed or lower:
+            self._confirmed = received
+            if self._progress is not None:
+                self._progress(received, len(self._image.data))
+
+    def _take_commit(self, answer: Answer, sent: _Sent) -> tuple[int, int | None] | None:
+        if not answer.reason:
+            self._confirm(len(self._image.data))
+            generation, line = _COMMITTED.unpack_from(answer.payload)
+            return generation, line
+        # The number is used up, but for a wrong key.
+        self._commit, self._nonce, self._poll_at = None, None, 0.0
+        self._poll_s = _POLL_S[0]
+        error = self._error(answer)
+        if answer.reason == Reason.INCOMPLETE:
+            received = min(answer.detail, len(self._image.data))
+            self._confirm(received, lower=True)
+            if sent.round == self._round:
+                self._go_back(received)
+            self._next = max(self._next, received)
+            self._go_on()
+        elif answer.reason == Reason.BUSY:
+            self._wait_for_others()
+        elif answer.reason in (Reason.KEY, Reason.UPLOAD, Reason.IMAGE):
+            self._count(answer.reason, error)
+            self._begin_anew()
+        else:
+            raise error
+        return None
+
+    def _take_refusal(self, answer: Answer, sent: _Sent) -> None:
+        error = self._error(answer)
+        if sent.kind == Request.BEGIN and answer.reason == Reason.BUSY:
+            self._wait_for_others()
+        elif sent.kind == Request.DATA and answer.reason == Reason.UPLOAD:
+            if sent.round == self._round:
+                self._count(answer.reason, error)
+                self._begin_anew()
+        elif sent.kind == Request.DATA and answer.reason in _OF_THE_WORDS and not self._begun:
+            pass  # of what was in hand before
+        else:
+            raise error
+
+    def _begin_anew(self) -> None:
+        """Send BEGIN, and wait for what it says before anything else is sent."""
+        self._flight = {key: sent for key, sent in self._flight.items() if sent.kind != Request.BEGIN}
+        self._begun = self._pipelined = False
+        self._go_back(0)
+
+    def _wait_for_others(self) -> None:
+        self._begin_anew()
+        self._busy = True
+        self._pause_until = self._session.now() + _BUSY_S
+
+    def _take_status(self, status: DeviceStatus) -> tuple[int, int | None] | None:
+        now = self._session.now()
+        at_work = status.upload in (Upload.CHECKING, Upload.WAITING)
+        if self._commit is None:
+            if self._in_force(status):
+                return status.generation, None
+            self._busy = self._busy and at_work
+            self._pause_until = now + _BUSY_S if self._busy else 0.0
+        elif at_work:
+            self._poll_at = now + self._poll_s
+            self._poll_s = min(2.0 * self._poll_s, _POLL_S[1])
+        else:
+            self._repeat_commit()  # it was lost, or its answer was
+        return None
+
+    # Errors
+
+    def _error(self, answer: Answer) -> Refused:
+        from tablegen.link.image import take_apart
+
+        info, contents = self._image.info, None
+        with suppress(ValueError):  # an image that is none is refused for what it is
+            contents = take_apart(self._image.data, info.x, info.y)
+        return refused(answer.kind, answer.reason, answer.detail, self._session.info, contents, self._limits)
+
+    def _out_of_time(self) -> OutOfTime:
+        if self._commit is not None:
+            what = "the device has everything, but has not come to the start of a line; `tablegen status` tells"
+        elif self._busy:
+            what = "the device is busy with another upload; try again later"
+        else:
+            what = f"the device has {self._confirmed} of {len(self._image.data)} bytes and keeps them: upload again"
+        return OutOfTime(f"out of time: {what}, or allow more (--timeout)")

@@ -1,0 +1,100 @@
+"""Images for devices: of random programs, as tables and as Fourier words, and damaged with a CRC that fits."""
+
+import zlib
+from dataclasses import replace
+
+import numpy as np
+from numpy.random import Generator
+from programs import Kind, random_dual, random_fourier, rendered
+
+from tablegen.link.image import PROGRAM_BYTES, Image, make_image
+from tablegen.link.messages import AxisLimits
+from tablegen.numerics.arrays import Ints
+from tablegen.registers import AXIS_WORDS, PAGE_WORDS, SCAN_WORDS
+from tablegen.sequencer import DualProgram
+from tablegen.verify.bench import Shape
+
+SCAN_PLACES = [SCAN_WORDS.index(name) for name in SCAN_WORDS]
+AXIS_PLACES = [
+    page * PAGE_WORDS + AXIS_WORDS.index(name) for page in (1, 2) for name in AXIS_WORDS if name != "harmonics"
+]
+
+
+def digest(rng: Generator) -> str:
+    """What names a plan."""
+    return bytes(rng.integers(0, 256, 32, dtype=np.uint8).tolist()).hex()
+
+
+def random_image(rng: Generator, shape: Shape, harmonics: int = 0, kind: Kind = "smooth") -> tuple[Image, DualProgram]:
+    """An image and the program in it; with ``harmonics`` some axes are Fourier words, where they are interpolated."""
+    program = random_dual(rng, shape, kind=kind)
+    words: dict[str, Ints | None] = {"x": None, "y": None}
+    for axis, interpolated in (("x", shape.x_interpolated), ("y", shape.y_interpolated)):
+        if harmonics and interpolated and rng.random() < 0.7:
+            fourier = random_fourier(rng, int(rng.integers(1, harmonics + 1)))
+            changed = rendered(getattr(program, axis), fourier)
+            program = replace(program, **{axis: _guarded(changed)})
+            words[axis] = fourier.in_order
+    return make_image(program, digest(rng), words["x"], words["y"]), program
+
+
+def _guarded(program):  # type: ignore[no-untyped-def]
+    """A gain and an offset that keep the codes inside, and a guard that lets the largest step pass."""
+    output = program.output
+    top = (1 << output.dac_bits) - 1
+    output = replace(output, gain_word=1 << 14, offset_word=(top // 2) << output.gain_q, code_min=0, code_max=top)
+    program = replace(program, output=replace(output, park_code=min(max(output.park_code, 0), top)))
+    codes = program.codes(np.arange(program.ticks))
+    largest = int(np.max(np.abs(codes - np.roll(codes, 1))))
+    return replace(program, output=replace(program.output, max_step=max(largest, 1)))
+
+
+def resealed(image: Image, data: bytes) -> Image:
+    """An image with other bytes and a CRC that fits them."""
+    return Image(replace(image.info, image_crc=zlib.crc32(data)), data)
+
+
+def _other_word(rng: Generator, word: int, bits: int) -> int:
+    """Near a word, or far from it."""
+    mask = (1 << bits) - 1
+    how = int(rng.integers(0, 6))
+    if how == 0:
+        return word ^ 1 << int(rng.integers(0, bits))
+    if how == 1:
+        return int(rng.integers(0, mask + 1))
+    if how == 2:
+        return int(rng.choice([0, 1, mask, mask >> 1, (mask >> 1) + 1]))
+    return (word + int(rng.choice([-1, 1])) * int(rng.choice([1, 1, 2, 7, 100, 3000]))) & mask
+
+
+def damaged(rng: Generator, image: Image) -> Image:
+    """An image with some words changed, as if somebody meant it; of the same length."""
+    data = bytearray(image.data)
+    for _ in range(int(rng.choice([1, 1, 1, 2, 5]))):
+        rest = len(data) - PROGRAM_BYTES
+        if rng.random() < 0.5:
+            places = SCAN_PLACES if rng.random() < 0.2 else AXIS_PLACES
+            at, size = 4 * int(rng.choice(places)), 4
+        else:
+            size = int(rng.choice([1, 2, 4]))
+            at = PROGRAM_BYTES + int(rng.integers(0, rest - size + 1))
+        word = int.from_bytes(data[at : at + size], "little")
+        data[at : at + size] = _other_word(rng, word, 8 * size).to_bytes(size, "little")
+    return resealed(image, bytes(data))
+
+
+def random_limits(rng: Generator, program: DualProgram) -> tuple[AxisLimits, AxisLimits]:
+    """Limits around what a program needs, now and then less."""
+    limits = []
+    for axis in (program.x, program.y):
+        output = axis.output
+        slack = int(rng.choice([0, 0, 1, 1000, 1 << 24])) - (rng.random() < 0.1)
+        limits.append(
+            AxisLimits(
+                max(output.code_min - slack, 0) + int(rng.choice([0, 0, 40])),
+                output.code_max + slack - int(rng.choice([0, 0, 40])),
+                output.max_step + slack,
+                int(rng.choice([0, 1, 1 << 24, *rng.integers(0, 1 << output.dac_bits, 4)])),
+            )
+        )
+    return limits[0], limits[1]

@@ -1,0 +1,252 @@
+"""Random dialogues with a device and with its model: requests good, damaged, repeated, of other sessions."""
+
+import struct
+from collections import Counter
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from link_device import HostDevice, widest
+from link_images import damaged, random_image, random_limits, resealed
+from link_talk import Talk, derived_nonce
+from programs import random_dual
+
+from tablegen.link.frames import Frame, FrameReader
+from tablegen.link.image import Image
+from tablegen.link.messages import (
+    VERSION,
+    AxisShape,
+    DeviceInfo,
+    Feature,
+    Refusal,
+    Request,
+)
+from tablegen.link.model import ModelDevice
+from tablegen.link.players import SequencerPlayer
+from tablegen.registers import AXIS_WORDS, PAGE_WORDS
+from tablegen.verify.bench import Shape
+
+HARMONICS = 4
+KEY = bytes(range(32))
+BOOT_HASH = bytes(range(100, 132))
+TAGGED = (Request.PARK, Request.ARM, Request.TRIGGER, Request.CLEAR, Request.LIMITS)
+
+
+class Differs(Exception):
+    """A device answers what its model does not."""
+
+
+class Dialogue:
+    """One that is told by a seed. ``seen`` counts answers by type, and refusals by request and reason."""
+
+    def __init__(self, shape: Shape, seed: int, key: bytes = b"", notes: bool = False, **how: Any) -> None:
+        self.rng = np.random.default_rng(seed)
+        self.shape, self.key = shape, key
+        boot = random_dual(self.rng, shape, kind="smooth") if self.rng.random() < 0.9 else None
+        like = boot or random_dual(self.rng, shape, kind="smooth")
+        limits = (widest(like.x.output), widest(like.y.output))
+        if self.rng.random() < 0.2:
+            limits = random_limits(self.rng, like)
+        index = tuple(max(bits, 3) for bits in (shape.x_index_bits, shape.y_index_bits))
+        self.device = HostDevice(
+            like,
+            boot,
+            limits=limits,
+            index_bits=(index[0], index[1]),
+            harmonics=HARMONICS,
+            key=key,
+            boot_hash=BOOT_HASH,
+            interlock=True,
+            boot_count=int(self.rng.integers(0, 1 << 32)),
+            update_rate_hz=20000,
+            **how,
+        )
+        if notes:
+            self.device.take_notes()
+        features = Feature.TABLES | Feature.FOURIER | Feature.READBACK | Feature.INTERLOCK | Feature.NARROWS
+        shapes = [AxisShape(index[0], like.x.bits, shape.dac_bits, shape.dac_bits)]
+        shapes += [AxisShape(index[1], like.y.bits, shape.dac_bits, shape.dac_bits)]
+        most = 192 + sum(max(each.word_bytes << each.index_bits, 4 * (2 * HARMONICS + 1)) for each in shapes)
+        ring = self.device.library.ring // 256
+        info = DeviceInfo(
+            VERSION, features | (Feature.KEY if key else 0), ring, 240, HARMONICS, most, *shapes, *limits, 20000
+        )
+        self._count = 0
+        self.model = ModelDevice(
+            info, SequencerPlayer(boot), key=key, boot=self.device.boot_count, boot_hash=BOOT_HASH, nonces=self._nonce
+        )
+        self.talk = Talk(int(self.rng.integers(1, 1 << 32)), key)
+        self.seen: Counter[Any] = Counter()
+        self._sent = [self.talk.hello()]
+        self._nonce_given = bytes(16)
+        self._image = self._some_image()
+        self._reader = FrameReader()
+        self.heard = bytearray()
+        self._received = 0
+
+    def _nonce(self) -> bytes:
+        self._count += 1
+        return derived_nonce(self.key, self.model.boot, self._count)
+
+    def _some_image(self) -> Image:
+        kind = str(self.rng.choice(["smooth", "smooth", "tame", "wild"]))
+        image, _ = random_image(self.rng, self.shape, HARMONICS, kind)  # type: ignore[arg-type]
+        if self.rng.random() < 0.05:
+            data = bytearray(image.data)
+            data[4 * (PAGE_WORDS * int(self.rng.integers(1, 3)) + AXIS_WORDS.index("harmonics"))] ^= 9
+            return resealed(image, bytes(data))
+        return damaged(self.rng, image) if self.rng.random() < 0.3 else image
+
+    # What is said
+
+    def _say(self, wire: bytes) -> None:
+        """To both; noise on the way is the same for both."""
+        if self.rng.random() < 0.03:
+            damage = bytearray(wire)
+            damage[int(self.rng.integers(0, len(damage)))] ^= 1 << int(self.rng.integers(0, 8))
+            wire = bytes(damage)
+        elif self.rng.random() < 0.02:
+            wire = wire[
+                : int(self.rng.integers(0, max(len(wire) - 1, 1)))
+            ]  # not just its end: two frames in one piece overlap
+        elif self.rng.random() < 0.02:
+            wire = b"\0" + wire
+        # With a trigger and a swap on one tick it is anybody's guess which line was the last of the old program.
+        alone = any(frame.type == Request.TRIGGER for frame in FrameReader().feed(wire))
+        self._tick(alone)
+        self.device.receive(wire)
+        self.model.receive(wire)
+        self._hear()
+        self._tick(alone)
+
+    def _tick(self, ticks: int) -> None:
+        for _ in range(ticks):
+            self.device.tick(1)
+            self.model.tick(1)
+            self._hear()
+
+    def _hear(self) -> None:
+        got, expected = self.device.transmit(), self.model.transmit()
+        self.heard += got
+        if got != expected:
+            reader = FrameReader()
+            raise Differs(f"{reader.feed(got)} and not {reader.feed(expected)}")
+        for frame in self._reader.feed(got):
+            if frame.type == 0xFF:
+                refusal = Refusal.unpack(frame.payload)
+                self.seen[refusal.type, refusal.reason] += 1
+            else:
+                self.seen[frame.type & 0x7F] += 1
+                if frame.type & 0x7F in (Request.BEGIN, Request.DATA):
+                    (self._received,) = struct.unpack_from("<I", frame.payload)
+                if frame.type & 0x7F == Request.CHALLENGE:
+                    self._nonce_given = frame.payload
+
+    def _send(self, wire: bytes) -> None:
+        self._sent = [*self._sent[-30:], wire]
+        self._say(wire)
+
+    def play(self, steps: int) -> None:
+        """So many things that are said or done."""
+        self._send(self.talk.hello())
+        doings: list[tuple[float, Callable[[], None]]] = [
+            (10, self._upload), (25, self._data), (6, self._commit), (8, self._ticks), (10, self._act),
+            (3, self._ask), (1, self._hello), (3, self._again), (1, self._noise), (1, self._odd),
+            (0.5, self._permit), (0.3, self._reboot), (0.7, self._whole),
+        ]  # fmt: skip
+        weights = np.array([weight for weight, _ in doings])
+        for _ in range(steps):
+            doings[int(self.rng.choice(len(doings), p=weights / weights.sum()))][1]()
+
+    def _upload(self) -> None:
+        if self.rng.random() < 0.4:
+            self._image = self._some_image()
+        info = self._image.info.pack()
+        if self.rng.random() < 0.1:
+            at = int(self.rng.integers(0, len(info)))
+            info = info[:at] + bytes([info[at] ^ 1 << int(self.rng.integers(0, 8))]) + info[at + 1 :]
+        if self._received == 0 or self.rng.random() < 0.2:
+            self._send(self.talk.request(Request.BEGIN, info))
+
+    def _data(self) -> None:
+        size = int(self.rng.choice([1, 3, 60, 150, 240]))
+        at = self._received
+        if self.rng.random() < 0.1:
+            at = max(at + int(self.rng.integers(-5, 6)), 0)
+        part = self._image.data[at : at + size] or b"\1"
+        self._send(self.talk.request(Request.DATA, struct.pack("<I", at) + part))
+
+    def _whole(self) -> None:
+        """An upload as it should be."""
+        for wire in self.talk.upload(self._image):
+            self._send(wire)
+        self._commit(sure=True)
+
+    def _tagged(self, kind: int, payload: bytes = b"", image: bytes | None = None) -> bytes:
+        if self.key and self.rng.random() < 0.9:
+            self._send(self.talk.request(Request.CHALLENGE))
+            if self.rng.random() < 0.9:
+                return self.talk.acting(kind, payload, self._nonce_given, image)
+            return self.talk.acting(kind, payload + bytes(16))
+        return self.talk.acting(kind, payload)
+
+    def _commit(self, sure: bool = False) -> None:
+        if not sure and self._received < len(self._image.data) and self.rng.random() < 0.7:
+            return
+        crc = self._image.info.image_crc ^ (0 if sure or self.rng.random() < 0.95 else 1)
+        self._send(self._tagged(Request.COMMIT, struct.pack("<I", crc), self._image.data))
+
+    def _ticks(self) -> None:
+        self._tick(int(self.rng.choice([0, 1, 2, 20, 60])))
+
+    def _act(self) -> None:
+        kind = int(self.rng.choice([Request.ABORT, *TAGGED, Request.ARM, Request.TRIGGER]))
+        payload = b""
+        if kind == Request.ARM:
+            payload = struct.pack("<I", int(self.rng.choice([0, 0, 0, 1, 2, 1 << 31, (1 << 31) + 1])))
+        if kind == Request.LIMITS:
+            limits = random_limits(self.rng, random_dual(self.rng, self.shape, kind="smooth"))
+            wide = self.rng.random() < 0.7
+            payload = struct.pack("<8I", *(0, 0xFFFFFFFF, 1 << 30, 1 << 30) * 2) if wide else b"".join(
+                each.pack() for each in limits
+            )  # fmt: skip
+        self._send(self.talk.acting(kind, payload) if kind == Request.ABORT else self._tagged(kind, payload))
+
+    def _ask(self) -> None:
+        kind = int(self.rng.choice([Request.STATUS, Request.READBACK, Request.LIMITS, Request.CHALLENGE]))
+        payload = b""
+        if kind == Request.READBACK:
+            offset = int(self.rng.choice([0, 1, 100, 190, 192, 240, 250, 400, 5000, (1 << 32) - 1]))
+            payload = struct.pack("<IB", offset, int(self.rng.choice([0, 1, 7, 240, 241])))
+        self._send(self.talk.request(kind, payload))
+
+    def _hello(self) -> None:
+        if self.rng.random() < 0.3:
+            self.talk.session = int(self.rng.integers(0, 1 << 32))
+            self.talk.seq = int(self.rng.integers(0, 256))
+        self._send(self.talk.hello())
+
+    def _again(self) -> None:
+        self._say(self._sent[-1 - int(self.rng.integers(0, min(len(self._sent), int(self.rng.choice([1, 3, 30])))))])
+
+    def _noise(self) -> None:
+        count = int(self.rng.choice([1, 5, 300]))
+        self._say(bytes(self.rng.integers(0, 256, count, dtype=np.uint8).tolist()))
+
+    def _odd(self) -> None:
+        """Frames that no host sends."""
+        kind = int(self.rng.choice([*range(20), 0x81, 0xFF]))
+        payload = bytes(self.rng.integers(0, 256, int(self.rng.integers(0, 244)), dtype=np.uint8).tolist())
+        session = self.talk.session if self.rng.random() < 0.7 else 1
+        seq = int(self.rng.integers(0, 256)) if kind in (Request.STATUS, Request.BEGIN) else self.talk.seq
+        self._send(Frame(kind, seq, session, payload[: int(self.rng.choice([0, 1, 4, 5, 16, 32, 48, 200]))]).encode())
+
+    def _permit(self) -> None:
+        permits = bool(self.rng.random() < 0.8)
+        self.device.permits = self.model.permits = permits
+
+    def _reboot(self) -> None:
+        self.device.reboot()
+        self.model.reboot()
+        self._count = self._received = 0
+        self._send(self.talk.hello())
