@@ -168,6 +168,23 @@ def test_the_console_says_what_is_wrong(tmp_path: Path) -> None:
         assert " swaps 1 " in machine.ask("status")
 
 
+@pytest.mark.parametrize("player", ["step", "fill"])
+def test_a_trigger_as_early_as_can_be_is_heard(player: str, tmp_path: Path) -> None:
+    """Commands that wait already when the firmware says that it is ready, on a machine that had no tick until then."""
+    executable, _ = firmware(tmp_path, "bits_16", "lm3s6965evb", player)
+    machine = Firmware(Pl011Board(), executable, np.random.default_rng(5))
+    machine.boot()
+    for line in ("arm 1", "trigger"):
+        machine.send(line)
+    while machine.board.uarts.to_console:
+        machine.interrupt(machine.board.uart)
+    machine.run(20_000)
+    for _ in range(200):
+        machine.tick(700)
+    assert machine.console == ["ready", "ok", "ok"]
+    assert any(markers(sample) & DAC_PLAYING for sample in machine.samples)
+
+
 def test_a_log_with_one_wrong_code_is_found(tmp_path: Path) -> None:
     """A negative control of ``follow``."""
     board = Pl011Board()

@@ -37,9 +37,9 @@ def build(
 ) -> int:
     """Build a scan: NAME.h, NAME.c, NAME.vh, .mem files, and manifest.json.
 
-    Beside them go the sequencers that play it: in C, dac_*.c and dac_*.h, and in Verilog, dac_*.v. The same input
-    gives the same bytes on every machine. Files that are already right are not touched, and if anything is wrong
-    nothing is written.
+    Beside them go the sequencers that play it: in C, dac_*.c and dac_*.h, and in Verilog, dac_*.v;
+    and the device's end of `tablegen upload`, dac_link*.c and program_loader.v. The same input gives the same bytes on
+    every machine. Files that are already right are not touched, and if anything is wrong nothing is written.
 
     \b
       tablegen build annexin_200nm.toml -o build
