@@ -18,8 +18,10 @@ from building import EXAMPLE, NAME, REPOSITORY, run
 from editing import SCANNER, edited
 from installing import write_command
 
+from tablegen.resources import c_link, c_runtime
+
 TOOLS = ("make", "Unix Makefiles", "Ninja")
-BUILT = {"main", NAME, "dac_axis", "dac_fourier", "dac_program", "dac_sequencer"}
+BUILT = {"main", NAME, *(path.stem for path in (*c_runtime(), *c_link()) if path.suffix == ".c")}
 LINKED = {"example"}
 
 

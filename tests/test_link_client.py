@@ -10,6 +10,7 @@ from client_line import VirtualLine
 from client_rig import BOOT, FOURIER, KEY, LARGE, LARGE_INFO, NEW, TABLE, Watched, client, model
 from link_programs import INFO, LIMITS, make_scan
 
+from tablegen.link import exchange
 from tablegen.link.device import Device
 from tablegen.link.errors import (
     LinkError,
@@ -174,6 +175,26 @@ def test_an_early_result_is_no_matter_of_luck() -> None:
     with client(line) as device:
         result = device.upload(LARGE)
     assert 10 * result.wire_bytes / 460800 / result.seconds < 0.5
+
+
+@pytest.mark.parametrize("way_s", [0.03, 0.06, 0.15])
+def test_a_long_way_is_learned(way_s: float) -> None:
+    """As through a network, which nobody told the client of: nothing is sent twice, since the first answers tell."""
+    line = Watched(model(LARGE_INFO), out_s=way_s, back_s=way_s, tick_hz=500_000)
+    with client(line) as device:
+        device.arm()
+        device.trigger()
+        result = device.upload(LARGE)
+    assert result.retransmissions == 0
+    assert line.count(Request.BEGIN) == line.count(Request.COMMIT) == 1
+
+
+def test_without_learning_a_long_way_is_never_at_its_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Negative control."""
+    monkeypatch.setattr(exchange, "_MOST_LATE_S", 0.0)
+    line = Watched(model(LARGE_INFO), out_s=0.06, back_s=0.06, tick_hz=500_000)
+    with client(line) as device, pytest.raises(OutOfTime):
+        device.upload(LARGE)
 
 
 def test_the_window_of_the_device_is_kept() -> None:

@@ -4,13 +4,16 @@ from dataclasses import dataclass
 from random import Random
 
 from tablegen.link.frames import OVERHEAD, Frame, FrameReader
-from tablegen.link.messages import ANSWER, REFUSAL, Refusal
+from tablegen.link.messages import ANSWER, REFUSAL, Refusal, Request
 from tablegen.link.transport import Transport, byte_s
 
 LATENCY_S = 0.016  # of a USB bridge, which passes on what has come 60 times a second
 _DEVICE_S = 0.02  # a device has other things to do
 _HALF_MORE = 1.5
 _END = b"\0"  # in front of a frame it ends what noise has begun
+_FADING = 0.8  # with each answer
+_MOST_LATE_S = 0.25  # more is a stall, which says nothing of the next answer
+_WAIT_FOR_A_LINE = (Request.COMMIT, Request.ABORT)  # and tell nothing of the way
 
 
 @dataclass(slots=True)
@@ -39,6 +42,8 @@ class Exchange:
         self._free = random.randrange(256)
         self._number = random.randrange(256)
         self._line_free = 0.0  # when what was written has left
+        self._expected: dict[tuple[int, int], float | None] = {}  # when; None: of what was sent twice nobody knows
+        self._late_s = 0.0  # by which answers came later than line and latency explain: the most, fading
         self.bytes_sent = 0
         self.frames_heard = 0
         self.noise = False  # bytes came that are no frames
@@ -49,6 +54,7 @@ class Exchange:
         self.transport = transport
         self._reader = FrameReader()
         self._line_free = 0.0
+        self._expected.clear()
 
     def new_session(self) -> None:
         """Choose another session; HELLO tells the device."""
@@ -69,7 +75,10 @@ class Exchange:
         return self._number
 
     def send(self, kind: int, seq: int, payload: bytes = b"", answer_bytes: int = 16, again: bool = False) -> float:
-        """Send a request; returns when its answer, of so many bytes of payload at most, should have come."""
+        """Send a request; returns when its answer, of so many bytes of payload at most, should have come.
+
+        What answers take longer than line and latency explain, a busy device or a way through a network, is learned.
+        """
         wire = Frame(kind, seq, self.session, payload).encode()
         if again:
             wire = _END + wire
@@ -78,7 +87,9 @@ class Exchange:
         self._line_free = max(self._line_free, now) + one * len(wire)
         self.bytes_sent += len(wire)
         way = self._line_free - now + one * (answer_bytes + OVERHEAD) + self._latency_s
-        return now + _HALF_MORE * way + _DEVICE_S
+        if kind not in _WAIT_FOR_A_LINE:
+            self._expected[kind, seq] = None if (kind, seq) in self._expected else now + way
+        return now + _HALF_MORE * (way + self._late_s) + _DEVICE_S
 
     def receive(self, until: float) -> list[Answer]:
         """Answers of this session that have come, or come first until then."""
@@ -98,10 +109,18 @@ class Exchange:
         if frame.session != self.session or not frame.type & ANSWER:
             return []
         self.frames_heard += 1
-        if frame.type != REFUSAL:
-            return [Answer(frame.type & ~ANSWER, frame.seq, frame.payload)]
-        try:
-            refusal = Refusal.unpack(frame.payload)
-        except ValueError:
-            return []
-        return [Answer(refusal.type, frame.seq, b"", refusal.reason, refusal.detail)]
+        answer = Answer(frame.type & ~ANSWER, frame.seq, frame.payload)
+        if frame.type == REFUSAL:
+            try:
+                refusal = Refusal.unpack(frame.payload)
+            except ValueError:
+                return []
+            answer = Answer(refusal.type, frame.seq, b"", refusal.reason, refusal.detail)
+        self._learn(answer)
+        return [answer]
+
+    def _learn(self, answer: Answer) -> None:
+        expected = self._expected.pop((answer.kind, answer.seq), None)
+        if expected is not None:
+            late = min(self.now() - expected, _MOST_LATE_S)
+            self._late_s = max(late, _FADING * self._late_s)

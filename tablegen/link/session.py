@@ -59,7 +59,7 @@ class Session:
         """Begin, or go on, and learn ``info`` and ``status``; ``anew`` is with another session."""
         if anew:
             self.exchange.new_session()
-        payload = self._repeat(Request.HELLO, self.exchange.seq(), bytes([VERSION]), HELLO_BYTES, deadline)
+        payload = self._repeat(Request.HELLO, None, bytes([VERSION]), HELLO_BYTES, deadline)
         size = DeviceInfo.LAYOUT.size
         try:
             self.info = DeviceInfo.unpack(payload)
@@ -108,7 +108,7 @@ class Session:
         """A request that does not act: the payload of its answer."""
         for _ in range(_ANEW):
             try:
-                return self._repeat(kind, self.exchange.seq(), payload, answer_bytes, deadline)
+                return self._repeat(kind, None, payload, answer_bytes, deadline)
             except Silent:
                 raise
             except LinkLost as lost:
@@ -180,16 +180,22 @@ class Session:
             why = "is it on, is its firmware made with the link, do port and --baud fit, are TX and RX crossed?"
         return NoAnswer(f"the port is open, but no device answers: {why}")
 
-    def _repeat(self, kind: Request, seq: int, payload: bytes, answer_bytes: int, deadline: float) -> bytes:
-        """Send a request until it is answered. Raises ``Refused``, ``LinkLost``, ``NoAnswer``."""
+    def _repeat(self, kind: Request, number: int | None, payload: bytes, answer_bytes: int, deadline: float) -> bytes:
+        """Send a request until it is answered. Raises ``Refused``, ``LinkLost``, ``NoAnswer``.
+
+        What acts has its ``number``; the rest has another one each time, so that answers tell how long the way is.
+        """
+        sent = set()
         for count in range(_TRIES):
             again = count > 0 or kind == Request.HELLO
+            seq = self.exchange.seq() if number is None else number
+            sent.add(seq)
             due = self.exchange.send(kind, seq, payload, answer_bytes, again)
             now = self.now()
             until = min(now + (due - now) * (1 << min(count, _LONGEST)), deadline)
             while self.now() < until:
                 for answer in self.exchange.receive(until):
-                    if answer.kind == kind and answer.seq == seq:
+                    if answer.kind == kind and answer.seq in sent:
                         return self._payload(answer)
             if self.now() >= deadline:
                 break
