@@ -1,7 +1,7 @@
 # make demo      set up, build the example, print its certificate
 # make test      set up, check and run every test but the slow ones
 # make test-hdl  only those of the Verilog: simulation, mutants, proofs, lint, synthesis
-# make test-slow a hundred thousand random swaps
+# make test-slow a hundred thousand random swaps, a thousand uploads with faults, every mutant of the link
 # make resources what the Verilog takes on FPGAs, into docs/resources.md
 # make instructions what the C takes on Cortex-M, into docs/instructions.md
 # make link      what an upload takes, into docs/upload.md
@@ -41,7 +41,7 @@ test-hdl: $(VENV)/installed-test
 	$(PYTEST) hdl_tests
 
 test-slow: $(VENV)/installed-test
-	@.ci/system-packages $(HDL_TOOLS)
+	@.ci/system-packages $(TOOLS)
 	$(BIN)/python -m pytest -m slow
 
 resources: $(VENV)/installed-test
