@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import link_device
+import numpy as np
 import test_c_link
 import test_c_link_acceptance
 import test_c_link_parts
@@ -50,6 +51,9 @@ def trials() -> Iterator[str]:
     parts.test_an_interlock_that_opens_during_the_checks_leaves_the_upload()
     parts.test_another_image_of_the_same_bytes_begins_again()
     parts.test_the_line_of_a_commit_is_the_last_of_the_old_program()
+    yield "the jump of y"
+    test_c_link_acceptance.test_the_jump_of_y_is_the_largest_there_can_be(np.argmax)
+    test_c_link_acceptance.test_the_jump_of_y_is_the_largest_there_can_be(np.argmin)
     for name in ("12 bits", "direct"):
         for state in ("playing", "parked"):
             yield f"programs: {name}, {state}"

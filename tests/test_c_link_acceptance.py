@@ -2,18 +2,22 @@
 
 import os
 from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 from link_device import HostDevice
 from link_images import damaged, random_image, random_limits
+from link_programs import make_scan
 from link_talk import Talk, is_answer
 
 from tablegen.link.acceptance import Playing, first_objection
 from tablegen.link.frames import Frame
 from tablegen.link.image import Image, make_image, take_apart
 from tablegen.link.messages import REFUSAL, AxisLimits, Reason, Refusal, Request
+from tablegen.numerics.arrays import Ints
 from tablegen.sequencer import DualProgram
 from tablegen.verify.bench import Shape
 
@@ -75,6 +79,25 @@ class Bench:
 @pytest.mark.parametrize("name", SHAPES)
 def test_a_device_objects_to_what_its_specification_objects_to(name: str, state: str) -> None:
     assert compare(SHAPES[name], state, PROGRAMS, 1)[None] > PROGRAMS // 20
+
+
+@pytest.mark.parametrize("first", [np.argmax, np.argmin], ids=["highest", "lowest"])
+def test_the_jump_of_y_is_the_largest_there_can_be(first: Callable[[Ints], int]) -> None:
+    """From the word that is furthest away, wherever in the table of the old program it stands."""
+    scan = make_scan(2).program
+    words = np.roll(scan.y.words, -int(first(scan.y.words)))
+    program = replace(scan, y=replace(scan.y, words=words))
+    codes = program.y.output.code(words << program.y.guard)
+    jump = int(codes.max() - codes.min())
+    assert jump > 1000
+    image = make_image(program, "00" * 32)
+    everything = AxisLimits(0, 1 << 24, 1 << 24, 1 << 24)
+    for most, expected in ((jump, None), (jump - 1, (Reason.JUMP, 1))):
+        limits = everything, replace(everything, max_jump=most)
+        bench = Bench(program, "playing", limits, Shape(16, 1, 7, 16, 1, 6, 16))
+        assert bench.objection(image) == expected
+        contents = take_apart(image.data, image.info.x, image.info.y)
+        assert first_objection(contents, *limits, bench.playing) == expected
 
 
 def test_every_check_was_met() -> None:
