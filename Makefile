@@ -8,6 +8,7 @@
 # make fuzz      a million inputs for the C link, with sanitizers, on from the kept corpus
 # make bench     what a build costs, against importing numpy
 # make figures   the pictures of the README and the docs
+# make paper     the paper's numbers beside ours, into docs/paper
 # make clean     remove what these made
 
 PYTHON ?= python3
@@ -21,9 +22,10 @@ FIRMWARE_TOOLS := gcc-arm-none-eabi qemu-system-arm gcc-avr avr-libc simavr gcc-
     libc6-dev-mips-cross qemu-user
 TOOLS := $(FIRMWARE_TOOLS) gcc clang libclang-rt-dev cppcheck cmake ninja-build ghdl $(HDL_TOOLS)
 # A file of tests goes to one process: what its tests share is made once.
-PYTEST := $(BIN)/python -m pytest --numprocesses auto --dist loadfile
+# OpenBLAS threads only spin beside the other processes.
+PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist loadfile
 
-.PHONY: demo test test-hdl test-slow resources instructions link fuzz bench figures clean
+.PHONY: demo test test-hdl test-slow resources instructions link fuzz bench figures paper clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/installed
@@ -77,6 +79,9 @@ figures: $(VENV)/installed-plot
 	$(BIN)/python docs/figures/make_figures.py
 	$(BIN)/python docs/figures/make_virtual.py
 
+paper: $(VENV)/installed-plot
+	$(BIN)/python docs/make_paper.py
+
 # The stamps depend on what decides an installation, so that the second run finds nothing to do.
 $(VENV)/installed: pyproject.toml
 	@.ci/virtual-environment $(PYTHON) $(VENV)
@@ -88,7 +93,7 @@ $(VENV)/installed-test: $(VENV)/installed
 	@touch $@
 
 $(VENV)/installed-plot: $(VENV)/installed
-	$(PIP) install --editable '.[plot]'
+	$(PIP) install --editable '.[calibrate,plot]'
 	@touch $@
 
 clean:

@@ -44,7 +44,9 @@ def _tables(kind: types.Type, path: str, written: dict[type, str]) -> list[str]:
         child = f"{path}.{field.encode_name}" if path else field.encode_name
         accepts = None
         if isinstance(inner, types.ListType):
-            inner, child, accepts = inner.item_type, f"[{child}]", "array of tables"
+            inner, child, accepts = _plain(inner.item_type)[0], f"[{child}]", "array of tables"
+            if not isinstance(inner, types.StructType):
+                accepts = f"array: {_accepts(inner)}"
         if isinstance(inner, types.StructType):
             before = written.get(inner.cls)
             description = description or (f"As `[{before}]`." if before else _summary(inner))

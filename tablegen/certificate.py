@@ -5,14 +5,17 @@ from math import log10, sqrt
 
 import numpy as np
 
-from tablegen.measurement import Played, ScalingError, power_at_resonance_db, scaling_error
+from tablegen.measurement import Played, Refined, ScalingError, power_at_resonance_db, refined, scaling_error
 from tablegen.plan import LinePlan, Plan
 from tablegen.problems import Document, Problem
 
 
 @dataclass(frozen=True)
 class Certificate:
-    """The error budget of one axis. Codes and LSB are the converter's; dB are of power, relative to the scan's."""
+    """The error budget of one axis. Codes and LSB are the converter's; dB are of power, relative to the scan's.
+
+    ``refinement`` is what the layer of ``tablegen refine`` moves, where there is one; it is not counted as an error.
+    """
 
     ticks: int
     max_error_lsb: float
@@ -27,6 +30,7 @@ class Certificate:
     peak_slew_v_per_s: float
     beyond_cutoff_db: float
     at_resonance_db: float | None
+    refinement: dict[str, Refined] | None = None
 
     @property
     def scaling_error_percent(self) -> float:
@@ -107,4 +111,7 @@ def _certify(line: LinePlan) -> Certificate:
         peak_slew_v_per_s=line.drive.v_amplitude * line.series.peak_slope() * float(line.rate),
         beyond_cutoff_db=10.0 * log10(max(square - mean * mean, 1e-30) / power),
         at_resonance_db=power_at_resonance_db(line, played.runs, power),
+        refinement=None
+        if line.layer is None
+        else {side: refined(line, side, branch) for side, branch in directions.items()},
     )

@@ -40,6 +40,17 @@ class ScalingError:
     uncompensated: float
 
 
+@dataclass(frozen=True)
+class Refined:
+    """What the layer moves in one direction, by the scanner's model, in percent over the window.
+
+    ``position`` is by how much of the line at most, ``scaling`` the scaling error, peak to peak, that it takes away.
+    """
+
+    position: float
+    scaling: float
+
+
 class Played:
     """The emitted period beside the float one, at any tick."""
 
@@ -107,13 +118,12 @@ def scaling_error(line: LinePlan, played: Played, side: str, branch: BranchShape
     position = np.linspace(low, high, _POINTS_PER_HARMONIC * line.target.harmonics + 513)
     times = _times(line, side, position)
     ideal_slope = line.drive.shape.slope(times)
-    reached = _reached(line)
-    target_slope = line.target.value(times, 1)
-    reached_slope = target_slope if reached is line.target else reached.value(times, 1)
-    # Where the modelled piezo is, to first order in a deviation of at most some percent: x - tau = (w - u) / u'.
+    target_slope, reached_slope, value = _slopes_and_value(line, times)
+    # Where the modelled piezo is, to first order in a deviation of at most some percent: x - tau = (w - u) / u'. What
+    # the layer moves is no error: it is there for what the model does not know.
     sweep = position if side == "forward" else 1.0 - position
     steepness = branch.slope(sweep)
-    deviation = (reached.value(times) - line.drive.shape.value(times)) / steepness
+    deviation = (value - line.drive.shape.value(times)) / steepness
     chords, noise = _chords(line, played, side, position, deviation, steepness)
     # A triangle leaves the piezo at the inverse of the branch, whose slope is 1 / u'.
     triangle = 1.0 / branch.slope(branch.inverse(sweep))
@@ -126,6 +136,28 @@ def scaling_error(line: LinePlan, played: Played, side: str, branch: BranchShape
         size=100.0 * float(deviation[-1] - deviation[0]) / (high - low),
         uncompensated=_peak_to_peak(triangle / middle),
     )
+
+
+def _slopes_and_value(line: LinePlan, times: Floats) -> tuple[Floats, Floats, Floats]:
+    """Of the target its slope, of what the piezo sees of it the slope and the value; all without the layer."""
+    reached = _reached(line)
+    target_slope = line.target.value(times, 1)
+    reached_slope = target_slope if reached is line.target else reached.value(times, 1)
+    value = reached.value(times)
+    if line.layer is None:
+        return target_slope, reached_slope, value
+    layer_slope = line.layer.value(times, 1)
+    return target_slope - layer_slope, reached_slope - layer_slope, value - line.layer.value(times)
+
+
+def refined(line: LinePlan, side: str, branch: BranchShape) -> Refined:
+    """What the layer does, to first order: it moves the modelled piezo by r / u'."""
+    assert line.layer is not None
+    low, high = line.band_limit.window
+    position = np.linspace(low, high, _POINTS_PER_HARMONIC * line.target.harmonics + 513)
+    steepness = branch.slope(position if side == "forward" else 1.0 - position)
+    moved = line.layer.value(_times(line, side, position)) / steepness
+    return Refined(100.0 * float(np.max(np.abs(moved))), _peak_to_peak(np.gradient(moved, position)))
 
 
 def _peak_to_peak(values: Floats) -> float:

@@ -16,6 +16,7 @@ from tablegen.fixedpoint.converter import Converter, fit_gain, make_output
 from tablegen.fixedpoint.phase import RationalPhase
 from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.synthesis import FourierWords, encode, synthesize
+from tablegen.layer import learnt_layer
 from tablegen.numerics.arrays import Floats, Ints
 from tablegen.problems import Problems
 from tablegen.schedule import Schedule, make_schedule
@@ -32,6 +33,7 @@ class LinePlan:
 
     ``target`` is the band-limited w that the piezo is to follow, ``series`` the w that is played: the same with
     each harmonic divided by the dynamics. ``held_harmonics`` are those at which the boost limit held that back.
+    ``layer`` is what of the target was learnt from a measurement, and lies over the model's shape.
     """
 
     axis: Literal["x", "y"]
@@ -46,6 +48,12 @@ class LinePlan:
     scale: float
     fourier: FourierWords
     program: Program
+    layer: FourierSeries | None = None
+
+    @property
+    def described(self) -> FourierSeries:
+        """The target without the layer: what the scanner's model describes."""
+        return self.target if self.layer is None else self.target.less(self.layer)
 
     def float_codes(self, w: Floats) -> Floats:
         """The codes, unrounded, that values of w ask for: V(t) = V_offset + m g V_scan (w - 1/2)."""
@@ -126,9 +134,12 @@ def _line_plan(setup: Setup, axis: Literal["x", "y"], schedule: Schedule, proble
     if drive is None or len(problems.found) > before:
         return None
 
+    layer = learnt_layer(setup, axis, drive, float(rate), harmonics, problems)
+    if len(problems.found) > before:
+        return None
     target = None
     with problems.at(file, f"{axis}.band_limit.harmonics"):
-        target = band_limited(drive.shape, scan.band_limit, harmonics)
+        target = band_limited(drive.shape, scan.band_limit, harmonics, layer)
     if target is None:
         return None
     series: FourierSeries = target
@@ -168,6 +179,7 @@ def _line_plan(setup: Setup, axis: Literal["x", "y"], schedule: Schedule, proble
         scale=scale,
         fourier=fourier,
         program=program,
+        layer=layer,
     )
 
 

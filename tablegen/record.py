@@ -2,10 +2,12 @@
 
 import hashlib
 import json
+from collections.abc import Mapping
 from decimal import ROUND_CEILING, Context, Decimal
 from typing import Any
 
 from tablegen.certificate import Certificate
+from tablegen.measurement import Refined, ScalingError
 from tablegen.plan import LinePlan, Plan
 from tablegen.schedule import Schedule, Window
 
@@ -29,14 +31,21 @@ def content_hash(record: dict[str, Any]) -> str:
 def certificate_record(certificate: Certificate) -> dict[str, Any]:
     """A certificate as JSON-ready data, its figures to six significant digits."""
     record: dict[str, Any] = {
-        name: _figure(getattr(certificate, name)) for name in certificate.__dataclass_fields__ if name != "scaling"
+        name: _figure(getattr(certificate, name))
+        for name in certificate.__dataclass_fields__
+        if name not in ("scaling", "refinement")
     }
     record["max_error_lsb"] = _bound(certificate.max_error_lsb)
-    record["scaling_error_percent"] = {
-        side: {part: _figure(getattr(error, part)) for part in error.__dataclass_fields__}
-        for side, error in certificate.scaling.items()
-    }
+    record["scaling_error_percent"] = _sides(certificate.scaling)
+    if certificate.refinement is not None:
+        record["refinement_percent"] = _sides(certificate.refinement)
     return record
+
+
+def _sides(figures: Mapping[str, ScalingError] | Mapping[str, Refined]) -> dict[str, dict[str, Any]]:
+    return {
+        side: {part: _figure(getattr(one, part)) for part in one.__dataclass_fields__} for side, one in figures.items()
+    }
 
 
 def _bound(value: float) -> float:
@@ -66,6 +75,13 @@ def _sequence(schedule: Schedule) -> dict[str, Any]:
         "up_lines": _window(schedule.up),
         "down_lines": _window(schedule.down),
     }
+
+
+def _layer(line: LinePlan) -> dict[str, Any]:
+    """What `tablegen refine` learnt; nothing without a layer, so that such a build keeps its hash."""
+    if line.layer is None:
+        return {}
+    return {"refinement": {"harmonics": line.layer.harmonics, "a": line.layer.a.tolist(), "b": line.layer.b.tolist()}}
 
 
 def _axis(line: LinePlan) -> dict[str, Any]:
@@ -108,6 +124,7 @@ def _axis(line: LinePlan) -> dict[str, Any]:
             "a0_word": line.fourier.a0,
             "a_words": line.fourier.a.tolist(),
             "b_words": line.fourier.b.tolist(),
+            **_layer(line),
         },
         "table": {
             "mode": program.mode,

@@ -2,8 +2,12 @@
 
 from fractions import Fraction
 
+import numpy as np
+
 from tablegen.certificate import Certificate
 from tablegen.plan import LinePlan, Plan
+
+_GRID = 32  # points a period of the highest harmonic
 
 
 def drive_lines(line: LinePlan) -> list[tuple[str, str]]:
@@ -28,6 +32,9 @@ def drive_lines(line: LinePlan) -> list[tuple[str, str]]:
         ("table", f"{len(line.program.words)} words of {line.program.bits} bits, {line.program.mode}"),
         ("gain, offset", f"{output.gain_word} / 2^{output.gain_q}, code {output.offset_code}"),
     ]
+    if line.layer is not None:
+        layer = 100.0 * float(np.max(np.abs(line.layer.on_grid(_GRID * line.layer.harmonics))))
+        rows.append(("refinement", f"{line.layer.harmonics} harmonics learnt, up to {layer:.3g} % of the line"))
     if line.held_harmonics:
         first, last = line.held_harmonics[0], line.held_harmonics[-1]
         rows.append(("boost limit", f"holds back {len(line.held_harmonics)} harmonics, {first} to {last}"))
@@ -76,6 +83,9 @@ def certificate_lines(certificate: Certificate) -> list[tuple[str, str]]:
         )
         rows.append(("scaling " + side, f"{_percent(e.total)} % peak to peak ({parts})"))
         rows.append(("", f"uncompensated {_percent(e.uncompensated)} %; window's size off by {e.size:+.4f} %"))
+    for side, r in (c.refinement or {}).items():
+        moves = f"moves up to {_percent(r.position)} % of the line, takes away {_percent(r.scaling)} % peak to peak"
+        rows.append(("refined " + side, moves))
     rows += [
         (
             "codes",

@@ -269,7 +269,7 @@ KEYS = [
         "x.motion = 'step'",
         says=(
             "scan.toml:23: x.motion: unknown key; known here: band_limit, offset_nm, offset_v, park_v, "
-            "size_nm, size_of, size_v, table, turn"
+            "refinement, size_nm, size_of, size_v, table, turn"
         ),
     ),
     case(
@@ -302,7 +302,10 @@ KEYS = [
     ),
     case(
         scanner="x.hysteresis.branches.forward = { rho = 4.0, u_peak = 0.4 }",
-        says="scanner.toml:20: x.hysteresis.branches[0].forward.beta_max: missing; this key is required",
+        says=(
+            "scanner.toml:20: x.hysteresis.branches[0].forward.beta_max: missing; give beta_max, rho and u_peak of "
+            "(22), or points"
+        ),
     ),
     case(
         scanner="- x.frequency.reference_hz",
@@ -506,6 +509,20 @@ ALTERNATIVES = [
     case(
         scanner="x.hysteresis.branches.forward = { beta_max = 0.037, rho = 4.0 }",
         says="scanner.toml:20: x.hysteresis.branches[0].forward.u_peak: missing; the harmonic model needs it",
+    ),
+    case(
+        scanner="x.hysteresis.branches.forward = { points = [{ size_v = 20.0, beta = 0.02 }] }",
+        says="scanner.toml:20: x.hysteresis.branches[0].forward.points[0].u_peak: missing; the harmonic model needs it",
+    ),
+    case(
+        scanner=(
+            "x.hysteresis.branches.forward = { rho = 4.0, points = [{ size_v = 20, beta = 0.02, u_peak = 0.5 },"
+            " { size_v = 20, beta = 0.03, u_peak = 0.5 }] }"
+        ),
+        says=[
+            "scanner.toml:20: x.hysteresis.branches[0].forward.points[1].size_v: 20 V is measured twice",
+            "scanner.toml:20: x.hysteresis.branches[0].forward.rho: points is given as well; keep one of the two",
+        ],
     ),
     case(
         scanner=(
@@ -744,6 +761,25 @@ DRIVE = [
 ]
 
 HYSTERESIS = [
+    case(
+        scanner="x.hysteresis.branches.forward = { points = [{ size_v = 150, beta = 0.03, u_peak = 0.4 }] }",
+        says="scanner.toml:20: x.hysteresis.branches[0].forward.points[0].size_v: 150 V is above v_max = 100 V",
+    ),
+    case(
+        scanner="x.hysteresis.branches.backward = { points = [{ size_v = 9.5, beta = 0.03, u_peak = 0.4 }] }",
+        says=(
+            "scanner.toml:21: x.hysteresis.branches[0].backward.points: measured up to 9.5 V, which serves scans up to "
+            "19.5 V; this one takes 20 V; measure a larger one"
+        ),
+    ),
+    case(
+        "x.size_nm = 900.0",
+        scanner="x.hysteresis.branches.backward = { points = [{ size_v = 70, beta = 0.45, u_peak = 0.7 }] }",
+        says=(
+            "scanner.toml:21: x.hysteresis.branches[0].backward.points: beta = 0.45 at u_peak = 0.7 makes the branch "
+            "run backwards, its slope falls to -0.8758; a beta up to 0.375 fits, or a smaller scan"
+        ),
+    ),
     case(
         scanner="x.hysteresis.branches.forward = { beta_max = 0.037, rho = 4.0, u_peak = 0.2 }",
         says=(

@@ -57,6 +57,21 @@ SCANS: dict[str, Variant] = {
             },
         },
     ),
+    "refined": Variant(
+        {
+            **NO_LIMITS,
+            "x.refinement": {
+                "a": [0.00123, -0.00047, 0.0, 0.00021],
+                "b": [-0.00151, 0.00062, 0.00033, -0.00009],
+                "v_amplitude": 20.4,
+                "v_offset": 50.0,
+                "rate_hz": 400.0,
+                "turn": 0.5,
+                "window": [0.1, 0.9],
+                "directions": "both",
+            },
+        }
+    ),
     "measured": Variant(
         {**NO_LIMITS, "timing.line_rate_hz": 934.5, "x.size_nm": 77.7, "x.band_limit.harmonics": 40},
         {"x.resonance": {"response": "response.csv", "max_boost_db": 3.0}},

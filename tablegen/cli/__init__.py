@@ -19,6 +19,7 @@ from tablegen.cli.init import init
 from tablegen.cli.paths import paths
 from tablegen.cli.ports import ports
 from tablegen.cli.readback import readback
+from tablegen.cli.refine import refine
 from tablegen.cli.schema import schema
 from tablegen.cli.show import show
 from tablegen.cli.simulate import simulate
@@ -53,7 +54,7 @@ def cli() -> None:
 
 
 instrument = (upload, device_status, readback, park, trigger, clear, ports)
-for command in (build, check, show, calibrate, simulate, verify, *instrument, init, paths, schema):
+for command in (build, check, show, calibrate, simulate, refine, verify, *instrument, init, paths, schema):
     cli.add_command(command)
 
 

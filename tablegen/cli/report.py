@@ -35,6 +35,12 @@ def certificate_table(plan: Plan, certificates: dict[str, Certificate]) -> list[
                 f"{start}   {side:<9}  {error.uncompensated:13.2f}  {error.total:7.3f}  {error.band_limit:10.4f}  "
                 f"{error.size:+.3f}  {step}".rstrip()
             )
+    for line in plan.lines:
+        for side, moved in (certificates[line.axis].refinement or {}).items():
+            lines.append(
+                f"{line.axis:<4}  refinement, {side}: moves up to {moved.position:.3g} % of the line and takes away "
+                f"{moved.scaling:.3g} % of scaling error, peak to peak"
+            )
     return lines
 
 

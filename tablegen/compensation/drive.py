@@ -5,8 +5,9 @@ from pathlib import Path
 
 from tablegen.compensation.dynamics import Response, SecondOrder
 from tablegen.compensation.frequency import frequency_gain
-from tablegen.compensation.hysteresis import HIGHEST_PEAK, LOWEST_PEAK, BranchShape, LineShape, beta_at
+from tablegen.compensation.hysteresis import HIGHEST_PEAK, LOWEST_PEAK, BranchShape, LineShape
 from tablegen.compensation.offset import OffsetLaw, normalised_offset
+from tablegen.compensation.residual import ResidualLaw
 from tablegen.compensation.response_file import read_response
 from tablegen.compensation.size import SizeLaw
 from tablegen.config.figures import at_least, at_most
@@ -166,6 +167,17 @@ def _check_points(setup: Setup, axis: str, problems: Problems) -> None:
             problems.add(setup.scanner_file, key, outside_driver(point.offset_v, v_max))
 
 
+def _check_amplitudes(setup: Setup, axis: str, hysteresis: Hysteresis, problems: Problems) -> None:
+    """No hysteresis can have been measured at more than the driver's range."""
+    v_max = setup.scanner.v_max
+    for i, entry in enumerate(hysteresis.branches):
+        for side, branch in (("forward", entry.forward), ("backward", entry.backward)):
+            for j, point in enumerate(branch.points or []):
+                if point.size_v > v_max:
+                    key = f"{axis}.hysteresis.branches[{i}].{side}.points[{j}].size_v"
+                    problems.add(setup.scanner_file, key, f"{point.size_v:g} V is above v_max = {v_max:g} V")
+
+
 def _offset_law(offset: Offset, v_max: float) -> OffsetLaw:
     if offset.points is not None:
         p = [normalised_offset(point.offset_v, v_max) for point in offset.points]
@@ -185,6 +197,7 @@ def _branches(
     if hysteresis is None or hysteresis.model == "triangle":
         return (straight[0], straight[0]), LineShape(turn, straight[1], straight[1])
 
+    _check_amplitudes(setup, axis, hysteresis, problems)
     entries = sorted(enumerate(hysteresis.branches), key=lambda entry: entry[1].turn)
     turns = [entry.turn for _, entry in entries]
     if not turns[0] - TURN_REACH - 1e-9 <= turn <= turns[-1] + TURN_REACH + 1e-9:
@@ -207,13 +220,18 @@ def _branches(
     for side in ("forward", "backward"):
         one: Branch = getattr(entries[left][1], side)
         other: Branch = getattr(entries[right][1], side)
-        beta_max = _between(one.beta_max, other.beta_max, share)
-        beta = beta_at(v, beta_max, _between(one.rho, other.rho, share))
-        peak = _between(one.u_peak or 0.5, other.u_peak or 0.5, share) if hysteresis.model == "harmonic" else None
         key = f"{axis}.hysteresis.branches[{entries[left if share < 0.5 else right][0]}].{side}"
+        found = None
+        with problems.at(setup.scanner_file, f"{key}.points"):
+            found = _residual(one, other, share, v, setup.scanner.v_max)
+        if found is None:
+            continue
+        beta, u_peak, beta_max = found
+        peak = u_peak if hysteresis.model == "harmonic" else None
         # Outside the poles of (20) it is the peak that is wrong, elsewhere the residual.
         beyond = peak is not None and not LOWEST_PEAK < peak - beta < HIGHEST_PEAK
-        with problems.at(setup.scanner_file, f"{key}.{'u_peak' if beyond else 'beta_max'}"):
+        name = "points" if beta_max is None else "u_peak" if beyond else "beta_max"
+        with problems.at(setup.scanner_file, f"{key}.{name}"):
             shapes.append(_shape(beta, beta_max, peak))
             applied.append(AppliedBranch(beta, 0.5 + beta if peak is None else peak))  # (16)
     if len(shapes) < 2:
@@ -221,7 +239,18 @@ def _branches(
     return (applied[0], applied[1]), LineShape(turn, shapes[0], shapes[1])
 
 
-def _shape(beta: float, beta_max: float, u_peak: float | None) -> BranchShape:
+def _residual(one: Branch, other: Branch, share: float, v: float, v_max: float) -> tuple[float, float, float | None]:
+    """beta and u_peak between two turns, and the beta_max that they come from where (22) gives both."""
+    left, right = ResidualLaw.of(one, v_max), ResidualLaw.of(other, v_max)
+    if not left.points and not right.points:
+        beta_max, rho = _between(left.beta_max, right.beta_max, share), _between(left.rho, right.rho, share)
+        law = ResidualLaw(beta_max, rho, _between(left.u_peak, right.u_peak, share))
+        return *law.at(v, v_max), beta_max
+    (beta_left, peak_left), (beta_right, peak_right) = left.at(v, v_max), right.at(v, v_max)
+    return _between(beta_left, beta_right, share), _between(peak_left, peak_right, share), None
+
+
+def _shape(beta: float, beta_max: float | None, u_peak: float | None) -> BranchShape:
     """A branch of the harmonic model, or of the sinusoidal one where there is no u_peak."""
 
     def build(share: float) -> BranchShape:
@@ -241,7 +270,8 @@ def _shape(beta: float, beta_max: float, u_peak: float | None) -> BranchShape:
                 fails = middle
         if not fits:
             raise
-        raise Unphysical(f"{text}; a beta_max up to {at_most(fits * beta_max)} fits, or a smaller scan") from None
+        what, value = ("beta", beta) if beta_max is None else ("beta_max", beta_max)
+        raise Unphysical(f"{text}; a {what} up to {at_most(fits * value)} fits, or a smaller scan") from None
 
 
 def _between(left: float, right: float, share: float) -> float:

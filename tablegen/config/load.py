@@ -17,10 +17,12 @@ from tablegen.config.schema import (
     MAXIMUM_NAME,
     Amplifier,
     BandLimit,
+    Branch,
     Dac,
     FastAxis,
     Hysteresis,
     Offset,
+    Refinement,
     Resonance,
     Scan,
     Scanner,
@@ -99,6 +101,8 @@ def _check(file: Document, problems: Problems, kind: type, key: str, written: Ma
         _check_ways(key, written, file, problems)
     elif kind is Resonance:
         _check_response(key, written, file, problems)
+    elif kind is Branch:
+        _check_branch(key, written, file, problems)
     if built is not None:
         for name, why in _faults(built):
             problems.add(file, f"{key}.{name}", why)
@@ -142,6 +146,16 @@ def _check_response(key: str, written: Mapping[str, Any], file: Document, proble
                 problems.add(file, f"{key}.{name}", f"missing beside {other}")
 
 
+def _check_branch(key: str, written: Mapping[str, Any], file: Document, problems: Problems) -> None:
+    if "points" not in written:
+        if "beta_max" not in written:
+            problems.add(file, f"{key}.beta_max", "missing; give beta_max, rho and u_peak of (22), or points")
+        return
+    for name in ("beta_max", "rho", "u_peak"):
+        if name in written:
+            problems.add(file, f"{key}.{name}", "points is given as well; keep one of the two")
+
+
 def _faults(built: Struct) -> list[tuple[str, str]]:
     """Keys of a table that contradict each other, and why."""
     match built:
@@ -161,6 +175,8 @@ def _faults(built: Struct) -> list[tuple[str, str]]:
             lower = 1 << (built.length.bit_length() - 1)
             if built.length != lower:
                 return [("length", f"{built.length} is not a power of two; the nearest are {lower} and {2 * lower}")]
+        case Refinement() if len(built.a) != len(built.b):
+            return [("b", f"{len(built.b)} harmonics, and {len(built.a)} in a")]
         case Hysteresis() if built.model != "triangle":
             return _hysteresis_faults(built)
         case _:
@@ -187,6 +203,14 @@ def _hysteresis_faults(hysteresis: Hysteresis) -> list[tuple[str, str]]:
         if any(branches.turn == earlier.turn for earlier in hysteresis.branches[:i]):
             found.append((f"branches[{i}].turn", f"{branches.turn:g} is calibrated twice"))
         for side, branch in (("forward", branches.forward), ("backward", branches.backward)):
-            if hysteresis.model == "harmonic" and branch.u_peak is None:
-                found.append((f"branches[{i}].{side}.u_peak", "missing; the harmonic model needs it"))
+            where = f"branches[{i}].{side}"
+            points = branch.points or []
+            for j, point in enumerate(points):
+                if any(point.size_v == earlier.size_v for earlier in points[:j]):
+                    found.append((f"{where}.points[{j}].size_v", f"{point.size_v:g} V is measured twice"))
+            if hysteresis.model == "harmonic":
+                lacking = [f"points[{j}].u_peak" for j, point in enumerate(points) if point.u_peak is None]
+                if not points and branch.u_peak is None:
+                    lacking = ["u_peak"]
+                found += [(f"{where}.{name}", "missing; the harmonic model needs it") for name in lacking]
     return found

@@ -22,6 +22,7 @@ Residual = Annotated[float, Meta(ge=0.0, lt=0.5)]
 Decay = Annotated[float, Meta(ge=1e-6, le=100.0)]
 Factor = Annotated[float, Meta(ge=0.1, le=10.0)]
 Percent = Annotated[float, Meta(gt=0.0, le=1000.0)]
+Harmonics = Annotated[list[Annotated[float, Meta(ge=-0.5, le=0.5)]], Meta(min_length=1, max_length=512)]
 Window = tuple[Annotated[float, Meta(ge=0.0, le=1.0)], Annotated[float, Meta(ge=0.0, le=1.0)]]
 
 
@@ -61,6 +62,26 @@ class BandLimit(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     directions: Annotated[Literal["both", "forward"], Meta(description="the branches that image")] = "both"
 
 
+class Refinement(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What `tablegen refine` learnt: a residual layer over the model's drive, and the scan that it belongs to."""
+
+    a: Annotated[Harmonics, Meta(description="cosine terms of harmonics 1, 2, ..., as fractions of the line")]
+    b: Annotated[Harmonics, Meta(description="sine terms, as many")]
+    v_amplitude: Annotated[PositiveVolts, Meta(description="drive that it was learnt at, peak to peak at the piezo")]
+    v_offset: Annotated[Volts, Meta(description="offset voltage that it was learnt at")]
+    rate_hz: Annotated[Hertz, Meta(description="rate that it was learnt at")]
+    turn: Annotated[Normalised, Meta(description="turning point that it was learnt at")]
+    window: Annotated[Window, Meta(description="imaging window that was measured")]
+    directions: Annotated[Literal["both", "forward"], Meta(description="branches that were measured")]
+    model: (
+        Annotated[str, Meta(pattern="^[0-9a-f]{16}$", description="digest of the model below; or it is not compared")]
+        | None
+    ) = None
+    before_percent: (
+        Annotated[float, Meta(ge=0.0, le=100.0, description="rms residual of the trace that it was learnt from")] | None
+    ) = None
+
+
 class FastAxis(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The axis that moves once a line."""
 
@@ -76,6 +97,7 @@ class FastAxis(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     turn: Annotated[Normalised, Meta(description="turning point: fraction of the period spent going forward")] = 0.5
     band_limit: BandLimit = BandLimit()
     table: Table = Table()
+    refinement: Refinement | None = None
 
 
 class SlowAxis(FastAxis, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -188,12 +210,27 @@ class Size(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     v_threshold: Annotated[float, Meta(gt=0.0, le=1.0, description="normalised; linear above")] = 0.5
 
 
-class Branch(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Hysteresis of one direction, (22); u_peak in sweep-aligned coordinates for both directions."""
+class HysteresisPoint(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Hysteresis of one direction as measured at one scan voltage."""
 
-    beta_max: Annotated[Residual, Meta(description="peak residual at full scale")]
+    size_v: Annotated[PositiveVolts, Meta(description="scan voltage V_scan of the measurement, at the piezo")]
+    beta: Annotated[Residual, Meta(description="peak residual there, of the scan")]
+    u_peak: Annotated[Normalised, Meta(description="where it peaks; harmonic model only")] | None = None
+
+
+class Branch(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Hysteresis of one direction: by (22), or as measured; u_peak in sweep-aligned coordinates for both directions."""
+
+    beta_max: Annotated[Residual, Meta(description="peak residual at full scale; or give `points`")] | None = None
     rho: Annotated[Decay, Meta(description="dimensionless decay constant of (22)")] = 1.5
     u_peak: Annotated[Normalised, Meta(description="where the residual peaks; harmonic model only")] | None = None
+    points: (
+        Annotated[
+            list[HysteresisPoint],
+            Meta(min_length=1, max_length=64, description="instead of (22); linear between, from 0 at 0 V"),
+        ]
+        | None
+    ) = None
 
 
 class Branches(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -44,5 +44,5 @@ def intended(line: LinePlan, drive: Drive) -> Floats:
     shape = line.drive.shape
     k = np.arange(len(drive.codes), dtype=np.int64)
     t = k / len(k)
-    w = Sampler(line.target, len(k)).at(k)
+    w = Sampler(line.described, len(k)).at(k)
     return np.where(t <= shape.turn, shape.forward.inverse(w), 1.0 - shape.backward.inverse(1.0 - w))

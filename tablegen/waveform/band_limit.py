@@ -6,21 +6,26 @@ from tablegen.compensation.hysteresis import LineShape
 from tablegen.config.schema import BandLimit
 from tablegen.numerics.turns import sinc
 from tablegen.waveform.closed_form import fourier_series
+from tablegen.waveform.refined import RefinedShape
 from tablegen.waveform.series import FourierSeries
 from tablegen.waveform.window_fit import fit_window
 
 
-def band_limited(shape: LineShape, limit: BandLimit, harmonics: int) -> FourierSeries:
+def band_limited(
+    shape: LineShape, limit: BandLimit, harmonics: int, layer: FourierSeries | None = None
+) -> FourierSeries:
     """The line waveform in harmonics 1..``harmonics``.
 
     ``truncate`` keeps the Fourier coefficients as they are and rings; ``lanczos`` multiplies them by sigma factors
     sinc(n / (H + 1)); ``window`` is straight inside the imaging window and leaves the turnarounds free.
+    A ``layer`` is added: inside the window to what is fitted, by the other methods to the coefficients as it is.
     Raises ``Unphysical`` where the fit cannot stay inside [0, 1].
     """
     if limit.method == "window":
-        return fit_window(shape, harmonics, limit.window, limit.directions == "both")
+        asked = shape if layer is None else RefinedShape(shape, layer)
+        return fit_window(asked, harmonics, limit.window, limit.directions == "both")
     series = fourier_series(shape, harmonics)
-    if limit.method == "truncate":
-        return series
-    sigma = sinc(np.arange(1, harmonics + 1) / (harmonics + 1))
-    return FourierSeries(series.a0, series.a * sigma, series.b * sigma)
+    if limit.method == "lanczos":
+        sigma = sinc(np.arange(1, harmonics + 1) / (harmonics + 1))
+        series = FourierSeries(series.a0, series.a * sigma, series.b * sigma)
+    return series if layer is None else series.plus(layer)

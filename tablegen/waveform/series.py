@@ -59,6 +59,19 @@ class FourierSeries:
         """max |w''| per period squared, on a grid of 32 points per period of the highest harmonic."""
         return float(np.max(np.abs(self.on_grid(32 * self.harmonics, 2))))
 
+    def plus(self, other: "FourierSeries") -> "FourierSeries":
+        """The sum of both, with the harmonics of the longer one."""
+        count = max(self.harmonics, other.harmonics)
+        a, b = np.zeros(count), np.zeros(count)
+        for one in (self, other):
+            a[: one.harmonics] += one.a
+            b[: one.harmonics] += one.b
+        return FourierSeries(self.a0 + other.a0, a, b)
+
+    def less(self, other: "FourierSeries") -> "FourierSeries":
+        """The difference."""
+        return self.plus(FourierSeries(-other.a0, -other.a, -other.b))
+
     def times(self, real: Floats, imaginary: Floats) -> "FourierSeries":
         """The series with harmonic n multiplied by real[n - 1] + i imaginary[n - 1]; the mean stays."""
         return FourierSeries(self.a0, self.a * real + self.b * imaginary, self.b * real - self.a * imaginary)

@@ -15,11 +15,11 @@ from math import tau
 
 import numpy as np
 
-from tablegen.compensation.hysteresis import LineShape
 from tablegen.numerics.arrays import Floats, tree_sum
 from tablegen.numerics.linear import Cholesky
 from tablegen.numerics.turns import cosine, sine_and_cosine
 from tablegen.problems import Unphysical
+from tablegen.waveform.refined import Shape
 from tablegen.waveform.series import FourierSeries
 
 # Keeps the fit on the line, not only parallel to it, where the harmonics are too few for both.
@@ -31,7 +31,7 @@ _MARGIN = 1e-3
 _ROUNDS = 40
 
 
-def fit_window(shape: LineShape, harmonics: int, window: tuple[float, float], both: bool) -> FourierSeries:
+def fit_window(shape: Shape, harmonics: int, window: tuple[float, float], both: bool) -> FourierSeries:
     """Fit harmonics 1..``harmonics`` to the line inside ``window`` (normalised position) of the imaging branches.
 
     Raises ``Unphysical`` where the range [0, 1] and the harmonics do not go together.
@@ -40,7 +40,9 @@ def fit_window(shape: LineShape, harmonics: int, window: tuple[float, float], bo
     slope = shape.slope(times)
     slope_weight = 1.0 / (slope * slope)
     value_weight = np.full_like(times, VALUE_WEIGHT)
-    normal, right = _normal_equations(times, shape.value(times), slope, value_weight, slope_weight, harmonics)
+    normal, right = normal_equations(
+        times, shape.value(times), slope, value_weight, slope_weight, harmonics, SMOOTHNESS
+    )
     try:
         factor = Cholesky(normal)
     except ArithmeticError:  # pragma: no cover - the smoothness term keeps every pivot positive
@@ -59,10 +61,16 @@ def _nodes(turn: float, harmonics: int, window: tuple[float, float], both: bool)
     return np.concatenate([forward, turn + (1.0 - turn) * (1.0 - position)])
 
 
-def _normal_equations(
-    times: Floats, value: Floats, slope: Floats, value_weight: Floats, slope_weight: Floats, harmonics: int
+def normal_equations(
+    times: Floats,
+    value: Floats,
+    slope: Floats,
+    value_weight: Floats,
+    slope_weight: Floats,
+    harmonics: int,
+    smoothness: float,
 ) -> tuple[Floats, Floats]:
-    """Gram matrix and right side in the basis 1, cos 1..H, sin 1..H.
+    """Gram matrix and right side in the basis 1, cos 1..H, sin 1..H, of a fit to values and slopes at ``times``.
 
     Products of two harmonics depend on the sum and the difference of their numbers alone, so that 4 H + 2 sums
     over the nodes give all (2 H + 1)^2 entries.
@@ -99,7 +107,7 @@ def _normal_equations(
     right = np.concatenate([value_c - rate * slope_s, (value_s + rate * slope_c)[1:]])
 
     square = rate * rate  # not rate**4: the power function's last bit is the processor's
-    energy = 0.5 * SMOOTHNESS * square * square
+    energy = 0.5 * smoothness * square * square
     diagonal = np.arange(2 * harmonics + 1)
     normal[diagonal, diagonal] += np.concatenate([energy, energy[1:]])
     return normal, right

@@ -1,0 +1,71 @@
+"""What `tablegen refine` reaches on the virtual scanner, round by round, as tables for docs/refine.md.
+
+``python benchmarks/refinement.py`` prints them, ``--write`` puts them into the page. A simulation: the scanner was
+calibrated on its own simulated sensor data, and every trace has the noise of a sensor.
+"""
+
+import argparse
+import re
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parent.parent
+PAGE = ROOT / "docs" / "refine.md"
+sys.path.insert(0, str(ROOT / "tests"))
+
+from refining import (  # noqa: E402
+    ROUNDS,
+    SCANS,
+    Step,
+    calibrated,
+    elsewhere,
+    rounds,
+)
+
+
+def reached() -> str:
+    """A row a round of every scan: true errors of the virtual scanner, not what its sensor saw."""
+    rows = [
+        "| scan | rounds | residual forward | backward | scaling forward | backward | by extremes forward | backward |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for scan in SCANS:
+        for count, step in enumerate(rounds(calibrated(scan), scan.axis, ROUNDS)):
+            rows.append(f"| {scan.name if count == 0 else ''} | {count} | {_figures(step)} |")
+    return "\n".join(rows) + "\n"
+
+
+def _figures(step: Step) -> str:
+    sides = [step.true.residual_percent.get(side) for side in ("forward", "backward")]
+    residual = [f"{rms:.3f} rms, {most:.3f}" for rms, most in filter(None, sides)]
+    scaling = [f"{value:.2f}" for value in step.true.scaling_percent.values()]
+    extremes = [f"{step.by_extremes[side]:.3f}" for side in step.true.scaling_percent]
+    return " | ".join(" | ".join(one + ["-"] * (2 - len(one))) for one in (residual, scaling, extremes))
+
+
+def served() -> str:
+    """A row a change of the scan: what is left with the layer, and without one."""
+    rows = ["| scan | with the layer | without |", "|---|---|---|"]
+    for what, kept, without in elsewhere():
+        rows.append(f"| {what} | {_short(kept)} | {_short(without)} |")
+    return "\n".join(rows) + "\n"
+
+
+def _short(step: Step) -> str:
+    return f"{step.true.rms_percent:.3f} rms, {max(step.true.scaling_percent.values()):.1f} % scaling error"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--write", action="store_true", help=f"put the tables into {PAGE.name}")
+    given = parser.parse_args()
+    for mark, text in (("reached", reached()), ("elsewhere", served())):
+        print(text)
+        if given.write:
+            page = PAGE.read_text("utf-8")
+            marked = rf"(?<=<!-- {mark} -->\n).*(?=<!-- /{mark} -->)"
+            PAGE.write_text(re.sub(marked, lambda _, text=text: text, page, count=1, flags=re.DOTALL), "utf-8")
+
+
+if __name__ == "__main__":
+    main()

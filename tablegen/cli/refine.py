@@ -1,0 +1,168 @@
+"""``tablegen refine``: a trace of the running scan to a layer over the model, by iterative learning."""
+
+import json
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import click
+
+from tablegen.cli.common import fail, scan_argument, written
+from tablegen.cli.status import Status
+
+if TYPE_CHECKING:
+    from tablegen.calibration.table import Source, Table
+    from tablegen.refinement.round import Options, Round
+
+_FORMATS = (".png", ".svg", ".pdf")
+
+
+@click.command(
+    short_help="A trace of the running scan: learn what the model leaves.",
+    epilog="""\b
+  tablegen refine scan.toml trace.csv --axis x            what a trace says; writes nothing
+  tablegen refine scan.toml trace.csv --axis x --write    put it into scan.toml; then build, upload, record again""",
+)
+@scan_argument
+@click.argument("trace", type=click.Path(path_type=Path), metavar="TRACE.CSV")
+@click.option("--axis", type=click.Choice(("x", "y")), required=True, help="Which axis was measured.")
+@click.option("--write", is_flag=True, help="Update SCAN.TOML in place.")
+@click.option(
+    "--gain",
+    type=click.FloatRange(0.0, 2.0, min_open=True, max_open=True),
+    default=0.7,
+    show_default=True,
+    help="The share of the error that a round takes.",
+)
+@click.option(
+    "--harmonics", type=click.IntRange(1, 512), metavar="N", help="Learn up to this one.  [default: 16, or the bound's]"
+)
+@click.option("--triggered", is_flag=True, help="Without drive_v: time 0 is a line start, of y a frame start.")
+@click.option(
+    "--period-s", type=click.FloatRange(min=0.0, min_open=True), metavar="S", help="By the recorder's clock, triggered."
+)
+@click.option("--delay-s", type=float, default=0.0, show_default=True, metavar="S", help="Of the sensor.")
+@click.option(
+    "--settle", type=click.IntRange(min=0), metavar="N", help="Periods left out.  [default: 1 of three or more]"
+)
+@click.option(
+    "--drift", type=click.IntRange(0, 5), metavar="N", help="Order of the drift.  [default: 0 to 3, by periods]"
+)
+@click.option("--force", is_flag=True, help="Learn even from a trace that is worse than the one before.")
+@click.option("--plot", type=click.Path(path_type=Path, dir_okay=False), metavar="PNG", help="Draw it; or .svg, .pdf.")
+@click.option("--json", "as_json", is_flag=True, help="Plain data instead of text.")
+def refine(
+    scan: Path,
+    trace: Path,
+    axis: Literal["x", "y"],
+    write: bool,
+    gain: float,
+    harmonics: int | None,
+    triggered: bool,
+    period_s: float | None,
+    delay_s: float,
+    settle: int | None,
+    drift: int | None,
+    force: bool,
+    plot: Path | None,
+    as_json: bool,
+) -> int:
+    """Learn from a displacement sensor what the model leaves of a running scan.
+
+    Columns: time_s, displacement_nm and drive_v, of several periods. What a round learns becomes [AXIS.refinement] of
+    the scan file, which the next build adds to the drive. Two or three rounds of recording, refining and building do.
+    """
+    if period_s is not None and not triggered:
+        raise click.UsageError("--period-s is for --triggered; otherwise drive_v has the period")
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    _require("scipy", "tomlkit", extra="calibrate")
+    if plot is not None:
+        if plot.suffix not in _FORMATS:
+            raise click.UsageError(f"--plot {plot}: the name has to end in .png, .svg or .pdf")
+        _require("matplotlib", extra="plot")
+    from tablegen.refinement.round import Options
+
+    options = Options(gain, harmonics, period_s, delay_s, settle, drift)
+    found, source, text = _learn(scan, trace, axis, triggered, options)
+    from tablegen.cli.refine_text import refine_record, refine_text
+
+    name = found.setup.scan.name
+    if as_json:
+        click.echo(json.dumps(refine_record(found, name, source), indent=2, allow_nan=False))
+    else:
+        click.echo("\n".join(refine_text(found, name, source)))
+    if plot is not None:
+        from tablegen.calibration.figure import draw
+
+        kind: Any = plot.suffix[1:]
+        written(plot.parent, {plot.name: draw(found.curves, kind)})
+    if found.worse and not force:
+        fail([f"{trace}: {found.worse}"], Status.WRONG_INPUT)
+    if write:
+        _write(scan, axis, found, source, text, as_json)
+    return Status.OK
+
+
+def _require(*modules: str, extra: str) -> None:
+    from importlib.util import find_spec
+
+    if missing := [module for module in modules if find_spec(module) is None]:
+        needs = " and ".join(missing)
+        fail([f"{needs} is missing; install it with: pip install 'tablegen[{extra}]'"], Status.TOOL_MISSING)
+
+
+def _learn(
+    scan: Path, trace: Path, axis: Literal["x", "y"], triggered: bool, options: "Options"
+) -> "tuple[Round, Source, str]":
+    """The round, where the trace came from, and the text of the scan file that was planned."""
+    from tablegen.config.load import load
+    from tablegen.problems import Rejected, Unphysical
+    from tablegen.refinement.round import refine as learn_from
+
+    try:
+        setup = load(scan)
+        text = scan.read_bytes().decode("utf-8")
+        table = _read(trace, triggered)
+        from tablegen.calibration.columns import DISPLACEMENT, DRIVE, TIME
+
+        drive = None if triggered else table[DRIVE]
+        found = learn_from(setup, axis, table[TIME], table[DISPLACEMENT], drive, options)
+    except Rejected as rejected:
+        fail(rejected.problems, Status.WRONG_INPUT)
+    except Unphysical as reason:
+        fail([f"{trace}: {reason}"], Status.WRONG_INPUT)
+    except OSError as error:
+        fail([f"{scan}: {error.strerror or error}"], Status.WRONG_INPUT)
+    return found, table.source, text
+
+
+def _read(trace: Path, triggered: bool) -> "Table":
+    from tablegen.calibration.columns import DISPLACEMENT, DRIVE, TIME
+    from tablegen.calibration.table import read_table
+    from tablegen.problems import Problem, Rejected
+
+    table = read_table(trace, [TIME, DISPLACEMENT], [DRIVE])
+    if DRIVE not in table and not triggered:
+        why = "missing; or say --triggered where time 0 is a line start"
+        raise Rejected([Problem(table.file, int(table.lines[0]) - 1, DRIVE.name, why)])
+    return table
+
+
+def _write(scan: Path, axis: str, found: "Round", source: "Source", text: str, quiet: bool) -> None:
+    import msgspec
+
+    from tablegen.cli.refine_text import provenance
+    from tablegen.problems import Rejected
+    from tablegen.refinement.scan_file import with_layer
+
+    if found.refinement is None or not found.lesson.harmonics:
+        click.echo(f"{scan}: left as it is", err=quiet)
+        return
+    values = msgspec.json.decode(msgspec.json.encode(found.refinement))  # as a file has it
+    try:
+        path = scan.resolve()
+        content = with_layer(text, str(scan), axis, values, provenance(found, source)).encode("utf-8")
+    except Rejected as rejected:
+        fail(rejected.problems, Status.WRONG_INPUT)
+    written(path.parent, {path.name: content})
+    click.echo(f"{scan}: {axis}.refinement written; build it, play it, and record it again", err=quiet)

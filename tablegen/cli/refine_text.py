@@ -1,0 +1,127 @@
+"""A round of refinement for the terminal, and as plain data."""
+
+from typing import Any
+
+import numpy as np
+
+from tablegen.calibration.table import Source
+from tablegen.cli.scatter import scatter
+from tablegen.refinement.departure import Departure
+from tablegen.refinement.round import Round
+
+
+def refine_text(found: Round, name: str, source: Source) -> list[str]:
+    """Lines of text."""
+    line, measured, lesson = found.line, found.displacement, found.lesson
+    lines = [
+        f"{name}, {line.axis}: {measured.periods:.4g} periods of {found.phase.period_s:.6g} s, "
+        f"{measured.samples} samples of {source.name}",
+        "",
+        "                        residual [% of the line]   scaling error",
+        "direction                    rms      largest      [% peak to peak]",
+    ]
+    for label, departure in (("measured", lesson.before), ("predicted", lesson.after)):
+        for side, (rms, largest) in departure.residual_percent.items():
+            scaling = departure.scaling_percent[side]
+            lines.append(f"{side:<9}  {label:<11}  {rms:8.4f}     {largest:8.4f}      {scaling:8.3f}")
+    lines += [
+        f"its noise{'':<14}{lesson.noise_percent:8.4f}{'':<20}{lesson.chord_noise_percent:8.3f} rms of a chord",
+        "",
+        *_learnt(found),
+        *_bound(found),
+        "",
+    ]
+    for curve in found.curves:
+        lines += [*scatter(curve), ""]
+    return lines + [f"note: {remark}" for remark in found.remarks]
+
+
+def _learnt(found: Round) -> list[str]:
+    lesson = found.lesson
+    if not lesson.harmonics:
+        return ["learnt: nothing"]
+    change, layer = (100.0 * float(np.max(np.abs(s.on_grid(1024)))) for s in (lesson.change, lesson.layer))
+    return [
+        f"learnt: harmonics 1 to {lesson.harmonics} of {found.bound.used}, up to {change:.3g} % of the line; "
+        f"the layer is now up to {layer:.3g} %"
+    ]
+
+
+def _bound(found: Round) -> list[str]:
+    b = found.bound
+    lines = [
+        f"bound: at a gain of {b.gain:g} it converges while the scanner's response at harmonics 1 to {b.used} is below "
+        f"{b.largest_gain:.3g} times the modelled one, or off by less than {b.phase_deg:.3g} degrees, a delay of "
+        f"{1e6 * b.delay_s:.3g} us"
+    ]
+    if b.dynamics:
+        lines.append(
+            f"with the dynamics of the scanner file off by a quarter a round leaves {100.0 * b.left:.3g} % at worst; "
+            f"up to {b.harmonics} harmonics converge"
+        )
+    else:
+        lines.append("the scanner file has no dynamics: keep the resonance and the delay away from these harmonics")
+    return lines
+
+
+def refine_record(found: Round, name: str, source: Source) -> dict[str, Any]:
+    """The same as plain data, for JSON."""
+    line, measured, lesson, b = found.line, found.displacement, found.lesson, found.bound
+
+    def errors(departure: Departure) -> dict[str, Any]:
+        sides = departure.residual_percent
+        return {
+            "residual_rms_percent": departure.rms_percent,
+            **{
+                side: {
+                    "residual_rms_percent": rms,
+                    "residual_largest_percent": largest,
+                    "scaling_error_peak_to_peak_percent": departure.scaling_percent[side],
+                }
+                for side, (rms, largest) in sides.items()
+            },
+        }
+
+    return {
+        "scan": name,
+        "axis": line.axis,
+        "source": {"name": source.name, "sha256": source.sha256},
+        "period_s": found.phase.period_s,
+        "periods": measured.periods,
+        "samples": measured.samples,
+        "left_out": measured.left_out,
+        "size_nm": abs(lesson.before.size_nm),
+        "asked_nm": line.drive.size_nm,
+        "noise": {"reading_nm": measured.noise_nm, "position_percent": lesson.noise_percent},
+        "drift_nm": measured.drift_nm,
+        "measured": errors(lesson.before),
+        "predicted": errors(lesson.after),
+        "harmonics": lesson.harmonics,
+        "bound": {
+            "gain": b.gain,
+            "harmonics": b.harmonics,
+            "used": b.used,
+            "left_of_error": b.left,
+            "largest_gain": b.largest_gain,
+            "phase_deg": b.phase_deg,
+            "delay_s": b.delay_s,
+            "dynamics_known": b.dynamics,
+        },
+        "layer": {"a": lesson.layer.a.tolist(), "b": lesson.layer.b.tolist()},
+        "worse": found.worse or None,
+        "remarks": list(found.remarks),
+    }
+
+
+def provenance(found: Round, source: Source) -> str:
+    """The line of the comment that says what a round rests on; no date."""
+    measured, lesson = found.displacement, found.lesson
+    name = source.name if source.name.isprintable() else ascii(source.name)
+    said = [
+        f"{name}, sha256 {source.sha256}",
+        f"{measured.periods:.4g} periods",
+        f"residual {lesson.before.rms_percent:.3g} % rms",
+        f"harmonics to {lesson.harmonics}",
+        f"gain {found.bound.gain:g}",
+    ]
+    return ", ".join(said)

@@ -1,0 +1,91 @@
+"""The layer that `tablegen refine` learnt: whether it belongs to the scan that is built, and its series."""
+
+import hashlib
+import json
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from tablegen.compensation.drive import Drive
+from tablegen.compensation.dynamics import Measured
+from tablegen.config.load import Setup
+from tablegen.config.schema import FastAxis, Refinement, ScannerAxis
+from tablegen.problems import Problems
+from tablegen.waveform.series import FourierSeries
+
+# How far a scan may be from the one at which a layer was learnt: docs/refine.md has what it is worth at the edges.
+AMPLITUDE_REACH = 0.05  # relative
+OFFSET_REACH = 0.05  # of v_max
+RATE_REACH = 0.2  # relative
+TURN_REACH = 0.02
+WINDOW_REACH = 0.02  # of the line, beyond what was measured
+
+
+def model_digest(setup: Setup, axis: str, drive: Drive) -> str:
+    """What the layer lies over: 16 hexadecimal digits of hysteresis and dynamics as the scanner file has them."""
+    scanner: ScannerAxis = getattr(setup.scanner, axis)
+    below = [_given(msgspec.to_builtins(part)) for part in (scanner.hysteresis, scanner.resonance)]
+    if isinstance(drive.response, Measured):  # of the file that it names, what it says
+        below += [drive.response.f_hz.tolist(), drive.response.gain.tolist(), drive.response.phase_turns.tolist()]
+    plain = json.dumps(below, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
+    return hashlib.sha256(plain.encode("ascii")).hexdigest()[:16]
+
+
+def _given(value: Any) -> Any:
+    """Without the keys that are not given: those that a later version adds then change nothing."""
+    if isinstance(value, dict):
+        return {key: _given(item) for key, item in value.items() if item is not None}
+    return [_given(item) for item in value] if isinstance(value, list) else value
+
+
+def learnt_layer(
+    setup: Setup, axis: str, drive: Drive, rate_hz: float, harmonics: int, problems: Problems
+) -> FourierSeries | None:
+    """The layer of one axis; None where the scan file has none, or where ``problems`` grew."""
+    scan: FastAxis = getattr(setup.scan, axis)
+    refinement = scan.refinement
+    if refinement is None:
+        return None
+    faults = _faults(refinement, scan, drive, rate_hz, setup.scanner.v_max)
+    if len(refinement.a) > harmonics:
+        why = f"{len(refinement.a)} harmonics, and the band limit passes {harmonics}"
+        faults.append(("a", why))
+    if refinement.model is not None and refinement.model != model_digest(setup, axis, drive):
+        faults.append(("model", f"learnt over another {axis}.hysteresis or {axis}.resonance of the scanner file"))
+    for key, why in faults:
+        problems.add(setup.scan_file, f"{axis}.refinement.{key}", f"{why}; {_remedy(axis)}")
+    return None if faults else FourierSeries(0.0, np.array(refinement.a), np.array(refinement.b))
+
+
+def _remedy(axis: str) -> str:
+    return f"remove [{axis}.refinement], build, and run tablegen refine on a new trace"
+
+
+def _faults(learnt: Refinement, scan: FastAxis, drive: Drive, rate_hz: float, v_max: float) -> list[tuple[str, str]]:
+    """By which keys the scan is another one than that at which the layer was learnt."""
+    faults = []
+    if abs(drive.v_amplitude - learnt.v_amplitude) > AMPLITUDE_REACH * learnt.v_amplitude:
+        by = 100.0 * (drive.v_amplitude / learnt.v_amplitude - 1.0)
+        why = f"learnt at {learnt.v_amplitude:.6g} V, this scan drives {drive.v_amplitude:.6g} V"
+        faults.append(("v_amplitude", f"{why}, {by:+.3g} % of it; up to {100 * AMPLITUDE_REACH:g} % are served"))
+    if abs(drive.v_offset - learnt.v_offset) > OFFSET_REACH * v_max:
+        why = f"learnt at {learnt.v_offset:.6g} V, this scan is at {drive.v_offset:.6g} V"
+        by = drive.v_offset - learnt.v_offset
+        faults.append(("v_offset", f"{why}, {by:+.4g} V off; up to {OFFSET_REACH * v_max:g} V are served"))
+    if abs(rate_hz - learnt.rate_hz) > RATE_REACH * learnt.rate_hz:
+        by = 100.0 * (rate_hz / learnt.rate_hz - 1.0)
+        why = f"learnt at {learnt.rate_hz:.6g} Hz, this scan has {rate_hz:.6g} Hz"
+        faults.append(("rate_hz", f"{why}, {by:+.3g} % of it; up to {100 * RATE_REACH:g} % are served"))
+    if abs(drive.turn - learnt.turn) > TURN_REACH + 1e-12:
+        why = f"learnt at {learnt.turn:.6g}, this scan turns at {drive.turn:.6g}"
+        by = drive.turn - learnt.turn
+        faults.append(("turn", f"{why}, {by:+.3g} off; up to {TURN_REACH:g} are served"))
+    (low, high), limit = learnt.window, scan.band_limit
+    beyond = max(low - limit.window[0], limit.window[1] - high)
+    if beyond > WINDOW_REACH + 1e-12:
+        why = f"learnt over {low:g}..{high:g}, this scan images {limit.window[0]:g}..{limit.window[1]:g}"
+        faults.append(("window", f"{why}, {beyond:.3g} beyond; up to {WINDOW_REACH:g} are served"))
+    if limit.directions == "both" and learnt.directions != "both":
+        faults.append(("directions", "learnt forward only, and this scan images both directions"))
+    return faults

@@ -1,0 +1,98 @@
+"""When learning converges: the stability bound of the loop, harmonic by harmonic.
+
+Let G be the scanner's true gain over the modelled one at a harmonic, a complex number, 1 for a perfect model. A round
+leaves |1 - gain G| of the error there: it shrinks if and only if |G| < 2 cos(arg G) / gain. Derivation: docs/refine.md.
+"""
+
+from dataclasses import dataclass
+from itertools import product
+from math import acos, degrees, pi
+
+import numpy as np
+import numpy.typing as npt
+
+from tablegen.compensation.dynamics import Measured, Response, SecondOrder, capped_inverse
+from tablegen.numerics.arrays import Floats
+from tablegen.plan import LinePlan
+
+# How wrong the dynamics of a scanner file are taken to be: frequencies, quality, and for responses gain and phase.
+FREQUENCIES = (0.8, 1.0, 1.25)
+QUALITIES = (0.5, 1.0, 2.0)
+GAINS = (0.8, 1.0, 1.25)
+PHASES = (-1.0 / 18.0, 0.0, 1.0 / 18.0)  # periods: 20 degrees
+LEAST_SHRINKING = 0.9  # of the error, that a round may leave of a harmonic that is learnt
+
+Complex = npt.NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class Bound:
+    """What the loop tolerates.
+
+    ``harmonics`` are the most that can be learnt, ``left`` what a round leaves at worst of the error of those in use
+    with dynamics as wrong as above. ``largest_gain`` is the true over the modelled gain without a phase error,
+    ``phase_deg`` the phase error at a gain of 1, ``delay_s`` that phase at the highest harmonic in use.
+    """
+
+    gain: float
+    harmonics: int
+    used: int
+    left: float
+    largest_gain: float
+    phase_deg: float
+    delay_s: float
+    dynamics: bool
+
+
+def left_of_error(gain: float, ratio: Complex) -> Floats:
+    """What a round leaves of an error, for true gains over modelled ones."""
+    return np.abs(1.0 - gain * ratio)
+
+
+def bound(line: LinePlan, gain: float, used: int) -> Bound:
+    """The bound of one axis at a learning gain, for ``used`` harmonics, or as many of them as it allows."""
+    n = np.arange(1.0, line.target.harmonics + 1.0)
+    worst = np.max(left_of_error(gain, plausible_ratios(line, n * float(line.rate))), axis=0)
+    beyond = np.flatnonzero(worst > LEAST_SHRINKING)
+    most = int(beyond[0]) if len(beyond) else line.target.harmonics
+    used = min(used, most)
+    phase = acos(min(0.5 * gain, 1.0))
+    return Bound(
+        gain=gain,
+        harmonics=most,
+        used=used,
+        left=float(np.max(worst[:used])) if used else float(worst[0]),
+        largest_gain=2.0 / gain,
+        phase_deg=degrees(phase),
+        delay_s=phase / (2.0 * pi * max(used, 1) * float(line.rate)),
+        dynamics=line.drive.response is not None,
+    )
+
+
+def plausible_ratios(line: LinePlan, f_hz: Floats) -> Complex:
+    """True gains over modelled ones, shape (scanners, frequencies), for scanners that the file may describe wrongly.
+
+    Without dynamics in the file there is one, whose ratio is 1: of the others nothing is known.
+    """
+    response = line.drive.response
+    if response is None:
+        return np.ones((1, len(f_hz)), dtype=np.complex128)
+    real, imaginary, _ = capped_inverse(response, f_hz, line.drive.max_boost_db)
+    played = real + 1j * imaginary
+    ratios: list[Complex] = []
+    if isinstance(response, SecondOrder):
+        for frequency, quality in product(FREQUENCIES, QUALITIES):
+            true = SecondOrder(frequency * response.frequency_hz, quality * response.quality, response.delay_s)
+            ratios.append(played / _inverse(true, f_hz))
+    else:
+        top = float(response.f_hz[-1]) if isinstance(response, Measured) else float(np.max(f_hz))
+        for frequency, gain, phase in product(FREQUENCIES, GAINS, PHASES):
+            true_inverse = _inverse(response, np.minimum(f_hz / frequency, top))
+            ratios.append(played / true_inverse * gain * np.exp(2j * pi * phase))
+    return np.array(ratios)
+
+
+def _inverse(response: Response, f_hz: Floats) -> Complex:
+    real, imaginary = response.inverse(f_hz)
+    found: Complex = real + 1j * imaginary
+    return found

@@ -1,0 +1,119 @@
+"""How far a measured line is from what was asked, where the image is taken: residual and scaling error.
+
+Origin and size are those of the best straight line through the imaged windows of all directions together. The turning
+points are not asked: the turnarounds are free, and their errors would tilt the whole line.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tablegen.measurement import CHORD
+from tablegen.numerics.arrays import Floats
+from tablegen.plan import LinePlan
+from tablegen.problems import Unphysical
+from tablegen.refinement.displacement import Displacement
+
+_POINTS = 801  # over the window of a direction
+_LOST = 0.1  # of the line: no error of a model, but another scan or another phase
+
+
+@dataclass(frozen=True, eq=False)
+class Imaged:
+    """Points of the imaged windows, forward then backward where that images too.
+
+    ``times`` in periods, ``position`` the place on the line, 0..1, ``asked`` where the model puts the piezo there, and
+    ``steepness`` of the model's branch, du/dtau, at that place.
+    """
+
+    sides: tuple[str, ...]
+    times: Floats
+    position: Floats
+    asked: Floats
+    steepness: Floats
+
+    def by_side(self, values: Floats) -> dict[str, Floats]:
+        """Values at the points, direction by direction."""
+        return dict(zip(self.sides, np.split(values, len(self.sides)), strict=True))
+
+
+def imaged(line: LinePlan, share: Floats) -> Imaged:
+    """The points at shares 0..1 of the window."""
+    (low, high), turn, shape = line.band_limit.window, line.drive.turn, line.drive.shape
+    x = low + (high - low) * share
+    sides: tuple[str, ...] = ("forward",)
+    times = turn * x
+    if line.band_limit.directions == "both":
+        sides, times = ("forward", "backward"), np.concatenate([times, turn + (1.0 - turn) * (1.0 - x)])
+    w = np.split(line.described.value(times), len(sides))
+    asked, steepness = [shape.forward.inverse(w[0])], [shape.forward.slope(shape.forward.inverse(w[0]))]
+    if len(sides) > 1:
+        sweep = shape.backward.inverse(1.0 - w[1])
+        asked.append(1.0 - sweep)
+        steepness.append(shape.backward.slope(sweep))
+    return Imaged(sides, times, np.tile(x, len(sides)), np.concatenate(asked), np.concatenate(steepness))
+
+
+@dataclass(frozen=True, eq=False)
+class Departure:
+    """What is left: ``error`` is reached less asked at the points, in lines; ``size_nm`` of the best line, negative
+    where the sensor counts the other way."""
+
+    points: Imaged
+    error: Floats
+    size_nm: float
+
+    @property
+    def rms_percent(self) -> float:
+        """Residual of both directions together, in percent of the line."""
+        return 100.0 * float(np.sqrt(np.mean(self.error**2)))
+
+    @property
+    def residual_percent(self) -> dict[str, tuple[float, float]]:
+        """Rms and largest of each direction, in percent of the line."""
+        sides = self.points.by_side(100.0 * self.error)
+        return {side: (float(np.sqrt(np.mean(e**2))), float(np.max(np.abs(e)))) for side, e in sides.items()}
+
+    @property
+    def scaling_percent(self) -> dict[str, float]:
+        """Scaling error of each direction, peak to peak, by chords of 1/20 of the line as the paper's lattices are."""
+        found = {}
+        reached = self.points.by_side(self.points.asked + self.error)
+        for side, x in self.points.by_side(self.points.position).items():
+            k = min(max(round(CHORD / float(x[1] - x[0])), 1), len(x) - 2)
+            slope = (reached[side][k:] - reached[side][:-k]) / (x[k:] - x[:-k])
+            middle = 0.5 * (x[k:] + x[:-k])
+            found[side] = 100.0 * float(np.ptp(slope)) / float(np.interp(0.5, middle, slope))
+        return found
+
+    def moved(self, by: Floats) -> "Departure":
+        """The same with the drive raised by so much at each point, by the model's slope."""
+        return _straightened(self.points, self.points.asked + self.error + by / self.points.steepness, self.size_nm)
+
+
+def departure(line: LinePlan, measured: Displacement, share: Floats | None = None) -> Departure:
+    """Compare a measured period with what the plan asks for, at shares of the window or evenly over it.
+
+    Raises ``Unphysical`` where the two have nothing to do with each other.
+    """
+    points = imaged(line, np.linspace(0.0, 1.0, _POINTS) if share is None else share)
+    found = _straightened(points, measured.series.value(points.times), 1.0)
+    if not abs(found.size_nm) > 0.0 or found.rms_percent > 100.0 * _LOST:
+        raise Unphysical(
+            f"the displacement is {found.rms_percent:.3g} % of the line off what this scan asks; is it another axis, "
+            f"or is time 0 no line start?"
+        )
+    return found
+
+
+def _straightened(points: Imaged, reached: Floats, unit_nm: float) -> Departure:
+    origin, size = straight_line(points.asked) @ reached
+    if size == 0.0:
+        return Departure(points, np.full_like(reached, np.inf), 0.0)
+    return Departure(points, (reached - origin) / size - points.asked, float(size) * unit_nm)
+
+
+def straight_line(asked: Floats) -> Floats:
+    """The matrix, shape (2, points), that takes values to the origin and the size of their best line over ``asked``."""
+    found: Floats = np.linalg.pinv(np.column_stack([np.ones_like(asked), asked]))
+    return found

@@ -1,0 +1,95 @@
+"""Samples of a displacement, each at its own phase -> one period as a Fourier series, with its covariance."""
+
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+
+from tablegen.calibration.trace import correlation_length
+from tablegen.numerics.arrays import Floats
+from tablegen.problems import Unphysical
+from tablegen.waveform.series import FourierSeries
+
+_CHUNK = 1 << 14  # samples that are worked out at a time
+
+
+@dataclass(frozen=True, eq=False)
+class Displacement:
+    """One settled period in nm, as the sensor has it.
+
+    ``covariance`` is of (a0, a, b) in nm^2, widened where residuals depend on each other over ``correlated`` samples.
+    ``noise_nm`` is that of a reading, ``drift_nm`` how far the trace drifted.
+    """
+
+    series: FourierSeries
+    covariance: Floats
+    noise_nm: float
+    drift_nm: float
+    correlated: float
+    periods: float
+    samples: int
+    left_out: int
+
+
+def fit_displacement(
+    turns: Floats, displacement_nm: Floats, harmonics: int, settle_periods: int | None = None, order: int | None = None
+) -> Displacement:
+    """Fit harmonics 0..``harmonics`` and a polynomial drift to samples at ``turns``, ascending, in periods.
+
+    The first ``settle_periods`` are left out (of three periods or more the first, if not given). The drift is a
+    polynomial of ``order`` over the record: by default none below two periods, from which it could not be told, a line
+    from two on, a parabola from four, a cubic from six. Raises ``Unphysical``.
+    """
+    per_turn = (len(turns) - 1) / float(turns[-1] - turns[0])
+    periods = float(turns[-1] - turns[0]) + 1.0 / per_turn
+    settle = settle_periods if settle_periods is not None else (1 if periods >= 2.99 else 0)
+    periods -= settle
+    if periods < 0.99:
+        raise Unphysical(f"{periods + settle:.3g} periods are recorded, and {settle} to settle leave no whole one")
+    used = turns >= turns[0] + settle - 0.5 / per_turn if settle else np.ones(len(turns), bool)
+    if order is None:
+        order = int(np.searchsorted([1.99, 3.99, 5.99], periods, side="right"))
+    t, measured = turns[used], displacement_nm[used]
+    middle, height = float(np.mean(measured)), float(np.ptp(measured))
+    if not height > 0.0:
+        raise Unphysical("the displacement does not move")
+    count = min(harmonics, int(per_turn / 2.5))
+    span = float(t[-1] - t[0])
+
+    def basis(rows: slice) -> Floats:
+        angle = 2.0 * pi * np.outer(t[rows] % 1.0, np.arange(1, count + 1))
+        s = 2.0 * (t[rows] - t[0]) / span - 1.0
+        drift = [s**n - s ** (n % 2) for n in range(2, order + 1)]  # 0 at both ends, and so nearly apart from the line
+        ramp = [s] if order else []
+        return np.column_stack([np.ones(len(s)), np.cos(angle), np.sin(angle), *ramp, *drift])
+
+    normal: Floats = np.zeros((1 + 2 * count + order,) * 2)
+    right = np.zeros(len(normal))
+    parts = [slice(first, first + _CHUNK) for first in range(0, len(t), _CHUNK)]
+    for rows in parts:
+        b = basis(rows)
+        normal += b.T @ b
+        right += b.T @ ((measured[rows] - middle) / height)
+    size = np.linalg.eigvalsh(normal)
+    if len(t) <= len(normal) or size[0] <= 1e-9 * size[-1]:
+        raise Unphysical(
+            f"{len(t)} samples at these times do not determine {count} harmonics; record more of them, or more periods"
+        )
+    inverse = np.linalg.inv(normal)
+    c = inverse @ right
+    left, drift = np.empty(len(t)), np.empty(len(t))
+    for rows in parts:
+        b = basis(rows)
+        left[rows] = (measured[rows] - middle) / height - b @ c
+        drift[rows] = b[:, 1 + 2 * count :] @ c[1 + 2 * count :]
+    correlated = correlation_length(left)
+    freedom = max(len(t) / correlated - len(c), 1.0)
+    covariance: Floats = np.array(
+        inverse[: 1 + 2 * count, : 1 + 2 * count] * float(float(left @ left) / freedom * height**2), dtype=np.float64
+    )
+    scaled: Floats = height * c[: 1 + 2 * count]
+    series = FourierSeries(middle + float(scaled[0]), scaled[1 : count + 1].copy(), scaled[count + 1 :].copy())
+    noise = height * float(np.sqrt(left @ left / max(len(t) - len(c), 1)))
+    return Displacement(
+        series, covariance, noise, height * float(np.ptp(drift)), correlated, periods, len(t), int(np.sum(~used))
+    )

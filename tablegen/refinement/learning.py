@@ -1,0 +1,114 @@
+"""One round of iterative learning: a measured period -> the correction of the layer, by the slope of the model."""
+
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+
+from tablegen.measurement import CHORD
+from tablegen.numerics.arrays import Floats
+from tablegen.plan import LinePlan
+from tablegen.refinement.departure import Departure, departure, straight_line
+from tablegen.refinement.displacement import Displacement
+from tablegen.waveform.series import FourierSeries
+from tablegen.waveform.window_fit import normal_equations
+
+DEFAULT_GAIN = 0.7
+DEFAULT_HARMONICS = 16
+DIGITS = 8  # of a coefficient in the scan file: a 24-bit converter has 7
+# Of the mean square acceleration: settles what the windows leave open, and costs nothing inside them.
+_SMOOTHNESS = 1e-9
+_COST = 4.0  # of the two figures of a harmonic, after Akaike: what a learnt one adds in noise, and in doubt of it
+
+
+@dataclass(frozen=True, eq=False)
+class Lesson:
+    """What a round learns: ``layer`` is the new one, ``change`` by how much it differs from the one that was played.
+
+    ``before`` was measured, ``after`` is what the model predicts. ``harmonics`` is 0 where nothing stands out of the
+    noise, which after all averaging is ``noise_percent`` rms of the position, in percent of the line, and
+    ``chord_noise_percent`` of its slope over a chord.
+    """
+
+    layer: FourierSeries
+    change: FourierSeries
+    harmonics: int
+    before: Departure
+    after: Departure
+    noise_percent: float
+    chord_noise_percent: float
+
+
+def learn(line: LinePlan, measured: Displacement, gain: float, harmonics: int) -> Lesson:
+    """Learn harmonics 1..``harmonics`` at most from a period of the running scan, at a gain in (0, 2).
+
+    The position error in the imaged windows, times the slope of the model's branch there, is what the drive lacks. It
+    is fitted by harmonics, the gentlest of those that fit, up to the one beyond which there is nothing but the
+    sensor's noise. Raises ``Unphysical`` where the displacement is not that of the scan.
+    """
+    before = departure(line, measured)
+    nodes = 4 * max(harmonics, measured.series.harmonics) + 32
+    share = 0.5 - 0.5 * np.cos((np.arange(nodes) + 0.5) * pi / nodes)
+    seen = departure(line, measured, share)
+    points = seen.points
+    # From coefficients of the displacement to the drive that is lacking, for the covariance.
+    basis = _basis(points.times, measured.series.harmonics)
+    line_of = np.column_stack([np.ones_like(points.asked), points.asked])
+    errors: Floats = (basis - line_of @ (straight_line(points.asked) @ basis)) / seen.size_nm
+    lacking = -gain * points.steepness * seen.error
+    fits = _fits(points.times, harmonics)
+    spread = [fit @ (gain * points.steepness[:, None] * errors) for fit in fits]
+    kept = _worth_learning([fit @ lacking for fit in fits], [s @ measured.covariance @ s.T for s in spread])
+    # The mean is not learnt: no sensor sees an origin.
+    c = fits[kept - 1] @ lacking if kept else np.zeros(1)
+    change = FourierSeries(0.0, c[1 : kept + 1].copy(), c[kept + 1 :].copy())
+    old = line.layer if line.layer is not None else FourierSeries(0.0, np.zeros(0), np.zeros(0))
+    whole = old.plus(change)
+    layer = FourierSeries(0.0, np.round(whole.a, DIGITS), np.round(whole.b, DIGITS))
+    after = before.moved(change.value(before.points.times))
+    noise = np.sqrt(np.mean(np.sum((errors @ measured.covariance) * errors, axis=1)))
+    chords = _chords(line, before, measured) / seen.size_nm
+    chord_noise = np.sqrt(np.mean(np.sum((chords @ measured.covariance) * chords, axis=1)))
+    return Lesson(layer, change, kept, before, after, 100.0 * float(noise), 100.0 * float(chord_noise))
+
+
+def _chords(line: LinePlan, seen: Departure, measured: Displacement) -> Floats:
+    """From coefficients of the displacement to slopes over chords, in nm a line, at some places of the forward line."""
+    x = seen.points.by_side(seen.points.position)["forward"]
+    middle = np.linspace(float(x[0]) + 0.5 * CHORD, float(x[-1]) - 0.5 * CHORD, 41)
+    ends = [_basis(line.drive.turn * (middle + by), measured.series.harmonics) for by in (-0.5 * CHORD, 0.5 * CHORD)]
+    found: Floats = (ends[1] - ends[0]) / CHORD
+    return found
+
+
+def _worth_learning(coefficients: list[Floats], covariances: list[Floats]) -> int:
+    """How many harmonics to learn, of fits with 1, 2, ... harmonics: the next ones explain no more than noise does.
+
+    The highest harmonic of each fit explains chi squared of its cosine and sine; what is left out costs the sum of
+    these, what is learnt costs noise.
+    """
+    explained = []
+    for count, (c, covariance) in enumerate(zip(coefficients, covariances, strict=True), 1):
+        top = [count, 2 * count]
+        explained.append(float(c[top] @ np.linalg.solve(covariance[np.ix_(top, top)], c[top])))
+    cost = np.cumsum([0.0, *(_COST - chi for chi in explained)])
+    return int(np.argmin(cost))
+
+
+def _basis(times: Floats, harmonics: int) -> Floats:
+    angle = 2.0 * pi * np.outer(times, np.arange(1, harmonics + 1))
+    basis: Floats = np.column_stack([np.ones(len(times)), np.cos(angle), np.sin(angle)])
+    return basis
+
+
+def _fits(times: Floats, harmonics: int) -> list[Floats]:
+    """For 1, 2, ... harmonics the matrix from values at the times to the coefficients of their gentlest fit."""
+    none, ones = np.zeros(len(times)), np.ones(len(times))
+    normal, _ = normal_equations(times, none, none, ones, none, harmonics, _SMOOTHNESS)
+    basis = _basis(times, harmonics)
+    found = []
+    for count in range(1, harmonics + 1):
+        first = np.r_[0 : count + 1, harmonics + 1 : harmonics + 1 + count]
+        fit = np.linalg.solve(normal[np.ix_(first, first)], basis[:, first].T / len(times))
+        found.append(np.asarray(fit, dtype=np.float64))
+    return found

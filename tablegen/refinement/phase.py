@@ -1,0 +1,171 @@
+"""When each sample of a trace was taken, in periods of the scan: from the recorded drive, or from a trigger."""
+
+from dataclasses import dataclass
+from math import ceil, pi
+
+import numpy as np
+
+from tablegen.calibration.least_squares import solve
+from tablegen.numerics.arrays import Floats
+from tablegen.plan import LinePlan
+from tablegen.problems import Unphysical
+from tablegen.waveform.series import FourierSeries
+
+LEAST_SAMPLES = 40  # a period
+_GRID = 1 << 16  # points a period, between which the known waveform is linear
+_CLOCKS = 0.01  # by which the clocks of generator and recorder may differ
+_REACH = 0.05  # by which the recorded drive may differ from the plan's, of its amplitude
+_CROOKED = 0.005  # rms departure of the drive from the plan's waveform, of its amplitude, averaged over periods
+_BINS = 64  # a period, for that
+_LACKS = 0.5  # of the layer
+
+
+@dataclass(frozen=True)
+class Phase:
+    """``turns`` are periods since a line start, one for each sample; the period is by the recorder's clock.
+
+    ``drive`` is the recorded drive's amplitude relative to the plan's, and its rms departure from the plan's waveform
+    relative to that; None without a recorded drive.
+    """
+
+    turns: Floats
+    period_s: float
+    drive: tuple[float, float] | None
+
+
+def phase_by_trigger(line: LinePlan, time_s: Floats, period_s: float | None, delay_s: float) -> Phase:
+    """Time 0 is a line start (of y: a frame start), the period the plan's or ``period_s``; times ascending."""
+    period = 1.0 / float(line.rate) if period_s is None else period_s
+    _check_times(time_s, period)
+    return Phase((time_s - delay_s) / period, period, None)
+
+
+def phase_by_drive(line: LinePlan, time_s: Floats, drive_v: Floats, delay_s: float) -> Phase:
+    """Period and start of the drive at the piezo (V), by fitting the waveform that the plan plays.
+
+    ``delay_s`` is that of the sensor against the drive. Raises ``Unphysical`` where the drive is not that of the plan.
+    """
+    nominal = 1.0 / float(line.rate)
+    _check_times(time_s, nominal)
+    period, start = _first_guess(line.series, time_s, drive_v, nominal)
+    w, slope = _tabled(line.series, 0), _tabled(line.series, 1)
+    amplitude, middle = line.drive.v_amplitude, line.drive.v_offset
+
+    def turns(x: Floats) -> Floats:
+        return (time_s - float(x[1])) / float(x[0])
+
+    def residuals(x: Floats) -> Floats:
+        left: Floats = float(x[2]) + float(x[3]) * (_at(w, turns(x)) - 0.5) - drive_v
+        return left / amplitude
+
+    def jacobian(x: Floats) -> Floats:
+        t = turns(x)
+        steep = float(x[3]) * _at(slope, t) / float(x[0])
+        return np.column_stack([-steep * t, -steep, np.ones_like(t), _at(w, t) - 0.5]) / amplitude
+
+    first = [period, start, float(np.mean(drive_v)), float(np.ptp(drive_v))]
+    scales = [0.01 * nominal, 0.05 * nominal, amplitude, amplitude]
+    found = solve(residuals, first, ("period", "start", "middle", "amplitude"), scales, jacobian=jacobian)
+    x = found.values
+    relative = float(x[3]) / amplitude
+    departure = _averaged(turns(x), found.residuals) / max(abs(relative), 1e-9)
+    if abs(float(x[0]) / nominal - 1.0) > _CLOCKS:
+        raise Unphysical(
+            f"the recorded drive has a period of {x[0]:.6g} s, this scan {nominal:.6g} s; is time_s in seconds?"
+        )
+    if abs(relative - 1.0) > _REACH or abs(float(x[2]) - middle) > _REACH * amplitude:
+        raise Unphysical(
+            f"the recorded drive is {x[3]:.4g} V about {x[2]:.4g} V, this scan {amplitude:.4g} V about {middle:.4g} V; "
+            f"drive_v is the voltage at the piezo, behind the amplifier, of the axis that is named"
+        )
+    if departure > _CROOKED:
+        raise Unphysical(
+            f"the recorded drive departs from this scan's by {100.0 * departure:.2g} % rms; record the scan as it is "
+            f"built from this file"
+        )
+    t = turns(x)
+    _check_layer(line, t, -found.residuals / relative)
+    return Phase(t - delay_s / float(x[0]), float(x[0]), (relative, departure))
+
+
+def _check_times(time_s: Floats, period_s: float) -> None:
+    if len(time_s) < LEAST_SAMPLES:
+        raise Unphysical(f"{len(time_s)} samples are no trace; at least {LEAST_SAMPLES} a period are needed")
+    if not np.all(np.diff(time_s) > 0.0):
+        at = int(np.argmin(np.diff(time_s) > 0.0))
+        raise Unphysical(f"time does not ascend after {time_s[at]:g} s; a file holds one trace")
+    periods = float(time_s[-1] - time_s[0]) * (1.0 + 1.0 / (len(time_s) - 1)) / period_s
+    if periods < 0.99:
+        raise Unphysical(f"{periods:.3g} of a period of {period_s:.6g} s are recorded; record one or more, best five")
+    if len(time_s) < LEAST_SAMPLES * periods:
+        raise Unphysical(f"{len(time_s) / periods:.3g} samples a period are too few; {LEAST_SAMPLES} are needed")
+
+
+def _first_guess(series: FourierSeries, time_s: Floats, drive_v: Floats, nominal_s: float) -> tuple[float, float]:
+    """Period and a line start, from the angle of the fundamental in pieces of one nominal period each."""
+    if not float(np.ptp(drive_v)) > 0.0:
+        raise Unphysical("the drive does not move")
+    turns = (time_s - time_s[0]) / nominal_s
+    pieces = max(int(np.floor(turns[-1] + 0.02)), 1)
+    angles = []
+    for i in range(pieces):
+        inside = (turns >= i) & (turns < i + 1)
+        wave = np.exp(-2j * pi * turns[inside])
+        basis = np.column_stack([np.ones(len(wave)), wave.real, wave.imag])
+        c = np.linalg.lstsq(basis, drive_v[inside], rcond=None)[0]
+        angles.append(np.angle(c[1] + 1j * c[2]))  # of exp(2 pi i turns)
+    # Of cos(2 pi (turns + angle)): a clock that is off lets the angle grow.
+    angle = np.unwrap(angles) / (2.0 * pi)
+    growth = float(np.polyfit(np.arange(pieces) + 0.5, angle, 1)[0]) if pieces > 1 else 0.0
+    period = nominal_s / (1.0 + growth)
+    own = float(np.angle(series.a[0] - 1j * series.b[0])) / (2.0 * pi)
+    middle = float(np.mean(angle)) + growth * (0.0 - 0.5 * pieces)  # the angle at the first sample
+    return period, float(time_s[0]) - (middle - own) * period
+
+
+def _tabled(series: FourierSeries, derivative: int) -> Floats:
+    count = _GRID
+    spectrum = 0.5 * (series.a - 1j * series.b) * (2j * pi * np.arange(1, series.harmonics + 1)) ** derivative
+    whole = np.concatenate([[series.a0 if derivative == 0 else 0.0], spectrum])
+    values = np.fft.irfft(whole, count) * count
+    return np.append(values, values[0])
+
+
+def _at(table: Floats, turns: Floats) -> Floats:
+    place = (turns - np.floor(turns)) * _GRID
+    k = np.minimum(place.astype(np.int64), _GRID - 1)
+    value: Floats = table[k] + (place - k) * (table[k + 1] - table[k])
+    return value
+
+
+def _averaged(turns: Floats, left: Floats) -> float:
+    """Rms of what is left, averaged over the periods in pieces of one: without the noise of a reading."""
+    place = np.minimum(((turns - np.floor(turns)) * _BINS).astype(np.int64), _BINS - 1)
+    count = np.bincount(place, minlength=_BINS)
+    mean = np.bincount(place, left, minlength=_BINS)[count > 0] / count[count > 0]
+    return float(np.sqrt(np.mean(mean**2)))
+
+
+def _check_layer(line: LinePlan, turns: Floats, left: Floats) -> None:
+    """The drive has to have the layer of the file in it: a trace of an older build would be learnt twice."""
+    if line.layer is None:
+        return
+    low, high = line.band_limit.window
+    t, turn = turns - np.floor(turns), line.drive.turn
+    x = np.where(t < turn, t / turn, (1.0 - t) / (1.0 - turn))
+    inside = (x >= low) & (x <= high) & ((t < turn) | (line.band_limit.directions == "both"))
+    columns = np.column_stack(
+        # Offset, amplitude and start were fitted, and took a part of it.
+        [_at(_tabled(line.layer, 0), t), np.ones_like(t), *(_at(_tabled(line.series, n), t) for n in (0, 1))],
+    )[inside]
+    found, left_over, rank, _ = np.linalg.lstsq(columns, left[inside], rcond=None)
+    if rank < 4 or not len(left_over):
+        return
+    inverse = np.linalg.inv(columns.T @ columns)
+    error = float(np.sqrt(inverse[0, 0] * left_over[0] / max(len(columns) - 4, 1)))
+    if float(found[0]) < -_LACKS and error < 0.2 * _LACKS:
+        share = min(-float(found[0]), 1.0)
+        raise Unphysical(
+            f"the recorded drive lacks {ceil(100.0 * share - 0.5)} % of the layer that the scan file has; "
+            f"build, upload and record again"
+        )

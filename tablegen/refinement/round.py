@@ -1,0 +1,175 @@
+"""A round from a loaded scan and a trace to what goes into the scan file, and whether it should."""
+
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import msgspec
+import numpy as np
+
+from tablegen.calibration.estimate import Curve
+from tablegen.config.load import Setup
+from tablegen.config.schema import Refinement
+from tablegen.layer import model_digest
+from tablegen.numerics.arrays import Floats
+from tablegen.plan import LinePlan, make_plan
+from tablegen.problems import Unphysical
+from tablegen.refinement.bound import Bound, bound
+from tablegen.refinement.displacement import Displacement, fit_displacement
+from tablegen.refinement.learning import DEFAULT_GAIN, DEFAULT_HARMONICS, Lesson, learn
+from tablegen.refinement.phase import Phase, phase_by_drive, phase_by_trigger
+
+_FINISHED = 0.9  # of the residual: what is left is noise where a round would take less than the rest
+_SIZE = 0.01  # of the line, beyond which the size is worth a remark
+
+
+@dataclass(frozen=True)
+class Options:
+    """How to learn; ``harmonics`` None is as many as the bound allows, up to 16."""
+
+    gain: float = DEFAULT_GAIN
+    harmonics: int | None = None
+    period_s: float | None = None
+    delay_s: float = 0.0
+    settle_periods: int | None = None
+    drift_order: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Round:
+    """What one trace says. ``worse`` is why it must not be learnt from, if so; ``setup`` has the new layer in it."""
+
+    line: LinePlan
+    phase: Phase
+    displacement: Displacement
+    bound: Bound
+    lesson: Lesson
+    refinement: Refinement | None
+    setup: Setup
+    worse: str
+    remarks: tuple[str, ...]
+
+    @property
+    def curves(self) -> list[Curve]:
+        """Residual of each direction: measured, and as predicted with the new layer."""
+        before, after = self.lesson.before, self.lesson.after
+        curves = []
+        for side, x in before.points.by_side(before.points.position).items():
+            measured, predicted = (100.0 * d.points.by_side(d.error)[side] for d in (before, after))
+            thin = slice(None, None, 20)
+            title = f"residual {side}: measured (points), predicted (line)"
+            curves.append(Curve(title, "position", "% of line", (x[thin], measured[thin]), (x, predicted)))
+        return curves
+
+
+def refine(
+    setup: Setup,
+    axis: Literal["x", "y"],
+    time_s: Floats,
+    displacement_nm: Floats,
+    drive_v: Floats | None,
+    options: Options,
+) -> Round:
+    """Learn from a trace of the running scan: times ascending (s), displacement (nm), the drive at the piezo (V).
+
+    Without a drive time 0 is a line start, of y a frame start. Raises ``Rejected`` where the scan, or the scan with the
+    new layer, cannot be planned, and ``Unphysical`` for a trace that is not of this scan or that bounds forbid.
+    """
+    line: LinePlan = getattr(make_plan(setup), axis)
+    limits = _allowed(line, options)
+    if drive_v is None:
+        phase = phase_by_trigger(line, time_s, options.period_s, options.delay_s)
+    else:
+        phase = phase_by_drive(line, time_s, drive_v, options.delay_s)
+    measured = fit_displacement(
+        phase.turns, displacement_nm, line.target.harmonics, options.settle_periods, options.drift_order
+    )
+    lesson = learn(line, measured, options.gain, min(limits.used, measured.series.harmonics))
+    refinement, changed = None, setup
+    if lesson.layer.harmonics:
+        refinement = _refinement(setup, line, lesson)
+        changed = with_refinement(setup, axis, refinement)
+        make_plan(changed)  # what is written can be built
+    worse, remarks = _worse(setup, axis, lesson), _remarks(line, measured, lesson, phase)
+    return Round(line, phase, measured, limits, lesson, refinement, changed, worse, remarks)
+
+
+def _refinement(setup: Setup, line: LinePlan, lesson: Lesson) -> Refinement:
+    """The new layer, and the scan at which it was learnt."""
+    return Refinement(
+        a=lesson.layer.a.tolist(),
+        b=lesson.layer.b.tolist(),
+        v_amplitude=_short(line.drive.v_amplitude),
+        v_offset=_short(line.drive.v_offset),
+        rate_hz=_short(float(line.rate)),
+        turn=_short(line.drive.turn),
+        window=line.band_limit.window,
+        directions=line.band_limit.directions,
+        model=model_digest(setup, line.axis, line.drive),
+        before_percent=float(f"{lesson.before.rms_percent:.3g}"),
+    )
+
+
+def with_refinement(setup: Setup, axis: str, refinement: Refinement | None) -> Setup:
+    """The scan with another layer on one axis."""
+    changed: Any = msgspec.structs.replace(getattr(setup.scan, axis), refinement=refinement)
+    return replace(setup, scan=msgspec.structs.replace(setup.scan, **{axis: changed}))
+
+
+def _allowed(line: LinePlan, options: Options) -> Bound:
+    asked = options.harmonics
+    limits = bound(line, options.gain, min(DEFAULT_HARMONICS, line.target.harmonics) if asked is None else asked)
+    if asked is not None and asked > line.target.harmonics:
+        raise Unphysical(f"{asked} harmonics are more than the {line.target.harmonics} that the scan plays")
+    if limits.used == 0 or (asked is not None and asked > limits.harmonics):
+        fits = f"learn up to {limits.harmonics} harmonics" if limits.harmonics else "scan slower"
+        raise Unphysical(
+            f"at a gain of {options.gain:g} the error of harmonic {limits.harmonics + 1} might not shrink, if the "
+            f"dynamics of the scanner file are off by a quarter; {fits}, or lower the gain"
+        )
+    return limits
+
+
+def _worse(setup: Setup, axis: str, lesson: Lesson) -> str:
+    """Whether the layer that was played made things worse, against the trace before it."""
+    played: Refinement | None = getattr(setup.scan, axis).refinement
+    if played is None or played.before_percent is None:
+        return ""
+    before, now = played.before_percent, lesson.before.rms_percent
+    if np.hypot(1.05 * before, 3.0 * lesson.noise_percent) >= now:
+        return ""
+    return (
+        f"the residual grew from {before:.3g} % to {now:.3g} % rms since the last round: the loop does not converge, "
+        f"or the scanner has changed. Remove [{axis}.refinement] and begin again with a smaller --gain or fewer "
+        f"--harmonics, or learn from this trace all the same with --force"
+    )
+
+
+def _remarks(line: LinePlan, measured: Displacement, lesson: Lesson, phase: Phase) -> tuple[str, ...]:
+    found = []
+    size = abs(lesson.before.size_nm)
+    by = size / line.drive.size_nm - 1.0
+    if abs(by) > _SIZE:
+        found.append(
+            f"the line is {size:.5g} nm where the scan file asks for {line.drive.size_nm:.5g} nm "
+            f"({100.0 * by:+.2f} %); sizes are not learnt: calibrate {line.axis}.size, best before refining"
+        )
+    if lesson.before.size_nm < 0.0:
+        found.append("the displacement falls where the drive rises; its sign was turned")
+    if lesson.harmonics == 0:
+        found.append("nothing stands out of the sensor's noise: there is nothing more to learn from such a trace")
+    elif lesson.after.rms_percent > _FINISHED * lesson.before.rms_percent:
+        found.append("most of what is left is noise: record more periods, or leave it at that")
+    if measured.correlated > 3.0:
+        found.append(
+            f"residuals are alike over {measured.correlated:.0f} samples: a part is no noise but drift, hum or what "
+            f"the harmonics leave; errors were widened by {measured.correlated**0.5:.2g}"
+        )
+    if measured.periods < 1.99:
+        found.append("drift cannot be told from a single period; record several")
+    if phase.drive is None:
+        found.append("without drive_v nothing says that the trace is of this build")
+    return tuple(found)
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.6g}")

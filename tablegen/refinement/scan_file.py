@@ -1,0 +1,87 @@
+"""A layer into a scan file: one table in place, comments and order kept, a comment on which traces it came from."""
+
+import re
+import tomllib
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import tomlkit
+from tomlkit.items import Array, InlineTable, Table
+
+from tablegen.config.toml import parse_toml
+from tablegen.problems import Problem, Rejected
+
+KEY = "refinement"
+_PER_ROW = 6
+_MARK = re.compile(r"# refine (\d+): ")
+
+
+def with_layer(text: str, name: str, axis: str, values: Mapping[str, Any], provenance: str) -> str:
+    """The text with ``[AXIS.refinement]`` put in; ``name`` is what messages call it.
+
+    ``provenance`` becomes a line of the comment above the table, below those of earlier rounds, numbered. Raises
+    ``Rejected`` where the text is no TOML or cannot be edited in place.
+    """
+    parse_toml(text, name)
+    windows = "\r\n" in text
+    text = text.replace("\r\n", "\n")
+    expected = tomllib.loads(text)
+    expected[axis][KEY] = dict(values)
+    try:
+        changed = _put(text, name, axis, values)
+        at = parse_toml(changed, name)[1].line_of(f"{axis}.{KEY}") - 1
+        changed = _commented(changed, at, provenance)
+        kept = tomllib.loads(changed) == expected
+    except (Rejected, ValueError):  # what came out is no TOML
+        changed, kept = text, False
+    if not kept:
+        why = f"its layout is too unusual to be edited in place; write [{axis}] as a table of its own"
+        raise Rejected([Problem(name, 0, axis, why)])
+    return changed.replace("\n", "\r\n") if windows else changed
+
+
+def _put(text: str, name: str, axis: str, values: Mapping[str, Any]) -> str:
+    """The text with the values of the table, which may be there."""
+    document = tomlkit.parse(text)
+    parent: Any = document[axis]
+    if KEY in parent:
+        _update(parent[KEY], values)
+    elif isinstance(parent, InlineTable):
+        parent[KEY] = dict(values)
+    else:  # a new table by hand: comments above the next one are that one's, which tomlkit does not know
+        rows = text.split("\n")
+        lines = [line for key, line in parse_toml(text, name)[1].lines.items() if key.split(".")[0] == axis]
+        end = next((i for i in range(max(lines), len(rows)) if rows[i].startswith("[")), len(rows))
+        while end > max(lines) and (not rows[end - 1] or rows[end - 1].startswith("#")):
+            end -= 1
+        table = tomlkit.table()
+        _update(table, values)
+        header = f"[{axis}.{KEY}]\n{table.as_string()}".split("\n")
+        return "\n".join([*rows[:end], "", *header[:-1], *(rows[end:] if any(rows[end:]) else [""])])
+    return tomlkit.dumps(document)
+
+
+def _update(table: Any, values: Mapping[str, Any]) -> None:
+    for key in [key for key in table if key not in values]:
+        table.pop(key)
+    for key, value in values.items():
+        before: Any = table.item(key) if isinstance(table, Table) and key in table else None
+        table[key] = _rows(value) if key in ("a", "b") and isinstance(table, Table) else value
+        if before is not None and before.trivia.comment:
+            table.item(key).trivia.comment_ws = before.trivia.comment_ws
+
+
+def _rows(values: Sequence[float]) -> Array:
+    array = tomlkit.array()
+    for first in range(0, len(values), _PER_ROW):
+        array.add_line(*values[first : first + _PER_ROW], indent="    ")
+    array.add_line(indent="")
+    return array
+
+
+def _commented(text: str, at: int, provenance: str) -> str:
+    """The text with a line more in the comment above row ``at``, that of the table."""
+    rows = text.split("\n")
+    last = _MARK.match(rows[at - 1]) if at > 0 else None
+    rows.insert(at, f"# refine {int(last[1]) + 1 if last else 1}: {provenance}")
+    return "\n".join(rows)

@@ -1,0 +1,157 @@
+"""Scans that run on the virtual scanner under a sensor, and rounds of refining them; for tests and a benchmark."""
+
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import Any, Literal
+
+import msgspec
+import numpy as np
+from editing import SCAN, edited, write_pair
+
+from tablegen.config.load import Setup, load
+from tablegen.config.schema import Scanner
+from tablegen.plan import LinePlan, make_plan
+from tablegen.refinement.departure import Departure, departure
+from tablegen.refinement.displacement import Displacement
+from tablegen.refinement.round import Options, Round, refine
+from tablegen.virtual.laboratory import calibrate
+from tablegen.virtual.parameters import load_truth
+from tablegen.virtual.running import running_trace
+from tablegen.virtual.scanner import VirtualAxis, VirtualScanner
+from tablegen.virtual.sensor import Sensor
+from tablegen.virtual.simulation import run_line
+from tablegen.waveform.series import FourierSeries
+
+ROUNDS = 4
+NOISE = 0.002  # rms of a reading, of the line
+PERIODS, SAMPLES = 11.3, 5000  # of a trace, and a period
+FREE = ("- limits.max_scaling_error_percent", "- limits.max_error_lsb")
+
+
+@dataclass(frozen=True)
+class Scan:
+    """A scan of the benchmark: what differs from the example."""
+
+    name: str
+    axis: Literal["x", "y"]
+    edits: tuple[str, ...]
+
+
+def _x(volts: float) -> Scan:
+    return Scan(f"x, {volts:g} V at 100 Hz", "x", ("- x.size_nm", f"x.size_v = {volts}"))
+
+
+SCANS = (
+    *(_x(volts) for volts in (30.0, 60.0, 95.0)),
+    Scan("y, 60 V at 0.5 Hz, turn 0.95", "y", ("- y.size_nm", "y.size_v = 60.0", "timing.lines = 200")),
+)
+
+
+@cache
+def scanner() -> VirtualScanner:
+    """The default one."""
+    return VirtualScanner.of(load_truth())
+
+
+def scan_text(*edits: str) -> str:
+    """The example at 100 Hz, without limits."""
+    return edited(SCAN, "timing.line_rate_hz = 100.0", "timing.lines = 20", *FREE, *edits)
+
+
+def setup_of(*edits: str) -> Setup:
+    """That scan, loaded, with edits."""
+    with tempfile.TemporaryDirectory() as folder:
+        return load(write_pair(Path(folder), scan_text(*edits)))
+
+
+@cache
+def _calibrated() -> Scanner:
+    """The virtual scanner from its own simulated data: x at 100 Hz, y at 0.5 Hz."""
+    return calibrate(setup_of("timing.lines = 200"), scanner()).setup.scanner
+
+
+def calibrated(scan: Scan) -> Setup:
+    """A scan on the virtual scanner as it was calibrated."""
+    return replace(setup_of(*scan.edits), scanner=_calibrated())
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """A scan as it stands after some rounds: its true errors, those by the extremes, and what refining it says."""
+
+    setup: Setup
+    line: LinePlan
+    true: Departure
+    by_extremes: dict[str, float]
+    round: Round | None
+
+
+def period(nanometres: np.ndarray) -> Displacement:
+    """One noiseless period at every tick, as if it had been measured."""
+    count = len(nanometres)
+    c = np.fft.rfft(nanometres) / count
+    few = min(512, count // 2 - 1)
+    series = FourierSeries(float(c[0].real), 2.0 * c[1 : few + 1].real, -2.0 * c[1 : few + 1].imag)
+    return Displacement(series, np.zeros((2 * few + 1,) * 2), 0.0, 0.0, 1.0, 1.0, count, 0)
+
+
+def play(setup: Setup, name: Literal["x", "y"], axis: VirtualAxis) -> Step:
+    """The true errors of the emitted integers, settled."""
+    line: LinePlan = getattr(make_plan(setup), name)
+    run = run_line(line, axis)
+    extremes = {side: max(map(abs, getattr(run.error, side).residual_range)) for side in ("forward", "backward")}
+    return Step(setup, line, departure(line, period(run.displacement_nm)), extremes, None)
+
+
+def sensed(line: LinePlan, axis: VirtualAxis, seed: int, **others: Any) -> dict[str, np.ndarray]:
+    """A trace with the sensor's noise, in mid-line from the start, by another clock and with drift."""
+    size = line.drive.size_nm
+    sensor = Sensor(NOISE * size, 0.002 * size * float(line.rate), seed)
+    return running_trace(line, axis, **{"periods": PERIODS, "samples": SAMPLES, **others}, sensor=sensor, start=0.37)
+
+
+def learnt(step: Step, axis: VirtualAxis, seed: int, options: Options | None = None, **others: Any) -> Round:
+    """A round on a trace of a scan as it stands."""
+    found = sensed(step.line, axis, seed, **{"clock": 5e-4, **others})
+    columns = found["time_s"], found["displacement_nm"], found["drive_v"]
+    return refine(step.setup, step.line.axis, *columns, options or Options())
+
+
+def rounds(setup: Setup, name: Literal["x", "y"], count: int, options: Options | None = None) -> Iterator[Step]:
+    """The scan before the first round and after each of ``count``."""
+    axis: VirtualAxis = getattr(scanner(), name)
+    for seed in range(count + 1):
+        step = play(setup, name, axis)
+        if seed == count:
+            yield step
+            return
+        found = learnt(step, axis, seed, options)
+        yield replace(step, round=found)
+        setup = found.setup
+
+
+def elsewhere() -> Iterator[tuple[str, Step, Step]]:
+    """A layer at 60 V as learnt, and at the edges of what it serves; beside it the same scan without."""
+    *_, last = rounds(calibrated(SCANS[1]), "x", 3)
+    layer = last.setup.scan.x.refinement
+    edges: tuple[tuple[str, dict[str, Any], dict[str, Any]], ...] = (
+        ("as learnt, 60 V", {}, {}),
+        ("amplitude + 5 %", {"size_v": 62.9}, {}),
+        ("amplitude - 5 %", {"size_v": 57.1}, {}),
+        ("offset + 5 % of v_max", {"offset_v": 54.9}, {}),
+        ("offset - 5 % of v_max", {"offset_v": 45.1}, {}),
+        ("rate + 20 %", {}, {"line_rate_hz": 119.0}),
+        ("rate - 20 %", {}, {"line_rate_hz": 81.0}),
+        ("turn + 0.02", {"turn": 0.52}, {}),
+    )
+    for what, axis, timing in edges:
+        both = []
+        for kept in (layer, None):
+            scan = last.setup.scan
+            x = msgspec.structs.replace(scan.x, refinement=kept, **axis)
+            changed = msgspec.structs.replace(scan, x=x, timing=msgspec.structs.replace(scan.timing, **timing))
+            both.append(play(replace(last.setup, scan=changed), "x", scanner().x))
+        yield what, both[0], both[1]

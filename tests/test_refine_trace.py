@@ -1,0 +1,167 @@
+"""A trace of the running scan: its phase from drive or trigger, a period of it with errors, and what is none."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from editing import SCANNER, write_pair
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from refining import scan_text
+
+from tablegen.config.load import load
+from tablegen.plan import LinePlan, make_plan
+from tablegen.problems import Unphysical
+from tablegen.refinement.displacement import fit_displacement
+from tablegen.refinement.phase import phase_by_drive, phase_by_trigger
+from tablegen.waveform.series import FourierSeries
+
+LAYER = """+ [x.refinement]
+a = [0.004, -0.001]
+b = [0.002, 0.001]
+v_amplitude = 20.0
+v_offset = 50.0
+rate_hz = 100.0
+turn = 0.5
+window = [0.1, 0.9]
+directions = "both"
+"""
+
+
+def line_of(folder: Path, *edits: str) -> LinePlan:
+    return make_plan(load(write_pair(folder, scan_text(*edits), SCANNER))).x
+
+
+@pytest.fixture(scope="module")
+def line(tmp_path_factory: pytest.TempPathFactory) -> LinePlan:
+    return line_of(tmp_path_factory.mktemp("line"))
+
+
+def drive(line: LinePlan, turns: np.ndarray) -> np.ndarray:
+    """The waveform that is played, term by term."""
+    n = np.arange(1, line.series.harmonics + 1)
+    angle = 2.0 * np.pi * np.outer(turns, n)
+    w = line.series.a0 + np.cos(angle) @ line.series.a + np.sin(angle) @ line.series.b
+    return line.drive.v_offset + line.drive.v_amplitude * (w - 0.5)
+
+
+@given(
+    start=st.floats(0.0, 0.999),
+    clock=st.floats(-2e-3, 2e-3),
+    periods=st.floats(1.05, 12.0),
+    samples=st.floats(50.0, 400.0),
+    noise=st.floats(0.0, 0.005),
+    late=st.floats(-0.01, 0.01),
+    seed=st.integers(0, 99),
+)
+@settings(max_examples=40, deadline=None)
+def test_the_drive_says_when_each_sample_was_taken(
+    line: LinePlan, start: float, clock: float, periods: float, samples: float, noise: float, late: float, seed: int
+) -> None:
+    turns = start + np.arange(int(periods * samples) + 1) / samples
+    time = 17.3 + turns * 0.01 * (1.0 + clock)
+    readings = drive(line, turns) + noise * 20.0 * np.random.default_rng(seed).standard_normal(len(turns))
+    found = phase_by_drive(line, time, readings, late * 0.01)
+    # Five standard errors of a phase: the noise over the slope of the drive, 2 a period.
+    error = 5.0 * noise / 2.0 / np.sqrt(len(turns)) * 2.0 + 1e-7
+    off = found.turns - turns + late / (1.0 + clock)
+    assert np.max(np.abs(off - np.rint(np.mean(off)))) < error
+    assert found.period_s == pytest.approx(0.01 * (1.0 + clock), rel=2.0 * error / periods)
+    assert found.drive is not None
+    assert found.drive[0] == pytest.approx(1.0, abs=0.01)
+    assert found.drive[1] < noise + 1e-6
+
+
+def test_a_trigger_is_a_line_start(line: LinePlan) -> None:
+    time = np.arange(500) * 1e-4
+    assert phase_by_trigger(line, time, None, 0.0).turns == pytest.approx(time / 0.01)
+    assert phase_by_trigger(line, time, 0.0101, 2e-4).turns == pytest.approx((time - 2e-4) / 0.0101)
+
+
+def wrong(line: LinePlan, time: np.ndarray, volts: np.ndarray) -> str:
+    with pytest.raises(Unphysical) as caught:
+        phase_by_drive(line, time, volts, 0.0)
+    return str(caught.value)
+
+
+def test_a_drive_of_something_else_is_refused(line: LinePlan) -> None:
+    turns = np.arange(1000) / 200
+    time, volts = turns * 0.01, drive(line, turns)
+    assert "20 V about 50 V" in wrong(line, time, 0.1 * (volts - 50.0))
+    assert "behind the amplifier" in wrong(line, time, volts + 3.0)
+    assert "has a period of 0.0103 s, this scan 0.01 s" in wrong(line, time * 1.03, volts)
+    triangle = 50.0 + 20.0 * (2.0 * np.abs(turns % 1.0 - 0.5) - 0.5)
+    assert re.search(r"departs from this scan's by .* % rms", wrong(line, time, 100.0 - triangle))
+    assert "the drive does not move" in wrong(line, time, np.full(1000, 50.0))
+    assert "time does not ascend after 0.0499" in wrong(line, np.minimum(time, time[-2]), volts)
+    assert "0.5 of a period of 0.01 s are recorded" in wrong(line, time[:100], volts[:100])
+    assert "20 samples a period are too few" in wrong(line, time[::10], volts[::10])
+    assert "39 samples are no trace" in wrong(line, time[:39], volts[:39])
+
+
+def test_a_trace_of_the_build_before_is_refused(line: LinePlan, tmp_path: Path) -> None:
+    """It lacks the layer that the file has by now; with noise, and without being fooled by noise."""
+    turns = 0.2 + np.arange(4000) / 500
+    noise = 0.02 * np.random.default_rng(1).standard_normal(len(turns))
+    later = line_of(tmp_path, LAYER)
+    assert re.search("lacks (9.|100) % of the layer", wrong(later, turns * 0.01, drive(line, turns) + noise))
+    phase_by_drive(later, turns * 0.01, drive(later, turns) + noise, 0.0)
+    loud = np.random.default_rng(2).standard_normal(len(turns)) * 0.1
+    phase_by_drive(later, turns * 0.01, drive(later, turns) + loud, 0.0)
+
+
+def series(seed: int, harmonics: int) -> FourierSeries:
+    generator = np.random.default_rng(seed)
+    falling = 1.0 / np.arange(1, harmonics + 1) ** 2
+    return FourierSeries(
+        300.0,
+        100.0 * falling * generator.standard_normal(harmonics),
+        100.0 * falling * generator.standard_normal(harmonics),
+    )
+
+
+@given(st.integers(0, 999), st.floats(2.1, 8.0), st.floats(60.0, 300.0), st.floats(-3.0, 3.0))
+@settings(max_examples=30, deadline=None)
+def test_a_period_comes_back_through_drift(seed: int, periods: float, samples: float, drift: float) -> None:
+    truth = series(seed, 12)
+    turns = 0.3 + np.arange(int(periods * samples)) / samples
+    found = fit_displacement(turns, truth.value(turns) + drift * turns, 16, settle_periods=0)
+    assert found.series.a[:12] == pytest.approx(truth.a, abs=1e-6)
+    assert found.series.b[:12] == pytest.approx(truth.b, abs=1e-6)
+    assert found.drift_nm == pytest.approx(abs(drift) * float(turns[-1] - turns[0]), abs=1e-6)
+    assert found.noise_nm < 1e-6
+
+
+def test_covariances_are_those_of_many_traces() -> None:
+    truth, sigma = series(3, 8), 0.7
+    turns = 0.1 + np.arange(1000) / 190
+    generator = np.random.default_rng(5)
+    found = [
+        fit_displacement(turns, truth.value(turns) + sigma * generator.standard_normal(1000), 8) for _ in range(300)
+    ]
+    c = np.array([[one.series.a0, *one.series.a, *one.series.b] for one in found])
+    expected = np.mean([np.diag(one.covariance) for one in found], axis=0)
+    assert np.var(c, axis=0) == pytest.approx(expected, rel=0.35)
+    assert np.mean([one.noise_nm for one in found]) == pytest.approx(sigma, rel=0.02)
+    assert {one.left_out for one in found} == {190}
+
+
+def test_hum_widens_the_errors() -> None:
+    turns = np.arange(2000) / 200
+    hum = 0.5 * np.sin(2.0 * np.pi * 3.37 * turns)
+    found = fit_displacement(turns, series(1, 8).value(turns) + hum, 8)
+    assert found.correlated > 3.0
+    white = 2.0 * found.noise_nm**2 / found.samples
+    assert found.covariance[1, 1] == pytest.approx(found.correlated * white, rel=0.2)
+
+
+def test_too_little_of_a_displacement() -> None:
+    turns = np.arange(200) / 100
+    with pytest.raises(Unphysical, match="does not move"):
+        fit_displacement(turns, np.ones(200), 8)
+    with pytest.raises(Unphysical, match="2 periods are recorded, and 2 to settle leave no whole one"):
+        fit_displacement(turns, turns, 8, settle_periods=2)
+    uneven = np.concatenate([np.linspace(0.0, 0.2, 150), [1.1]])
+    with pytest.raises(Unphysical, match="do not determine"):
+        fit_displacement(uneven, np.sin(uneven), 30)
