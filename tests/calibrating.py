@@ -7,12 +7,14 @@ truth lies within two standard errors.
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from math import cos, exp, log10, pi, sin, tan
+from typing import Any
 
 import numpy as np
 
 from tablegen.calibration.estimate import Estimate
 from tablegen.calibration.frequency import fit_frequency
-from tablegen.calibration.hysteresis import Trace, fit_hysteresis
+from tablegen.calibration.hysteresis import HysteresisFit, Trace, fit_hysteresis
+from tablegen.calibration.images import Pair, fit_images
 from tablegen.calibration.offset import fit_offset
 from tablegen.calibration.resonance import fit_resonance
 from tablegen.calibration.size import fit_size
@@ -92,6 +94,22 @@ class Scanner:
         volts = 50.0 + v_scan * (drive - 0.5 + noise[1])
         return Trace(f"{v_scan:g} V", time, volts, 3.0 + self.sign * 10.0 * v_scan * (moved + noise[0]))
 
+    def images(self, v_scan: float, sample: "Sample", noise: float, random: np.random.Generator) -> Pair:
+        """Trace and retrace of a sample, left on the left; ``noise`` rms of the heights' peak to peak."""
+        low, high = sample.window
+        place = low + (high - low) * (np.arange(sample.pixels) + 0.5) / sample.pixels
+        laws = [branch(grown(v_scan, beta_max, rho), u) for beta_max, rho, u in (self.forward, self.backward)]
+        lines = np.arange(sample.lines)[:, None]
+        shown = []
+        for x, within in (
+            (inverse(laws[0], place), self.turn * place),
+            (1.0 - inverse(laws[1], 1.0 - place), self.turn + (1.0 - self.turn) * (1.0 - place)),
+        ):
+            frame = (lines + sample.lag * within) / sample.lines
+            heights = sample.height(v_scan / V_MAX * (x + sample.drift * frame**2), v_scan / V_MAX * frame)
+            shown.append(heights + noise * float(np.ptp(heights)) * random.standard_normal(heights.shape))
+        return Pair(f"{v_scan:g} V", v_scan, shown[0], shown[1])
+
     def _triangle(self, time: Floats) -> Floats:
         phase = (time / self.period_s + self.begins) % 1.0
         return np.where(phase <= self.turn, phase / self.turn, (1.0 - phase) / (1.0 - self.turn))
@@ -102,6 +120,42 @@ class Scanner:
         laws = [branch(grown(v_scan, beta_max, rho), u) for beta_max, rho, u in (self.forward, self.backward)]
         # The backward branch is the forward one turned by half a turn: it begins where drive and position are 1.
         return np.where(rising, inverse(laws[0], drive), 1.0 - inverse(laws[1], 1.0 - drive))
+
+
+@dataclass(frozen=True)
+class Sample:
+    """A periodic sample: of each wave its periods in a line of 100 V, angle in degrees, height, and phase in turns.
+
+    ``lag`` is 1 for a slow axis that ramps and 0 for one that steps; ``drift`` of the line, quadratic in the frame.
+    """
+
+    waves: tuple[tuple[float, float, float, float], ...]
+    pixels: int = 256
+    lines: int = 256
+    window: tuple[float, float] = (0.0, 1.0)
+    lag: float = 1.0
+    drift: float = 0.0
+
+    def height(self, x: Floats, y: Floats) -> Floats:
+        """At x and y in lines of 100 V."""
+        total = np.zeros(np.broadcast(x, y).shape)
+        for periods, angle, size, begins in self.waves:
+            a = angle * pi / 180.0
+            total = total + size * np.sin(2.0 * pi * (periods * (x * cos(a) + y * sin(a)) + begins))
+        return total
+
+
+def grating(periods: float = 14.3, angle: float = 3.0, begins: float = 0.2, **options: Any) -> Sample:
+    """Bars that are no sine wave: three harmonics."""
+    sizes = ((1.0, 0.0), (0.3, 0.1), (0.15, 0.3))
+    waves = tuple((n * periods, angle, size, n * begins + more) for n, (size, more) in enumerate(sizes, 1))
+    return Sample(waves, **options)
+
+
+def lattice(periods: float = 14.3, angle: float = 7.0, **options: Any) -> Sample:
+    """Hexagonal, with waves of different heights."""
+    waves = tuple((periods, angle + 60.0 * n, 1.0 - 0.1 * n, 0.3 * n) for n in range(3))
+    return Sample(waves, **options)
 
 
 def offset_case(random: np.random.Generator, noise: float) -> Found:
@@ -136,7 +190,11 @@ def resonance_case(random: np.random.Generator, noise: float) -> Found:
 def hysteresis_case(random: np.random.Generator, noise: float) -> Found:
     scanner = Scanner()
     traces = [scanner.trace(v, noise=noise * random.standard_normal((2, 1000))) for v in AMPLITUDES]
-    (fit,) = fit_hysteresis(traces, V_MAX).branches
+    return _branches(scanner, fit_hysteresis(traces, V_MAX))
+
+
+def _branches(scanner: Scanner, found: HysteresisFit) -> Found:
+    (fit,) = found.branches
     return {
         f"{side}.{name}": (getattr(getattr(fit, side), name), truth)
         for side, truths in (("forward", scanner.forward), ("backward", scanner.backward))
@@ -144,10 +202,19 @@ def hysteresis_case(random: np.random.Generator, noise: float) -> Found:
     }
 
 
+def images_case(random: np.random.Generator, noise: float) -> Found:
+    """A grating as it comes to lie; noise of 5 % where a sensor has 0.2 %."""
+    scanner = Scanner()
+    sample = grating(random.uniform(11.0, 20.0), random.uniform(-6.0, 6.0), random.uniform())
+    pairs = [scanner.images(v, sample, 25.0 * noise, random) for v in AMPLITUDES]
+    return _branches(scanner, fit_images(pairs, V_MAX))
+
+
 CASES: dict[str, Case] = {
     "offset": offset_case,
     "size": size_case,
     "hysteresis": hysteresis_case,
+    "images": images_case,
     "frequency": frequency_case,
     "resonance": resonance_case,
 }

@@ -176,6 +176,58 @@ def test_the_base_and_the_reference_of_the_file_are_kept(lab: Path) -> None:
     assert "at base_nm = 250" in calibrate("size", "--base-nm", "250").out
 
 
+def test_the_size_law_of_the_file_makes_offsets_exact(lab: Path) -> None:
+    """m of a drive, from images at 13 V; without the law it is what the images show."""
+    plain, exact = (
+        json.loads(
+            run("calibrate", "offset", "--axis", "x", "offset.csv", "--scanner", "scanner.toml", "--json", *extra).out
+        )
+        for extra in ((), ("--size-v", "13"))
+    )
+    shown, m = (one["parameters"]["m_plus"]["value"] for one in (plain, exact))
+    # beta = 0.53 of the file: R(V) / R(V / m) is what the object looks like.
+    v = 0.13
+    assert shown == pytest.approx(m * (1.0 + 0.53 * v) / (1.0 + 0.53 * v / m), rel=2e-3)
+    assert m < shown - 0.008
+    missing = run("calibrate", "offset", "--axis", "x", "offset.csv", "--v-max", "100", "--size-v", "13")
+    assert (missing.status, "calibrate the size first" in missing.err) == (2, True)
+    large = run("calibrate", "offset", "--axis", "x", "offset.csv", "--scanner", "scanner.toml", "--size-v", "130")
+    assert (large.status, "above v_max" in large.err) == (2, True)
+
+
+def test_points_stand_in_for_the_law_and_back(lab: Path) -> None:
+    """As measured at each amplitude; the file builds, and keeps all else; another calibration takes them out again."""
+    before = (lab / "scanner.toml").read_text("utf-8")
+    law = ("calibrate", "hysteresis", "--axis", "x", *TRACES, "--scanner", "scanner.toml", "--write")
+    fit = json.loads(run(*law, "--points", "--json").out)
+    text = (lab / "scanner.toml").read_text("utf-8")
+    branch = tomllib.loads(text)["x"]["hysteresis"]["branches"][0]
+    for side in ("forward", "backward"):
+        assert list(branch[side]) == ["points"]
+        for point, trace in zip(branch[side]["points"], fit["branches"][0]["traces"], strict=True):
+            assert point["size_v"] == pytest.approx(trace["v_scan"], rel=1e-4)
+            assert point["beta"] == pytest.approx(trace[side]["beta"]["value"], rel=1e-3)
+            assert point["u_peak"] == pytest.approx(trace[side]["u_peak"]["value"], rel=1e-3)
+    for line in before.splitlines():
+        if not line.startswith(("forward", "backward")):
+            assert line in text.splitlines()
+    assert run("check", "scan.toml").status == 0
+    assert run(*law, "--points").err == ""
+    assert (lab / "scanner.toml").read_text("utf-8") == text
+    assert run(*law).status == 0
+    back = tomllib.loads((lab / "scanner.toml").read_text("utf-8"))["x"]["hysteresis"]["branches"][0]
+    assert {*back["forward"]} == {*back["backward"]} == {"beta_max", "rho", "u_peak"}
+    assert run("check", "scan.toml").status == 0
+
+
+def test_the_same_amplitude_twice_makes_no_points(lab: Path) -> None:
+    before = (lab / "scanner.toml").read_bytes()
+    twice = [TRACES[0], TRACES[0], *TRACES[1:]]
+    outcome = run("calibrate", "hysteresis", "--axis", "x", *twice, "--scanner", "scanner.toml", "--write", "--points")
+    assert (outcome.status, "measured twice" in outcome.err) == (2, True)
+    assert (lab / "scanner.toml").read_bytes() == before
+
+
 def test_volts_and_lattice_constants_do_as_well(lab: Path) -> None:
     sizes = actual(DRIVES, 11.0, 0.6, 0.5, 200.0)
     write_csv(lab / "v.csv", drive_v=DRIVES, actual_um=sizes / 1000.0)

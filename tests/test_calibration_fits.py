@@ -15,7 +15,7 @@ from tablegen.compensation.offset import OffsetLaw
 from tablegen.compensation.size import SizeLaw
 from tablegen.problems import Unphysical
 
-FAST = {"offset": 400, "size": 100, "hysteresis": 50, "frequency": 300, "resonance": 50}
+FAST = {"offset": 400, "size": 100, "hysteresis": 50, "images": 10, "frequency": 300, "resonance": 50}
 COVERED = 0.9545  # by two standard errors, as they are defined
 
 
@@ -42,9 +42,11 @@ def test_standard_errors_are_neither_too_small_nor_too_large(kind: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", CASES)
 def test_the_truth_lies_within_two_errors_in_95_of_100(kind: str) -> None:
-    """Of 1,000 trials a share of 95.45 % is measured to 0.66 %: three times of that are allowed."""
-    for name, found in distances(kind, 1000).items():
-        assert 0.9347 <= np.mean(np.abs(found) <= 2.0) <= 0.975, name
+    """Of 1,000 trials a share of 95.45 % is measured to 0.66 %: three times of that are allowed. Images take longer."""
+    count = 300 if kind == "images" else 1000
+    allowed = 3.0 * sqrt(COVERED * (1.0 - COVERED) / count)
+    for name, found in distances(kind, count).items():
+        assert COVERED - allowed <= np.mean(np.abs(found) <= 2.0) <= COVERED + allowed, name
 
 
 # offset

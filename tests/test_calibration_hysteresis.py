@@ -8,10 +8,11 @@ from calibrating import AMPLITUDES, V_MAX, Scanner, branch, grown
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tablegen.calibration.branch import MeasuredBranch, peak
 from tablegen.calibration.estimate import Estimate
 from tablegen.calibration.growth import fit_growth
 from tablegen.calibration.hysteresis import Trace, fit_hysteresis
-from tablegen.calibration.trace import MeasuredBranch, TraceFit, correlation_length, fit_trace, peak
+from tablegen.calibration.trace import TraceFit, correlation_length, fit_trace
 from tablegen.calibration.triangle import find_triangle
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.problems import Unphysical

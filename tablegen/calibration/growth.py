@@ -7,9 +7,9 @@ from math import expm1, sqrt
 import numpy as np
 from scipy.special import chdtrc
 
+from tablegen.calibration.branch import MeasuredBranch
 from tablegen.calibration.estimate import Estimate
 from tablegen.calibration.least_squares import few_points, solve
-from tablegen.calibration.trace import MeasuredBranch
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 
@@ -103,7 +103,7 @@ def _peak(branches: Sequence[MeasuredBranch], beta: Floats, error: Floats, remar
     what = f"u_peak differs from amplitude to amplitude, {low:.3g} to {high:.3g}, where the scanner file has one,"
     variance = _variance(left, len(seen) - 1, what, remarks)
     if variance > 1.0:
-        remarks[-1] += "; where it matters leave out amplitudes that you do not scan with"
+        remarks[-1] += "; --points writes it as measured, or leave out amplitudes that you do not scan with"
     return Estimate(mean, sqrt(variance / float(np.sum(weight))))
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tablegen.calibration.branch import AmplitudeFit
 from tablegen.calibration.estimate import Curve, Estimate, Fit
 from tablegen.calibration.growth import Growth, fit_growth
 from tablegen.calibration.trace import TraceFit, fit_trace
@@ -30,12 +31,12 @@ class Trace:
 
 @dataclass(frozen=True)
 class TurnFit:
-    """Both directions at one turning point, and the traces that they rest on, by ascending amplitude."""
+    """Both directions at one turning point, and the traces or image pairs that they rest on, by ascending amplitude."""
 
     turn: Estimate
     forward: Growth
     backward: Growth
-    traces: tuple[TraceFit, ...]
+    traces: tuple[AmplitudeFit, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,9 +73,15 @@ def fit_hysteresis(
             raise Unphysical(f"{trace.name}: {reason}" if trace.name else str(reason)) from None
         fits.append(fit)
         remarks += [f"{trace.name}: {text}" if trace.name else text for text in _remarks(fit)]
-    groups: list[list[TraceFit]] = []
-    for fit in sorted(fits, key=lambda fit: fit.triangle.turn):
-        if groups and fit.triangle.turn - groups[-1][0].triangle.turn < SAME_TURN:
+    return combined(fits, v_max, rho, remarks)
+
+
+def combined(fits: Sequence[AmplitudeFit], v_max: float, rho: float, remarks: Sequence[str]) -> HysteresisFit:
+    """Amplitudes in any order -> (22) at each turn; remarks of the single ones come first. Raises ``Unphysical``."""
+    remarks = list(remarks)
+    groups: list[list[AmplitudeFit]] = []
+    for fit in sorted(fits, key=lambda fit: fit.turn.value):
+        if groups and fit.turn.value - groups[-1][0].turn.value < SAME_TURN:
             groups[-1].append(fit)
         else:
             groups.append([fit])
@@ -82,8 +89,8 @@ def fit_hysteresis(
     for group in groups:
         group.sort(key=lambda fit: fit.v_scan)
         v = np.array([fit.v_scan / v_max for fit in group])
-        turn = float(np.mean([fit.triangle.turn for fit in group]))
-        spread = float(np.sqrt(np.sum([fit.triangle.timing_covariance[2, 2] for fit in group])) / len(group))
+        turn = float(np.mean([fit.turn.value for fit in group]))
+        spread = float(np.sqrt(np.sum([fit.turn.standard_error**2 for fit in group])) / len(group))
         sides = []
         for name in ("forward", "backward"):
             try:
@@ -139,10 +146,10 @@ def _remarks(fit: TraceFit) -> list[str]:
 
 def _curves(branches: Sequence[TurnFit], v_max: float) -> list[Curve]:
     """Of each turn the residual at the largest amplitude, figure 5a, and its growth, figure 5k."""
-    curves = []
+    curves: list[Curve] = []
     line = np.linspace(0.0, 1.0, 101)
     for branch in branches:
-        curves.append(branch.traces[-1].curve)
+        curves += branch.traces[-1].curves
         for name in ("forward", "backward"):
             growth: Growth = getattr(branch, name)
             v = np.array([fit.v_scan for fit in branch.traces])

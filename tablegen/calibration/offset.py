@@ -8,6 +8,7 @@ from tablegen.calibration.estimate import Curve, Estimate, Fit
 from tablegen.calibration.least_squares import Solution, solve
 from tablegen.calibration.outliers import outliers
 from tablegen.compensation.offset import OffsetLaw, normalised_offset
+from tablegen.compensation.size import SizeLaw
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 
@@ -24,10 +25,14 @@ class OffsetFit(Fit):
     centre_nm: Estimate
 
 
-def fit_offset(offset_v: Floats, apparent_nm: Floats, v_max: float) -> OffsetFit:
+def fit_offset(
+    offset_v: Floats, apparent_nm: Floats, v_max: float, size_law: SizeLaw | None = None, size_v: float | None = None
+) -> OffsetFit:
     """The law of (1) through apparent sizes (nm, of one object, or lattice constants) at three or more offsets (V).
 
-    Least squares, the same as ``OffsetLaw.fit``; exact for three different offsets. Raises ``Unphysical``.
+    Least squares; exact for three different offsets. m multiplies the drive, and a drive that is m times as large makes
+    the scan more than m times as large, (6): with the size law and ``size_v``, the scan voltage of the images, apparent
+    sizes are R(V) / R(V / m). Without, they are taken for m itself, as ``OffsetLaw.fit`` does. Raises ``Unphysical``.
     """
     outside = (offset_v < 0.0) | (offset_v > v_max)
     if outside.any():
@@ -39,24 +44,39 @@ def fit_offset(offset_v: Floats, apparent_nm: Floats, v_max: float) -> OffsetFit
     factors = np.array([law.factor(one) for one in p.tolist()])
     start = [law.factor(-1.0), law.factor(1.0), float(np.mean(apparent_nm) / np.mean(factors))]
 
+    def looks(m: Floats) -> Floats:
+        """Apparent size, relative to that at m = 1."""
+        if size_law is None or size_v is None:
+            return m
+        v = size_v / v_max
+        return size_law.size_nm(v) / np.array([size_law.size_nm(v / one) for one in np.maximum(m, 0.1).tolist()])
+
     def residuals(x: Floats) -> Floats:
-        left: Floats = (x[2] * (shape @ np.array([1.0, x[0], x[1]])) - apparent_nm) / scale
+        left: Floats = (x[2] * looks(shape @ np.array([1.0, x[0], x[1]])) - apparent_nm) / scale
         return left
 
     scale = float(np.mean(apparent_nm))
     solution = solve(residuals, start, _NAMES, [0.5, 0.5, scale])
     centre = float(solution.values[2])
-    expected = centre * (shape @ np.array([1.0, *solution.values[:2]]))
+    expected = centre * looks(shape @ np.array([1.0, *solution.values[:2]]))
     found = outliers(solution.jacobian, solution.residuals, _LEAST_SPREAD)
     line = np.linspace(0.0, v_max, 101)
-    curve = _shape(2.0 * line / v_max - 1.0) @ np.array([1.0, *solution.values[:2]])
+    curve = looks(_shape(2.0 * line / v_max - 1.0) @ np.array([1.0, *solution.values[:2]]))
     return OffsetFit(
         points=len(p),
         residual_percent=100.0 * (apparent_nm / expected - 1.0),
         before_percent=float(np.max(np.abs(100.0 * (apparent_nm / centre - 1.0)))),
         remarks=tuple(_remarks(p, solution)),
         outliers=found,
-        curves=(Curve("amplitude factor", "offset [V]", "m", (offset_v, apparent_nm / centre), (line, curve)),),
+        curves=(
+            Curve(
+                "apparent size, relative",
+                "offset [V]",
+                "size / that at v_max / 2",
+                (offset_v, apparent_nm / centre),
+                (line, curve),
+            ),
+        ),
         m_minus=solution.estimate("m_minus"),
         m_plus=solution.estimate("m_plus"),
         centre_nm=solution.estimate("centre_nm"),

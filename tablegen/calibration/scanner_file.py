@@ -106,10 +106,25 @@ def _put_branches(table: Any, branches: Sequence[Mapping[str, Any]]) -> None:
             if not isinstance(value, Mapping):
                 _set(entry, key, value)
                 continue
-            if not isinstance(entry.get(key), Mapping):
+            # The two ways of a branch exclude each other.
+            old = {"beta_max", "rho", "u_peak"} if "points" in value else {"points"}
+            present = entry.get(key)
+            if not isinstance(present, Mapping) or (isinstance(present, InlineTable) and old & {*present}):
                 entry[key] = tomlkit.inline_table()
+            for other in old:
+                entry[key].pop(other, None)
             for inner_key, inner in value.items():
-                _set(entry[key], inner_key, inner)
+                _set(entry[key], inner_key, _points(inner) if inner_key == "points" else inner)
+
+
+def _points(rows: Sequence[Mapping[str, Any]]) -> Any:
+    """A row a line."""
+    array = tomlkit.array()
+    for row in rows:
+        table = tomlkit.inline_table()
+        table.update(row)
+        array.append(table)
+    return array.multiline(True)
 
 
 def _set(table: Any, key: str, value: Any) -> None:

@@ -4,14 +4,18 @@ from collections.abc import Sequence
 from math import isfinite
 from typing import Any
 
+from tablegen.calibration.branch import AmplitudeFit
 from tablegen.calibration.estimate import Estimate, Fit
 from tablegen.calibration.frequency import FrequencyFit
 from tablegen.calibration.hysteresis import HysteresisFit, TurnFit
+from tablegen.calibration.image_fit import ImageFit
 from tablegen.calibration.offset import OffsetFit
+from tablegen.calibration.points import measured_points
 from tablegen.calibration.resonance import ResonanceFit
 from tablegen.calibration.scanner_file import Change
 from tablegen.calibration.size import SizeFit
 from tablegen.calibration.table import Source
+from tablegen.calibration.trace import TraceFit
 
 _DIRECTIONS = ("forward", "backward")
 
@@ -60,8 +64,11 @@ def _branch_parameters(branch: TurnFit) -> list[tuple[str, Estimate, str]]:
     return rows
 
 
-def change(fit: Fit, sources: Sequence[Source]) -> Change:
-    """What the fit writes into the scanner file, and the comment that says where it came from."""
+def change(fit: Fit, sources: Sequence[Source], points: bool = False) -> Change:
+    """What the fit writes into the scanner file, and the comment that says where it came from.
+
+    With ``points`` hysteresis is written as it was measured at each amplitude, in place of (22).
+    """
     residual = f"{fit.points} points, residual {fit.rms_percent:.2g} % rms"
     files = [f"from {_printable(source.name)}, sha256 {source.sha256}" for source in sources]
     if isinstance(fit, HysteresisFit):
@@ -70,11 +77,17 @@ def change(fit: Fit, sources: Sequence[Source]) -> Change:
             entry: dict[str, Any] = {"turn": float(f"{branch.turn.value:.3g}")}
             for direction in _DIRECTIONS:
                 growth = getattr(branch, direction)
-                entry[direction] = {key: getattr(growth, key).rounded for key in ("beta_max", "rho", "u_peak")}
+                entry[direction] = (
+                    {"points": measured_points(branch, direction)}
+                    if points
+                    else {key: getattr(growth, key).rounded for key in ("beta_max", "rho", "u_peak")}
+                )
             branches.append(entry)
             count = sum(trace.samples for trace in branch.traces)
+            of = "pairs of images" if isinstance(branch.traces[0], ImageFit) else "traces"
+            what = "pixels" if isinstance(branch.traces[0], ImageFit) else "samples"
             comments.append(
-                [f"{len(branch.traces)} traces, {count} samples, residual {fit.rms_percent:.2g} % rms", *files]
+                [f"{len(branch.traces)} {of}, {count} {what}, residual {fit.rms_percent:.2g} % rms", *files]
             )
         return Change("hysteresis", {"model": "harmonic"}, (), branches, comments)
     values = {key: estimate.rounded for key, estimate, _ in parameters(fit) if not key.startswith("(")}
@@ -119,24 +132,36 @@ def _branch_record(branch: TurnFit) -> dict[str, Any]:
     for direction in _DIRECTIONS:
         growth = getattr(branch, direction)
         data[direction] = {key: _plain(getattr(growth, key)) for key in ("beta_max", "rho", "u_peak")}
-    data["traces"] = [
-        {
-            "v_scan": trace.v_scan,
-            "rate_hz": 1.0 / trace.triangle.period_s,
-            "periods": trace.periods,
-            "samples": trace.samples,
-            "delay_s": _plain(trace.delay_s),
-            "drift_percent": trace.drift_percent,
-            "noise_percent": trace.noise_percent,
-            "scaling_percent": dict(zip(_DIRECTIONS, trace.scaling_percent, strict=True)),
-            **{
-                direction: {key: _plain(getattr(getattr(trace, direction), key)) for key in ("beta", "u_peak")}
-                for direction in _DIRECTIONS
-            },
-        }
-        for trace in branch.traces
-    ]
+    data["traces"] = [_amplitude_record(trace) for trace in branch.traces]
     return data
+
+
+def _amplitude_record(trace: AmplitudeFit) -> dict[str, Any]:
+    data: dict[str, Any] = {"v_scan": trace.v_scan}
+    match trace:
+        case TraceFit():
+            data |= {
+                "rate_hz": 1.0 / trace.triangle.period_s,
+                "periods": trace.periods,
+                "delay_s": _plain(trace.delay_s),
+            }
+        case ImageFit():
+            data |= {
+                "periods": trace.periods,
+                "spots": trace.spots,
+                "explained": trace.explained,
+                "registration_percent": trace.registration_percent,
+            }
+    return data | {
+        "samples": trace.samples,
+        "drift_percent": trace.drift_percent,
+        "noise_percent": trace.noise_percent,
+        "scaling_percent": dict(zip(_DIRECTIONS, trace.scaling_percent, strict=True)),
+        **{
+            direction: {key: _plain(getattr(getattr(trace, direction), key)) for key in ("beta", "u_peak")}
+            for direction in _DIRECTIONS
+        },
+    }
 
 
 def _plain(estimate: Estimate) -> dict[str, float | None]:

@@ -52,8 +52,8 @@ def read_table(path: Path, needed: Sequence[Column], optional: Sequence[Column] 
     Lines that are blank or begin with # count for nothing. Raises ``Rejected`` with file, line and column.
     """
     name = shown_path(path)
-    content = _content(path, name)
-    rows = _rows(_text(content, name))
+    content = file_content(path, name)
+    rows = _rows(file_text(content, name))
     if not rows:
         raise Rejected([Problem(name, 0, "", f"is empty; a header with {_list(needed)} is needed")])
     header_line, header = rows[0]
@@ -149,7 +149,8 @@ def _places(
     return places
 
 
-def _content(path: Path, name: str) -> bytes:
+def file_content(path: Path, name: str) -> bytes:
+    """The bytes of a measurement. Raises ``Rejected``."""
     if not os.path.isfile(path):  # a pipe would be waited for
         raise Rejected([Problem(name, 0, "", "is not a file")])
     try:
@@ -162,7 +163,8 @@ def _content(path: Path, name: str) -> bytes:
     return content
 
 
-def _text(content: bytes, name: str) -> str:
+def file_text(content: bytes, name: str) -> str:
+    """UTF-8 without its mark. Raises ``Rejected``."""
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise Rejected([Problem(name, 1, "", "is UTF-16; save it as UTF-8")])
     try:

@@ -5,53 +5,33 @@ from math import pi
 
 import numpy as np
 
+from tablegen.calibration.branch import BINS, WINDOW, AmplitudeFit, measured_branch
 from tablegen.calibration.estimate import Curve, Estimate
 from tablegen.calibration.least_squares import Solution, solve
 from tablegen.calibration.triangle import Triangle, find_triangle
-from tablegen.compensation.hysteresis import HIGHEST_PEAK, LOWEST_PEAK, BranchShape
+from tablegen.compensation.hysteresis import BranchShape
 from tablegen.numerics.arrays import Bools, Floats
 from tablegen.problems import Unphysical
 
-_BINS = 20  # of a branch: the baseline of the scaling error
-_WINDOW = slice(2, 18)  # x = 0.1 .. 0.9
 _LEAST_SAMPLES = 40  # a period
 _TOO_FAR = 1e3  # the residual of a branch that runs backwards
 
 
-@dataclass(frozen=True)
-class MeasuredBranch:
-    """The peak residual and where it is, (17), as a fraction of the scan, in sweep-aligned coordinates."""
+@dataclass(frozen=True, kw_only=True)
+class TraceFit(AmplitudeFit):
+    """What one trace says, of which whole ``periods`` count and ``left_out`` samples do not.
 
-    beta: Estimate
-    u_peak: Estimate
-
-
-@dataclass(frozen=True)
-class TraceFit:
-    """What one trace says.
-
-    ``v_scan`` is peak to peak in V. ``residual_percent`` is the position error that the model leaves, in percent of
-    the scan, averaged over the periods in bins of a twentieth of the line, forward then backward; ``scaling_percent``
-    the local scaling error that it leaves, peak to peak over x = 0.1..0.9, of each direction. ``correlated`` is over
-    how many samples residuals depend on each other; ``strays`` are samples far off the curve, counted from 0.
+    ``correlated`` is over how many samples residuals depend on each other; ``strays`` are samples far off the curve,
+    counted from 0.
     """
 
     triangle: Triangle
-    v_scan: float
     periods: float
-    samples: int
     left_out: int
-    forward: MeasuredBranch
-    backward: MeasuredBranch
     delay_s: Estimate
-    drift_percent: float
-    noise_percent: float
-    residual_percent: Floats
-    scaling_percent: tuple[float, float]
     correlated: float
     inverted: bool
     strays: tuple[int, ...]
-    curve: Curve
 
 
 def fit_trace(
@@ -207,7 +187,7 @@ def _result(model: _Model, solution: Solution, triangle: Triangle, periods: floa
     # Errors of the drive's timing move the branches too.
     moved = solution.unit_covariance @ solution.jacobian.T @ model.timing_jacobian(x)
     covariance = covariance + moved @ triangle.timing_covariance @ moved.T
-    forward, backward = (_branch(x[i : i + 2], covariance[i : i + 2, i : i + 2]) for i in (0, 2))
+    forward, backward = (measured_branch(x[i : i + 2], covariance[i : i + 2, i : i + 2]) for i in (0, 2))
     delay = Estimate(model.given_delay * triangle.period_s)
     if model.fits_delay:
         delay = Estimate(float(x[-1]) * triangle.period_s, float(covariance[-1, -1]) ** 0.5 * triangle.period_s)
@@ -216,6 +196,7 @@ def _result(model: _Model, solution: Solution, triangle: Triangle, periods: floa
     spread = 1.4826 * float(np.median(np.abs(left - np.median(left))))
     return TraceFit(
         triangle=triangle,
+        turn=Estimate(triangle.turn, float(triangle.timing_covariance[2, 2]) ** 0.5),
         v_scan=triangle.v_high - triangle.v_low,
         periods=periods,
         samples=len(left),
@@ -230,52 +211,24 @@ def _result(model: _Model, solution: Solution, triangle: Triangle, periods: floa
         correlated=correlated,
         inverted=bool(x[5] < 0.0),
         strays=tuple((left_out + np.flatnonzero(np.abs(left) > max(7.0 * spread, 1e-6))).tolist()),
-        curve=curve,
+        curves=(curve,),
     )
 
 
 def correlation_length(residuals: Floats) -> float:
-    """Over how many samples residuals depend on each other: 1 for white noise.
+    """Over how many samples residuals depend on each other: 1 for white noise. Shape (n,), or (n, series) of one kind.
 
     The integrated autocorrelation, summed up to five times itself: far enough for what it finds, not for noise.
     """
-    power = float(residuals @ residuals)
+    power = float(np.vdot(residuals, residuals))
     total = 1.0
     if power <= 0.0:
         return total
     for lag in range(1, len(residuals) // 4):
         if lag > 5.0 * total:
             break
-        total += 2.0 * float(residuals[lag:] @ residuals[:-lag]) / power
+        total += 2.0 * float(np.vdot(residuals[lag:], residuals[:-lag])) / power
     return max(total, 1.0)
-
-
-def peak(shape: Floats) -> tuple[float, float]:
-    """beta and u_peak of (xi, xi gamma): u - tau turns once between the poles of (20)."""
-    xi, xi_gamma = float(shape[0]), float(shape[1])
-    tau = np.linspace(LOWEST_PEAK, HIGHEST_PEAK, 257)
-    slope = pi * xi * np.cos(pi * tau) + xi_gamma * (2.0 - pi * np.sin(pi * tau))
-    turning = np.flatnonzero(np.sign(slope[1:]) != np.sign(slope[:-1]))
-    if not len(turning):  # no hysteresis at all
-        return 0.0, 0.5
-    at = int(turning[0])
-    low, high = float(tau[at]), float(tau[at + 1])
-    rising = slope[at] > 0.0
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        value = pi * xi * np.cos(pi * middle) + xi_gamma * (2.0 - pi * np.sin(pi * middle))
-        low, high = (middle, high) if (value > 0.0) == rising else (low, middle)
-    beta = xi * np.sin(pi * low) + xi_gamma * (np.cos(pi * low) - 1.0 + 2.0 * low)
-    return float(beta), float(low + beta)
-
-
-def _branch(shape: Floats, covariance: Floats) -> MeasuredBranch:
-    beta, u_peak = peak(shape)
-    step = 1e-6 * max(float(np.max(np.abs(shape))), 1e-3)
-    steps = step * np.eye(2)
-    slopes = np.stack([np.subtract(peak(shape + by), peak(shape - by)) / (2.0 * step) for by in steps], axis=1)
-    spread = np.sqrt(np.diag(slopes @ covariance @ slopes.T))
-    return MeasuredBranch(Estimate(beta, float(spread[0])), Estimate(u_peak, float(spread[1])))
 
 
 def _averaged(model: _Model, x: Floats, left: Floats) -> tuple[Floats, tuple[float, float], Curve]:
@@ -285,12 +238,12 @@ def _averaged(model: _Model, x: Floats, left: Floats) -> tuple[Floats, tuple[flo
     residuals, scaling, drawn = [], [], []
     for side, sign, shape in ((rising, 1.0, x[:2]), (~rising, -1.0, x[2:4])):
         errors = -left[side] / height * sign  # along the sweep, measured less model
-        place = np.minimum((tau[side] * _BINS).astype(np.int64), _BINS - 1)
-        count = np.maximum(np.bincount(place, minlength=_BINS), 1)
-        mean = np.bincount(place, errors, minlength=_BINS) / count
+        place = np.minimum((tau[side] * BINS).astype(np.int64), BINS - 1)
+        count = np.maximum(np.bincount(place, minlength=BINS), 1)
+        mean = np.bincount(place, errors, minlength=BINS) / count
         residuals.append(100.0 * mean)
-        scaling.append(100.0 * float(np.ptp(np.diff(mean)[_WINDOW]) * _BINS))
-        at = np.bincount(place, u[side], minlength=_BINS) / count
+        scaling.append(100.0 * float(np.ptp(np.diff(mean)[WINDOW]) * BINS))
+        at = np.bincount(place, u[side], minlength=BINS) / count
         fitted = BranchShape(*shape.tolist()).inverse(at)
         drawn.append((at, 100.0 * (mean + fitted - at), 100.0 * (fitted - at)))
     # As figure 5a has it: against the drive, the backward branch mirrored.

@@ -1,84 +1,27 @@
 """``tablegen calibrate``: measurements to parameters of the scanner file, with standard errors."""
 
-import json
-import os
-from collections.abc import Callable
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypeVar
+from typing import Literal
 
 import click
 
-from tablegen.cli.common import fail, written
+from tablegen.cli.calibration_run import (
+    Common,
+    finish,
+    full_scale,
+    in_file,
+    read_columns,
+    read_heights,
+    require,
+    shared_options,
+    size_law,
+    within,
+)
+from tablegen.cli.common import fail
 from tablegen.cli.status import Status
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from tablegen.calibration.columns import Column
-    from tablegen.calibration.estimate import Fit
-    from tablegen.calibration.table import Table
-
-F = TypeVar("F", bound=Callable[..., Any])
-_EXTRAS = ("scipy", "tomlkit")
-
-
-@dataclass(frozen=True)
-class _Common:
-    """The options that all calibrations share."""
-
-    axis: str
-    scanner: Path | None
-    v_max: float | None
-    write: bool
-    plot: Path | None
-    as_json: bool
-
-
-def _shared(command: F) -> F:
-    """Those options, as ``common``."""
-    options = [
-        click.option("--axis", type=click.Choice(("x", "y")), required=True, help="Which axis was measured."),
-        click.option(
-            "--scanner",
-            type=click.Path(path_type=Path, dir_okay=False),
-            metavar="FILE",
-            help="The scanner file; v_max is taken from it.",
-        ),
-        click.option("--v-max", type=click.FloatRange(min=1e-3, max=1e5), metavar="V", help="Without a scanner file."),
-        click.option("--write", is_flag=True, help="Update FILE in place, or make it with --v-max."),
-        click.option(
-            "--plot", type=click.Path(path_type=Path, dir_okay=False), metavar="PNG", help="Draw it; or .svg, .pdf."
-        ),
-        click.option("--json", "as_json", is_flag=True, help="Plain data instead of text."),
-    ]
-
-    def run(
-        axis: str,
-        scanner: Path | None,
-        v_max: float | None,
-        write: bool,
-        plot: Path | None,
-        as_json: bool,
-        **rest: Any,
-    ) -> Any:
-        if write and scanner is None:
-            raise click.UsageError("--write needs --scanner FILE")
-        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the fits are small, and its threads would only spin
-        _require(*_EXTRAS, extra="calibrate")
-        if plot is not None:
-            if plot.suffix not in (".png", ".svg", ".pdf"):
-                raise click.UsageError(f"--plot {plot}: the name has to end in .png, .svg or .pdf")
-            _require("matplotlib", extra="plot")
-        return command(common=_Common(axis, scanner, v_max, write, plot, as_json), **rest)
-
-    run.__doc__, run.__name__ = command.__doc__, command.__name__
-    for option in reversed(options):
-        run = option(run)
-    run.__click_params__ += getattr(command, "__click_params__", [])  # type: ignore[attr-defined]
-    return run  # type: ignore[return-value]
-
-
+_points = click.option("--points", is_flag=True, help="Write each amplitude as measured, in place of (22).")
 _data = click.argument("data", type=click.Path(path_type=Path), metavar="DATA.CSV")
 _from_hz = click.option("--from-hz", type=float, default=0.0, metavar="HZ", help="Leave out what is below.")
 _to_hz = click.option("--to-hz", type=float, default=float("inf"), metavar="HZ", help="Leave out what is above.")
@@ -89,10 +32,11 @@ _to_hz = click.option("--to-hz", type=float, default=float("inf"), metavar="HZ",
     epilog="""\b
   tablegen calibrate offset --axis x offsets.csv --scanner scanner.toml
   tablegen calibrate offset --axis x offsets.csv --scanner scanner.toml --write
-  tablegen calibrate hysteresis --axis x 30v.csv 60v.csv 100v.csv --v-max 100 --plot x.png""",
+  tablegen calibrate hysteresis --axis x 30v.csv 60v.csv 100v.csv --v-max 100 --plot x.png
+  tablegen calibrate images --axis x --v-max 100 --pair 100 trace.npy retrace.npy""",
 )
 def calibrate() -> None:
-    """Calibrate a scanner from CSV files, whose header has units in its names.
+    """Calibrate a scanner from CSV files, whose header has units in its names, or from images.
 
     Prints parameters with standard errors, and what they leave of the paper's errors. With --write the scanner file is
     updated in place; a comment says from which bytes. Points that do not fit are named, and never dropped.
@@ -100,23 +44,31 @@ def calibrate() -> None:
 
 
 @calibrate.command(short_help="Apparent sizes at several offsets: m_minus, m_plus.")
-@_shared
+@shared_options
 @_data
-def offset(common: _Common, data: Path) -> int:
+@click.option(
+    "--size-v",
+    type=click.FloatRange(min=0.0, min_open=True),
+    metavar="V",
+    help="Scan voltage of the images: with the size law of FILE, m is then exact.",
+)
+def offset(common: Common, data: Path, size_v: float | None) -> int:
     """Apparent sizes of one object, or lattice constants, at three or more offset voltages.
 
-    Columns: offset_v, apparent_nm. They give m_minus and m_plus, (1)-(4).
+    Columns: offset_v, apparent_nm. They give m_minus and m_plus, (1)-(4). A drive m times as large makes a scan more
+    than m times as large, (6): calibrate the size first, and give --size-v.
     """
     from tablegen.calibration.columns import APPARENT, OFFSET
     from tablegen.calibration.offset import fit_offset
 
-    table = _read(data, [OFFSET, APPARENT])
-    v_max = _v_max(common)
-    return _finish(common, [table], lambda: fit_offset(table[OFFSET], table[APPARENT], v_max))
+    table = read_columns(data, [OFFSET, APPARENT])
+    v_max = full_scale(common)
+    law = None if size_v is None else size_law(common, v_max, size_v)
+    return finish(common, [table], lambda: fit_offset(table[OFFSET], table[APPARENT], v_max, law, size_v))
 
 
 @calibrate.command(short_help="Actual scan sizes: k, beta, threshold.")
-@_shared
+@shared_options
 @_data
 @click.option("--k", type=click.FloatRange(min=1e-6), metavar="NM/V", help="What nominal_nm were set with.")
 @click.option("--base-nm", type=click.FloatRange(min=1e-6), metavar="NM", help="Base size.  [default: FILE's, or 200]")
@@ -129,7 +81,7 @@ def offset(common: _Common, data: Path) -> int:
     help="Errors in proportion to the size, as in images, or the same for all, as of a sensor.",
 )
 def size(
-    common: _Common,
+    common: Common,
     data: Path,
     k: float | None,
     base_nm: float | None,
@@ -149,7 +101,7 @@ def size(
     from tablegen.calibration.columns import ACTUAL, APPARENT, DRIVE, NOMINAL, TRUE
     from tablegen.calibration.size import fit_size
 
-    table = _read(data, [], [DRIVE, NOMINAL, ACTUAL, APPARENT, TRUE])
+    table = read_columns(data, [], [DRIVE, NOMINAL, ACTUAL, APPARENT, TRUE])
     if DRIVE not in table and (NOMINAL not in table or k is None):
         fail([f"{table.file}: drive_v is missing; or give nominal_nm, and --k NM/V"], Status.WRONG_INPUT)
     if DRIVE in table and k is not None:
@@ -158,13 +110,13 @@ def size(
         fail([f"{table.file}: actual_nm is missing; or give nominal_nm, apparent_nm and true_nm"], Status.WRONG_INPUT)
     actual = table[ACTUAL] if ACTUAL in table else table[NOMINAL] * table[TRUE] / table[APPARENT]
     drive = table[DRIVE] if DRIVE in table else table[NOMINAL] / (k or 1.0)
-    v_max = _v_max(common)
-    base = base_nm or _present(common, "size", "base_nm") or 200.0
-    return _finish(common, [table], lambda: fit_size(drive, actual, v_max, base, threshold, noise))
+    v_max = full_scale(common)
+    base = base_nm or in_file(common, "size", "base_nm") or 200.0
+    return finish(common, [table], lambda: fit_size(drive, actual, v_max, base, threshold, noise))
 
 
 @calibrate.command(short_help="Sensor traces: beta_max, rho, u_peak.")
-@_shared
+@shared_options
 @click.argument("data", type=click.Path(path_type=Path), metavar="DATA.CSV...", nargs=-1, required=True)
 @click.option("--rho", type=click.FloatRange(1e-6, 100.0), default=1.5, show_default=True, help="With one amplitude.")
 @click.option(
@@ -174,8 +126,15 @@ def size(
     "--drift", type=click.IntRange(0, 5), metavar="N", help="Order of the drift.  [default: 1 to 3, by periods]"
 )
 @click.option("--delay-s", default="0", show_default=True, metavar="S|fit", help="Of the sensor against the drive.")
+@_points
 def hysteresis(
-    common: _Common, data: tuple[Path, ...], rho: float, settle: int | None, drift: int | None, delay_s: str
+    common: Common,
+    data: tuple[Path, ...],
+    rho: float,
+    settle: int | None,
+    drift: int | None,
+    delay_s: str,
+    points: bool,
 ) -> int:
     """Displacement against a triangular drive, over one period or more, at several amplitudes.
 
@@ -190,19 +149,86 @@ def hysteresis(
         delay = None if delay_s == "fit" else float(delay_s)
     except ValueError:
         raise click.UsageError(f"--delay-s {delay_s}: seconds, or fit") from None
-    tables = [_read(path, [TIME, DRIVE, DISPLACEMENT], [TRACE]) for path in data]
-    v_max = _v_max(common)
+    tables = [read_columns(path, [TIME, DRIVE, DISPLACEMENT], [TRACE]) for path in data]
+    v_max = full_scale(common)
     traces = [trace for table in tables for trace in split_traces(table)]
-    return _finish(common, tables, lambda: fit_hysteresis(traces, v_max, rho, settle, drift, delay))
+    return finish(common, tables, lambda: fit_hysteresis(traces, v_max, rho, settle, drift, delay), points)
+
+
+@calibrate.command(short_help="Trace and retrace images: beta_max, rho, u_peak.")
+@shared_options
+@click.option(
+    "--pair",
+    "pairs",
+    type=(click.FloatRange(min=0.0, min_open=True), click.Path(path_type=Path), click.Path(path_type=Path)),
+    metavar="VOLTS TRACE RETRACE",
+    multiple=True,
+    required=True,
+    help="Two images, and the scan voltage peak to peak at the piezo. Once for every amplitude.",
+)
+@click.option("--channel", metavar="NAME|N", help="The data to take from files that have several.")
+@click.option("--retrace-channel", metavar="NAME|N", help="Another one for the retrace.  [default: --channel]")
+@click.option("--retrace-mirrored", is_flag=True, help="The retrace is stored in the order of time, right to left.")
+@click.option(
+    "--window",
+    type=(float, float),
+    default=(0.0, 1.0),
+    show_default=True,
+    metavar="LOW HIGH",
+    help="Part of the sweep.",
+)
+@click.option("--turn", type=float, default=0.5, show_default=True, help="Of the triangle.")
+@click.option("--delay-pixels", type=float, default=0.0, show_default=True, metavar="N", help="By which images lag.")
+@click.option("--rho", type=click.FloatRange(1e-6, 100.0), default=1.5, show_default=True, help="With one amplitude.")
+@_points
+def images(
+    common: Common,
+    pairs: tuple[tuple[float, Path, Path], ...],
+    channel: str | None,
+    retrace_channel: str | None,
+    retrace_mirrored: bool,
+    window: tuple[float, float],
+    turn: float,
+    delay_pixels: float,
+    rho: float,
+    points: bool,
+) -> int:
+    """Images of a grating or a lattice, three periods in the line or more, scanned with a triangle. No sensor.
+
+    \b
+    Files:   .npy, .tif, .png, .gwy, or numbers as .txt, .asc, .csv, .dat;
+    Columns: evenly spread in time over --window of each sweep, 0 1 for all of it;
+    Rows:    in the order of time. Left is left in both, or --retrace-mirrored.
+
+    A pair an amplitude gives what sensor traces give: beta_max and rho, (22), and u_peak, (17).
+    """
+    from tablegen.calibration.image_files import MODULES
+    from tablegen.calibration.images import Pair, fit_images
+
+    needed = {MODULES.get(path.suffix.lower()) for _, *paths in pairs for path in paths} - {None}
+    require(*sorted(filter(None, needed)), extra="images")
+    read = [
+        (read_heights(trace, channel), read_heights(retrace, retrace_channel or channel)) for _, trace, retrace in pairs
+    ]
+    v_max = full_scale(common)
+    taken = [
+        Pair(
+            " and ".join(dict.fromkeys((trace.source.name, retrace.source.name))), volts, trace.heights, retrace.heights
+        )
+        for (volts, *_), (trace, retrace) in zip(pairs, read, strict=True)
+    ]
+    files = [image for both in read for image in both]
+    fit = partial(fit_images, taken, v_max, rho, turn, window, retrace_mirrored, delay_pixels)
+    return finish(common, files, fit, points)
 
 
 @calibrate.command(short_help="Gain against frequency: alpha.")
-@_shared
+@shared_options
 @_data
 @click.option("--reference-hz", type=click.FloatRange(min=1e-6), metavar="HZ", help="[default: FILE's, or the lowest]")
 @_from_hz
 @_to_hz
-def frequency(common: _Common, data: Path, reference_hz: float | None, from_hz: float, to_hz: float) -> int:
+def frequency(common: Common, data: Path, reference_hz: float | None, from_hz: float, to_hz: float) -> int:
     """Gain at several frequencies below a tenth of the resonance.
 
     Columns: frequency_hz, gain or gain_db. They give alpha, (23). The reference is the rate of the size calibration.
@@ -210,17 +236,17 @@ def frequency(common: _Common, data: Path, reference_hz: float | None, from_hz: 
     from tablegen.calibration.columns import FREQUENCY, GAIN
     from tablegen.calibration.frequency import fit_frequency
 
-    table = _cut(_read(data, [FREQUENCY, GAIN]), from_hz, to_hz)
-    reference = reference_hz or _present(common, "frequency", "reference_hz")
-    return _finish(common, [table], lambda: fit_frequency(table[FREQUENCY], table[GAIN], reference))
+    table = within(read_columns(data, [FREQUENCY, GAIN]), from_hz, to_hz)
+    reference = reference_hz or in_file(common, "frequency", "reference_hz")
+    return finish(common, [table], lambda: fit_frequency(table[FREQUENCY], table[GAIN], reference))
 
 
 @calibrate.command(short_help="Frequency response: resonance, quality, delay.")
-@_shared
+@shared_options
 @_data
 @_from_hz
 @_to_hz
-def resonance(common: _Common, data: Path, from_hz: float, to_hz: float) -> int:
+def resonance(common: Common, data: Path, from_hz: float, to_hz: float) -> int:
     """Gain and phase through the resonance.
 
     Columns: frequency_hz, gain or gain_db, phase_deg or phase_rad. They give frequency_hz, quality and delay_s.
@@ -228,120 +254,6 @@ def resonance(common: _Common, data: Path, from_hz: float, to_hz: float) -> int:
     from tablegen.calibration.columns import FREQUENCY, GAIN, PHASE
     from tablegen.calibration.resonance import fit_resonance
 
-    table = _cut(_read(data, [FREQUENCY, GAIN], [PHASE]), from_hz, to_hz)
+    table = within(read_columns(data, [FREQUENCY, GAIN], [PHASE]), from_hz, to_hz)
     phase = table.columns.get(PHASE.name)
-    return _finish(common, [table], lambda: fit_resonance(table[FREQUENCY], table[GAIN], phase))
-
-
-def _require(*modules: str, extra: str) -> None:
-    from importlib.util import find_spec
-
-    missing = [module for module in modules if find_spec(module) is None]
-    if missing:
-        needs = " and ".join(missing)
-        fail([f"{needs} is missing; install it with: pip install 'tablegen[{extra}]'"], Status.TOOL_MISSING)
-
-
-def _read(path: Path, needed: "Sequence[Column]", optional: "Sequence[Column]" = ()) -> "Table":
-    from tablegen.calibration.table import read_table
-    from tablegen.problems import Rejected
-
-    try:
-        return read_table(path, needed, optional)
-    except Rejected as rejected:
-        fail(rejected.problems, Status.WRONG_INPUT)
-
-
-def _cut(table: "Table", from_hz: float, to_hz: float) -> "Table":
-    from dataclasses import replace
-
-    from tablegen.calibration.columns import FREQUENCY
-
-    kept = (table[FREQUENCY] >= from_hz) & (table[FREQUENCY] <= to_hz)
-    if not kept.any():
-        fail([f"{table.file}: no row lies from {from_hz:g} to {to_hz:g} Hz"], Status.WRONG_INPUT)
-    return replace(
-        table, columns={name: values[kept] for name, values in table.columns.items()}, lines=table.lines[kept]
-    )
-
-
-def _scanner_values(common: _Common) -> dict[str, Any]:
-    """What the scanner file says now; nothing where it is to be made."""
-    from tablegen.config.toml import read_toml
-    from tablegen.problems import Rejected
-
-    if common.scanner is None or (common.write and not common.scanner.exists()):
-        return {}
-    try:
-        return read_toml(common.scanner, str(common.scanner))[0]
-    except Rejected as rejected:
-        fail(rejected.problems, Status.WRONG_INPUT)
-
-
-def _v_max(common: _Common) -> float:
-    values = _scanner_values(common)
-    found = values.get("v_max")
-    if isinstance(found, int | float) and not isinstance(found, bool) and found > 0.0:
-        if common.v_max is not None and common.v_max != found:
-            fail([f"{common.scanner}: v_max: {found:g} there, and --v-max {common.v_max:g}"], Status.WRONG_INPUT)
-        return float(found)
-    if values:
-        fail([f"{common.scanner}: v_max: missing, or no voltage"], Status.WRONG_INPUT)
-    if common.v_max is None:
-        raise click.UsageError("give --scanner FILE, or --v-max V, the driver's maximum output")
-    return common.v_max
-
-
-def _present(common: _Common, kind: str, key: str) -> float | None:
-    """A number of the scanner file as it is, or None."""
-    values: Any = _scanner_values(common)
-    for name in (common.axis, kind, key):
-        values = values.get(name) if isinstance(values, dict) else None
-    return float(values) if isinstance(values, int | float) and values > 0.0 else None
-
-
-def _finish(common: _Common, tables: "list[Table]", run: "Callable[[], Fit]") -> int:
-    """Fit, print, draw and write."""
-    from tablegen.calibration.summary import record
-    from tablegen.cli.calibration_text import calibration_text
-    from tablegen.problems import Unphysical
-
-    try:
-        fit = run()
-    except Unphysical as reason:
-        fail([f"{', '.join(table.file for table in tables)}: {reason}"], Status.WRONG_INPUT)
-    sources = [table.source for table in tables]
-    if common.as_json:
-        click.echo(json.dumps(record(fit, common.axis, sources), indent=2, allow_nan=False))
-    else:
-        click.echo("\n".join(calibration_text(fit, common.axis, tables)))
-    if common.plot is not None:
-        from tablegen.calibration.figure import draw
-
-        kind: Any = common.plot.suffix[1:]
-        written(common.plot.parent, {common.plot.name: draw(fit.curves, kind)})
-    if common.write:
-        _write(common, fit, tables)
-    return Status.OK
-
-
-def _write(common: _Common, fit: "Fit", tables: "list[Table]") -> None:
-    from tablegen.calibration.scanner_file import new_file, updated
-    from tablegen.calibration.summary import change
-    from tablegen.problems import Rejected
-
-    assert common.scanner is not None
-    name = str(common.scanner)
-    try:
-        path = common.scanner.resolve()
-        text = path.read_bytes().decode("utf-8") if path.exists() else new_file(path.stem, _v_max(common))
-        put = change(fit, [table.source for table in tables])
-        content = updated(text, name, common.axis, put).encode("utf-8")
-    except Rejected as rejected:
-        fail(rejected.problems, Status.WRONG_INPUT)
-    except UnicodeDecodeError:
-        fail([f"{name}: is not UTF-8"], Status.WRONG_INPUT)
-    except OSError as error:
-        fail([f"{name}: {error.strerror or error}"], Status.WRONG_INPUT)
-    changed = written(path.parent, {path.name: content})
-    click.echo(f"{name}: {common.axis}.{put.kind} {'written' if changed else 'up to date'}", err=common.as_json)
+    return finish(common, [table], lambda: fit_resonance(table[FREQUENCY], table[GAIN], phase))

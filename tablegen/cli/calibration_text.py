@@ -3,21 +3,28 @@
 from collections.abc import Sequence
 from math import floor, isfinite, log10
 
+from tablegen.calibration.branch import AmplitudeFit, MeasuredBranch
 from tablegen.calibration.estimate import Estimate, Fit
 from tablegen.calibration.hysteresis import HysteresisFit
+from tablegen.calibration.image_files import Image
+from tablegen.calibration.image_fit import ImageFit
 from tablegen.calibration.summary import change, parameters
 from tablegen.calibration.table import Table
-from tablegen.calibration.trace import MeasuredBranch
+from tablegen.calibration.trace import TraceFit
 from tablegen.cli.scatter import scatter
 
+_TRACE_HEAD = ("turn", "V_scan", "rate [Hz]", "periods", "noise [%]", "drift [%]")
+_IMAGE_HEAD = ("turn", "V_scan", "periods", "noise [%]", "drift [%]", "apart [%]")
 
-def calibration_text(fit: Fit, axis: str, tables: Sequence[Table]) -> list[str]:
+
+def calibration_text(fit: Fit, axis: str, tables: Sequence[Table | Image]) -> list[str]:
     """Lines of text; ``tables`` are what was fitted, for the places of outliers."""
     hysteresis = isinstance(fit, HysteresisFit)
     rows = [(name, *figures(estimate), meaning) for name, estimate, meaning in parameters(fit)]
     widths = [max(len(row[i]) for row in rows) for i in range(3)]
     files = ", ".join(table.source.name for table in tables)
-    lines = [f"{change(fit, []).kind} of {axis}, {fit.points} {'samples' if hysteresis else 'points'} of {files}", ""]
+    points = "pixels" if isinstance(tables[0], Image) else "samples" if hysteresis else "points"
+    lines = [f"{change(fit, []).kind} of {axis}, {fit.points} {points} of {files}", ""]
     lines += [
         f"{name:<{widths[0]}}  {value:>{widths[1]}} {error:<{widths[2]}}  {meaning}"
         for name, value, error, meaning in rows
@@ -34,7 +41,7 @@ def calibration_text(fit: Fit, axis: str, tables: Sequence[Table]) -> list[str]:
     for curve in fit.curves:
         lines += [*scatter(curve), ""]
     for row in fit.outliers:
-        place = f"{tables[0].file}:{tables[0].lines[row]}"
+        place = f"{tables[0].file}:{tables[0].lines[row]}" if isinstance(tables[0], Table) else tables[0].file
         lines.append(
             f"outlier: {place}: far from what the other points say; kept. Remove the row if it was measured wrongly"
         )
@@ -43,31 +50,35 @@ def calibration_text(fit: Fit, axis: str, tables: Sequence[Table]) -> list[str]:
 
 def _traces(fit: HysteresisFit) -> list[str]:
     """What each trace says by itself, and how good it is."""
-    head = (
-        "turn",
-        "V_scan",
-        "rate [Hz]",
-        "periods",
-        "noise [%]",
-        "drift [%]",
-        "direction",
-        "beta",
-        "u_peak",
-        "left [% p-p]",
-    )
-    rows = [head]
+    images = isinstance(fit.branches[0].traces[0], ImageFit)
+    head = (*(_IMAGE_HEAD if images else _TRACE_HEAD), "direction", "beta", "u_peak", "left [% p-p]")
+    rows: list[tuple[str, ...]] = [head]
     for branch in fit.branches:
         for trace in branch.traces:
-            shape = f"{trace.triangle.turn:.3f}", f"{trace.v_scan:.4g}", f"{1.0 / trace.triangle.period_s:.4g}"
-            record = f"{trace.periods:.3g}", f"{trace.noise_percent:.2g}", f"{trace.drift_percent:.2g}"
+            record = _record(trace)
             for side, left in zip(("forward", "backward"), trace.scaling_percent, strict=True):
                 measured: MeasuredBranch = getattr(trace, side)
-                start = (*shape, *record) if side == "forward" else ("",) * 6
+                start = record if side == "forward" else ("",) * len(record)
                 branch_figures = (" ".join(figures(measured.beta)), " ".join(figures(measured.u_peak)))
                 rows.append((*start, side, *branch_figures, f"{left:.2g}"))
     widths = [max(len(row[i]) for row in rows) for i in range(len(head))]
     lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
-    return [*lines, "left: scaling error that the model does not describe, over x = 0.1..0.9"]
+    lines.append("left: scaling error that the model does not describe, over x = 0.1..0.9")
+    if images:
+        lines.append("apart: where trace and retrace show the same, as far apart as they come, of the line")
+    return lines
+
+
+def _record(trace: AmplitudeFit) -> tuple[str, ...]:
+    """What a row says of a trace or of a pair of images."""
+    shape = f"{trace.turn.value:.3f}", f"{trace.v_scan:.4g}"
+    quality = f"{trace.noise_percent:.2g}", f"{trace.drift_percent:.2g}"
+    match trace:
+        case TraceFit():
+            return *shape, f"{1.0 / trace.triangle.period_s:.4g}", f"{trace.periods:.3g}", *quality
+        case ImageFit():
+            return *shape, f"{trace.periods:.3g}", *quality, f"{trace.registration_percent:.2f}"
+    raise NotImplementedError(type(trace))
 
 
 def figures(estimate: Estimate) -> tuple[str, str]:

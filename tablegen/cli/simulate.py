@@ -11,6 +11,9 @@ from tablegen.cli.progress import Progress
 from tablegen.cli.status import Status
 
 if TYPE_CHECKING:
+    from tablegen.config.load import Setup
+    from tablegen.virtual.report import Stage
+    from tablegen.virtual.scanner import VirtualScanner
     from tablegen.virtual.simulation import Run
 
 
@@ -35,27 +38,50 @@ if TYPE_CHECKING:
     "--plot", "plot_file", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE.png", help="A figure."
 )
 @click.option("--json", "as_json", is_flag=True, help="Plain data instead of text.")
-def simulate(scan: Path, truth_file: str, csv_file: Path | None, plot_file: Path | None, as_json: bool) -> None:
+@click.option(
+    "--calibration/--no-calibration",
+    "calibrated",
+    default=True,
+    help="Also with a scanner file that was calibrated on the virtual scanner's own data.  [default: also]",
+)
+@click.option(
+    "--noise",
+    type=click.FloatRange(0.0, 10.0),
+    default=0.2,
+    show_default=True,
+    metavar="PERCENT",
+    help="Of that data, rms.",
+)
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of that noise.")
+def simulate(
+    scan: Path,
+    truth_file: str,
+    csv_file: Path | None,
+    plot_file: Path | None,
+    as_json: bool,
+    calibrated: bool,
+    noise: float,
+    seed: int,
+) -> None:
     """Play the emitted integers of a scan on a virtual scanner, and print what it does. This is a simulation.
 
-    The scan is played as a triangle, and with each hysteresis model for which the scanner file has parameters. The
-    virtual scanner has hysteresis of another kind, creep, a resonance and a sensitivity of its own: none of the
+    The scan is played as a triangle, and with each hysteresis model for which the scanner file has parameters: first
+    with the scanner file as it is, then with one that was calibrated on what a sensor would have measured on this
+    virtual scanner. It has hysteresis of another kind, creep, a resonance and a sensitivity of its own: none of the
     equations that a build inverts.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from tablegen.config.load import load
-    from tablegen.problems import Rejected
+    from tablegen.problems import Rejected, Unphysical
     from tablegen.virtual import report
     from tablegen.virtual.parameters import load_truth
+    from tablegen.virtual.report import Stage
     from tablegen.virtual.scanner import VirtualScanner
-    from tablegen.virtual.simulation import models_of
-    from tablegen.virtual.simulation import simulate as play
 
     if plot_file is not None:
-        _need_matplotlib()
-    runs: list[Run] = []
-    rejected: list[tuple[str, str]] = []
-    problems: list[object] = []
+        _need("matplotlib", "--plot", "plot")
+    if calibrated:
+        _need("scipy", "the calibration", "calibrate", "; or give --no-calibration")
     try:
         setup = load(scan)
         truth = load_truth(None if truth_file == "default" else truth_file)
@@ -63,32 +89,61 @@ def simulate(scan: Path, truth_file: str, csv_file: Path | None, plot_file: Path
         fail(faults.problems, Status.WRONG_INPUT)
     scanner = VirtualScanner.of(truth)
     with Progress() as progress:
-        for model in models_of(setup):
-            progress.now(f"playing the {model} model")
+        stages = [_play("given", "with the scanner file as it is", setup, scanner, truth_file, progress)]
+        if calibrated:
+            from tablegen.virtual.laboratory import calibrate
+
+            progress.now("calibrating")
+            heading = f"with one calibrated on the virtual scanner's own data, {noise:g} % noise"
             try:
-                runs.append(play(setup, scanner, model))
-            except Rejected as faults:
-                rejected.append((model, "; ".join(map(str, faults.problems))))
-                problems += faults.problems
-            except ValueError as reason:
-                problems.append(f"{truth_file}: {reason}")
-    if not runs:
-        fail(list(dict.fromkeys(map(str, problems))), Status.WRONG_INPUT)
+                after = calibrate(setup, scanner, 0.01 * noise, seed).setup
+                stages.append(_play("calibrated", heading, after, scanner, truth_file, progress))
+            except (Unphysical, ValueError) as reason:
+                stages.append(Stage("calibrated", heading, (), (("calibration", str(reason)),)))
     if csv_file is not None:
-        written(csv_file.parent, {csv_file.name: report.csv(runs).encode()})
+        written(csv_file.parent, {csv_file.name: report.csv(stages).encode()})
     if plot_file is not None:
-        written(plot_file.parent, {plot_file.name: report.figure(f"{setup.scan.name}: {report.LABEL}", runs)})
+        written(plot_file.parent, {plot_file.name: report.figure(f"{setup.scan.name}: {report.LABEL}", stages)})
     if as_json:
         import json
 
-        click.echo(json.dumps(report.data(setup.scan.name, truth.name, runs, rejected), indent=2))
+        click.echo(json.dumps(report.data(setup.scan.name, truth.name, stages), indent=2))
         return
-    for line in report.text(setup.scan.name, truth.name, runs, rejected):
+    for line in report.text(setup.scan.name, truth.name, stages):
         click.echo(line)
 
 
-def _need_matplotlib() -> None:
+def _play(
+    name: str, heading: str, setup: "Setup", scanner: "VirtualScanner", truth_file: str, progress: Progress
+) -> "Stage":
+    """Every model that can be played; where none can, the command ends."""
+    from tablegen.problems import Rejected
+    from tablegen.virtual.report import Stage
+    from tablegen.virtual.simulation import models_of, simulate
+
+    runs: list[Run] = []
+    rejected: list[tuple[str, str]] = []
+    problems: list[object] = []
+    for model in models_of(setup):
+        progress.now(f"playing the {model} model, scanner file as {name}")
+        try:
+            runs.append(simulate(setup, scanner, model))
+        except Rejected as faults:
+            rejected.append((model, "; ".join(map(str, faults.problems))))
+            problems += faults.problems
+        except ValueError as reason:
+            problems.append(f"{truth_file}: {reason}")
+    if not runs:
+        fail(list(dict.fromkeys(map(str, problems))), Status.WRONG_INPUT)
+    return Stage(name, heading, tuple(runs), tuple(rejected))
+
+
+def _need(module: str, what: str, extra: str, otherwise: str = "") -> None:
+    from importlib.util import find_spec
+
     try:
-        import matplotlib  # noqa: F401
-    except ImportError:
-        fail(["--plot needs matplotlib: pip install 'tablegen[plot]'"], Status.TOOL_MISSING)
+        missing = find_spec(module) is None
+    except ValueError:
+        missing = True
+    if missing:
+        fail([f"{what} needs {module}: pip install 'tablegen[{extra}]'{otherwise}"], Status.TOOL_MISSING)

@@ -1,0 +1,231 @@
+"""One trace and one retrace image of a periodic sample -> both branches of the model."""
+
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+from scipy.special import chdtrc
+
+from tablegen.calibration.branch import BINS, WINDOW, AmplitudeFit, measured_branch, peak
+from tablegen.calibration.estimate import Curve, Estimate
+from tablegen.calibration.image_model import begin, check_signs, grown, prepared
+from tablegen.calibration.periodic import Model, State
+from tablegen.calibration.spots import LEAST_PERIODS
+from tablegen.calibration.trace import correlation_length
+from tablegen.compensation.hysteresis import BranchShape
+from tablegen.numerics.arrays import Bools, Floats
+from tablegen.problems import Unphysical
+
+_LEAST_EXPLAINED = 0.03  # of the variance
+_ROUNDING = 1e-7  # of the line: what arithmetic may leave
+_TOO_FAR_PERCENT = 3.0  # of the line, that the model may leave
+_OPEN = 0.05  # largest standard error of xi
+_CHANCE = 1e-3  # that noise alone would be taken for misfit
+_WRONG_WAY = 0.004  # least |beta| that is a sign
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImageFit(AmplitudeFit):
+    """What a pair says; see ``AmplitudeFit``.
+
+    ``periods`` in the line of the spot that carries most, ``spots`` how many were fitted; ``explained`` the share of
+    the heights' variance that is periodic; ``registration_percent`` how far trace and retrace are apart where they are
+    farthest, of the line. ``widened`` is the factor on standard errors; ``strays`` are rows unlike the others, counted
+    from 0.
+    """
+
+    periods: float
+    pixels_a_period: float
+    spots: int
+    explained: float
+    registration_percent: float
+    widened: float
+    strays: tuple[int, ...]
+
+
+def fit_pair(
+    trace: Floats,
+    retrace: Floats,
+    v_scan: float,
+    turn: float = 0.5,
+    window: tuple[float, float] = (0.0, 1.0),
+    retrace_mirrored: bool = False,
+    delay_pixels: float = 0.0,
+) -> ImageFit:
+    """Both branches from heights in any unit, rows x columns, rows in the order of time.
+
+    Columns are evenly spread in time over ``window`` of each sweep; the retrace is stored with left on the left, or
+    ``retrace_mirrored`` in the order of time. Columns show the sample ``delay_pixels`` late, as of a feedback.
+    Raises ``Unphysical``.
+    """
+    geometry, heights = prepared(
+        trace, np.ascontiguousarray(retrace[:, ::-1]) if retrace_mirrored else retrace, turn, window, delay_pixels
+    )
+    spot, bends = begin(geometry, heights, retrace_mirrored)
+    model, state, free = grown(geometry, heights, spot, bends)
+    _check(model, state, free)
+    return _result(model, state, free, v_scan)
+
+
+def _carrying(model: Model, state: State) -> float:
+    """Periods in the line of the spot that says most of x."""
+    along = np.abs(model.spots @ model.q(state.parameters))
+    return float(along[np.argmax(along * np.abs(state.amplitudes))])
+
+
+def _check(model: Model, state: State, free: Bools) -> None:
+    """Whether it is a fit at all."""
+    shares = [1.0 - float(np.mean(left**2)) / float(np.mean(image**2)) for (_, image), left in _both(model, state)]
+    if min(shares) < _LEAST_EXPLAINED:
+        name = "trace" if shares[0] < shares[1] else "retrace"
+        raise Unphysical(
+            f"{100.0 * max(min(shares), 0.0):.0f} % of the {name}'s contrast is a periodic sample; the rest is "
+            f"something else, or trace and retrace are not of one scan"
+        )
+    first = float(model.q(state.parameters)[0])
+    if max(_carrying(model, state), first) < LEAST_PERIODS - 0.2:
+        raise Unphysical(f"the line has {first:.2g} periods; at least {LEAST_PERIODS:g} are needed: scan more of them")
+    forward, backward = (peak(state.parameters[i : i + 2])[0] for i in (0, 2))
+    check_signs(forward, backward, _WRONG_WAY, "try --retrace-mirrored")
+
+
+def _both(model: Model, state: State) -> list[tuple[tuple[bool, Floats], Floats]]:
+    return list(zip(model.images, state.left, strict=True))
+
+
+def _result(model: Model, state: State, free: Bools, v_scan: float) -> ImageFit:
+    geometry, x = model.geometry, state.parameters
+    noise = _noise(state)
+    residual, scaling, curves, misfit, clean = _positions(model, state)
+    worst = float(np.max(np.abs(residual)))
+    if worst > _TOO_FAR_PERCENT:
+        raise Unphysical(
+            f"no branches of the harmonic model join these images: up to {worst:.2g} % of the line is left; are trace "
+            f"and retrace of one scan, --window and --turn right, and the drive a triangle?"
+        )
+    covariance, widened = _covariance(model, state, free, misfit, clean)
+    if float(np.sqrt(np.max(np.diag(covariance)[[0, 2]]))) > _OPEN:
+        raise Unphysical("these images do not determine the shape of the branches; scan more periods, or average")
+    forward, backward = (measured_branch(x[i : i + 2], covariance[i : i + 2, i : i + 2]) for i in (0, 2))
+    line = np.linspace(0.0, 1.0, 201)
+    lagging = [BranchShape(float(x[i]), float(x[i + 1])) for i in (0, 2)]
+    apart = lagging[0].value(line) - line + lagging[1].value(1.0 - line) - (1.0 - line)
+    carrying = _carrying(model, state)
+    slope = max(float(np.max(model.columns(x, side).steep)) for side in (True, False))
+    span = geometry.window[1] - geometry.window[0]
+    bent = model.s(x)[0, 1:] @ model.y_powers[2:]
+    drawn = np.concatenate([image - left for (_, image), left in _both(model, state)])
+    return ImageFit(
+        turn=Estimate(geometry.turn),
+        v_scan=v_scan,
+        samples=2 * geometry.rows * geometry.columns,
+        forward=forward,
+        backward=backward,
+        noise_percent=100.0 * noise / float(np.ptp(drawn)),
+        drift_percent=100.0 * float(np.ptp(bent)) / max(carrying, 1.0),
+        residual_percent=residual,
+        scaling_percent=scaling,
+        curves=curves,
+        periods=carrying,
+        pixels_a_period=geometry.columns / (span * slope * carrying),
+        spots=len(model.spots),
+        explained=1.0 - 2.0 * state.cost / sum(float(np.vdot(image, image)) for _, image in model.images),
+        registration_percent=100.0 * float(apart[np.argmax(np.abs(apart))]),
+        widened=sqrt(widened),
+        strays=_loud_rows(state),
+    )
+
+
+def _loud_rows(state: State) -> tuple[int, ...]:
+    """Rows that leave far more than the others do."""
+    power = np.sqrt(np.mean(np.stack(state.left) ** 2, axis=(0, 2)))
+    middle = float(np.median(power))
+    spread = 1.4826 * float(np.median(np.abs(power - middle)))
+    return tuple(np.flatnonzero(power > middle + max(8.0 * spread, 0.5 * middle)).tolist())
+
+
+def _noise(state: State) -> float:
+    """Of neighbouring pixels, rms."""
+    left = np.concatenate(state.left)
+    return float(np.sqrt(np.mean(np.diff(left, axis=1) ** 2) / 2.0))
+
+
+def _covariance(model: Model, state: State, free: Bools, misfit: float, clean: list[Floats]) -> tuple[Floats, float]:
+    """Of all parameters, 0 for those that are not free; and by how much it was widened.
+
+    From what each line says by itself, so that noise may have any spectrum along the line. It is widened where
+    neighbouring lines say the same, and by ``misfit``; ``clean`` are the images that are left without that.
+    """
+    joint = np.concatenate([free, np.ones(2 * len(model.spots), bool)])
+    inverse = np.linalg.pinv(state.hessian[np.ix_(joint, joint)], rcond=1e-13, hermitian=True)
+    count = int(np.sum(free))
+    influence = (model.scores_of(state, clean)[:, joint] @ inverse)[:, :count]
+    lines = len(influence)
+    shapes = influence[:, :4] / np.maximum(np.sqrt(np.mean(influence[:, :4] ** 2, axis=0)), 1e-300)
+    widened = max(correlation_length(shapes), misfit)
+    covariance = influence.T @ influence * (widened * lines / max(lines - len(inverse), 1))
+    whole = np.zeros((len(free), len(free)))
+    whole[np.ix_(free, free)] = covariance
+    return whole, widened
+
+
+def _positions(
+    model: Model, state: State
+) -> tuple[Floats, tuple[float, float], tuple[Curve, ...], float, list[Floats]]:
+    """The position error of each twentieth of the window, what it does to scaling, and curves.
+
+    Then by how much it is larger than noise would have it, at least 1, and what is left of the images without it.
+    """
+    geometry = model.geometry
+    place = np.minimum((np.arange(geometry.columns) * BINS) // geometry.columns, BINS - 1)
+    count = np.bincount(place, minlength=BINS)
+    residuals, scaling, lines, clean, beyond = [], [], [], [], 0.0
+    span = geometry.window[1] - geometry.window[0]
+    for forward, left, steep in zip((True, False), state.left, state.steepness, strict=True):
+        bins = np.arange(BINS)[:, None] == place
+        weights, products = (bins @ values.T for values in (steep**2, steep * left))  # (bins, rows)
+        weight = np.maximum(np.sum(weights, axis=1), 1e-300)
+        more = np.sum(products, axis=1) / weight
+        spread = np.sum((products - more[:, None] * weights) ** 2, axis=1)
+        clean.append(left - steep * more[place])
+        columns = model.columns(state.parameters, forward)
+        # The model's own x is without what was added to it: that is a part of the error.
+        known = np.bincount(place, model.off[0 if forward else 1], minlength=BINS) / count
+        off = known + more
+        beyond += float(np.sum(off**2 / (spread / weight**2 + _ROUNDING**2)))
+        at, x = (np.bincount(place, values, minlength=BINS) / count for values in (geometry.place, columns.x))
+        x = x - known
+        stretch = np.diff(x + off) / np.diff(at)
+        residuals.append(100.0 * off if forward else -100.0 * off)
+        inside = np.diff(off)[WINDOW] / span * BINS
+        scaling.append(100.0 * float(np.ptp(inside)))
+        lines.append((geometry.place, columns, at, x + off, 0.5 * (at[1:] + at[:-1]), stretch))
+    expected = 2 * BINS - 6
+    misfit = beyond / expected if chdtrc(expected, beyond) < _CHANCE else 1.0
+    residual = Curve(
+        "position less that of a straight line, against the normalised drive",
+        "drive",
+        "% of scan",
+        (
+            np.concatenate([at for _, _, at, *_ in lines]),
+            np.concatenate([100.0 * (x - at) for _, _, at, x, *_ in lines]),
+        ),
+        (
+            np.concatenate([place for place, *_ in lines]),
+            np.concatenate([100.0 * (c.x - o - p) for o, (p, c, *_) in zip(model.off, lines, strict=True)]),
+        ),
+    )
+    period = Curve(
+        "local period less that of an undistorted image",
+        "x of the image",
+        "%",
+        (
+            np.concatenate([middle for *_, middle, _ in lines]),
+            np.concatenate([100.0 * (1.0 / stretch - 1.0) for *_, stretch in lines]),
+        ),
+        (
+            np.concatenate([place for place, *_ in lines]),
+            np.concatenate([100.0 * (1.0 / c.steep - 1.0) for _, c, *_ in lines]),
+        ),
+    )
+    return np.concatenate(residuals), (scaling[0], scaling[1]), (residual, period), max(misfit, 1.0), clean

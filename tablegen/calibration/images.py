@@ -1,0 +1,80 @@
+"""Trace and retrace images of a periodic sample at several amplitudes -> beta_max, rho and u_peak of each branch."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tablegen.calibration.hysteresis import TYPICAL_RHO, HysteresisFit, combined
+from tablegen.calibration.image_fit import ImageFit, fit_pair
+from tablegen.numerics.arrays import Floats
+from tablegen.problems import Unphysical
+
+_POOR_PERCENT = 1.0
+_COARSE = 4.0  # pixels in the shortest period
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two images of one scan at ``v_scan`` V peak to peak, rows x columns each; and a name."""
+
+    name: str
+    v_scan: float
+    trace: Floats
+    retrace: Floats
+
+
+def fit_images(
+    pairs: Sequence[Pair],
+    v_max: float,
+    rho: float = TYPICAL_RHO,
+    turn: float = 0.5,
+    window: tuple[float, float] = (0.0, 1.0),
+    retrace_mirrored: bool = False,
+    delay_pixels: float = 0.0,
+) -> HysteresisFit:
+    """Both branches from images of a triangle's scan; see ``fit_pair`` for what is done to a pair.
+
+    ``rho`` is kept where there is one amplitude only. Raises ``Unphysical``, with the pair's name.
+    """
+    fits: list[ImageFit] = []
+    remarks: list[str] = []
+    for pair in pairs:
+        try:
+            if not 0.0 < pair.v_scan <= 1.02 * v_max:
+                raise Unphysical(f"a scan of {pair.v_scan:g} V is outside the driver's 0..{v_max:g} V")
+            fit = fit_pair(pair.trace, pair.retrace, pair.v_scan, turn, window, retrace_mirrored, delay_pixels)
+        except Unphysical as reason:
+            raise Unphysical(f"{pair.name}: {reason}" if pair.name else str(reason)) from None
+        fits.append(fit)
+        remarks += [f"{pair.name}: {text}" if pair.name else text for text in _remarks(fit)]
+    volts = [pair.v_scan for pair in pairs]
+    if len(set(volts)) < len(volts):
+        remarks.append("some pairs have the same voltage; the piezo voltage peak to peak of each is needed")
+    return combined(fits, v_max, rho, remarks)
+
+
+def _remarks(fit: ImageFit) -> list[str]:
+    found = []
+    worst = float(np.max(np.abs(fit.residual_percent)))
+    if worst > _POOR_PERCENT:
+        found.append(
+            f"the harmonic model leaves {worst:.2g} % of the line; was the drive the triangle itself, is --window what "
+            f"the columns span, and does the feedback follow?"
+        )
+    if fit.widened > 3.0:
+        found.append(
+            f"a part of what is left is no noise but what the model does not describe; standard errors were "
+            f"widened by {fit.widened:.3g}"
+        )
+    if fit.pixels_a_period < _COARSE:
+        found.append(f"the shortest period has {fit.pixels_a_period:.2g} pixels; scan less, or take more pixels")
+    if fit.explained < 0.5:
+        found.append(f"{100.0 * fit.explained:.0f} % of the contrast is periodic, the rest noise, debris or defects")
+    if fit.strays:
+        shown = ", ".join(str(i + 1) for i in fit.strays[:5]) + (", ..." if len(fit.strays) > 5 else "")
+        found.append(f"{len(fit.strays)} lines are unlike the others (row {shown}); they were kept")
+    for name, side in (("forward", fit.forward), ("backward", fit.backward)):
+        if side.u_peak.standard_error > 0.1:
+            found.append(f"u_peak {name} is not determined by these images; scan more periods, or average")
+    return found

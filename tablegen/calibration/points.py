@@ -1,0 +1,38 @@
+"""Hysteresis as it was measured at each amplitude, for scanners that (22) and one u_peak do not describe."""
+
+from typing import Any
+
+from tablegen.calibration.branch import MeasuredBranch
+from tablegen.calibration.hysteresis import TurnFit
+from tablegen.compensation.hysteresis import BranchShape
+from tablegen.problems import Unphysical
+
+_SIGNIFICANT = 3.0  # standard errors of a beta that has a peak worth looking at
+_OPEN_PEAK = 0.1  # standard error of a u_peak that was not determined
+
+
+def measured_points(branch: TurnFit, direction: str) -> list[dict[str, Any]]:
+    """Entries of ``points`` of one direction: size_v, beta, u_peak, by ascending amplitude.
+
+    Where noise hides the peak, u_peak is that of the mean; an amplitude at which noise hides all is left out. Raises
+    ``Unphysical`` where a residual has the wrong sign, or makes no branch.
+    """
+    points: list[dict[str, Any]] = []
+    for trace in branch.traces:
+        side: MeasuredBranch = getattr(trace, direction)
+        beta, peak = side.beta, side.u_peak
+        size_v = float(f"{trace.v_scan:.5g}")
+        if beta.value < 0.0:
+            if beta.value < -_SIGNIFICANT * beta.standard_error:
+                raise Unphysical(f"{size_v:g} V, {direction}: the residual has the wrong sign")
+            continue
+        if beta.value < _SIGNIFICANT * beta.standard_error or peak.standard_error > _OPEN_PEAK:
+            peak = getattr(branch, direction).u_peak
+        if any(point["size_v"] == size_v for point in points):
+            raise Unphysical(f"{size_v:g} V was measured twice; give one of the two")
+        try:
+            BranchShape.harmonic(beta.value, peak.value)
+        except Unphysical as reason:
+            raise Unphysical(f"{size_v:g} V, {direction}: {reason}") from None
+        points.append({"size_v": size_v, "beta": beta.rounded, "u_peak": peak.rounded})
+    return points

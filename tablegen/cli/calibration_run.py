@@ -1,0 +1,229 @@
+"""What all calibrations of the command line share: options, reading, and what is done with a fit."""
+
+import json
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from tablegen.cli.common import fail, written
+from tablegen.cli.status import Status
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from tablegen.calibration.columns import Column
+    from tablegen.calibration.estimate import Fit
+    from tablegen.calibration.image_files import Image
+    from tablegen.calibration.table import Table
+    from tablegen.compensation.size import SizeLaw
+
+F = TypeVar("F", bound=Callable[..., Any])
+_EXTRAS = ("scipy", "tomlkit")
+
+
+@dataclass(frozen=True)
+class Common:
+    """The options that all calibrations share."""
+
+    axis: str
+    scanner: Path | None
+    v_max: float | None
+    write: bool
+    plot: Path | None
+    as_json: bool
+
+
+def shared_options(command: F) -> F:
+    """Those options, as ``common``."""
+    options = [
+        click.option("--axis", type=click.Choice(("x", "y")), required=True, help="Which axis was measured."),
+        click.option(
+            "--scanner",
+            type=click.Path(path_type=Path, dir_okay=False),
+            metavar="FILE",
+            help="The scanner file; v_max is taken from it.",
+        ),
+        click.option("--v-max", type=click.FloatRange(min=1e-3, max=1e5), metavar="V", help="Without a scanner file."),
+        click.option("--write", is_flag=True, help="Update FILE in place, or make it with --v-max."),
+        click.option(
+            "--plot", type=click.Path(path_type=Path, dir_okay=False), metavar="PNG", help="Draw it; or .svg, .pdf."
+        ),
+        click.option("--json", "as_json", is_flag=True, help="Plain data instead of text."),
+    ]
+
+    def run(
+        axis: str,
+        scanner: Path | None,
+        v_max: float | None,
+        write: bool,
+        plot: Path | None,
+        as_json: bool,
+        **rest: Any,
+    ) -> Any:
+        if write and scanner is None:
+            raise click.UsageError("--write needs --scanner FILE")
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the fits are small, and its threads would only spin
+        require(*_EXTRAS, extra="calibrate")
+        if plot is not None:
+            if plot.suffix not in (".png", ".svg", ".pdf"):
+                raise click.UsageError(f"--plot {plot}: the name has to end in .png, .svg or .pdf")
+            require("matplotlib", extra="plot")
+        return command(common=Common(axis, scanner, v_max, write, plot, as_json), **rest)
+
+    run.__doc__, run.__name__ = command.__doc__, command.__name__
+    for option in reversed(options):
+        run = option(run)
+    run.__click_params__ += getattr(command, "__click_params__", [])  # type: ignore[attr-defined]
+    return run  # type: ignore[return-value]
+
+
+def require(*modules: str, extra: str) -> None:
+    from importlib.util import find_spec
+
+    missing = [module for module in modules if find_spec(module) is None]
+    if missing:
+        needs = " and ".join(missing)
+        fail([f"{needs} is missing; install it with: pip install 'tablegen[{extra}]'"], Status.TOOL_MISSING)
+
+
+def read_columns(path: Path, needed: "Sequence[Column]", optional: "Sequence[Column]" = ()) -> "Table":
+    from tablegen.calibration.table import read_table
+    from tablegen.problems import Rejected
+
+    try:
+        return read_table(path, needed, optional)
+    except Rejected as rejected:
+        fail(rejected.problems, Status.WRONG_INPUT)
+
+
+def read_heights(path: Path, channel: str | None) -> "Image":
+    from tablegen.calibration.image_files import read_image
+    from tablegen.problems import Rejected
+
+    try:
+        return read_image(path, channel)
+    except Rejected as rejected:
+        fail(rejected.problems, Status.WRONG_INPUT)
+
+
+def within(table: "Table", from_hz: float, to_hz: float) -> "Table":
+    from dataclasses import replace
+
+    from tablegen.calibration.columns import FREQUENCY
+
+    kept = (table[FREQUENCY] >= from_hz) & (table[FREQUENCY] <= to_hz)
+    if not kept.any():
+        fail([f"{table.file}: no row lies from {from_hz:g} to {to_hz:g} Hz"], Status.WRONG_INPUT)
+    return replace(
+        table, columns={name: values[kept] for name, values in table.columns.items()}, lines=table.lines[kept]
+    )
+
+
+def _scanner_values(common: Common) -> dict[str, Any]:
+    """What the scanner file says now; nothing where it is to be made."""
+    from tablegen.config.toml import read_toml
+    from tablegen.problems import Rejected
+
+    if common.scanner is None or (common.write and not common.scanner.exists()):
+        return {}
+    try:
+        return read_toml(common.scanner, str(common.scanner))[0]
+    except Rejected as rejected:
+        fail(rejected.problems, Status.WRONG_INPUT)
+
+
+def full_scale(common: Common) -> float:
+    values = _scanner_values(common)
+    found = values.get("v_max")
+    if isinstance(found, int | float) and not isinstance(found, bool) and found > 0.0:
+        if common.v_max is not None and common.v_max != found:
+            fail([f"{common.scanner}: v_max: {found:g} there, and --v-max {common.v_max:g}"], Status.WRONG_INPUT)
+        return float(found)
+    if values:
+        fail([f"{common.scanner}: v_max: missing, or no voltage"], Status.WRONG_INPUT)
+    if common.v_max is None:
+        raise click.UsageError("give --scanner FILE, or --v-max V, the driver's maximum output")
+    return common.v_max
+
+
+def in_file(common: Common, kind: str, key: str) -> float | None:
+    """A number of the scanner file as it is, or None; no length or frequency is 0 or less."""
+    value = _number(common, kind, key)
+    return value if value is not None and value > 0.0 else None
+
+
+def _number(common: Common, kind: str, key: str) -> float | None:
+    values: Any = _scanner_values(common)
+    for name in (common.axis, kind, key):
+        values = values.get(name) if isinstance(values, dict) else None
+    return float(values) if isinstance(values, int | float) else None
+
+
+def size_law(common: Common, v_max: float, size_v: float) -> "SizeLaw":
+    """That of the scanner file, for images of ``size_v`` volts."""
+    from tablegen.compensation.size import SizeLaw
+    from tablegen.problems import Unphysical
+
+    k, base = in_file(common, "size", "k_nm_per_v"), in_file(common, "size", "base_nm")
+    beta, threshold = _number(common, "size", "beta"), in_file(common, "size", "v_threshold")
+    if k is None:
+        fail([f"--size-v takes {common.axis}.size of --scanner FILE; calibrate the size first"], Status.WRONG_INPUT)
+    if size_v > v_max:
+        fail([f"--size-v {size_v:g} is above v_max = {v_max:g} V"], Status.WRONG_INPUT)
+    try:
+        return SizeLaw.calibrated(k, v_max, beta or 0.0, base or 200.0, threshold or 0.5)
+    except Unphysical as reason:
+        fail([f"{common.scanner}: {common.axis}.size: {reason}"], Status.WRONG_INPUT)
+
+
+def finish(common: Common, tables: "Sequence[Table | Image]", run: "Callable[[], Fit]", points: bool = False) -> int:
+    """Fit, print, draw and write; with ``points`` hysteresis as measured."""
+    from tablegen.calibration.summary import record
+    from tablegen.cli.calibration_text import calibration_text
+    from tablegen.problems import Unphysical
+
+    try:
+        fit = run()
+    except Unphysical as reason:
+        fail([f"{', '.join(dict.fromkeys(table.file for table in tables))}: {reason}"], Status.WRONG_INPUT)
+    sources = list(dict.fromkeys(table.source for table in tables))  # images may stand in one file
+    if common.as_json:
+        click.echo(json.dumps(record(fit, common.axis, sources), indent=2, allow_nan=False))
+    else:
+        click.echo("\n".join(calibration_text(fit, common.axis, tables)))
+    if common.plot is not None:
+        from tablegen.calibration.figure import draw
+
+        kind: Any = common.plot.suffix[1:]
+        written(common.plot.parent, {common.plot.name: draw(fit.curves, kind)})
+    if common.write:
+        _write(common, fit, tables, points)
+    return Status.OK
+
+
+def _write(common: Common, fit: "Fit", tables: "Sequence[Table | Image]", points: bool) -> None:
+    from tablegen.calibration.scanner_file import new_file, updated
+    from tablegen.calibration.summary import change
+    from tablegen.problems import Rejected, Unphysical
+
+    assert common.scanner is not None
+    name = str(common.scanner)
+    try:
+        path = common.scanner.resolve()
+        text = path.read_bytes().decode("utf-8") if path.exists() else new_file(path.stem, full_scale(common))
+        put = change(fit, list(dict.fromkeys(table.source for table in tables)), points)
+        content = updated(text, name, common.axis, put).encode("utf-8")
+    except Rejected as rejected:
+        fail(rejected.problems, Status.WRONG_INPUT)
+    except Unphysical as reason:
+        fail([f"--points: {reason}"], Status.WRONG_INPUT)
+    except UnicodeDecodeError:
+        fail([f"{name}: is not UTF-8"], Status.WRONG_INPUT)
+    except OSError as error:
+        fail([f"{name}: {error.strerror or error}"], Status.WRONG_INPUT)
+    changed = written(path.parent, {path.name: content})
+    click.echo(f"{name}: {common.axis}.{put.kind} {'written' if changed else 'up to date'}", err=common.as_json)
