@@ -4,6 +4,7 @@ import csv
 import json
 import sys
 from importlib.resources import files
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -33,17 +34,62 @@ def test_text_and_data_say_the_same(tmp_path: Path) -> None:
     assert shown.out.splitlines()[-1].startswith("A simulation, not a measurement")
     data = json.loads(plain.out)
     assert data["simulation"] is True
-    assert list(data["models"]) == ["triangle", "sinusoidal", "harmonic"]
-    for model, axes in data["models"].items():
+    rows = [line for line in shown.out.splitlines() if line.startswith(("x  ", "y  "))]
+    for stage in ("given", "calibrated"):
+        models = data[stage]["models"]
+        assert list(models) == ["triangle", "sinusoidal", "harmonic"]
         for axis in "xy":
-            row = next(line for line in shown.out.splitlines() if line.startswith(f"{axis}     {model}"))
-            found = axes[axis]
-            assert ("*" in row) == (model == "harmonic") == (axis in axes["in_scanner_file"])
-            assert f"{found['moved_nm']:7.1f}    forward    {found['forward']['residual_peak_percent']:+6.3f}" in row
-            assert row.endswith(f"{found['forward']['scaling_error_peak_to_peak_percent']:6.3f}")
-            assert found["size_error_percent"] == pytest.approx(100.0 * (found["moved_nm"] / found["nominal_nm"] - 1.0))
-    # y images forward only.
-    assert ["backward" in data["models"]["triangle"][axis] for axis in "xy"] == [True, False]
+            for model in models:
+                row, found = rows.pop(0), models[model][axis]
+                assert row.startswith(f"{axis}     {model}")
+                assert ("*" in row) == (model == "harmonic") == (axis in models[model]["in_scanner_file"])
+                assert f"{found['size_error_percent']:+6.2f}  forward" in row
+                assert f"   {found['forward']['residual_peak_percent']:+6.3f}   " in row
+                for name in ("residual_range_percent", "residual_about_image_line_percent"):
+                    low, high = found["forward"][name]
+                    assert f"{low:+6.3f} .. {high:+6.3f}" in row
+                assert row.endswith(f"{found['forward']['scaling_error_peak_to_peak_percent']:6.3f}")
+        # y images forward only.
+        assert ["backward" in models["triangle"][axis] for axis in "xy"] == [True, False]
+    assert not rows
+
+
+def test_a_calibration_makes_the_scan_straighter(tmp_path: Path) -> None:
+    """x at the example's 200 nm: the example's file is another scanner's, of the same kind."""
+    data = json.loads(run("simulate", write_pair(tmp_path, SHORT), "--json").out)
+    given, calibrated = (data[stage]["models"]["harmonic"]["x"] for stage in ("given", "calibrated"))
+    for side in ("forward", "backward"):
+        before, after = (one[side]["scaling_error_peak_to_peak_percent"] for one in (given, calibrated))
+        assert after < 0.5 * before
+    assert abs(calibrated["size_error_percent"]) < 1.0 < abs(given["size_error_percent"])
+
+
+def test_noise_and_seed_are_those_of_the_calibration(tmp_path: Path) -> None:
+    scan = write_pair(tmp_path, SHORT)
+    first, again, other, loud = (
+        json.loads(run("simulate", scan, "--json", *extra).out)
+        for extra in ((), ("--seed", "0"), ("--seed", "1"), ("--noise", "1"))
+    )
+    assert first == again
+    for changed in (other, loud):
+        assert changed["given"] == first["given"]
+        assert changed["calibrated"] != first["calibrated"]
+
+
+def test_without_a_calibration(tmp_path: Path) -> None:
+    data = json.loads(run("simulate", write_pair(tmp_path, SHORT), "--json", "--no-calibration").out)
+    assert "given" in data
+    assert "calibrated" not in data
+
+
+def test_a_calibration_needs_scipy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "scipy", None)
+    scan = write_pair(tmp_path, SHORT)
+    outcome = run("simulate", scan)
+    assert outcome.status == Status.TOOL_MISSING
+    assert "tablegen[calibrate]" in outcome.err
+    assert "--no-calibration" in outcome.err
+    assert run("simulate", scan, "--no-calibration").status == 0
 
 
 def test_a_line_and_a_frame_as_csv(tmp_path: Path) -> None:
@@ -52,8 +98,10 @@ def test_a_line_and_a_frame_as_csv(tmp_path: Path) -> None:
     lines = (tmp_path / "out" / "ticks.csv").read_text(encoding="utf-8").splitlines()
     assert lines[0] == "# simulation"
     rows = list(csv.DictReader(lines[1:]))
-    for model in ("triangle", "sinusoidal", "harmonic"):
-        x, y = ([row for row in rows if (row["model"], row["axis"]) == (model, axis)] for axis in "xy")
+    stages, models = ("given", "calibrated"), ("triangle", "sinusoidal", "harmonic")
+    for stage, model in product(stages, models):
+        mine = [row for row in rows if (row["scanner"], row["model"]) == (stage, model)]
+        x, y = ([row for row in mine if row["axis"] == axis] for axis in "xy")
         assert len(x) == 1250
         assert len(y) == 25_000 / 3 + 2 / 3  # every third tick of the frame
         volts = np.array([float(row["drive_v"]) for row in x])
@@ -82,7 +130,9 @@ def test_an_uncalibrated_scanner_is_a_triangle(tmp_path: Path) -> None:
     scanner = edited(scanner, "- [[y.hysteresis.branches]]")
     outcome = run("simulate", write_pair(tmp_path, SHORT, scanner), "--json")
     assert outcome.status == 0
-    assert list(json.loads(outcome.out)["models"]) == ["triangle"]
+    data = json.loads(outcome.out)
+    assert list(data["given"]["models"]) == ["triangle"]
+    assert list(data["calibrated"]["models"]) == ["triangle", "sinusoidal", "harmonic"]
 
 
 def test_another_truth(tmp_path: Path) -> None:
@@ -94,7 +144,10 @@ def test_another_truth(tmp_path: Path) -> None:
     outcome = run("simulate", scan, "--scanner-truth", tmp_path / "straight.toml", "--json")
     data = json.loads(outcome.out)
     assert data["virtual_scanner"] == "straight"
-    plain, shaped = (data["models"][model]["x"]["forward"] for model in ("triangle", "harmonic"))
+    # There is nothing to calibrate, which is said.
+    assert data["calibrated"]["models"] == {}
+    assert "no hysteresis" in data["calibrated"]["rejected"]["calibration"]
+    plain, shaped = (data["given"]["models"][model]["x"]["forward"] for model in ("triangle", "harmonic"))
     assert abs(plain["residual_peak_percent"]) < 0.05
     assert shaped["residual_peak_percent"] == pytest.approx(2.08, abs=0.1)  # (22) at 0.2 of full scale
 
@@ -149,5 +202,5 @@ def test_a_model_that_is_rejected_leaves_the_others(tmp_path: Path) -> None:
     outcome = run("simulate", write_pair(tmp_path, SHORT, scanner), "--json")
     assert outcome.status == 0
     data = json.loads(outcome.out)
-    assert list(data["models"]) == ["triangle", "sinusoidal"]
-    assert "u_peak" in data["rejected"]["harmonic"]
+    assert list(data["given"]["models"]) == ["triangle", "sinusoidal"]
+    assert "u_peak" in data["given"]["rejected"]["harmonic"]

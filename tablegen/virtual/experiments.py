@@ -4,6 +4,7 @@ Columns have the names and units that ``tablegen.calibration`` reads. Noise come
 """
 
 from collections.abc import Sequence
+from math import ceil, exp, pi
 
 import numpy as np
 
@@ -13,11 +14,15 @@ from tablegen.virtual.scanner import VirtualAxis
 from tablegen.virtual.sensor import Sensor
 
 TICKS = 2000  # of a triangle whose size alone counts
+STEPS_PER_RING = 8  # of the generator, in a period of the resonance
+RUNG_OUT = 1e-2  # what is left of a step's ringing that is small beside the sensor's noise
+MOST_TICKS = 1 << 21  # beyond it steps are so small that they ring nothing
 
 
 def triangle_size(axis: VirtualAxis, size_v: float, offset_v: float, rate_hz: float, turn: float = 0.5) -> float:
     """Nanometres between the ends of a settled triangle of ``size_v`` volts peak to peak."""
-    moved = axis.settled(_triangle(size_v, offset_v, TICKS, turn), 1.0 / (rate_hz * TICKS))
+    ticks = TICKS * _finer(axis, rate_hz * TICKS, TICKS)
+    moved = axis.settled(_triangle(size_v, offset_v, ticks, turn), 1.0 / (rate_hz * ticks))
     return float(np.max(moved) - np.min(moved))
 
 
@@ -35,10 +40,11 @@ def sensor_trace(
 
     ``samples`` a period; the first period is not settled, and creep drifts through all of them.
     """
-    volts = np.tile(_triangle(size_v, offset_v, samples, turn), periods)
-    tick_s = 1.0 / (rate_hz * samples)
-    time = np.arange(len(volts), dtype=np.float64) * tick_s
-    moved = axis.follow(volts, tick_s, offset_v)
+    finer = _finer(axis, rate_hz * samples, periods * samples)
+    volts = np.tile(_triangle(size_v, offset_v, samples * finer, turn), periods)
+    time = np.arange(periods * samples, dtype=np.float64) / (rate_hz * samples)
+    moved = axis.follow(volts, 1.0 / (rate_hz * samples * finer), offset_v)[::finer]
+    volts = volts[::finer]
     return {"time_s": time, "drive_v": volts, "displacement_nm": (sensor or Sensor()).read(moved, time)}
 
 
@@ -50,13 +56,14 @@ def apparent_sizes(
     true_nm: float = 17.7,
     noise: float = 0.0,
     seed: int = 0,
+    turn: float = 0.5,
 ) -> dict[str, Floats]:
     """``offset_v``, ``apparent_nm``: how large an object looks in a scan of ``size_v``, calibrated at v_max / 2.
 
     ``noise`` is relative, rms.
     """
-    middle = triangle_size(axis, size_v, 0.5 * axis.v_max, rate_hz)
-    ratios = [middle / triangle_size(axis, size_v, offset, rate_hz) for offset in offsets_v]
+    middle = triangle_size(axis, size_v, 0.5 * axis.v_max, rate_hz, turn)
+    ratios = [middle / triangle_size(axis, size_v, offset, rate_hz, turn) for offset in offsets_v]
     return {"offset_v": np.array(offsets_v, dtype=np.float64), "apparent_nm": true_nm * _noisy(ratios, noise, seed)}
 
 
@@ -68,10 +75,11 @@ def actual_sizes(
     offset_v: float | None = None,
     noise: float = 0.0,
     seed: int = 0,
+    turn: float = 0.5,
 ) -> dict[str, Floats]:
     """``nominal_nm``, ``actual_nm``: sizes set with a linear k, and those reached; by default at v_max / 2."""
     offset = 0.5 * axis.v_max if offset_v is None else offset_v
-    sizes = [triangle_size(axis, nominal / k_nm_per_v, offset, rate_hz) for nominal in nominal_nm]
+    sizes = [triangle_size(axis, nominal / k_nm_per_v, offset, rate_hz, turn) for nominal in nominal_nm]
     return {"nominal_nm": np.array(nominal_nm, dtype=np.float64), "actual_nm": _noisy(sizes, noise, seed)}
 
 
@@ -84,6 +92,19 @@ def frequency_response(
     complex_noise = generator.standard_normal(f.shape) + 1j * generator.standard_normal(f.shape)
     h = axis.response(f) * (1.0 + noise * complex_noise)
     return {"frequency_hz": f, "gain": np.abs(h), "phase_deg": np.degrees(np.unwrap(np.angle(h)))}
+
+
+def _finer(axis: VirtualAxis, tick_hz: float, ticks: int) -> int:
+    """Into how many a tick is split, so that the generator's own steps do not ring the resonance.
+
+    Steps that are far apart need not be: their ringing has died away when the tick ends.
+    """
+    if not axis.resonance.poles:
+        return 1
+    ringing = max(axis.resonance.poles, key=lambda pole: abs(pole.imag))
+    if exp(ringing.real / tick_hz) < RUNG_OUT:
+        return 1
+    return max(1, min(ceil(STEPS_PER_RING * abs(ringing.imag) / (2.0 * pi * tick_hz)), MOST_TICKS // ticks))
 
 
 def _triangle(size_v: float, offset_v: float, samples: int, turn: float) -> Floats:

@@ -10,7 +10,7 @@ sensitivity's. Needs scipy.
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 from scipy.optimize import nnls
@@ -22,7 +22,7 @@ from tablegen.numerics.arrays import Floats
 from tablegen.virtual.creep import logarithmic_creep
 from tablegen.virtual.preisach import Preisach
 
-DEGREE, REVERSIBLE, SENSITIVITY = 8, 2, 4  # degrees of the polynomials
+DEGREE, REVERSIBLE, SENSITIVITY = 8, 2, 6  # degrees of the polynomials
 TICKS = 2000  # of a triangle
 SIZES = (0.07, 0.13, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 OFFSETS_V = (7.0, 20.0, 35.0, 50.0, 65.0, 80.0, 93.0)
@@ -30,10 +30,14 @@ V_MAX = 100.0
 OFFSET_SIZE = 0.13  # of v_max, 200 nm in figure 2 of the paper
 LOSS = 0.03
 FASTEST_S, SLOWEST_S, PER_DECADE = 1e-6, 1e3, 2
-# Sizes and middles, normalised, at which the size nonlinearity shall be what it is in the middle of the range.
-ELSEWHERE = tuple((v, middle) for v in (0.05, 0.2, 0.4, 0.6) for middle in (0.3, 0.4, 0.6, 0.7))
+# Normalised sizes at middles away from that of the range, at which one m(p) and one size law shall serve.
+ELSEWHERE = (
+    *product((0.05, 0.2, 0.4), (0.3, 0.4, 0.6, 0.7)),
+    *product((0.03, 0.06, 0.1), (0.07, 0.15, 0.285, 0.5, 0.715, 0.85, 0.93)),
+    *product((0.2, 0.24), (0.15, 0.2, 0.8, 0.85)),
+)
 # The largest loop is what the paper prints most of; the offset's curvature, which the sensitivity can take over, least.
-SIZE_WEIGHT, LARGEST_WEIGHT, SMALLER_WEIGHT, OFFSET_WEIGHT, ELSEWHERE_WEIGHT = 20.0, 60.0, 10.0, 1.0, 1.0
+SIZE_WEIGHT, LARGEST_WEIGHT, SMALLER_WEIGHT, OFFSET_WEIGHT, ELSEWHERE_WEIGHT = 20.0, 80.0, 10.0, 1.0, 7.0
 
 
 @dataclass(frozen=True)
@@ -94,11 +98,15 @@ def identify(targets: Targets) -> Identified:
     sizes = np.array([b - a for a, b in ends]) / targets.size.size_nm(OFFSET_SIZE)
     add(sizes * factors[:, None], np.ones(len(factors)), OFFSET_WEIGHT)
 
+    # A build asks for m times the drive, whatever the size: m of the offset's images has to serve the others.
     small = targets.size.size_nm(OFFSET_SIZE)
     for v, middle in ELSEWHERE:
-        start, end = _triangles(units, v, middle, targets.rate_hz)[[0, half]] / targets.size.size_nm(v)
-        start_small, end_small = _triangles(units, OFFSET_SIZE, middle, targets.rate_hz)[[0, half]] / small
-        add((end - start - end_small + start_small)[None, :], np.zeros(1), ELSEWHERE_WEIGHT)
+        m = targets.offset.factor(2.0 * middle - 1.0)
+        if max(0.5 * m * v, 0.5 * m * OFFSET_SIZE) > min(middle, 1.0 - middle):
+            continue
+        at_v = np.diff(_triangles(units, m * v, middle, targets.rate_hz)[[0, half]], axis=0)
+        at_small = np.diff(_triangles(units, m * OFFSET_SIZE, middle, targets.rate_hz)[[0, half]], axis=0)
+        add(at_v / targets.size.size_nm(v) - at_small / small, np.zeros(1), ELSEWHERE_WEIGHT)
 
     found, _ = nnls(np.vstack(rows), np.concatenate(wanted), maxiter=20000)
     found = np.array([float(f"{value:.6g}") for value in found])

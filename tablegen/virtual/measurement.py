@@ -5,7 +5,8 @@ slope from that at x = 0.5, in percent, above 0 where the image is stretched, ta
 lie inside the window.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -58,6 +59,25 @@ class LineError:
     size_nm: float
     forward: Branch
     backward: Branch
+
+
+def about_window_line(error: LineError, directions: Sequence[str] = ("forward", "backward")) -> LineError:
+    """The same about the straight line that fits the imaged windows best, one line for all ``directions``.
+
+    Where turnarounds are rounded, the ends of the line are not imaged and need not be where the ends of a straight line
+    would be. What an image shows is the departure from this line, and its slope is the size of the image.
+    """
+    imaged: list[Branch] = [getattr(error, side) for side in directions]
+    inside = [branch._inside() for branch in imaged]
+    x = np.concatenate([branch.position[part] for branch, part in zip(imaged, inside, strict=True)])
+    y = np.concatenate([branch.residual[part] for branch, part in zip(imaged, inside, strict=True)])
+    slope, offset = np.polyfit(x, y, 1)
+    grown = 1.0 + 0.01 * slope
+
+    def branch(one: Branch) -> Branch:
+        return replace(one, residual=(one.residual - offset - slope * one.position) / grown)
+
+    return LineError(error.size_nm * grown, branch(error.forward), branch(error.backward))
 
 
 def ideal_triangle(ticks: int, turn: float) -> Floats:

@@ -2,53 +2,85 @@
 
 import io
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from tablegen.virtual.measurement import Branch, ideal_triangle
+from tablegen.virtual.measurement import Branch, LineError, ideal_triangle
 from tablegen.virtual.simulation import AxisRun, Run
 
-LABEL = "simulation on a virtual scanner, before calibration on it"
+LABEL = "simulation on a virtual scanner"
 _MOST_ROWS = 10_000
+_COLOURS = {"triangle": "#c23b22", "sinusoidal": "#d98e04", "harmonic": "#1f5fa8"}
 
 
-def text(name: str, truth: str, runs: Sequence[Run], rejected: Sequence[tuple[str, str]]) -> list[str]:
-    """A table for the terminal; ``rejected`` are models that could not be planned, and why."""
+@dataclass(frozen=True)
+class Stage:
+    """Runs with one scanner file: as ``given``, or as ``calibrated`` on the virtual scanner; and what could not run."""
+
+    name: str
+    heading: str
+    runs: tuple[Run, ...]
+    rejected: tuple[tuple[str, str], ...] = ()
+
+
+def text(name: str, truth: str, stages: Sequence[Stage]) -> list[str]:
+    """A table for the terminal."""
+    first = next(run for stage in stages for run in stage.runs)
     lines = [
-        f"{name}: {LABEL} ({truth!r})",
+        f"{name}: {LABEL} ({truth!r}); {first.x.nominal_nm:g} nm in x and {first.y.nominal_nm:g} nm in y asked for",
         "",
-        "                   line [nm]         residual in the window [% of the line]",
-        "axis  model        nominal  moved      direction  peak      at x   range              "
-        "scaling error [% peak to peak]",
+        "                  size    residual in the window [% of the line]               in the image       "
+        "scaling error",
+        "axis  model       [%]     direction  peak      at x   range                    about its line     "
+        "[%, peak to peak]",
     ]
-    for axis in ("x", "y"):
-        for run in runs:
-            one: AxisRun = getattr(run, axis)
-            mark = "*" if axis in run.asked else " "
-            start = f"{axis:<4}  {run.model:<10}{mark}  {one.nominal_nm:7.1f}  {one.error.size_nm:7.1f}"
-            for i, side in enumerate(one.directions):
-                branch: Branch = getattr(one.error, side)
-                peak, at = branch.peak
-                low, high = branch.residual_range
-                lines.append(
-                    f"{start if i == 0 else ' ' * len(start)}    {side:<9}  {peak:+6.3f}   {at:5.3f}   "
-                    f"{low:+6.3f} .. {high:+6.3f}   {branch.scaling_peak_to_peak:6.3f}"
-                )
-    lines += ["", "* the model of the scanner file", *(f"{model}: {why}" for model, why in rejected)]
+    for stage in stages:
+        lines += ["", stage.heading]
+        for axis in ("x", "y"):
+            for run in stage.runs:
+                lines += _rows(axis, run)
+        lines += [f"{model}: {why}" for model, why in stage.rejected]
+    lines.append("")
+    lines.append("* the model of the scanner file")
+    if any(getattr(run, axis).refined for stage in stages for run in stage.runs for axis in ("x", "y")):
+        lines.append("+ with the refinement of the scan file")
     lines.append("A simulation, not a measurement: the virtual scanner was identified from figures in a paper.")
     return lines
 
 
-def data(name: str, truth: str, runs: Sequence[Run], rejected: Sequence[tuple[str, str]]) -> dict[str, Any]:
-    """The same as plain data, for JSON."""
+def _rows(axis: str, run: Run) -> list[str]:
+    one: AxisRun = getattr(run, axis)
+    mark = ("*" if axis in run.asked else "") + ("+" if one.refined else "")
+    start = f"{axis:<4}  {run.model + mark:<12}{one.size_error_percent:+6.2f}"
+    rows: list[str] = []
+    for side in one.directions:
+        branch: Branch = getattr(one.error, side)
+        imaged: Branch = getattr(one.imaged, side)
+        peak, at = branch.peak
+        rows.append(
+            f"{start if not rows else ' ' * len(start)}  {side:<9}  {peak:+6.3f}   {at:5.3f}   {_range(branch)}       "
+            f"{_range(imaged)}   {branch.scaling_peak_to_peak:6.3f}"
+        )
+    return rows
 
-    def branch(one: Branch) -> dict[str, Any]:
+
+def _range(branch: Branch) -> str:
+    low, high = branch.residual_range
+    return f"{low:+6.3f} .. {high:+6.3f}"
+
+
+def data(name: str, truth: str, stages: Sequence[Stage]) -> dict[str, Any]:
+    """The same as plain data, for JSON, by stage and model."""
+
+    def branch(one: Branch, imaged: Branch) -> dict[str, Any]:
         peak, at = one.peak
         return {
             "residual_peak_percent": peak,
             "residual_peak_at": at,
             "residual_range_percent": list(one.residual_range),
+            "residual_about_image_line_percent": list(imaged.residual_range),
             "scaling_error_peak_to_peak_percent": one.scaling_peak_to_peak,
             "window": list(one.window),
         }
@@ -58,69 +90,91 @@ def data(name: str, truth: str, runs: Sequence[Run], rejected: Sequence[tuple[st
             "nominal_nm": one.nominal_nm,
             "moved_nm": one.error.size_nm,
             "size_error_percent": one.size_error_percent,
-            **{side: branch(getattr(one.error, side)) for side in one.directions},
+            "refined": one.refined,
+            **{side: branch(getattr(one.error, side), getattr(one.imaged, side)) for side in one.directions},
         }
 
-    models = {run.model: {"in_scanner_file": list(run.asked), "x": axis(run.x), "y": axis(run.y)} for run in runs}
     return {
         "simulation": True,
         "label": LABEL,
         "scan": name,
         "virtual_scanner": truth,
-        "models": models,
-        "rejected": dict(rejected),
+        **{
+            stage.name: {
+                "models": {
+                    run.model: {"in_scanner_file": list(run.asked), "x": axis(run.x), "y": axis(run.y)}
+                    for run in stage.runs
+                },
+                "rejected": dict(stage.rejected),
+            }
+            for stage in stages
+        },
     }
 
 
-def csv(runs: Sequence[Run]) -> str:
+def csv(stages: Sequence[Stage]) -> str:
     """One settled period of each axis, at most some ten thousand of its ticks; ``position`` is that of the triangle."""
     out = io.StringIO()
     out.write("# simulation\n")
-    out.write("model,axis,tick,time_s,code,drive_v,displacement_nm,position,residual_percent\n")
-    for run in runs:
-        for one in (run.x, run.y):
-            ticks = len(one.displacement_nm)
-            thin = slice(None, None, -(-ticks // _MOST_ROWS))
-            position = ideal_triangle(ticks, one.turn)[thin]
-            rising = (np.arange(ticks) / ticks <= one.turn)[thin]
-            forward, backward = one.error.forward, one.error.backward
-            residual = np.where(
-                rising,
-                np.interp(position, forward.position, forward.residual),
-                np.interp(position, backward.position, backward.residual),
-            )
-            drive = one.drive
-            columns = (drive.tick, drive.time_s, drive.codes, drive.volts, one.displacement_nm)
-            for k, t, code, v, d, p, r in zip(*(c[thin] for c in columns), position, residual, strict=True):
-                out.write(f"{run.model},{one.axis},{k},{t:.9g},{code},{v:.9g},{d:.9g},{p:.6f},{r:.6f}\n")
+    out.write("scanner,model,axis,tick,time_s,code,drive_v,displacement_nm,position,residual_percent\n")
+    for stage in stages:
+        for run in stage.runs:
+            for one in (run.x, run.y):
+                _write_ticks(out, f"{stage.name},{run.model},{one.axis}", one)
     return out.getvalue()
 
 
-def figure(title: str, runs: Sequence[Run]) -> bytes:
-    """A PNG: displacement, residual and scaling error of both axes. Needs matplotlib."""
+def _write_ticks(out: io.StringIO, start: str, one: AxisRun) -> None:
+    ticks = len(one.displacement_nm)
+    thin = slice(None, None, -(-ticks // _MOST_ROWS))
+    position = ideal_triangle(ticks, one.turn)[thin]
+    rising = (np.arange(ticks) / ticks <= one.turn)[thin]
+    forward, backward = one.error.forward, one.error.backward
+    residual = np.where(
+        rising,
+        np.interp(position, forward.position, forward.residual),
+        np.interp(position, backward.position, backward.residual),
+    )
+    drive = one.drive
+    columns = (drive.tick, drive.time_s, drive.codes, drive.volts, one.displacement_nm)
+    for k, t, code, v, d, p, r in zip(*(c[thin] for c in columns), position, residual, strict=True):
+        out.write(f"{start},{k},{t:.9g},{code},{v:.9g},{d:.9g},{p:.6f},{r:.6f}\n")
+
+
+def figure(title: str, stages: Sequence[Stage]) -> bytes:
+    """A PNG: displacement, residual and scaling error, a row for each axis and stage. Needs matplotlib."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    page = Figure(figsize=(12, 6.4), layout="constrained")
+    rows = [(axis, stage) for axis in ("x", "y") for stage in stages if stage.runs]
+    page = Figure(figsize=(12, 3.1 * len(rows) + 0.4), layout="constrained")
     FigureCanvasAgg(page)
-    rows = page.subplots(2, 3)
-    for axes, name in zip(rows, ("x", "y"), strict=True):
-        for run, colour in zip(runs, ("#c23b22", "#d98e04", "#1f5fa8"), strict=False):
-            one: AxisRun = getattr(run, name)
-            thin = slice(None, None, max(1, len(one.displacement_nm) // 4000))
-            axes[0].plot(one.drive.time_s[thin], one.displacement_nm[thin], color=colour, lw=1.4, label=run.model)
-            for side in one.directions:
-                branch: Branch = getattr(one.error, side)
-                style = "-" if side == "forward" else "--"
-                low, high = branch.window
-                inside = (branch.position >= low) & (branch.position <= high)
-                axes[1].plot(branch.position[inside], branch.residual[inside], style, color=colour, lw=1.4)
-                axes[2].plot(branch.scaling_position, branch.scaling, style, color=colour, lw=1.4)
-        axes[0].set(title=f"{name}: displacement (simulation)", xlabel="time [s]", ylabel="nm")
-        axes[1].set(title=f"{name}: residual", xlabel="position in the line", ylabel="% of the line")
-        axes[2].set(title=f"{name}: scaling error", xlabel="position in the line", ylabel="%")
+    grid = page.subplots(len(rows), 3, squeeze=False)
+    for axes, (name, stage) in zip(grid, rows, strict=True):
+        for run in stage.runs:
+            _draw(axes, getattr(run, name), run.model)
+        axes[0].set(title=f"{name}, scanner file as {stage.name}: displacement", xlabel="time [s]", ylabel="nm")
+        axes[1].set(title="residual", xlabel="position in the line", ylabel="% of the line")
+        axes[2].set(title="scaling error", xlabel="position in the line", ylabel="%")
         axes[0].legend(frameon=False, fontsize=8)
+        for panel in axes[1:]:
+            panel.axhline(0.0, color="#999999", lw=0.6)
+            panel.set_xlim(0.0, 1.0)
     page.suptitle(f"{title}; forward solid, backward dashed")
     out = io.BytesIO()
     page.savefig(out, dpi=110, metadata={"Software": None})
     return out.getvalue()
+
+
+def _draw(axes: Sequence[Any], one: AxisRun, model: str) -> None:
+    colour = _COLOURS[model]
+    thin = slice(None, None, max(1, len(one.displacement_nm) // 4000))
+    axes[0].plot(one.drive.time_s[thin], one.displacement_nm[thin], color=colour, lw=1.4, label=model)
+    error: LineError = one.error
+    for side in one.directions:
+        branch: Branch = getattr(error, side)
+        style = "-" if side == "forward" else "--"
+        low, high = branch.window
+        inside = (branch.position >= low) & (branch.position <= high)
+        axes[1].plot(branch.position[inside], branch.residual[inside], style, color=colour, lw=1.4)
+        axes[2].plot(branch.scaling_position, branch.scaling, style, color=colour, lw=1.4)

@@ -6,10 +6,10 @@ from typing import Literal
 import msgspec
 
 from tablegen.config.load import Setup
-from tablegen.config.schema import Hysteresis, ScannerAxis
+from tablegen.config.schema import Branch, Hysteresis, ScannerAxis
 from tablegen.numerics.arrays import Floats
 from tablegen.plan import LinePlan, make_plan
-from tablegen.virtual.measurement import LineError, line_error
+from tablegen.virtual.measurement import LineError, about_window_line, line_error
 from tablegen.virtual.played import Drive, intended, played
 from tablegen.virtual.scanner import VirtualAxis, VirtualScanner
 
@@ -19,25 +19,31 @@ MODELS: tuple[Model, ...] = ("triangle", "sinusoidal", "harmonic")
 
 @dataclass(frozen=True, eq=False)
 class AxisRun:
-    """One axis of a scan: what was put out, and where the virtual scanner went, in nm above rest at 0 V."""
+    """One axis of a scan: what was put out, and where the virtual scanner went, in nm above rest at 0 V.
+
+    ``error`` takes the line's ends for right, as the paper does; ``imaged`` is about the best line through the windows
+    that are imaged.
+    """
 
     axis: Literal["x", "y"]
     turn: float
     drive: Drive
     displacement_nm: Floats
     error: LineError
+    imaged: LineError
     nominal_nm: float
     directions: tuple[str, ...]
+    refined: bool
 
     @property
     def size_error_percent(self) -> float:
-        """Of the line's size against what the scan file asks for."""
-        return 100.0 * (self.error.size_nm / self.nominal_nm - 1.0)
+        """Of the size in the image against what the scan file asks for."""
+        return 100.0 * (self.imaged.size_nm / self.nominal_nm - 1.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A scan with one hysteresis model. ``asked`` is whether it is that of the scanner file."""
+    """A scan with one hysteresis model. ``asked`` are the axes on which it is that of the scanner file."""
 
     model: Model
     asked: tuple[str, ...]
@@ -51,20 +57,34 @@ def run_line(line: LinePlan, axis: VirtualAxis) -> AxisRun:
     displacement = axis.settled(drive.volts, drive.tick_s)
     error = line_error(displacement, line.drive.turn, line.band_limit.window, intended(line, drive))
     directions = ("forward", "backward") if line.band_limit.directions == "both" else ("forward",)
-    return AxisRun(line.axis, line.drive.turn, drive, displacement, error, line.drive.size_nm, directions)
+    return AxisRun(
+        axis=line.axis,
+        turn=line.drive.turn,
+        drive=drive,
+        displacement_nm=displacement,
+        error=error,
+        imaged=about_window_line(error, directions),
+        nominal_nm=line.drive.size_nm,
+        directions=directions,
+        refined=line.layer is not None,
+    )
 
 
 def with_model(setup: Setup, model: Model) -> Setup:
-    """The same scan with another hysteresis model on both axes; one without calibrated branches stays a triangle."""
+    """The same scan with another hysteresis model on both axes; one without calibrated branches stays a triangle.
 
-    def axis(scanner: ScannerAxis) -> ScannerAxis:
-        h = scanner.hysteresis
-        if h is None or (not h.branches and model != "triangle"):
-            return scanner
-        return msgspec.structs.replace(scanner, hysteresis=Hysteresis(model=model, branches=h.branches))
-
-    scanner = setup.scanner
-    return replace(setup, scanner=msgspec.structs.replace(scanner, x=axis(scanner.x), y=axis(scanner.y)))
+    A refinement was learnt over the scanner file's own model, and stays on axes that keep it.
+    """
+    scan, scanner = setup.scan, setup.scanner
+    for name in ("x", "y"):
+        axis: ScannerAxis = getattr(scanner, name)
+        h = axis.hysteresis
+        if h is None or h.model == model or (not h.branches and model != "triangle"):
+            continue
+        axis = msgspec.structs.replace(axis, hysteresis=Hysteresis(model=model, branches=h.branches))
+        scanner = msgspec.structs.replace(scanner, **{name: axis})
+        scan = msgspec.structs.replace(scan, **{name: msgspec.structs.replace(getattr(scan, name), refinement=None)})
+    return replace(setup, scan=scan, scanner=scanner)
 
 
 def models_of(setup: Setup) -> tuple[Model, ...]:
@@ -72,8 +92,14 @@ def models_of(setup: Setup) -> tuple[Model, ...]:
     calibrated = [h for h in (setup.scanner.x.hysteresis, setup.scanner.y.hysteresis) if h is not None and h.branches]
     if not calibrated:
         return ("triangle",)
-    peaks = all(b.u_peak is not None for h in calibrated for e in h.branches for b in (e.forward, e.backward))
-    return MODELS if peaks else MODELS[:2]
+    branches = [b for h in calibrated for entry in h.branches for b in (entry.forward, entry.backward)]
+    return MODELS if all(_has_peak(branch) for branch in branches) else MODELS[:2]
+
+
+def _has_peak(branch: Branch) -> bool:
+    if branch.points is None:
+        return branch.u_peak is not None
+    return all(point.u_peak is not None for point in branch.points)
 
 
 def simulate(setup: Setup, scanner: VirtualScanner, model: Model) -> Run:

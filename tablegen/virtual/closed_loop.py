@@ -1,0 +1,77 @@
+"""The closed loop: a scan on the virtual scanner, before and after a calibration on the scanner's own data."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import msgspec
+import numpy as np
+
+from tablegen.config.load import Setup
+from tablegen.config.schema import BandLimit, ScannerAxis
+from tablegen.numerics.arrays import Floats
+from tablegen.plan import make_plan
+from tablegen.virtual.scanner import VirtualScanner
+from tablegen.virtual.simulation import AxisRun, run_line
+
+# As the paper measured its waveforms: turns as sharp as the drive, nothing near the resonance.
+SHARP = BandLimit(method="lanczos", harmonics=256)
+SHARP_RATE_HZ = 20.0
+# A fourth of the drive's range can be reached at either end of it.
+OFFSETS = (0.07, 0.285, 0.5, 0.715, 0.93)  # of v_max
+MAP_SIZES = (0.02, 0.04, 0.06, 0.08, 0.1)  # nominal, of k v_max
+
+
+def with_scan(
+    setup: Setup,
+    size_v: float | None = None,
+    size_nm: float | None = None,
+    offset_v: float | None = None,
+    rate_hz: float | None = None,
+    band_limit: BandLimit | None = None,
+) -> Setup:
+    """The same scan with another fast axis: a size, and what else is given; without a refinement."""
+    scan = setup.scan
+    x = msgspec.structs.replace(
+        scan.x,
+        size_v=size_v,
+        size_nm=size_nm,
+        size_of="line",
+        offset_v=scan.x.offset_v if offset_v is None else offset_v,
+        offset_nm=scan.x.offset_nm if offset_v is None else None,
+        band_limit=scan.x.band_limit if band_limit is None else band_limit,
+        refinement=None,
+    )
+    rate = scan.timing.line_rate_hz if rate_hz is None else rate_hz
+    timing = msgspec.structs.replace(scan.timing, line_rate_hz=rate)
+    return replace(setup, scan=msgspec.structs.replace(scan, x=x, timing=timing))
+
+
+def uncorrected(setup: Setup) -> Setup:
+    """The same scan on a scanner file that knows k of x alone, as controllers without correction do."""
+    x: ScannerAxis = setup.scanner.x
+    size = msgspec.structs.replace(x.size, beta=0.0)
+    return replace(setup, scanner=msgspec.structs.replace(setup.scanner, x=ScannerAxis(size=size)))
+
+
+def play_x(setup: Setup, scanner: VirtualScanner) -> AxisRun:
+    """The fast axis of a scan. Raises ``Rejected``."""
+    return run_line(make_plan(setup).x, scanner.x)
+
+
+def size_map(
+    setup: Setup,
+    scanner: VirtualScanner,
+    offsets: Sequence[float] = OFFSETS,
+    sizes: Sequence[float] = MAP_SIZES,
+) -> Floats:
+    """Error of the size in the image, in percent, a row an offset and a column a size, both as shares of full scale."""
+    v_max, k = setup.scanner.v_max, setup.scanner.x.size.k_nm_per_v
+    return np.array(
+        [
+            [
+                play_x(with_scan(setup, size_nm=share * k * v_max, offset_v=at * v_max), scanner).size_error_percent
+                for share in sizes
+            ]
+            for at in offsets
+        ]
+    )

@@ -1,0 +1,195 @@
+"""A calibration day on the virtual scanner: its own simulated data through the fits of ``tablegen.calibration``.
+
+What comes out is the scanner file that a laboratory would have, noise and all; nothing is known but what was measured.
+Needs scipy (``tablegen[calibrate]``).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal, TypeVar
+
+import msgspec
+import numpy as np
+
+from tablegen.calibration.estimate import Fit
+from tablegen.calibration.frequency import fit_frequency
+from tablegen.calibration.hysteresis import HysteresisFit, Trace, fit_hysteresis
+from tablegen.calibration.images import Pair, fit_images
+from tablegen.calibration.offset import fit_offset
+from tablegen.calibration.resonance import fit_resonance
+from tablegen.calibration.size import SizeFit, fit_size
+from tablegen.calibration.summary import change
+from tablegen.compensation.size import SizeLaw
+from tablegen.config.load import Setup
+from tablegen.config.schema import Frequency, Hysteresis, Offset, Resonance, ScannerAxis, Size
+from tablegen.virtual.experiments import actual_sizes, apparent_sizes, frequency_response, sensor_trace
+from tablegen.virtual.imaging import grating_images, lattice_images
+from tablegen.virtual.scanner import VirtualAxis, VirtualScanner
+from tablegen.virtual.sensor import Sensor
+
+T = TypeVar("T")
+NOISE = 0.002  # rms of every reading, of the scan or of the value
+# Shares of v_max. Offsets stay away from the ends, as the paper advises.
+OFFSETS = (0.07, 0.285, 0.5, 0.715, 0.93)
+OFFSET_SIZE = 0.13
+SIZES = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
+AMPLITUDES = (0.2, 0.4, 0.6, 0.8, 1.0)
+SMALL_IMAGE, LATTICE_NM, GRATING_NM = 0.2, 17.7, 50.0
+PERIODS, SAMPLES = 4, 1000  # of a trace, and a period
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """The scanner as calibrated, and by axis and kind the fits that it rests on."""
+
+    setup: Setup
+    fits: dict[str, dict[str, Fit]]
+
+
+def calibrate(
+    setup: Setup,
+    scanner: VirtualScanner,
+    noise: float = NOISE,
+    seed: int = 0,
+    amplitudes: Sequence[float] = AMPLITUDES,
+    points: bool = True,
+    images: bool = False,
+) -> Calibration:
+    """Measure both axes with a sensor and fit what a scanner file holds; its base size, references and boost are kept.
+
+    ``noise`` is relative, rms, of every reading; ``amplitudes`` of the traces are shares of v_max. Hysteresis is taken
+    as measured at each amplitude, or by (22) with one u_peak where ``points`` is false; with ``images`` not from a
+    sensor, but from trace and retrace of a lattice and a grating, 256 x 256 with 5 % noise. Raises ``Unphysical``.
+    """
+    axes: dict[str, ScannerAxis] = {}
+    fits: dict[str, dict[str, Fit]] = {}
+    names: tuple[Literal["x"], Literal["y"]] = ("x", "y")
+    for name in names:
+        axis: VirtualAxis = getattr(scanner, name)
+        day = _Day(setup, name, axis, noise, 1000 * (2 * seed + names.index(name)))
+        fits[name] = day.fits(amplitudes, images)
+        axes[name] = day.scanner_axis(fits[name], points)
+    scan = msgspec.structs.replace(  # what was learnt over another model does not fit to this one
+        setup.scan,
+        x=msgspec.structs.replace(setup.scan.x, refinement=None),
+        y=msgspec.structs.replace(setup.scan.y, refinement=None),
+    )
+    return Calibration(replace(setup, scan=scan, scanner=msgspec.structs.replace(setup.scanner, **axes)), fits)
+
+
+class _Day:
+    """One axis on the bench. Every measurement has noise of its own."""
+
+    def __init__(self, setup: Setup, name: Literal["x", "y"], axis: VirtualAxis, noise: float, seed: int) -> None:
+        self._axis, self._noise, self._seed = axis, noise, seed
+        self._before: ScannerAxis = getattr(setup.scanner, name)
+        self._v_max = setup.scanner.v_max
+        self._turn: float = getattr(setup.scan, name).turn
+        timing = setup.scan.timing
+        self._rate_hz = timing.line_rate_hz if name == "x" else timing.line_rate_hz / timing.lines
+        frequency = self._before.frequency
+        self._reference_hz = self._rate_hz if frequency is None else frequency.reference_hz
+        scan = getattr(setup.scan, name)
+        self._scan_v: float = scan.size_v or scan.size_nm / self._before.size.k_nm_per_v
+
+    def fits(self, amplitudes: Sequence[float], images: bool) -> dict[str, Fit]:
+        """Everything that can be calibrated; a resonance only where the scanner file has one."""
+        size = self._size()
+        fits: dict[str, Fit] = {
+            "offset": self._offset(size),
+            "size": size,
+            "hysteresis": self._imaged_hysteresis(amplitudes) if images else self._hysteresis(amplitudes),
+            "frequency": self._frequency(),
+        }
+        if self._before.resonance is not None:
+            fits["resonance"] = self._resonance(self._before.resonance)
+        return fits
+
+    def scanner_axis(self, fits: dict[str, Fit], points: bool) -> ScannerAxis:
+        """The axis of a scanner file with these parameters, as ``tablegen calibrate --write`` would put them."""
+        changes = {kind: change(fit, (), points) for kind, fit in fits.items()}
+        branches = list(changes["hysteresis"].branches)
+        resonance = None
+        if self._before.resonance is not None:
+            boost = {"max_boost_db": self._before.resonance.max_boost_db}
+            resonance = _as(Resonance, {**changes["resonance"].values, **boost})
+        return ScannerAxis(
+            size=_as(Size, changes["size"].values),
+            offset=_as(Offset, changes["offset"].values),
+            hysteresis=_as(Hysteresis, {"model": "harmonic", "branches": branches}),
+            frequency=_as(Frequency, changes["frequency"].values),
+            resonance=resonance,
+        )
+
+    def _offset(self, size: SizeFit) -> Fit:
+        volts = [share * self._v_max for share in OFFSETS]
+        size_v = OFFSET_SIZE * self._v_max
+        found = apparent_sizes(
+            self._axis, volts, size_v, self._reference_hz, noise=self._noise, seed=self._next(), turn=self._turn
+        )
+        k, beta, threshold = size.k_nm_per_v.value, size.beta.value, size.v_threshold.value
+        law = SizeLaw.calibrated(k, self._v_max, beta, size.base_nm, threshold)
+        return fit_offset(found["offset_v"], found["apparent_nm"], self._v_max, law, size_v)
+
+    def _size(self) -> SizeFit:
+        size = self._before.size
+        nominal = [share * self._v_max * size.k_nm_per_v for share in SIZES]
+        found = actual_sizes(
+            self._axis,
+            nominal,
+            size.k_nm_per_v,
+            self._reference_hz,
+            noise=self._noise,
+            seed=self._next(),
+            turn=self._turn,
+        )
+        return fit_size(
+            found["nominal_nm"] / size.k_nm_per_v, found["actual_nm"], self._v_max, size.base_nm, None, "relative"
+        )
+
+    def _hysteresis(self, amplitudes: Sequence[float]) -> HysteresisFit:
+        """Each at the scan's tip velocity, and no faster than the scan, as the paper does."""
+        traces = []
+        for share in amplitudes:
+            volts = share * self._v_max
+            rate = self._rate_hz * min(self._scan_v / volts, 1.0)
+            size_nm = volts * self._before.size.k_nm_per_v
+            sensor = Sensor(noise_nm=self._noise * size_nm, seed=self._next())
+            found = sensor_trace(
+                self._axis, volts, 0.5 * self._v_max, rate, PERIODS, SAMPLES, turn=self._turn, sensor=sensor
+            )
+            traces.append(Trace(f"{volts:g} V", found["time_s"], found["drive_v"], found["displacement_nm"]))
+        return fit_hysteresis(traces, self._v_max)
+
+    def _imaged_hysteresis(self, amplitudes: Sequence[float]) -> HysteresisFit:
+        """The same from images: of a lattice where the line is short, of a grating where it is long."""
+        pairs = []
+        for share in amplitudes:
+            volts = share * self._v_max
+            rate = self._rate_hz * min(self._scan_v / volts, 1.0)
+            image = lattice_images if share <= SMALL_IMAGE else grating_images
+            pitch = {"constant_nm": LATTICE_NM} if share <= SMALL_IMAGE else {"pitch_nm": GRATING_NM}
+            seed = self._next()
+            trace, retrace = image(self._axis, volts, 0.5 * self._v_max, rate, turn=self._turn, seed=seed, **pitch)
+            pairs.append(Pair(f"{volts:g} V", volts, trace, retrace))
+        return fit_images(pairs, self._v_max, turn=self._turn)
+
+    def _frequency(self) -> Fit:
+        """Two decades about the reference, below a tenth of any resonance."""
+        f = self._reference_hz * np.geomspace(0.1, 10.0, 15)
+        found = frequency_response(self._axis, f, noise=self._noise, seed=self._next())
+        return fit_frequency(found["frequency_hz"], found["gain"], self._reference_hz)
+
+    def _resonance(self, before: Resonance) -> Fit:
+        near = before.frequency_hz or 1e4
+        f = near * np.geomspace(0.2, 3.0, 200)
+        found = frequency_response(self._axis, f, noise=self._noise, seed=self._next())
+        return fit_resonance(found["frequency_hz"], found["gain"], found["phase_deg"])
+
+    def _next(self) -> int:
+        self._seed += 1
+        return self._seed
+
+
+def _as(kind: type[T], values: Any) -> T:
+    return msgspec.convert(dict(values), kind)
