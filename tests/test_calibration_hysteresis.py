@@ -231,6 +231,22 @@ def test_what_comes_out_is_what_a_build_takes() -> None:
         assert shape.value(tau) == pytest.approx(branch(beta, u_peak)(tau), abs=1e-8)
 
 
+def test_a_residual_that_hardly_grows_keeps_no_small_rho() -> None:
+    """Through measurements that (22) describes as a step at best, the curve of the default rho would be 40 % off."""
+    v = np.array([0.3, 0.6, 1.0])
+    found = ((0.0354, 0.0013), (0.0431, 0.0023), (0.0336, 0.0013))
+    measured = [MeasuredBranch(Estimate(*beta), Estimate(0.45, 0.01)) for beta in found]
+    growth = fit_growth(v, measured, 1.5)
+    assert growth.rho.value > 5.0
+    assert np.isnan(growth.rho.standard_error)
+    assert any("rho is only known to be large" in text for text in growth.remarks)
+    assert growth.beta(v) == pytest.approx([beta for beta, _ in found], abs=0.008)
+    # Negative control: one that grows as (22) has it is fitted, and one amplitude keeps what was given.
+    grows = [MeasuredBranch(Estimate(grown(0.08, 1.5, one), 0.0005), Estimate(0.45, 0.01)) for one in v.tolist()]
+    assert fit_growth(v, grows, 4.0).rho.value == pytest.approx(1.5, abs=1e-6)
+    assert fit_growth(v[:1], measured[:1], 1.5).rho.value == 1.5
+
+
 def test_one_amplitude_does_not_determine_rho() -> None:
     fit = fit_hysteresis([Scanner().trace(50.0, noise=noise(1000, 4))], V_MAX, rho=2.0)
     growth = fit.branches[0].backward

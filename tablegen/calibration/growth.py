@@ -16,6 +16,7 @@ from tablegen.problems import Unphysical
 _SIGNIFICANT = 0.01
 _NEAR_ZERO = 1e-9  # below it (22) is a straight line to the last place
 _LARGEST_RHO, _OPEN_RHO = 60.0, 5.0  # beyond the first (22) is a step; a larger error than the second tells nothing
+_FAR = 4.0  # in chi squared, two standard errors
 _ROUNDING = 1e-9  # least error of a measured beta: that of the fit's own arithmetic
 
 
@@ -45,9 +46,12 @@ def fit_growth(v: Floats, branches: Sequence[MeasuredBranch], rho: float) -> Gro
     if float(np.max(v)) - float(np.min(v)) > 0.05:
         found = _both(v, beta, error, rho, remarks)
     if found is None:
-        found = _height(v, beta, error, rho, remarks)
+        steep = _steepest(v, beta, error, rho)
+        found = _height(v, beta, error, steep or rho, remarks)
         remarks.append(
-            f"rho is not determined by these amplitudes and was left at {rho:g}; it takes two or "
+            f"the residual hardly grows with the amplitude: rho is only known to be large, {steep:g} was taken"
+            if steep
+            else f"rho is not determined by these amplitudes and was left at {rho:g}; it takes two or "
             f"more, best from 0.2 to 1 of v_max"
         )
     beta_max, estimate = found
@@ -76,6 +80,21 @@ def _both(v: Floats, beta: Floats, error: Floats, rho: float, remarks: list[str]
         return None
     spread = spread * sqrt(_variance(found.residuals, found.freedom, "(22) misses the measured residuals", remarks))
     return Estimate(float(value[0]), float(spread[0])), Estimate(float(value[1]), float(spread[1]))
+
+
+def _steepest(v: Floats, beta: Floats, error: Floats, rho: float) -> float | None:
+    """The rho that fits best where it is large and open, if the one that would be kept is far worse; else None."""
+    grid = np.geomspace(_OPEN_RHO, _LARGEST_RHO, 60)
+
+    def cost(one: float) -> float:
+        share = _share(v, one) / error
+        left = float(share @ (beta / error)) / float(share @ share) * share - beta / error
+        return float(left @ left)
+
+    costs = [cost(one) for one in grid.tolist()]
+    best = int(np.argmin(costs))
+    spread = max(costs[best] / max(len(v) - 1, 1), 1.0)  # what it misses itself counts as error
+    return float(f"{grid[best]:.3g}") if cost(rho) - costs[best] > _FAR * spread else None
 
 
 def _height(v: Floats, beta: Floats, error: Floats, rho: float, remarks: list[str]) -> tuple[Estimate, Estimate]:
