@@ -242,7 +242,9 @@ def test_a_residual_that_hardly_grows_keeps_no_small_rho() -> None:
     assert any("rho is only known to be large" in text for text in growth.remarks)
     assert growth.beta(v) == pytest.approx([beta for beta, _ in found], abs=0.008)
     # Negative control: one that grows as (22) has it is fitted, and one amplitude keeps what was given.
-    grows = [MeasuredBranch(Estimate(grown(0.08, 1.5, one), 0.0005), Estimate(0.45, 0.01)) for one in v.tolist()]
+    grows = [
+        MeasuredBranch(Estimate(grown(one * V_MAX, 0.08, 1.5), 0.0005), Estimate(0.45, 0.01)) for one in v.tolist()
+    ]
     assert fit_growth(v, grows, 4.0).rho.value == pytest.approx(1.5, abs=1e-6)
     assert fit_growth(v[:1], measured[:1], 1.5).rho.value == 1.5
 
