@@ -189,10 +189,39 @@ def test_the_size_law_of_the_file_makes_offsets_exact(lab: Path) -> None:
     v = 0.13
     assert shown == pytest.approx(m * (1.0 + 0.53 * v) / (1.0 + 0.53 * v / m), rel=2e-3)
     assert m < shown - 0.008
+    assert (plain["size_v"], exact["size_v"]) == (None, 13.0)
+    kept = run(
+        "calibrate", "offset", "--axis", "x", "offset.csv", "--scanner", "scanner.toml", "--size-v", "13", "--write"
+    )
+    assert kept.status == 0
+    assert "rms, drive factors of 13 V by the size law\n" in (lab / "scanner.toml").read_text("utf-8")
     missing = run("calibrate", "offset", "--axis", "x", "offset.csv", "--v-max", "100", "--size-v", "13")
     assert (missing.status, "calibrate the size first" in missing.err) == (2, True)
-    large = run("calibrate", "offset", "--axis", "x", "offset.csv", "--scanner", "scanner.toml", "--size-v", "130")
-    assert (large.status, "above v_max" in large.err) == (2, True)
+    for volts in ("130", "nan"):
+        large = run("calibrate", "offset", "--axis", "x", "offset.csv", "--scanner", "scanner.toml", "--size-v", volts)
+        assert (large.status, "above v_max" in large.err) == (2, True)
+
+
+@pytest.mark.parametrize(
+    ("beta", "said"),
+    [
+        ("-3", "-3 is not above -0.5"),
+        ("nan", "nan"),
+        ("true", "true"),
+        ('"0.53"', "'0.53'"),
+        ("0.53\nbeat = 1", "beat"),
+    ],
+)
+def test_a_size_law_that_cannot_be_is_refused(beta: str, said: str, lab: Path) -> None:
+    """With its line; y is missing, and does not matter."""
+    (lab / "s.toml").write_text(f'name = "a"\nv_max = 100.0\n[x.size]\nk_nm_per_v = 10.0\nbeta = {beta}\n', "utf-8")
+    words = ("calibrate", "offset", "--axis", "x", "offset.csv", "--scanner", "s.toml", "--size-v", "13")
+    outcome = run(*words)
+    assert (outcome.status, outcome.out) == (2, "")
+    assert outcome.err.startswith(f"s.toml:{6 if 'beat' in beta else 5}: x.size.be")
+    assert said in outcome.err
+    (lab / "s.toml").write_text('name = "a"\nv_max = 100.0\n[x.size]\nk_nm_per_v = 10.0\n', "utf-8")
+    assert run(*words).status == 0
 
 
 def test_points_stand_in_for_the_law_and_back(lab: Path) -> None:

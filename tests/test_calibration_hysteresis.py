@@ -8,10 +8,11 @@ from calibrating import AMPLITUDES, V_MAX, Scanner, branch, grown
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tablegen.calibration.branch import MeasuredBranch, peak
+from tablegen.calibration.branch import AmplitudeFit, MeasuredBranch, peak
 from tablegen.calibration.estimate import Estimate
-from tablegen.calibration.growth import fit_growth
-from tablegen.calibration.hysteresis import Trace, fit_hysteresis
+from tablegen.calibration.growth import Growth, fit_growth
+from tablegen.calibration.hysteresis import Trace, TurnFit, fit_hysteresis
+from tablegen.calibration.points import measured_points
 from tablegen.calibration.trace import TraceFit, correlation_length, fit_trace
 from tablegen.calibration.triangle import find_triangle
 from tablegen.compensation.hysteresis import BranchShape
@@ -261,9 +262,15 @@ def test_one_amplitude_does_not_determine_rho() -> None:
 
 
 def test_no_hysteresis_has_no_peak() -> None:
+    """Whichever sign noise gives it."""
     scanner = Scanner(forward=(1e-5, 4.0, 0.4), backward=(1e-5, 4.0, 0.4))
-    with pytest.raises(Unphysical, match=r"turn 0.5, forward: .*(no hysteresis can be told from noise|the wrong sign)"):
-        fit_hysteresis([scanner.trace(100.0, noise=noise(1000, 5))], V_MAX)
+    signs = set()
+    for seed in range(4):
+        trace = scanner.trace(100.0, noise=noise(1000, seed))
+        signs.add(fit_trace(trace.time_s, trace.drive_v, trace.displacement_nm).forward.beta.value > 0.0)
+        with pytest.raises(Unphysical, match=r"turn 0.\d+, (for|back)ward: no hysteresis can be told from noise"):
+            fit_hysteresis([trace], V_MAX)
+    assert signs == {True, False}, "or the test would show half"
 
 
 def test_a_displacement_that_leads_is_refused() -> None:
@@ -304,3 +311,53 @@ def test_white_noise_is_not_correlated_and_its_mean_over_five_is() -> None:
     assert correlation_length(white) == pytest.approx(1.0, abs=0.1)
     assert correlation_length(np.convolve(white, np.ones(5), "valid")) == pytest.approx(5.0, rel=0.15)
     assert correlation_length(np.zeros(100)) == 1.0
+
+
+# points
+
+
+def turned(*amplitudes: tuple[float, float, float, float]) -> TurnFit:
+    """One of volts, beta with its standard error, and the standard error of a u_peak of 0.3, both directions alike."""
+    sides = [MeasuredBranch(Estimate(beta, error), Estimate(0.3, open_by)) for _, beta, error, open_by in amplitudes]
+    growth = Growth(Estimate(0.04, 1e-3), Estimate(2.0, 0.1), Estimate(0.4, 1e-3), ())
+    nothing = {"samples": 0, "noise_percent": 0.0, "drift_percent": 0.0, "residual_percent": np.zeros(0)}
+    traces = tuple(
+        AmplitudeFit(
+            turn=Estimate(0.5),
+            v_scan=v,
+            forward=side,
+            backward=side,
+            scaling_percent=(0.0, 0.0),
+            curves=(),
+            **nothing,  # type: ignore[arg-type]
+        )
+        for (v, *_), side in zip(amplitudes, sides, strict=True)
+    )
+    return TurnFit(Estimate(0.5), growth, growth, traces)
+
+
+def test_points_are_what_was_measured_where_it_was_determined() -> None:
+    branch = turned(
+        (10.0, -0.001, 1e-3, 0.01),  # noise
+        (20.0, 0.002, 1e-3, 0.01),  # a beta that hides its peak
+        (40.0, 0.02, 1e-3, 0.2),  # a peak that is open
+        (60.0, 0.03, 1e-3, 0.01),
+    )
+    assert [(p["size_v"], p["beta"], p["u_peak"]) for p in measured_points(branch, "forward")] == [
+        (20.0, 0.002, 0.4),
+        (40.0, 0.02, 0.4),
+        (60.0, 0.03, 0.3),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("volts", "beta", "said"),
+    [
+        (30.0, -0.01, "30 V, backward: the residual has the wrong sign"),
+        (60.000001, 0.03, "60 V was measured twice"),
+        (30.0, 0.4, "30 V, backward: "),
+    ],
+)
+def test_points_that_make_no_branch_are_refused(volts: float, beta: float, said: str) -> None:
+    with pytest.raises(Unphysical, match=said):
+        measured_points(turned((60.0, 0.03, 1e-3, 0.01), (volts, beta, 1e-3, 0.01)), "backward")

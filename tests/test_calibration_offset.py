@@ -32,12 +32,12 @@ def test_factors_are_those_of_the_drive(ends: tuple[float, float], beta: float, 
 
 
 def test_without_the_law_large_scans_mislead() -> None:
-    """Negative control, with the numbers of the virtual scanner: 1.7 % too much at the end of the range."""
+    """Negative control, with the numbers of the virtual scanner: 1.3 % too much at the end of the range."""
     size = SizeLaw.calibrated(10.0, V_MAX, 0.53, 200.0, 0.5)
     apparent = looks(OffsetLaw.from_ends(0.92, 1.25), size, 15.6)
     plain, exact = fit_offset(OFFSETS, apparent, V_MAX), fit_offset(OFFSETS, apparent, V_MAX, size, 15.6)
     assert exact.m_plus.value == pytest.approx(1.25, abs=1e-6)
-    assert plain.m_plus.value == pytest.approx(1.264, abs=0.003)
+    assert plain.m_plus.value == pytest.approx(1.013 * 1.25, abs=0.001)
 
 
 def test_a_linear_scanner_needs_no_law() -> None:

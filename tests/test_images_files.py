@@ -98,6 +98,12 @@ def test_matrices_of_numbers(separator: str, comma: bool, ending: str, tmp_path:
     assert np.array_equal(read_image(path).heights, HEIGHTS)
 
 
+def test_a_first_row_of_whole_numbers_leaves_the_comma_a_separator(tmp_path: Path) -> None:
+    rows = np.vstack([np.arange(HEIGHTS.shape[1]), HEIGHTS])
+    text = "\n".join(", ".join(f"{value:g}" for value in row) for row in rows)
+    assert read_image(put(tmp_path, "a.csv", text.encode())).heights == pytest.approx(rows, rel=1e-4)
+
+
 def test_whole_numbers_lines_of_windows_and_a_last_separator(tmp_path: Path) -> None:
     rows = "\r\n".join("\t".join(f"{v:.0f}" for v in row) + "\t" for row in STEPS)
     assert np.array_equal(read_image(put(tmp_path, "a.txt", rows.encode())).heights, STEPS)

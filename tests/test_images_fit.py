@@ -150,6 +150,17 @@ def test_many_periods_do_not_lose_count() -> None:
     assert fit.registration_percent == pytest.approx(10.6, abs=0.1)
 
 
+@pytest.mark.parametrize("taken", [0, 7])
+def test_pixels_are_the_middle_of_their_time(taken: int) -> None:
+    """Of eight moments the first or the last: what --delay-pixels makes good."""
+    fine = pair(grating(pixels=256 * 8, lines=96))
+    trace, retrace = fine.trace[:, taken::8], fine.retrace[:, 7 - taken :: 8]
+    late = 0.5 - (taken + 0.5) / 8.0
+    assert shapes(fit_pair(trace, retrace, 100.0, delay_pixels=late)) == pytest.approx(FULL, abs=1e-7)
+    average = [image.reshape(96, 256, 8).mean(axis=2) for image in (fine.trace, fine.retrace)]
+    assert shapes(fit_pair(average[0], average[1], 100.0)) == pytest.approx(FULL, abs=1e-4)
+
+
 def test_a_known_lag_of_the_feedback_is_taken_off() -> None:
     images = pair(grating(), 0.02)
     columns = np.arange(256.0)
@@ -173,6 +184,19 @@ def test_amplitudes_give_growth_as_traces_do() -> None:
     assert [one.v_scan for one in branch.traces] == list(AMPLITUDES)
     assert np.isnan(branch.turn.standard_error)
     assert fit.points == 3 * 2 * 256 * 256
+
+
+def test_voltages_of_other_pairs_are_told() -> None:
+    """More volts and fewer periods may be another sample, but hysteresis grows then."""
+    large, small = pair(grating(15.0)), pair(grating(15.0), v=30.0)
+    asked = "are the voltages those of their pairs?"
+    swapped = fit_images([replace(large, v_scan=30.0), replace(small, v_scan=100.0)], V_MAX)
+    assert any(asked in remark for remark in swapped.remarks)
+    finer = pair(grating(60.0), v=30.0)
+    for right in ([large, small], [large, finer]):
+        assert not any(asked in remark for remark in fit_images(right, V_MAX).remarks)
+    with pytest.raises(Unphysical, match="images of 100 V and of 60 V are the same"):
+        fit_images([large, replace(large, v_scan=60.0)], V_MAX)
 
 
 def test_one_amplitude_keeps_rho() -> None:
@@ -259,11 +283,30 @@ def test_images_that_cannot_be_are_refused(changed: dict[str, object], said: str
 
 
 @pytest.mark.parametrize(
-    ("options", "said"), [({"window": (0.4, 0.6)}, "no large part"), ({"turn": 1.0}, "a turn of 1 is outside")]
+    ("options", "said"),
+    [
+        ({"window": (0.4, 0.6)}, "no large part"),
+        ({"turn": 1.0}, "a turn of 1 is outside"),
+        ({"delay_pixels": np.nan}, "a delay of nan pixels is no small part of a line of 128"),
+        ({"delay_pixels": -125.0}, "a delay of -125 pixels is no small part"),
+    ],
 )
 def test_options_out_of_range_are_refused(options: dict[str, object], said: str) -> None:
     images = pair(grating(**SMALL))
     assert said in refused(images.trace, images.retrace, **options)
+
+
+def test_a_scan_that_was_stopped_is_told() -> None:
+    """A few lines without contrast do no harm."""
+    images = pair(grating(**SMALL))
+    for rows, cut in ((1, False), (40, True)):
+        stopped = [image.copy() for image in (images.trace, images.retrace)]
+        for image in stopped:
+            image[len(image) - rows :] = 0.7
+        if cut:
+            assert "40 rows of the trace, from 57 to 96, have no contrast" in refused(*stopped)
+        else:
+            assert shapes(fit_pair(stopped[0], stopped[1], 100.0)) == pytest.approx(FULL, abs=1e-3)
 
 
 def test_loud_lines_are_named() -> None:

@@ -13,7 +13,7 @@ from tablegen.compensation.residual import SIZE_REACH, ResidualLaw
 from tablegen.config.load import load
 from tablegen.config.schema import Branch, HysteresisPoint
 from tablegen.plan import make_plan
-from tablegen.problems import Unphysical
+from tablegen.problems import Rejected, Unphysical
 
 V_MAX = 120.0
 rows = st.lists(
@@ -84,3 +84,15 @@ def test_points_on_the_curve_build_the_same_words(tmp_path: Path) -> None:
         (tmp_path / str(i)).mkdir()
         plans.append(make_plan(load(write_pair(tmp_path / str(i), scan, edited(SCANNER, *edits)))))
     assert np.array_equal(plans[0].x.program.words, plans[1].x.program.words)
+
+
+@pytest.mark.parametrize(("volts", "served"), [(101.9, True), (102.1, False)])
+def test_no_point_was_measured_beyond_the_driver(volts: float, served: bool, tmp_path: Path) -> None:
+    """But for the error of a voltage, as calibrations allow it."""
+    points = f"{{ points = [{{ size_v = {volts}, beta = 0.03, u_peak = 0.4 }}] }}"
+    setup = load(write_pair(tmp_path, SCAN, edited(SCANNER, f"x.hysteresis.branches.backward = {points}")))
+    if served:
+        assert make_plan(setup).x.drive.backward.u_peak == 0.4
+    else:
+        with pytest.raises(Rejected, match=r"backward.points\[0\].size_v: 102.1 V is above v_max = 100 V"):
+            make_plan(setup)

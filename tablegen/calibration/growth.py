@@ -16,7 +16,9 @@ from tablegen.problems import Unphysical
 _SIGNIFICANT = 0.01
 _NEAR_ZERO = 1e-9  # below it (22) is a straight line to the last place
 _LARGEST_RHO, _OPEN_RHO = 60.0, 5.0  # beyond the first (22) is a step; a larger error than the second tells nothing
+_HIDDEN = 3.0  # standard errors of a residual that may be noise
 _FAR = 4.0  # in chi squared, two standard errors
+_NOTHING = 'no hysteresis can be told from noise, and hence no u_peak; model = "triangle" does, or average more'
 _ROUNDING = 1e-9  # least error of a measured beta: that of the fit's own arithmetic
 
 
@@ -55,6 +57,8 @@ def fit_growth(v: Floats, branches: Sequence[MeasuredBranch], rho: float) -> Gro
             f"more, best from 0.2 to 1 of v_max"
         )
     beta_max, estimate = found
+    if beta_max.value <= 0.0 and np.all(beta > -_HIDDEN * error):
+        raise Unphysical(_NOTHING)
     if beta_max.value <= 0.0:
         raise Unphysical(
             f"the residual has the wrong sign (beta_max = {beta_max.value:.3g}): the displacement leads the drive; "
@@ -108,11 +112,9 @@ def _height(v: Floats, beta: Floats, error: Floats, rho: float, remarks: list[st
 
 def _peak(branches: Sequence[MeasuredBranch], beta: Floats, error: Floats, remarks: list[str]) -> Estimate:
     """The mean of u_peak over the amplitudes, each weighted by its error: the paper finds it the same at all."""
-    seen = [branch.u_peak for branch, b, e in zip(branches, beta, error, strict=True) if b > 3.0 * e]
+    seen = [branch.u_peak for branch, b, e in zip(branches, beta, error, strict=True) if b > _HIDDEN * e]
     if not seen:
-        raise Unphysical(
-            'no hysteresis can be told from noise, and hence no u_peak; model = "triangle" does, or average more'
-        )
+        raise Unphysical(_NOTHING)
     value = np.array([estimate.value for estimate in seen])
     spread = np.maximum([estimate.standard_error for estimate in seen], _ROUNDING)
     weight = 1.0 / spread**2

@@ -24,7 +24,8 @@ from tablegen.problems import Problem, Rejected
 
 _LEAST = 32  # rows and columns
 _MOST_PIXELS = 1 << 26
-_DECIMAL_COMMA = re.compile(r"[+-]?\d+(,\d*)?([eE][+-]?\d+)?")
+_LISTED = 12  # channels in a message
+_DECIMAL_COMMA = re.compile(r"[+-]?\d+(,\d+)?([eE][+-]?\d+)?")
 MODULES = {".png": "PIL", ".tif": "tifffile", ".tiff": "tifffile"}  # what reads them, beside numpy
 
 
@@ -83,7 +84,8 @@ def _chosen(channels: list[_Channel], wanted: str | None) -> _Channel:
     """By title, or by number. Raises ``ValueError``."""
     if not channels:
         raise ValueError("has no image in it")
-    there = ", ".join(f"{number} ({title})" if title else f"{number}" for number, title, _ in channels)
+    there = ", ".join(f"{number} ({title})" if title else f"{number}" for number, title, _ in channels[:_LISTED])
+    there += ", ..." if len(channels) > _LISTED else ""
     if wanted is None:
         if len(channels) > 1:
             raise ValueError(f"has several channels, {there}; choose with --channel")

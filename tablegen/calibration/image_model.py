@@ -19,6 +19,8 @@ _HIGHEST = {1: 12, 2: 3}  # whole numbers of a spot, by bases
 _VISIBLE = 6.0  # standard errors of an amplitude
 _FAINT = 0.003  # of the strongest
 _LOUD = 100.0  # times the usual power of a line
+_FLAT, _MANY_FLAT = 1e-9, 0.02  # of the largest power of a line; of all lines
+_LONGEST_DELAY = 0.1  # of the line
 _TRACKED_FROM = 8.0  # periods
 _SAME_PHASE = 0.01  # of a period, rms
 _DISTINCT = 1.5  # how much worse another count of periods has to be
@@ -38,6 +40,8 @@ def prepared(
         raise Unphysical(f"a turn of {turn:g} is outside 0..1")
     if not (window[0] >= 0.0 and window[1] <= 1.0 and window[1] - window[0] >= 0.3):
         raise Unphysical(f"a window of {window[0]:g}..{window[1]:g} is no large part of the sweep, 0..1")
+    if not abs(delay) <= _LONGEST_DELAY * trace.shape[1]:
+        raise Unphysical(f"a delay of {delay:g} pixels is no small part of a line of {trace.shape[1]}")
     if np.array_equal(trace, retrace) or np.array_equal(trace, retrace[:, ::-1]):
         raise Unphysical(
             "trace and retrace are the same image; both directions are needed, since the scanner file has a branch for "
@@ -54,6 +58,12 @@ def prepared(
         if not np.max(np.abs(level)) > 1e-12 * largest:
             raise Unphysical(f"the {name} has no contrast along its lines")
         power = np.sum(level**2, axis=1)
+        flat = np.flatnonzero(power <= _FLAT * np.max(power))
+        if len(flat) > _MANY_FLAT * len(power):
+            raise Unphysical(
+                f"{len(flat)} rows of the {name}, from {flat[0] + 1} to {flat[-1] + 1}, have no contrast, as of a scan "
+                f"that was stopped; crop both images"
+            )
         loud = np.flatnonzero(power > _LOUD * np.median(power))
         if np.sum(power[loud]) > 0.5 * np.sum(power):
             raise Unphysical(f"rows {loud[0] + 1} to {loud[-1] + 1} have most of the {name}'s contrast; crop them")

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations, pairwise
 
 import numpy as np
 
@@ -48,9 +49,19 @@ def fit_images(
             raise Unphysical(f"{pair.name}: {reason}" if pair.name else str(reason)) from None
         fits.append(fit)
         remarks += [f"{pair.name}: {text}" if pair.name else text for text in _remarks(fit)]
+    for one, other in combinations(pairs, 2):
+        if np.array_equal(one.trace, other.trace) or np.array_equal(one.retrace, other.retrace):
+            name = f"{other.name}: " if other.name else ""
+            raise Unphysical(f"{name}images of {one.v_scan:g} V and of {other.v_scan:g} V are the same")
     volts = [pair.v_scan for pair in pairs]
     if len(set(volts)) < len(volts):
         remarks.append("some pairs have the same voltage; the piezo voltage peak to peak of each is needed")
+    for less, more in pairwise(sorted(fits, key=lambda fit: fit.v_scan)):
+        if more.periods < less.periods and more.registration_percent < less.registration_percent:
+            remarks.append(
+                f"{more.v_scan:g} V have fewer periods in the line and less hysteresis than {less.v_scan:g} V; "
+                f"are the voltages those of their pairs?"
+            )
     return combined(fits, v_max, rho, remarks)
 
 
@@ -65,7 +76,7 @@ def _remarks(fit: ImageFit) -> list[str]:
     if fit.widened > 3.0:
         found.append(
             f"a part of what is left is no noise but what the model does not describe; standard errors were "
-            f"widened by {fit.widened:.3g}"
+            f"widened by {fit.widened:.3g}; a --window that is not that of the images does that too"
         )
     if fit.pixels_a_period < _COARSE:
         found.append(f"the shortest period has {fit.pixels_a_period:.2g} pixels; scan less, or take more pixels")

@@ -18,11 +18,15 @@ _LEAST_SPREAD = 1e-7  # relative scatter that is rounding of the file, not of th
 
 @dataclass(frozen=True, kw_only=True)
 class OffsetFit(Fit):
-    """The amplitude factors at 0 V and at v_max, dimensionless, and the apparent size at the centre in nm."""
+    """The amplitude factors at 0 V and at v_max, dimensionless, and the apparent size at the centre in nm.
+
+    ``size_v`` is the scan voltage at which a size law made them factors of the drive, None where none did.
+    """
 
     m_minus: Estimate
     m_plus: Estimate
     centre_nm: Estimate
+    size_v: float | None
 
 
 def fit_offset(
@@ -80,6 +84,7 @@ def fit_offset(
         m_minus=solution.estimate("m_minus"),
         m_plus=solution.estimate("m_plus"),
         centre_nm=solution.estimate("centre_nm"),
+        size_v=None if size_law is None else size_v,
     )
 
 

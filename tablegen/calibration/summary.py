@@ -93,7 +93,8 @@ def change(fit: Fit, sources: Sequence[Source], points: bool = False) -> Change:
     values = {key: estimate.rounded for key, estimate, _ in parameters(fit) if not key.startswith("(")}
     match fit:
         case OffsetFit():
-            return Change("offset", values, ("alpha", "beta", "points"), (), [[residual, *files]])
+            law = "" if fit.size_v is None else f", drive factors of {fit.size_v:g} V by the size law"
+            return Change("offset", values, ("alpha", "beta", "points"), (), [[residual + law, *files]])
         case SizeFit():
             return Change("size", {**values, "base_nm": fit.base_nm}, (), (), [[residual, *files]])
         case FrequencyFit():
@@ -120,6 +121,8 @@ def record(fit: Fit, axis: str, sources: Sequence[Source]) -> dict[str, Any]:
         "remarks": list(fit.remarks),
         "outliers": list(fit.outliers),
     }
+    if isinstance(fit, OffsetFit):
+        data["size_v"] = fit.size_v
     if isinstance(fit, HysteresisFit):
         data["branches"] = [_branch_record(branch) for branch in fit.branches]
     else:

@@ -152,32 +152,36 @@ def full_scale(common: Common) -> float:
 
 def in_file(common: Common, kind: str, key: str) -> float | None:
     """A number of the scanner file as it is, or None; no length or frequency is 0 or less."""
-    value = _number(common, kind, key)
-    return value if value is not None and value > 0.0 else None
-
-
-def _number(common: Common, kind: str, key: str) -> float | None:
     values: Any = _scanner_values(common)
     for name in (common.axis, kind, key):
         values = values.get(name) if isinstance(values, dict) else None
-    return float(values) if isinstance(values, int | float) else None
+    return float(values) if isinstance(values, int | float) and values > 0.0 else None
 
 
 def size_law(common: Common, v_max: float, size_v: float) -> "SizeLaw":
-    """That of the scanner file, for images of ``size_v`` volts."""
+    """That of the scanner file, for images of ``size_v`` volts; the rest of the file may be incomplete."""
     from tablegen.compensation.size import SizeLaw
-    from tablegen.problems import Unphysical
+    from tablegen.config.decode import decode
+    from tablegen.config.schema import Scanner
+    from tablegen.config.toml import read_toml
+    from tablegen.problems import Problems, Unphysical
 
-    k, base = in_file(common, "size", "k_nm_per_v"), in_file(common, "size", "base_nm")
-    beta, threshold = _number(common, "size", "beta"), in_file(common, "size", "v_threshold")
-    if k is None:
-        fail([f"--size-v takes {common.axis}.size of --scanner FILE; calibrate the size first"], Status.WRONG_INPUT)
-    if size_v > v_max:
+    path = f"{common.axis}.size"
+    if in_file(common, "size", "k_nm_per_v") is None:
+        fail([f"--size-v takes {path} of --scanner FILE; calibrate the size first"], Status.WRONG_INPUT)
+    if not size_v <= v_max:
         fail([f"--size-v {size_v:g} is above v_max = {v_max:g} V"], Status.WRONG_INPUT)
+    values, document = read_toml(common.scanner, str(common.scanner))  # type: ignore[arg-type]
+    tables: dict[str, Any] = {}
+    problems = Problems()
+    decode(Scanner, values, document, problems, lambda _kind, key, _values, built: tables.update({key: built}))
+    size = tables.get(path)
+    if size is None:
+        fail([problem for problem in problems.found if problem.key.startswith(path)], Status.WRONG_INPUT)
     try:
-        return SizeLaw.calibrated(k, v_max, beta or 0.0, base or 200.0, threshold or 0.5)
+        return SizeLaw.calibrated(size.k_nm_per_v, v_max, size.beta, size.base_nm, size.v_threshold)
     except Unphysical as reason:
-        fail([f"{common.scanner}: {common.axis}.size: {reason}"], Status.WRONG_INPUT)
+        fail([f"{common.scanner}: {path}: {reason}"], Status.WRONG_INPUT)
 
 
 def finish(common: Common, tables: "Sequence[Table | Image]", run: "Callable[[], Fit]", points: bool = False) -> int:
