@@ -131,9 +131,10 @@ def test_the_trigger_and_the_drive_agree(folder: Path) -> None:
         one["measured"]["residual_rms_percent"], rel=0.1
     )
     # In the middle of a line nothing starts.
-    late = refining(folder, trace, "--triggered", "--delay-s", "0.0025")
-    assert late.status == 2
-    assert "is time 0 no line start?" in late.err
+    for delay in ("0.0025", "0.001"):
+        late = refining(folder, trace, "--triggered", "--delay-s", delay)
+        assert late.status == 2
+        assert "is time 0 no line start?" in late.err
 
 
 def test_a_sensor_that_is_late_or_turned(folder: Path) -> None:
@@ -191,6 +192,46 @@ def test_a_trace_of_the_build_before_is_refused(folder: Path) -> None:
     assert "of the layer that the scan file has; build, upload and record again" in outcome.err
 
 
+def test_a_trace_is_learnt_from_once(folder: Path) -> None:
+    """Of a late round the drive lacks too little to be seen, but the file knows where its layer came from."""
+    assert refining(folder, record(folder, seed=0), "--write").status == 0
+    path, trace = folder / "scan.toml", record(folder, seed=1)
+    assert refining(folder, trace, "--write").status == 0
+    text = path.read_text("utf-8")
+    path.write_text(text, "utf-8", newline="\r\n")
+    outcome = refining(folder, trace, "--write")
+    assert outcome.status == 2
+    assert outcome.messages == [
+        f"{trace}: [x.refinement] was learnt from this trace already; build, upload and record again"
+    ]
+    assert path.read_text("utf-8") == text
+    assert refining(folder, trace, "--write", "--force").status == 0
+    # Without the table its comment says nothing.
+    path.write_text(edited(text, "- [x.refinement]"), "utf-8")
+    assert "# refine 2: " in path.read_text("utf-8")
+    first = record(folder, seed=0)
+    assert refining(folder, first, "--write").status == 0
+
+
+def test_a_glitch_is_named(folder: Path) -> None:
+    trace = record(folder, clock=0.0)
+    rows = trace.read_text("utf-8").splitlines()
+    time, drive, displacement = rows[3001].split(",")
+    rows[3001] = f"{time},{drive},{float(displacement) + 1e4}"
+    trace.write_text("\n".join(rows), "utf-8")
+    notes = refining(folder, trace).out.split("note: ")
+    assert any(f"the reading at {float(time):.9g} s is far off the others" in note for note in notes)
+    assert "far off" not in refining(folder, record(folder)).out
+
+
+def test_a_trigger_where_the_line_turns(folder: Path) -> None:
+    """Nothing tells it from a sensor that counts the other way; it is said."""
+    trace = record(folder, clock=0.0, without=("drive_v",))
+    late = refining(folder, trace, "--triggered", "--delay-s", "0.005")
+    assert "its sign was turned; if the sensor counts upwards, time 0 is where the line turns" in late.out
+    assert "its sign" not in refining(folder, trace, "--triggered").out
+
+
 def test_when_there_is_nothing_to_learn(folder: Path) -> None:
     """A short and noisy trace of what was refined well: the file is left as it is."""
     step = list(rounds(load(folder / "scan.toml"), "x", 2))[-1]
@@ -217,6 +258,10 @@ def test_wrong_use(folder: Path) -> None:
     assert "--period-s is for --triggered" in refining(folder, trace, "--period-s", "0.01").err
     for gain in ("0", "2"):
         assert refining(folder, trace, "--gain", gain).status == 2
+    for option, value in (("--gain", "nan"), ("--delay-s", "nan"), ("--delay-s", "-inf"), ("--period-s", "inf")):
+        outcome = refining(folder, trace, "--triggered", option, value)
+        assert outcome.status == 2
+        assert f"'{option}': {value} is not a finite number" in outcome.err
     assert "33 harmonics are more than the 32 that the scan plays" in refining(folder, trace, "--harmonics", "33").err
     assert "is not a file" in refining(folder, folder / "none.csv").err
     other = refining(folder, trace, axis="y")

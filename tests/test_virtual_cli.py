@@ -117,6 +117,18 @@ def test_a_figure(tmp_path: Path) -> None:
     assert (tmp_path / "figure.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
 
 
+def test_wrong_use(tmp_path: Path) -> None:
+    scan = write_pair(tmp_path, SHORT)
+    for arguments, why in (
+        (("--plot", tmp_path / "figure.pdf"), "the name has to end in .png"),
+        (("--noise", "nan"), "nan is not a finite number"),
+    ):
+        outcome = run("simulate", scan, *arguments)
+        assert outcome.status == Status.WRONG_INPUT
+        assert why in outcome.err
+    assert not (tmp_path / "figure.pdf").exists()
+
+
 def test_a_figure_needs_matplotlib(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     outcome = run("simulate", write_pair(tmp_path, SHORT), "--plot", tmp_path / "figure.png")

@@ -1,6 +1,7 @@
 """``tablegen calibrate``: measurements to parameters of the scanner file, with standard errors."""
 
 from functools import partial
+from math import isfinite
 from pathlib import Path
 from typing import Literal
 
@@ -13,12 +14,11 @@ from tablegen.cli.calibration_run import (
     in_file,
     read_columns,
     read_heights,
-    require,
     shared_options,
     size_law,
     within,
 )
-from tablegen.cli.common import fail
+from tablegen.cli.common import fail, require
 from tablegen.cli.status import Status
 
 _points = click.option("--points", is_flag=True, help="Write each amplitude as measured, in place of (22).")
@@ -147,6 +147,8 @@ def hysteresis(
 
     try:
         delay = None if delay_s == "fit" else float(delay_s)
+        if delay is not None and not isfinite(delay):
+            raise ValueError
     except ValueError:
         raise click.UsageError(f"--delay-s {delay_s}: seconds, or fit") from None
     tables = [read_columns(path, [TIME, DRIVE, DISPLACEMENT], [TRACE]) for path in data]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from tablegen.cli.common import fail, written
+from tablegen.cli.common import fail, require, written
 from tablegen.cli.status import Status
 
 if TYPE_CHECKING:
@@ -79,15 +79,6 @@ def shared_options(command: F) -> F:
         run = option(run)
     run.__click_params__ += getattr(command, "__click_params__", [])  # type: ignore[attr-defined]
     return run  # type: ignore[return-value]
-
-
-def require(*modules: str, extra: str) -> None:
-    from importlib.util import find_spec
-
-    missing = [module for module in modules if find_spec(module) is None]
-    if missing:
-        needs = " and ".join(missing)
-        fail([f"{needs} is missing; install it with: pip install 'tablegen[{extra}]'"], Status.TOOL_MISSING)
 
 
 def read_columns(path: Path, needed: "Sequence[Column]", optional: "Sequence[Column]" = ()) -> "Table":

@@ -1,7 +1,9 @@
 """What several commands share: the way from a path to a certified plan, and how its failures are told."""
 
+import importlib.util
 import os
 import signal
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
@@ -18,6 +20,28 @@ if TYPE_CHECKING:
     from tablegen.plan import Plan
 
 scan_argument = click.argument("scan", type=click.Path(path_type=Path), metavar="SCAN.TOML")
+
+
+def finite(_context: click.Context, _option: click.Parameter, value: float | None) -> float | None:
+    """A callback of options: NaN is in every range of click's, and infinity in those that are open above."""
+    if value is not None and not isfinite(value):
+        raise click.BadParameter(f"{value} is not a finite number.")
+    return value
+
+
+def require(*modules: str, extra: str, otherwise: str = "") -> None:
+    """End the command where modules of an extra are not installed; ``otherwise`` says what does without them."""
+    missing = [module for module in modules if not _installed(module)]
+    if missing:
+        needs = " and ".join(missing)
+        fail([f"{needs} is missing; install it with: pip install 'tablegen[{extra}]'{otherwise}"], Status.TOOL_MISSING)
+
+
+def _installed(module: str) -> bool:
+    try:
+        return importlib.util.find_spec(module) is not None
+    except ValueError:  # it was imported in an unusual way, or kept from being
+        return False
 
 
 class Failure(click.ClickException):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
-from tablegen.cli.common import fail, scan_argument, written
+from tablegen.cli.common import fail, finite, require, scan_argument, written
 from tablegen.cli.status import Status
 
 if TYPE_CHECKING:
@@ -32,6 +32,7 @@ _FORMATS = (".png", ".svg", ".pdf")
     type=click.FloatRange(0.0, 2.0, min_open=True, max_open=True),
     default=0.7,
     show_default=True,
+    callback=finite,
     help="The share of the error that a round takes.",
 )
 @click.option(
@@ -39,16 +40,22 @@ _FORMATS = (".png", ".svg", ".pdf")
 )
 @click.option("--triggered", is_flag=True, help="Without drive_v: time 0 is a line start, of y a frame start.")
 @click.option(
-    "--period-s", type=click.FloatRange(min=0.0, min_open=True), metavar="S", help="By the recorder's clock, triggered."
+    "--period-s",
+    type=click.FloatRange(min=0.0, min_open=True),
+    callback=finite,
+    metavar="S",
+    help="By the recorder's clock, triggered.",
 )
-@click.option("--delay-s", type=float, default=0.0, show_default=True, metavar="S", help="Of the sensor.")
+@click.option(
+    "--delay-s", type=float, default=0.0, callback=finite, show_default=True, metavar="S", help="Of the sensor."
+)
 @click.option(
     "--settle", type=click.IntRange(min=0), metavar="N", help="Periods left out.  [default: 1 of three or more]"
 )
 @click.option(
     "--drift", type=click.IntRange(0, 5), metavar="N", help="Order of the drift.  [default: 0 to 3, by periods]"
 )
-@click.option("--force", is_flag=True, help="Learn even from a trace that is worse than the one before.")
+@click.option("--force", is_flag=True, help="Learn even from a trace that is worse than the last one, or that is it.")
 @click.option("--plot", type=click.Path(path_type=Path, dir_okay=False), metavar="PNG", help="Draw it; or .svg, .pdf.")
 @click.option("--json", "as_json", is_flag=True, help="Plain data instead of text.")
 def refine(
@@ -75,11 +82,11 @@ def refine(
     if period_s is not None and not triggered:
         raise click.UsageError("--period-s is for --triggered; otherwise drive_v has the period")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    _require("scipy", "tomlkit", extra="calibrate")
+    require("scipy", "tomlkit", extra="calibrate")
     if plot is not None:
         if plot.suffix not in _FORMATS:
             raise click.UsageError(f"--plot {plot}: the name has to end in .png, .svg or .pdf")
-        _require("matplotlib", extra="plot")
+        require("matplotlib", extra="plot")
     from tablegen.refinement.round import Options
 
     options = Options(gain, harmonics, period_s, delay_s, settle, drift)
@@ -96,19 +103,12 @@ def refine(
 
         kind: Any = plot.suffix[1:]
         written(plot.parent, {plot.name: draw(found.curves, kind)})
-    if found.worse and not force:
-        fail([f"{trace}: {found.worse}"], Status.WRONG_INPUT)
+    refused = found.worse or _learnt_before(scan, axis, found, source, text)
+    if refused and not force:
+        fail([f"{trace}: {refused}"], Status.WRONG_INPUT)
     if write:
         _write(scan, axis, found, source, text, as_json)
     return Status.OK
-
-
-def _require(*modules: str, extra: str) -> None:
-    from importlib.util import find_spec
-
-    if missing := [module for module in modules if find_spec(module) is None]:
-        needs = " and ".join(missing)
-        fail([f"{needs} is missing; install it with: pip install 'tablegen[{extra}]'"], Status.TOOL_MISSING)
 
 
 def _learn(
@@ -134,6 +134,15 @@ def _learn(
     except OSError as error:
         fail([f"{scan}: {error.strerror or error}"], Status.WRONG_INPUT)
     return found, table.source, text
+
+
+def _learnt_before(scan: Path, axis: str, found: "Round", source: "Source", text: str) -> str:
+    """Whether the layer of the file rests on this very trace: it was then recorded without what was learnt from it."""
+    from tablegen.refinement.scan_file import rounds_of
+
+    if found.line.layer is None or not any(source.sha256 in row for row in rounds_of(text, str(scan), axis)):
+        return ""
+    return f"[{axis}.refinement] was learnt from this trace already; build, upload and record again"
 
 
 def _read(trace: Path, triggered: bool) -> "Table":

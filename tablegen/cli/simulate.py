@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tablegen.cli.common import fail, scan_argument, written
+from tablegen.cli.common import fail, finite, require, scan_argument, written
 from tablegen.cli.progress import Progress
 from tablegen.cli.status import Status
 
@@ -47,6 +47,7 @@ if TYPE_CHECKING:
 @click.option(
     "--noise",
     type=click.FloatRange(0.0, 10.0),
+    callback=finite,
     default=0.2,
     show_default=True,
     metavar="PERCENT",
@@ -79,9 +80,11 @@ def simulate(
     from tablegen.virtual.scanner import VirtualScanner
 
     if plot_file is not None:
-        _need("matplotlib", "--plot", "plot")
+        if plot_file.suffix != ".png":
+            raise click.UsageError(f"--plot {plot_file}: the name has to end in .png")
+        require("matplotlib", extra="plot")
     if calibrated:
-        _need("scipy", "the calibration", "calibrate", "; or give --no-calibration")
+        require("scipy", extra="calibrate", otherwise="; or give --no-calibration")
     try:
         setup = load(scan)
         truth = load_truth(None if truth_file == "default" else truth_file)
@@ -136,14 +139,3 @@ def _play(
     if not runs:
         fail(list(dict.fromkeys(map(str, problems))), Status.WRONG_INPUT)
     return Stage(name, heading, tuple(runs), tuple(rejected))
-
-
-def _need(module: str, what: str, extra: str, otherwise: str = "") -> None:
-    from importlib.util import find_spec
-
-    try:
-        missing = find_spec(module) is None
-    except ValueError:
-        missing = True
-    if missing:
-        fail([f"{what} needs {module}: pip install 'tablegen[{extra}]'{otherwise}"], Status.TOOL_MISSING)

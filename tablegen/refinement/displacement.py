@@ -11,6 +11,7 @@ from tablegen.problems import Unphysical
 from tablegen.waveform.series import FourierSeries
 
 _CHUNK = 1 << 14  # samples that are worked out at a time
+_STRAY = 7.0  # standard deviations
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,7 +19,8 @@ class Displacement:
     """One settled period in nm, as the sensor has it.
 
     ``covariance`` is of (a0, a, b) in nm^2, widened where residuals depend on each other over ``correlated`` samples.
-    ``noise_nm`` is that of a reading, ``drift_nm`` how far the trace drifted.
+    ``noise_nm`` is that of a reading, ``drift_nm`` how far the trace drifted, ``stray`` the sample farthest off the
+    others, counted from 0, where that is no noise.
     """
 
     series: FourierSeries
@@ -29,6 +31,7 @@ class Displacement:
     periods: float
     samples: int
     left_out: int
+    stray: int | None = None
 
 
 def fit_displacement(
@@ -90,6 +93,9 @@ def fit_displacement(
     scaled: Floats = height * c[: 1 + 2 * count]
     series = FourierSeries(middle + float(scaled[0]), scaled[1 : count + 1].copy(), scaled[count + 1 :].copy())
     noise = height * float(np.sqrt(left @ left / max(len(t) - len(c), 1)))
-    return Displacement(
-        series, covariance, noise, height * float(np.ptp(drift)), correlated, periods, len(t), int(np.sum(~used))
-    )
+    left_out = int(np.sum(~used))
+    farthest = int(np.argmax(np.abs(left)))  # it pulls the fit, and the others seem off too
+    stands_out = abs(float(left[farthest])) > max(_STRAY * 1.4826 * float(np.median(np.abs(left))), 1e-6)
+    stray = left_out + farthest if stands_out else None
+    moved = height * float(np.ptp(drift))
+    return Displacement(series, covariance, noise, moved, correlated, periods, len(t), left_out, stray)

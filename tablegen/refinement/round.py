@@ -89,7 +89,7 @@ def refine(
         refinement = _refinement(setup, line, lesson)
         changed = with_refinement(setup, axis, refinement)
         make_plan(changed)  # what is written can be built
-    worse, remarks = _worse(setup, axis, lesson), _remarks(line, measured, lesson, phase)
+    worse, remarks = _worse(setup, axis, lesson), _remarks(line, measured, lesson, phase, time_s)
     return Round(line, phase, measured, limits, lesson, refinement, changed, worse, remarks)
 
 
@@ -144,7 +144,7 @@ def _worse(setup: Setup, axis: str, lesson: Lesson) -> str:
     )
 
 
-def _remarks(line: LinePlan, measured: Displacement, lesson: Lesson, phase: Phase) -> tuple[str, ...]:
+def _remarks(line: LinePlan, measured: Displacement, lesson: Lesson, phase: Phase, time_s: Floats) -> tuple[str, ...]:
     found = []
     size = abs(lesson.before.size_nm)
     by = size / line.drive.size_nm - 1.0
@@ -154,7 +154,12 @@ def _remarks(line: LinePlan, measured: Displacement, lesson: Lesson, phase: Phas
             f"({100.0 * by:+.2f} %); sizes are not learnt: calibrate {line.axis}.size, best before refining"
         )
     if lesson.before.size_nm < 0.0:
-        found.append("the displacement falls where the drive rises; its sign was turned")
+        doubt = "; if the sensor counts upwards, time 0 is where the line turns, and this is not to be learnt"
+        turned = "the displacement falls where the drive rises; its sign was turned"
+        found.append(turned + (doubt if phase.drive is None else ""))
+    if measured.stray is not None:
+        at = float(time_s[measured.stray])
+        found.append(f"the reading at {at:.9g} s is far off the others; without such there is less noise")
     if lesson.harmonics == 0:
         found.append("nothing stands out of the sensor's noise: there is nothing more to learn from such a trace")
     elif lesson.after.rms_percent > _FINISHED * lesson.before.rms_percent:

@@ -40,6 +40,15 @@ def with_layer(text: str, name: str, axis: str, values: Mapping[str, Any], prove
     return changed.replace("\n", "\r\n") if windows else changed
 
 
+def rounds_of(text: str, name: str, axis: str) -> list[str]:
+    """The provenance of each round of ``[AXIS.refinement]``, which the text has, oldest first."""
+    rows = text.split("\n")
+    at = first = parse_toml(text, name)[1].line_of(f"{axis}.{KEY}") - 1
+    while first > 0 and _MARK.match(rows[first - 1]):
+        first -= 1
+    return [_MARK.sub("", row).rstrip("\r") for row in rows[first:at]]
+
+
 def _put(text: str, name: str, axis: str, values: Mapping[str, Any]) -> str:
     """The text with the values of the table, which may be there."""
     document = tomlkit.parse(text)
