@@ -14,7 +14,9 @@ from tablegen.compensation.hysteresis import BranchShape, LineShape
 from tablegen.config.load import load
 from tablegen.config.schema import BandLimit
 from tablegen.emit import render
+from tablegen.fixedpoint.synthesis import FourierWords, synthesize
 from tablegen.layer import model_digest
+from tablegen.link.prepare import Scan
 from tablegen.plan import Plan, make_plan
 from tablegen.problems import Rejected
 from tablegen.recorded import read_manifest
@@ -169,6 +171,19 @@ def test_such_a_build_verifies(target: str, tmp_path: Path) -> None:
     assert run("build", path, "-o", tmp_path / "out", "-q").status == 0
     outcome = run("verify", tmp_path / "out", "--target", target)
     assert outcome.status == 0, outcome.err
+
+
+def test_such_a_scan_uploads_as_it_plays(tmp_path: Path, plain: Plan, refined: Plan) -> None:
+    """From the plan and from the build the same image, whose Fourier words render the words that are played."""
+    path = write_pair(tmp_path, edited(SCAN, *at("x")))
+    assert run("build", path, "-o", tmp_path / "out", "-q").status == 0
+    of_plan, of_build = Scan.of_plan(refined), Scan.of_build(tmp_path / "out")
+    assert of_plan.digest == of_build.digest != Scan.of_plan(plain).digest
+    assert of_plan.image("fourier") == of_build.image("fourier") != Scan.of_plan(plain).image("fourier")
+    a, b = np.split(of_build.x_fourier[1:], 2)
+    fourier = FourierWords(int(of_build.x_fourier[0]), a, b)
+    program = refined.x.program
+    assert np.array_equal(synthesize(fourier, len(program.words), program.bits), program.words)
 
 
 REMEDY = "remove [x.refinement], build, and run tablegen refine on a new trace"
