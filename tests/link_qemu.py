@@ -83,6 +83,26 @@ class LinkMachine:
         """Pull the processor's reset."""
         self._monitor.sendall(b"system_reset\n")
 
+    def reset_while_receiving(self, data: bytes, status: int, raised: int, when: Callable[[int, int], bool]) -> None:
+        """The same in the middle of bytes: when the registers at two addresses are so, as the monitor reads them."""
+        until = time.monotonic() + _LONGEST_WAIT
+        with socket.create_connection(("127.0.0.1", self.port)) as link:
+            while True:
+                link.sendall(data)
+                self._monitor.sendall(b"stop\n")
+                if when(self._word(status), self._word(raised)):
+                    break
+                assert time.monotonic() < until, "the registers were never so"
+                self._monitor.sendall(b"cont\n")
+        self._monitor.sendall(b"system_reset\ncont\n")
+
+    def _word(self, address: int) -> int:
+        self._monitor.sendall(f"xp /1wx {address:#x}\n".encode())
+        shown = b""
+        while (found := re.search(rb"%016x: 0x([0-9a-f]{8})" % address, shown)) is None:
+            shown += self._monitor.recv(65536)
+        return int(found[1], 16)
+
     def lines(self) -> list[PlayedLine]:
         """Those that were logged since the last call."""
         with self._lock:

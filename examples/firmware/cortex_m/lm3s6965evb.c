@@ -54,6 +54,9 @@ void board_start(void)
     GPIO_DEN(PORT_D) |= 3u << 2;
     start_uart(CONSOLE);
     start_uart(LOG);
+    /* What was received before: the interrupt comes when the FIFO fills to its level, and not while it is above. */
+    while ((UART_FR(CONSOLE) & RECEIVE_EMPTY) == 0)
+        (void)UART_DR(CONSOLE);
     UART_IM(CONSOLE) = RECEIVE_INTERRUPT | RECEIVE_TIMEOUT;
     NVIC_ISER0 = 1u << 5;
 }
