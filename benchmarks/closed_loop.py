@@ -14,7 +14,6 @@ from tablegen.config.load import Setup, load
 from tablegen.config.schema import BandLimit
 from tablegen.virtual.closed_loop import (
     MAP_SIZES,
-    OFFSETS,
     SHARP,
     SHARP_RATE_HZ,
     play_x,
@@ -22,7 +21,7 @@ from tablegen.virtual.closed_loop import (
     uncorrected,
     with_scan,
 )
-from tablegen.virtual.laboratory import calibrate
+from tablegen.virtual.laboratory import OFFSETS, calibrate
 from tablegen.virtual.parameters import load_truth
 from tablegen.virtual.scanner import VirtualScanner
 from tablegen.virtual.simulation import with_model

@@ -3,17 +3,21 @@
 The limits are the paper's results (figures 5i and 5j), at the paper's conditions: full scale, turns that are sharp.
 """
 
+from typing import Any
+
 import numpy as np
 import pytest
 from building import EXAMPLE
 
 from tablegen.calibration.hysteresis import HysteresisFit
 from tablegen.config.load import Setup, load
+from tablegen.virtual import laboratory
 from tablegen.virtual.closed_loop import SHARP, SHARP_RATE_HZ, play_x, size_map, uncorrected, with_scan
+from tablegen.virtual.experiments import sensor_trace
 from tablegen.virtual.laboratory import Calibration, calibrate
 from tablegen.virtual.measurement import about_window_line, line_error
 from tablegen.virtual.parameters import load_truth
-from tablegen.virtual.scanner import VirtualScanner
+from tablegen.virtual.scanner import VirtualAxis, VirtualScanner
 from tablegen.virtual.simulation import with_model
 
 SCANNER = VirtualScanner.of(load_truth())
@@ -137,6 +141,19 @@ def test_the_line_of_the_image_is_the_best_one() -> None:
     assert again.size_nm == pytest.approx(1.0, rel=2e-3)
     forward_only = about_window_line(error, ["forward"])
     assert np.mean(forward_only.forward.residual[100:901]) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_traces_keep_the_tip_velocity(example: Setup, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Section 9: a larger scan is played more slowly, a smaller one no faster than the scan."""
+    taken: list[tuple[float, float]] = []
+
+    def noted(axis: VirtualAxis, size_v: float, offset_v: float, rate_hz: float, *rest: Any, **more: Any) -> Any:
+        taken.append((size_v, rate_hz))
+        return sensor_trace(axis, size_v, offset_v, rate_hz, *rest, **more)
+
+    monkeypatch.setattr(laboratory, "sensor_trace", noted)
+    calibrate(with_scan(example, size_v=40.0, rate_hz=80.0), SCANNER, amplitudes=(0.2, 0.4, 0.8))
+    assert taken[:3] == pytest.approx([(20.0, 80.0), (40.0, 80.0), (80.0, 40.0)])
 
 
 def test_noise_comes_from_the_seed(example: Setup) -> None:

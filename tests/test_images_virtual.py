@@ -7,14 +7,16 @@ from tablegen.calibration.branch import AmplitudeFit
 from tablegen.calibration.image_fit import fit_pair
 from tablegen.calibration.trace import fit_trace
 from tablegen.compensation.hysteresis import BranchShape, LineShape
+from tablegen.numerics.arrays import Floats
 from tablegen.virtual.experiments import sensor_trace
-from tablegen.virtual.imaging import grating_images, lattice_images
+from tablegen.virtual.imaging import grating, hexagonal, image_pair
 from tablegen.virtual.measurement import LineError, line_error
 from tablegen.virtual.parameters import load_truth
 from tablegen.virtual.scanner import VirtualAxis, VirtualScanner
 from tablegen.virtual.sensor import Sensor
 
 OFFSET, RATE = 50.0, 1.0
+GRATING, LATTICE = grating(50.0), hexagonal(50.0)
 
 
 @pytest.fixture(scope="module")
@@ -32,8 +34,8 @@ def test_images_say_what_the_sensor_says(v: float, axis: VirtualAxis) -> None:
     """Within 0.1 % of the scan in beta and 0.02 in u_peak, where branches differ from the model by some 0.4 %."""
     sensor = by_sensor(axis, v)
     for trace, retrace in (
-        grating_images(axis, v, OFFSET, RATE, seed=2),
-        lattice_images(axis, v, OFFSET, RATE, drift=0.02, seed=3),
+        image_pair(axis, GRATING, v, OFFSET, RATE, seed=2),
+        image_pair(axis, LATTICE, v, OFFSET, RATE, drift=0.02, seed=3),
     ):
         images = fit_pair(trace, retrace, v)
         for side in ("forward", "backward"):
@@ -41,6 +43,8 @@ def test_images_say_what_the_sensor_says(v: float, axis: VirtualAxis) -> None:
             assert one.beta.value == pytest.approx(other.beta.value, abs=1e-3)
             assert one.u_peak.value == pytest.approx(other.u_peak.value, abs=0.02)
             assert one.beta.standard_error < 3.0 * other.beta.standard_error
+        # What (17) does not describe is many times the noise of so many pixels, and counts as error.
+        assert images.widened > 20.0
         assert np.max(np.abs(images.residual_percent)) < 1.5 * np.max(np.abs(sensor.residual_percent))
 
 
@@ -54,7 +58,7 @@ def corrected(axis: VirtualAxis, fit: AmplitudeFit) -> LineError:
 
 def test_a_drive_from_images_is_as_good_as_one_from_the_sensor(axis: VirtualAxis) -> None:
     """At most 1.5 times the sensor's residual, the issue's bound; and far below what a triangle leaves."""
-    trace, retrace = grating_images(axis, 100.0, OFFSET, RATE, seed=4)
+    trace, retrace = image_pair(axis, GRATING, 100.0, OFFSET, RATE, seed=4)
     images = fit_pair(trace, retrace, 100.0)
     ours, sensor = corrected(axis, images), corrected(axis, by_sensor(axis, 100.0))
     for direction in ("forward", "backward"):
@@ -65,7 +69,7 @@ def test_a_drive_from_images_is_as_good_as_one_from_the_sensor(axis: VirtualAxis
 
 def test_the_window_is_the_columns(axis: VirtualAxis) -> None:
     """The same scan seen through a window, with as many pixels; and a wrong window is another scan."""
-    trace, retrace = grating_images(axis, 100.0, OFFSET, RATE, window=(0.03, 0.97), seed=5)
+    trace, retrace = image_pair(axis, GRATING, 100.0, OFFSET, RATE, window=(0.03, 0.97), seed=5)
     right, wrong = fit_pair(trace, retrace, 100.0, window=(0.03, 0.97)), fit_pair(trace, retrace, 100.0)
     whole = by_sensor(axis, 100.0)
     assert right.forward.beta.value == pytest.approx(whole.forward.beta.value, abs=1e-3)
@@ -73,7 +77,23 @@ def test_the_window_is_the_columns(axis: VirtualAxis) -> None:
 
 
 def test_the_same_seed_is_the_same_image(axis: VirtualAxis) -> None:
-    first, again, other = (grating_images(axis, 50.0, OFFSET, RATE, pixels=64, lines=40, seed=s) for s in (1, 1, 2))
+    first, again, other = (
+        image_pair(axis, GRATING, 50.0, OFFSET, RATE, pixels=64, lines=40, seed=s) for s in (1, 1, 2)
+    )
     assert np.array_equal(first[0], again[0])
     assert not np.array_equal(first[0], other[0])
     assert first[0].shape == (40, 64)
+
+
+def test_a_pixel_is_the_middle_of_its_time() -> None:
+    """On an axis that follows its drive, of a sample that rises with x: trace and retrace show the same."""
+
+    class Linear:
+        @staticmethod
+        def settled(volts: Floats, _tick_s: float) -> Floats:
+            return 10.0 * volts
+
+    trace, retrace = image_pair(Linear(), lambda x, y: x + 0.0 * y, 40.0, 50.0, RATE, pixels=50, lines=32, noise=0.0)  # type: ignore[arg-type]
+    expected = 300.0 + 400.0 * (np.arange(50) + 0.5) / 50
+    assert trace == pytest.approx(np.tile(expected, (32, 1)), abs=0.05)
+    assert retrace == pytest.approx(trace, abs=0.05)

@@ -147,6 +147,17 @@ def test_an_uncalibrated_scanner_is_a_triangle(tmp_path: Path) -> None:
     assert list(data["calibrated"]["models"]) == ["triangle", "sinusoidal", "harmonic"]
 
 
+def test_a_calibrated_scan_that_cannot_be_played_leaves_the_given_one(tmp_path: Path) -> None:
+    """98 V for k as given; the virtual scanner goes less far a volt than such a file says, and takes more than 100 V."""
+    scanner = edited(SCANNER, "x.size.k_nm_per_v = 15.0", "x.size.beta = 0.0")
+    outcome = run("simulate", write_pair(tmp_path, edited(SHORT, "x.size_nm = 1450.0"), scanner), "--json")
+    assert outcome.status == 0
+    data = json.loads(outcome.out)
+    assert data["given"]["models"]
+    assert data["calibrated"]["models"] == {}
+    assert "x.size_nm" in data["calibrated"]["rejected"]["harmonic"]
+
+
 def test_another_truth(tmp_path: Path) -> None:
     """Without hysteresis, creep or resonance the triangle is straight, and compensation makes it worse."""
     scan = write_pair(tmp_path, SHORT)

@@ -82,6 +82,7 @@ def shared_options(command: F) -> F:
 
 
 def read_columns(path: Path, needed: "Sequence[Column]", optional: "Sequence[Column]" = ()) -> "Table":
+    """A CSV with these columns; what is wrong with it ends the command."""
     from tablegen.calibration.table import read_table
     from tablegen.problems import Rejected
 
@@ -92,6 +93,7 @@ def read_columns(path: Path, needed: "Sequence[Column]", optional: "Sequence[Col
 
 
 def read_heights(path: Path, channel: str | None) -> "Image":
+    """An image; what is wrong with it ends the command."""
     from tablegen.calibration.image_files import read_image
     from tablegen.problems import Rejected
 
@@ -102,6 +104,7 @@ def read_heights(path: Path, channel: str | None) -> "Image":
 
 
 def within(table: "Table", from_hz: float, to_hz: float) -> "Table":
+    """The rows from one frequency to the other; none ends the command."""
     from dataclasses import replace
 
     from tablegen.calibration.columns import FREQUENCY
@@ -128,6 +131,7 @@ def _scanner_values(common: Common) -> dict[str, Any]:
 
 
 def full_scale(common: Common) -> float:
+    """v_max in V, of the scanner file, or as given where there is none."""
     values = _scanner_values(common)
     found = values.get("v_max")
     if isinstance(found, int | float) and not isinstance(found, bool) and found > 0.0:

@@ -93,6 +93,8 @@ def simulate(
     scanner = VirtualScanner.of(truth)
     with Progress() as progress:
         stages = [_play("given", "with the scanner file as it is", setup, scanner, truth_file, progress)]
+        if not stages[0].runs:
+            fail(list(dict.fromkeys(why for _, reasons in stages[0].rejected for why in reasons)), Status.WRONG_INPUT)
         if calibrated:
             from tablegen.virtual.laboratory import calibrate
 
@@ -102,7 +104,7 @@ def simulate(
                 after = calibrate(setup, scanner, 0.01 * noise, seed).setup
                 stages.append(_play("calibrated", heading, after, scanner, truth_file, progress))
             except (Unphysical, ValueError) as reason:
-                stages.append(Stage("calibrated", heading, (), (("calibration", str(reason)),)))
+                stages.append(Stage("calibrated", heading, (), (("calibration", (str(reason),)),)))
     if csv_file is not None:
         written(csv_file.parent, {csv_file.name: report.csv(stages).encode()})
     if plot_file is not None:
@@ -119,23 +121,19 @@ def simulate(
 def _play(
     name: str, heading: str, setup: "Setup", scanner: "VirtualScanner", truth_file: str, progress: Progress
 ) -> "Stage":
-    """Every model that can be played; where none can, the command ends."""
+    """Every model that can be played, and why the others cannot."""
     from tablegen.problems import Rejected
     from tablegen.virtual.report import Stage
     from tablegen.virtual.simulation import models_of, simulate
 
     runs: list[Run] = []
-    rejected: list[tuple[str, str]] = []
-    problems: list[object] = []
+    rejected: list[tuple[str, tuple[str, ...]]] = []
     for model in models_of(setup):
         progress.now(f"playing the {model} model, scanner file as {name}")
         try:
             runs.append(simulate(setup, scanner, model))
         except Rejected as faults:
-            rejected.append((model, "; ".join(map(str, faults.problems))))
-            problems += faults.problems
+            rejected.append((model, tuple(map(str, faults.problems))))
         except ValueError as reason:
-            problems.append(f"{truth_file}: {reason}")
-    if not runs:
-        fail(list(dict.fromkeys(map(str, problems))), Status.WRONG_INPUT)
+            rejected.append((model, (f"{truth_file}: {reason}",)))
     return Stage(name, heading, tuple(runs), tuple(rejected))

@@ -10,15 +10,15 @@ from tablegen.config.load import Setup
 from tablegen.config.schema import BandLimit, ScannerAxis
 from tablegen.numerics.arrays import Floats
 from tablegen.plan import make_plan
+from tablegen.virtual.laboratory import OFFSETS
 from tablegen.virtual.scanner import VirtualScanner
 from tablegen.virtual.simulation import AxisRun, run_line
 
 # As the paper measured its waveforms: turns as sharp as the drive, nothing near the resonance.
 SHARP = BandLimit(method="lanczos", harmonics=256)
 SHARP_RATE_HZ = 20.0
-# A fourth of the drive's range can be reached at either end of it.
-OFFSETS = (0.07, 0.285, 0.5, 0.715, 0.93)  # of v_max
-MAP_SIZES = (0.02, 0.04, 0.06, 0.08, 0.1)  # nominal, of k v_max
+# Nominal, of k v_max: the largest, with m and all, just fits between an outermost offset and the end of the range.
+MAP_SIZES = (0.02, 0.04, 0.06, 0.08, 0.1)
 
 
 def with_scan(

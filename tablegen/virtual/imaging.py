@@ -44,7 +44,7 @@ def hexagonal(constant_nm: float, angle_deg: float = 7.0) -> Surface:
     return height
 
 
-def images(
+def image_pair(
     axis: VirtualAxis,
     surface: Surface,
     size_v: float,
@@ -75,29 +75,3 @@ def images(
         heights = surface(x + drift * size * frame**2, size * frame)
         shown.append(heights + noise * float(np.ptp(heights)) * random.standard_normal(heights.shape))
     return shown[0], shown[1]
-
-
-def grating_images(
-    axis: VirtualAxis,
-    size_v: float,
-    offset_v: float,
-    rate_hz: float,
-    pitch_nm: float = 50.0,
-    angle_deg: float = 3.0,
-    **options: float,
-) -> tuple[Floats, Floats]:
-    """Trace and retrace of a grating; options as of ``images``."""
-    return images(axis, grating(pitch_nm, angle_deg), size_v, offset_v, rate_hz, **options)  # type: ignore[arg-type]
-
-
-def lattice_images(
-    axis: VirtualAxis,
-    size_v: float,
-    offset_v: float,
-    rate_hz: float,
-    constant_nm: float = 50.0,
-    angle_deg: float = 7.0,
-    **options: float,
-) -> tuple[Floats, Floats]:
-    """Trace and retrace of a hexagonal lattice; options as of ``images``."""
-    return images(axis, hexagonal(constant_nm, angle_deg), size_v, offset_v, rate_hz, **options)  # type: ignore[arg-type]

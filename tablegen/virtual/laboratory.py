@@ -23,11 +23,12 @@ from tablegen.compensation.size import SizeLaw
 from tablegen.config.load import Setup
 from tablegen.config.schema import Frequency, Hysteresis, Offset, Resonance, ScannerAxis, Size
 from tablegen.virtual.experiments import actual_sizes, apparent_sizes, frequency_response, sensor_trace
-from tablegen.virtual.imaging import grating_images, lattice_images
+from tablegen.virtual.imaging import grating, hexagonal, image_pair
 from tablegen.virtual.scanner import VirtualAxis, VirtualScanner
 from tablegen.virtual.sensor import Sensor
 
 T = TypeVar("T")
+_AXES: tuple[Literal["x", "y"], ...] = ("x", "y")
 NOISE = 0.002  # rms of every reading, of the scan or of the value
 # Shares of v_max. Offsets stay away from the ends, as the paper advises.
 OFFSETS = (0.07, 0.285, 0.5, 0.715, 0.93)
@@ -63,10 +64,9 @@ def calibrate(
     """
     axes: dict[str, ScannerAxis] = {}
     fits: dict[str, dict[str, Fit]] = {}
-    names: tuple[Literal["x"], Literal["y"]] = ("x", "y")
-    for name in names:
+    for number, name in enumerate(_AXES):
         axis: VirtualAxis = getattr(scanner, name)
-        day = _Day(setup, name, axis, noise, 1000 * (2 * seed + names.index(name)))
+        day = _Day(setup, name, axis, noise, 1000 * (2 * seed + number))
         fits[name] = day.fits(amplitudes, images)
         axes[name] = day.scanner_axis(fits[name], points)
     scan = msgspec.structs.replace(  # what was learnt over another model does not fit to this one
@@ -148,11 +148,10 @@ class _Day:
         )
 
     def _hysteresis(self, amplitudes: Sequence[float]) -> HysteresisFit:
-        """Each at the scan's tip velocity, and no faster than the scan, as the paper does."""
         traces = []
         for share in amplitudes:
             volts = share * self._v_max
-            rate = self._rate_hz * min(self._scan_v / volts, 1.0)
+            rate = self._rate_at(volts)
             size_nm = volts * self._before.size.k_nm_per_v
             sensor = Sensor(noise_nm=self._noise * size_nm, seed=self._next())
             found = sensor_trace(
@@ -166,13 +165,16 @@ class _Day:
         pairs = []
         for share in amplitudes:
             volts = share * self._v_max
-            rate = self._rate_hz * min(self._scan_v / volts, 1.0)
-            image = lattice_images if share <= SMALL_IMAGE else grating_images
-            pitch = {"constant_nm": LATTICE_NM} if share <= SMALL_IMAGE else {"pitch_nm": GRATING_NM}
-            seed = self._next()
-            trace, retrace = image(self._axis, volts, 0.5 * self._v_max, rate, turn=self._turn, seed=seed, **pitch)
+            rate = self._rate_at(volts)
+            sample = hexagonal(LATTICE_NM) if share <= SMALL_IMAGE else grating(GRATING_NM)
+            middle, seed = 0.5 * self._v_max, self._next()
+            trace, retrace = image_pair(self._axis, sample, volts, middle, rate, turn=self._turn, seed=seed)
             pairs.append(Pair(f"{volts:g} V", volts, trace, retrace))
         return fit_images(pairs, self._v_max, turn=self._turn)
+
+    def _rate_at(self, volts: float) -> float:
+        """The rate, in Hz, with the scan's tip velocity, and no faster than the scan, as the paper does."""
+        return self._rate_hz * min(self._scan_v / volts, 1.0)
 
     def _frequency(self) -> Fit:
         """Two decades about the reference, below a tenth of any resonance."""

@@ -22,7 +22,7 @@ class Stage:
     name: str
     heading: str
     runs: tuple[Run, ...]
-    rejected: tuple[tuple[str, str], ...] = ()
+    rejected: tuple[tuple[str, tuple[str, ...]], ...] = ()
 
 
 def text(name: str, truth: str, stages: Sequence[Stage]) -> list[str]:
@@ -41,7 +41,7 @@ def text(name: str, truth: str, stages: Sequence[Stage]) -> list[str]:
         for axis in ("x", "y"):
             for run in stage.runs:
                 lines += _rows(axis, run)
-        lines += [f"{model}: {why}" for model, why in stage.rejected]
+        lines += [f"{model}: {'; '.join(reasons)}" for model, reasons in stage.rejected]
     lines.append("")
     lines.append("* the model of the scanner file")
     if any(getattr(run, axis).refined for stage in stages for run in stage.runs for axis in ("x", "y")):
@@ -105,7 +105,7 @@ def data(name: str, truth: str, stages: Sequence[Stage]) -> dict[str, Any]:
                     run.model: {"in_scanner_file": list(run.asked), "x": axis(run.x), "y": axis(run.y)}
                     for run in stage.runs
                 },
-                "rejected": dict(stage.rejected),
+                "rejected": {model: "; ".join(reasons) for model, reasons in stage.rejected},
             }
             for stage in stages
         },
