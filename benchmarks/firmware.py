@@ -13,12 +13,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from tablegen.certificate import certify
+from tablegen.certificate.certificate import certify
 from tablegen.config.load import load
-from tablegen.emit import render
-from tablegen.plan import make_plan
+from tablegen.emit.render import render
+from tablegen.planning.line_plan import make_plan
 from tablegen.resources import c_runtime
-from tablegen.verify.emulate import CORES, Processor, compile_bare
+from tablegen.verification.emulate import CORES, Processor, compile_bare
 
 HERE = Path(__file__).parent
 EXAMPLE = HERE.parent / "examples" / "annexin_200nm.toml"

@@ -14,16 +14,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from tablegen.certificate import certify
+from tablegen.certificate.certificate import certify
 from tablegen.config.load import load
-from tablegen.emit import render
+from tablegen.emit.render import render
 from tablegen.link.frames import Frame, FrameReader
-from tablegen.link.image import Image, make_image
+from tablegen.link.image import ProgramImage, make_image
 from tablegen.link.messages import ANSWER, DATA_BYTES, TAG_BYTES, VERSION, Request
-from tablegen.plan import make_plan
+from tablegen.planning.line_plan import make_plan
 from tablegen.resources import c_link, c_runtime
-from tablegen.sequencer import DualProgram
-from tablegen.verify.emulate import CORES, Processor, compile_bare
+from tablegen.verification.emulate import CORES, Processor, compile_bare
 
 HERE = Path(__file__).parent
 EXAMPLE = HERE.parent / "examples" / "annexin_200nm.toml"
@@ -93,14 +92,14 @@ class Device:
                 return counts, answers
 
 
-def _requests(image: Image) -> Iterator[Frame]:
+def _requests(image: ProgramImage) -> Iterator[Frame]:
     yield Frame(Request.HELLO, 0, 1, bytes([VERSION]))
     yield Frame(Request.BEGIN, 0, 1, image.info.pack())
     for at in range(0, len(image.data), DATA_BYTES):
         yield Frame(Request.DATA, 0, 1, struct.pack("<I", at) + image.data[at : at + DATA_BYTES])
 
 
-def upload(device: Device, image: Image, key: bytes = b"") -> Upload:
+def upload(device: Device, image: ProgramImage, key: bytes = b"") -> Upload:
     """A whole one, counted."""
     device.processor.call("link_start", int(bool(key)))
     device.stack = 0
@@ -122,7 +121,7 @@ def upload(device: Device, image: Image, key: bytes = b"") -> Upload:
 def measure(core: str, optimisation: str, folder: Path) -> Counts:
     """Build the example for a core and count."""
     device = Device(core, optimisation, folder)
-    program, digest = DualProgram.of(device.plan), bytes(32).hex()
+    program, digest = device.plan.program, bytes(32).hex()
     table = make_image(program, digest)
     fourier = make_image(program, digest, *(line.fourier.in_order for line in device.plan.lines))
     device.processor.call("link_start", 0)

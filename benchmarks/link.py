@@ -19,12 +19,12 @@ sys.path.insert(0, str(HERE.parent / "tests"))  # the line and the device are th
 
 from link_line import Line  # noqa: E402
 
-from tablegen.certificate import certify  # noqa: E402
+from tablegen.certificate.certificate import certify  # noqa: E402
 from tablegen.config.load import load  # noqa: E402
-from tablegen.emit import render  # noqa: E402
+from tablegen.emit.render import render  # noqa: E402
 from tablegen.link.device import Device  # noqa: E402
 from tablegen.link.frames import Frame, FrameReader  # noqa: E402
-from tablegen.link.image import Image  # noqa: E402
+from tablegen.link.image import ProgramImage  # noqa: E402
 from tablegen.link.messages import (  # noqa: E402
     ANSWER,
     DATA_BYTES,
@@ -36,10 +36,10 @@ from tablegen.link.messages import (  # noqa: E402
 )
 from tablegen.link.model import ModelDevice  # noqa: E402
 from tablegen.link.players import LinePlayer  # noqa: E402
-from tablegen.link.prepare import Scan  # noqa: E402
-from tablegen.plan import make_plan  # noqa: E402
+from tablegen.link.prepare import PreparedScan  # noqa: E402
+from tablegen.planning.line_plan import make_plan  # noqa: E402
 from tablegen.resources import c_link, c_runtime  # noqa: E402
-from tablegen.verify.emulate import Processor, compile_bare  # noqa: E402
+from tablegen.verification.emulate import Processor, compile_bare  # noqa: E402
 
 EXAMPLE = HERE.parent / "examples" / "annexin_200nm.toml"
 MEMORY = HERE.parent / "examples" / "firmware" / "memory.c"
@@ -83,14 +83,14 @@ class Work:
     commit: int
 
 
-def example() -> tuple[Scan, Scan]:
+def example() -> tuple[PreparedScan, PreparedScan]:
     """The example, and the same as another scan."""
-    scan = Scan.of_plan(make_plan(load(EXAMPLE)))
+    scan = PreparedScan.of_plan(make_plan(load(EXAMPLE)))
     other = replace(scan, digest="5" * 64)
     return scan, other
 
 
-def count(core: str, image: Image, folder: Path) -> Work:
+def count(core: str, image: ProgramImage, folder: Path) -> Work:
     """Upload an image to a bare processor."""
     plan = make_plan(load(EXAMPLE))
     for name, content in render(plan, certify(plan)).items():
@@ -149,7 +149,7 @@ class _Watched(ModelDevice):
             self.in_force_s = self.line.now_s
 
 
-def _line(scan: Scan, baud: int, back_s: float, tick_hz: int, checking: int = 0, window: int = 8) -> Line:
+def _line(scan: PreparedScan, baud: int, back_s: float, tick_hz: int, checking: int = 0, window: int = 8) -> Line:
     """The example plays at the far end."""
     shapes = [AxisShape(axis.index_bits, axis.bits, axis.output.dac_bits) for axis in (scan.program.x, scan.program.y)]
     features = Feature.TABLES | Feature.FOURIER | Feature.READBACK
@@ -168,7 +168,7 @@ class Rate:
     wire_bytes: int
 
 
-def rate(scan: Scan, image: Image, baud: int, back_s: float) -> Rate:
+def rate(scan: PreparedScan, image: ProgramImage, baud: int, back_s: float) -> Rate:
     """An upload over a paced line."""
     line = _line(scan, baud, back_s, 500_000)
     with Device(line.open, random=Random(1), sleep=line.sleep) as client:
@@ -179,7 +179,7 @@ def rate(scan: Scan, image: Image, baud: int, back_s: float) -> Rate:
     return Rate(share * result.bytes, share * result.wire_bytes, result.wire_bytes)
 
 
-def until_in_force(scan: Scan, image: Image, part: Part, checks_s: float) -> Iterator[float]:
+def until_in_force(scan: PreparedScan, image: ProgramImage, part: Part, checks_s: float) -> Iterator[float]:
     """Seconds from the first byte of HELLO at 115200 baud, for uploads that begin at several places of a line."""
     line_s = scan.program.schedule.ticks / part.tick_hz
     for phase in range(_PHASES):

@@ -16,7 +16,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from tablegen.resources import verilog_runtime
-from tablegen.verify.simulate import Compiled, Design, compile_design
+from tablegen.verification.simulate import Compiled, Design, compile_design
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "firmware_templates" / "loader"))
 _before, sys.dont_write_bytecode = sys.dont_write_bytecode, True  # nothing but sources in a folder that ships

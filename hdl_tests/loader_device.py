@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 from loader_bridge import Simulation, compile_loader
 
+from tablegen.device.registers import program_words
+from tablegen.device.sequencer import DualProgram
 from tablegen.emit.memory import memory_file
 from tablegen.fixedpoint.synthesis import sine_quarter
 from tablegen.link.frames import Frame, FrameReader
 from tablegen.link.messages import ANSWER, AxisLimits, AxisShape, DeviceInfo, Feature, Request
-from tablegen.registers import program_words
-from tablegen.sequencer import DualProgram
-from tablegen.verify.simulate import Compiled
+from tablegen.verification.simulate import Compiled
 
 _LINE_AT = 12  # in a status
 _MEMORY_BYTES = 2048

@@ -14,16 +14,16 @@ from link_talk import Talk
 from loader_bridge import BOOT_HASH
 from loader_device import LoaderDevice, without_lines
 
+from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS
+from tablegen.device.sequencer import DualProgram
 from tablegen.link import model_bank
 from tablegen.link.acceptance import Finding, first_objection
 from tablegen.link.frames import Frame, FrameReader
-from tablegen.link.image import Contents, Image
+from tablegen.link.image import Contents, ProgramImage
 from tablegen.link.messages import ANSWER, DeviceInfo, Reason, Refusal, Request
 from tablegen.link.model import ModelDevice
 from tablegen.link.players import SequencerPlayer
-from tablegen.registers import AXIS_WORDS, PAGE_WORDS
-from tablegen.sequencer import DualProgram
-from tablegen.verify.bench import Shape
+from tablegen.verification.bench import SequencerShape
 
 MOST_FRAMES = (1 << 16) - 1
 _NOT_CHECKED = {Reason.RANGE, Reason.SLEW, Reason.JUMP}  # docs/verilog.md says why not
@@ -46,7 +46,9 @@ def objection(contents: Contents, *others: Any) -> Finding | None:
 class Dialogue:
     """``seen`` counts answers by type, and refusals by request and reason."""
 
-    def __init__(self, device: LoaderDevice, info: DeviceInfo, boot: DualProgram, shape: Shape, seed: int) -> None:
+    def __init__(
+        self, device: LoaderDevice, info: DeviceInfo, boot: DualProgram, shape: SequencerShape, seed: int
+    ) -> None:
         self.rng = np.random.default_rng(seed)
         self.shape, self.info, self.device = shape, info, device
         self.model = ModelDevice(
@@ -90,11 +92,11 @@ class Dialogue:
                 self._advance(60)
                 self._say(self.talk.request(Request.READBACK, struct.pack("<IB", 0, 240)))
 
-    def _rare(self, image: Image) -> Image:
+    def _rare(self, image: ProgramImage) -> ProgramImage:
         """Now and then what chance does not bring about."""
         data, how = bytearray(image.data), int(self.rng.integers(0, 20))
         if how == 0:  # not what BEGIN announces
-            return Image(
+            return ProgramImage(
                 replace(image.info, image_crc=image.info.image_crc ^ 1 << int(self.rng.integers(0, 32))), image.data
             )
         if how == 1:  # longer than its words say
@@ -103,9 +105,9 @@ class Dialogue:
             data[4 * PAGE_WORDS + 3] ^= 0x80
         if how == 3 and not data[8 * PAGE_WORDS + 4 * AXIS_WORDS.index("harmonics")]:  # a word of y of 13 bits
             data[-1] ^= 0x08
-        return Image(replace(image.info, image_bytes=len(data), image_crc=crc32(data)), bytes(data))
+        return ProgramImage(replace(image.info, image_bytes=len(data), image_crc=crc32(data)), bytes(data))
 
-    def _some_image(self, wrong: float = 0.4) -> Image:
+    def _some_image(self, wrong: float = 0.4) -> ProgramImage:
         image, _ = random_image(self.rng, self.shape, self.info.harmonics, "smooth")
         return damaged(self.rng, image) if self.rng.random() < wrong else image
 

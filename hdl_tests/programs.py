@@ -7,14 +7,14 @@ from typing import Literal
 import numpy as np
 from numpy.random import Generator
 
+from tablegen.device.schedule import Schedule, Window
+from tablegen.device.sequencer import DualProgram
 from tablegen.fixedpoint.interpolation import guard_bits
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.phase import RationalPhase
 from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.synthesis import FourierWords, synthesize
-from tablegen.schedule import Schedule, Window
-from tablegen.sequencer import DualProgram
-from tablegen.verify.bench import Shape
+from tablegen.verification.bench import SequencerShape
 
 Kind = Literal["wild", "tame", "smooth", "held"]
 
@@ -53,7 +53,7 @@ def random_schedule(rng: Generator, ticks: int, lines: int) -> Schedule:
     )
 
 
-def random_program(rng: Generator, shape: Shape, axis: str, schedule: Schedule, kind: Kind) -> Program:
+def random_program(rng: Generator, shape: SequencerShape, axis: str, schedule: Schedule, kind: Kind) -> Program:
     """Words over the whole range, gains of either sign.
 
     A wild one clamps and is held back, a tame one does neither. The guard of a smooth one lets its own largest step
@@ -122,7 +122,7 @@ def rendered(program: Program, words: FourierWords) -> Program:
 
 def random_dual(
     rng: Generator,
-    shape: Shape,
+    shape: SequencerShape,
     ticks: tuple[int, int] = (8, 40),
     tame: bool = False,
     kind: Kind = "wild",

@@ -14,7 +14,7 @@ from spi_monitor import Converter, Wires, quiet, receive, two_channels, updates
 
 from tablegen.fixedpoint.output import Output
 from tablegen.numerics.arrays import Ints
-from tablegen.verify.simulate import Design, compile_design
+from tablegen.verification.simulate import Design, compile_design
 
 HERE = Path(__file__).parent
 MODULES = HERE.parent / "firmware_templates" / "verilog"

@@ -7,20 +7,20 @@ import numpy as np
 from programs import random_dual
 from stream_scripts import random_play
 
-from tablegen.sequencer import DualProgram
-from tablegen.verify.bench import Shape
-from tablegen.verify.placement import Placement
-from tablegen.verify.stream import Script
+from tablegen.device.sequencer import DualProgram
+from tablegen.verification.bench import SequencerShape
+from tablegen.verification.placement import Placement
+from tablegen.verification.stream import Script
 
 SWAPS, SWAPS_SLOW = 10_000, 100_000
-SMALL = Shape(16, 1, 2, 16, 1, 2, 16)  # so that an upload takes few clocks
+SMALL = SequencerShape(16, 1, 2, 16, 1, 2, 16)  # so that an upload takes few clocks
 
 
 @dataclass(frozen=True)
 class Configuration:
     """A sequencer as synthesised, and how it is played; ``samples`` on Icarus."""
 
-    shape: Shape
+    shape: SequencerShape
     parameters: Mapping[str, int] = field(default_factory=dict)
     paces: tuple[int, ...] = (1,)
     ticks: tuple[int, int] = (8, 40)
@@ -42,35 +42,37 @@ LOW_AREA = {"LOW_AREA": 1}
 LEAST_PACE = Placement("serial").tick_clocks
 LEAST_PACES = (LEAST_PACE, 64)  # clocks from tick to tick, with LOW_AREA
 CONFIGURATIONS: dict[str, Configuration] = {
-    "bits_16": Configuration(Shape(16, 1, 5, 16, 1, 4, 16), samples=12000),
-    "bits_16_plain": Configuration(Shape(16, 1, 5, 16, 1, 4, 16), PLAIN_MULTIPLIER, samples=12000),
-    "bits_8": Configuration(Shape(8, 1, 3, 8, 1, 2, 8)),
-    "bits_12": Configuration(Shape(12, 1, 2, 12, 0, 7, 12), paces=(1, 2, 3, 7)),
-    "bits_18_plain": Configuration(Shape(18, 0, 6, 18, 1, 3, 18), PLAIN_MULTIPLIER, paces=(1, 2, 3, 7)),
-    "bits_20": Configuration(Shape(20, 1, 3, 20, 1, 3, 20), paces=(7, 1)),
-    "bits_24": Configuration(Shape(24, 1, 3, 24, 1, 2, 24)),
-    "bits_24_plain": Configuration(Shape(24, 1, 3, 24, 1, 2, 24), PLAIN_MULTIPLIER),
-    "dac_24_words_8_plain": Configuration(Shape(24, 1, 4, 8, 0, 3, 12), PLAIN_MULTIPLIER),
-    "dac_24_words_8": Configuration(Shape(24, 1, 4, 8, 1, 3, 9)),
-    "dac_8_words_24": Configuration(Shape(8, 1, 4, 24, 1, 3, 22)),
-    "dac_8_words_24_plain": Configuration(Shape(8, 0, 5, 24, 1, 3, 21), PLAIN_MULTIPLIER),
+    "bits_16": Configuration(SequencerShape(16, 1, 5, 16, 1, 4, 16), samples=12000),
+    "bits_16_plain": Configuration(SequencerShape(16, 1, 5, 16, 1, 4, 16), PLAIN_MULTIPLIER, samples=12000),
+    "bits_8": Configuration(SequencerShape(8, 1, 3, 8, 1, 2, 8)),
+    "bits_12": Configuration(SequencerShape(12, 1, 2, 12, 0, 7, 12), paces=(1, 2, 3, 7)),
+    "bits_18_plain": Configuration(SequencerShape(18, 0, 6, 18, 1, 3, 18), PLAIN_MULTIPLIER, paces=(1, 2, 3, 7)),
+    "bits_20": Configuration(SequencerShape(20, 1, 3, 20, 1, 3, 20), paces=(7, 1)),
+    "bits_24": Configuration(SequencerShape(24, 1, 3, 24, 1, 2, 24)),
+    "bits_24_plain": Configuration(SequencerShape(24, 1, 3, 24, 1, 2, 24), PLAIN_MULTIPLIER),
+    "dac_24_words_8_plain": Configuration(SequencerShape(24, 1, 4, 8, 0, 3, 12), PLAIN_MULTIPLIER),
+    "dac_24_words_8": Configuration(SequencerShape(24, 1, 4, 8, 1, 3, 9)),
+    "dac_8_words_24": Configuration(SequencerShape(8, 1, 4, 24, 1, 3, 22)),
+    "dac_8_words_24_plain": Configuration(SequencerShape(8, 0, 5, 24, 1, 3, 21), PLAIN_MULTIPLIER),
     "small_counters": Configuration(
-        Shape(16, 1, 3, 16, 1, 2, 16),
+        SequencerShape(16, 1, 3, 16, 1, 2, 16),
         {"TICK_BITS": 5, "LINE_BITS": 3, "PERIOD_BITS": 9, "COUNT_BITS": 5},
         ticks=(24, 32),
         lines=(6, 8),
     ),
-    "shortest_lines": Configuration(Shape(16, 1, 3, 16, 0, 3, 16), ticks=(8, 8), lines=(1, 2)),
-    "low_area": Configuration(Shape(16, 1, 5, 16, 1, 4, 16), LOW_AREA, LEAST_PACES, samples=1200),
-    "low_area_dac_24": Configuration(Shape(24, 1, 3, 8, 0, 4, 24), LOW_AREA, LEAST_PACES, samples=800),
-    "low_area_dac_8": Configuration(Shape(8, 0, 5, 24, 1, 3, 12), LOW_AREA, LEAST_PACES, samples=800),
+    "shortest_lines": Configuration(SequencerShape(16, 1, 3, 16, 0, 3, 16), ticks=(8, 8), lines=(1, 2)),
+    "low_area": Configuration(SequencerShape(16, 1, 5, 16, 1, 4, 16), LOW_AREA, LEAST_PACES, samples=1200),
+    "low_area_dac_24": Configuration(SequencerShape(24, 1, 3, 8, 0, 4, 24), LOW_AREA, LEAST_PACES, samples=800),
+    "low_area_dac_8": Configuration(SequencerShape(8, 0, 5, 24, 1, 3, 12), LOW_AREA, LEAST_PACES, samples=800),
     "power_up_codes": Configuration(
-        Shape(16, 1, 3, 16, 0, 3, 14), {"X_POWER_UP_CODE": 65535, "Y_POWER_UP_CODE": 12345}, paces=(3, 1)
+        SequencerShape(16, 1, 3, 16, 0, 3, 14), {"X_POWER_UP_CODE": 65535, "Y_POWER_UP_CODE": 12345}, paces=(3, 1)
     ),
 }
 
 
-def random_swaps(rng: np.random.Generator, swaps: int, shape: Shape = SMALL) -> tuple[Script, list[DualProgram]]:
+def random_swaps(
+    rng: np.random.Generator, swaps: int, shape: SequencerShape = SMALL
+) -> tuple[Script, list[DualProgram]]:
     """A scan without end in which programs follow each other, committed at any tick; and the programs, in order."""
     script, programs = Script(), []
     script.tick_every(1)

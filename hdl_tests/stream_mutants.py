@@ -26,9 +26,9 @@ from stream_scripts import (
 from tablegen.emit.memory import memory_file
 from tablegen.fixedpoint.synthesis import sine_quarter
 from tablegen.resources import verilog_runtime
-from tablegen.verify.bench import SequencerBench, Shape
-from tablegen.verify.placement import Placement
-from tablegen.verify.stream import Script
+from tablegen.verification.bench import SequencerBench, SequencerShape
+from tablegen.verification.placement import Placement
+from tablegen.verification.stream import Script
 
 HARMONICS = 4
 LEAST_PACE = Placement("serial").tick_clocks
@@ -37,12 +37,12 @@ Y_AXIS_AFTER_LOADS = """
                 .bank(bank), .restart(frame_0)"""
 
 _SHAPES = {
-    "digits": Shape(16, 1, 4, 16, 1, 3, 16),
-    "plain": Shape(20, 1, 3, 24, 1, 4, 18),
-    "direct": Shape(12, 0, 6, 12, 0, 6, 20),
-    "low area": Shape(22, 1, 4, 24, 0, 4, 16),
-    "fourier": Shape(16, 1, 4, 16, 1, 3, 14),
-    "long table": Shape(24, 1, 12, 24, 1, 2, 24),  # in which every bit of the phase counts
+    "digits": SequencerShape(16, 1, 4, 16, 1, 3, 16),
+    "plain": SequencerShape(20, 1, 3, 24, 1, 4, 18),
+    "direct": SequencerShape(12, 0, 6, 12, 0, 6, 20),
+    "low area": SequencerShape(22, 1, 4, 24, 0, 4, 16),
+    "fourier": SequencerShape(16, 1, 4, 16, 1, 3, 14),
+    "long table": SequencerShape(24, 1, 12, 24, 1, 2, 24),  # in which every bit of the phase counts
 }
 BENCHES = tuple(_SHAPES)
 

@@ -8,32 +8,32 @@ import numpy as np
 from numpy.random import Generator
 from programs import Kind, random_dual, random_fourier, rendered
 
+from tablegen.device.registers import PAGE_WORDS, program_words
+from tablegen.device.schedule import Window
+from tablegen.device.sequencer import DualProgram
 from tablegen.fixedpoint.synthesis import FourierWords
-from tablegen.registers import PAGE_WORDS, program_words
-from tablegen.schedule import Window
-from tablegen.sequencer import DualProgram
-from tablegen.verify.bench import Shape
-from tablegen.verify.placement import Placement
-from tablegen.verify.stream import FLAGS, PROGRAM, X_FOURIER, X_TABLE, Y_FOURIER, Y_TABLE, Script, Words
+from tablegen.verification.bench import SequencerShape
+from tablegen.verification.placement import Placement
+from tablegen.verification.stream import FLAGS, PROGRAM, X_FOURIER, X_TABLE, Y_FOURIER, Y_TABLE, Script, Words
 
 FAULTS = ("slew", "clamp", "overrun", "underrun")
 _KINDS: tuple[Kind, ...] = ("wild", "tame", "smooth", "held")
 
 
-def flag(record: Words, name: str) -> np.ndarray:
-    """One marker, or fault, of every tick of a record."""
+def flag(capture: Words, name: str) -> np.ndarray:
+    """One marker, or fault, of every tick of a capture."""
     bit = 48 + FLAGS.index(name) if name in FLAGS else 56 + FAULTS.index(name)
-    return (record >> np.uint64(bit) & np.uint64(1)).astype(bool)
+    return (capture >> np.uint64(bit) & np.uint64(1)).astype(bool)
 
 
-def codes(record: Words, axis: str) -> np.ndarray:
-    """The codes of an axis of a record, int64."""
-    return (record >> np.uint64(0 if axis == "x" else 24) & np.uint64(0xFFFFFF)).astype(np.int64)
+def codes(capture: Words, axis: str) -> np.ndarray:
+    """The codes of an axis of a capture, int64."""
+    return (capture >> np.uint64(0 if axis == "x" else 24) & np.uint64(0xFFFFFF)).astype(np.int64)
 
 
-def occurrences(record: Words) -> Counter[str]:
+def occurrences(capture: Words) -> Counter[str]:
     """On how many ticks each marker and each fault was high."""
-    return Counter({name: int(np.sum(flag(record, name))) for name in (*FLAGS, *FAULTS)})
+    return Counter({name: int(np.sum(flag(capture, name))) for name in (*FLAGS, *FAULTS)})
 
 
 def play(script: Script, program: DualProgram, frames: int = 0) -> None:
@@ -44,12 +44,12 @@ def play(script: Script, program: DualProgram, frames: int = 0) -> None:
     script.request("arm", "trigger", frames=frames)
 
 
-def some_program(rng: Generator, shape: Shape, ticks: tuple[int, int], lines: tuple[int, int]) -> DualProgram:
+def some_program(rng: Generator, shape: SequencerShape, ticks: tuple[int, int], lines: tuple[int, int]) -> DualProgram:
     """A random program of a random kind."""
     return random_dual(rng, shape, ticks, kind=_KINDS[int(rng.integers(len(_KINDS)))], lines=lines)
 
 
-def imaging_program(rng: Generator, shape: Shape, kind: Kind) -> DualProgram:
+def imaging_program(rng: Generator, shape: SequencerShape, kind: Kind) -> DualProgram:
     """A short one that images both ways, on the two middle lines of its four, after two lines to settle in."""
     while True:
         program = random_dual(rng, shape, (11, 16), kind=kind, lines=(4, 4))
@@ -90,7 +90,7 @@ def _change_pace(rng: Generator, script: Script, paces: Sequence[int]) -> int:
 def random_play(
     rng: Generator,
     script: Script,
-    shape: Shape,
+    shape: SequencerShape,
     samples: int,
     paces: Sequence[int] = (1,),
     ticks: tuple[int, int] = (8, 40),
@@ -114,7 +114,7 @@ def random_play(
         script.wait(int(rng.integers(0, 3 * ticks[1])) * pace + int(rng.integers(0, pace)))
 
 
-def rendering_clocks(shape: Shape, x: FourierWords | None, y: FourierWords | None, multiplier: int) -> int:
+def rendering_clocks(shape: SequencerShape, x: FourierWords | None, y: FourierWords | None, multiplier: int) -> int:
     """From a commit to the committed bank."""
     return Placement("blocks" if multiplier else "pipelined", fourier=True).commit_clocks(
         (1 << shape.x_index_bits, x.harmonics if x else 0), (1 << shape.y_index_bits, y.harmonics if y else 0)
@@ -122,7 +122,7 @@ def rendering_clocks(shape: Shape, x: FourierWords | None, y: FourierWords | Non
 
 
 def random_renderings(
-    rng: Generator, script: Script, shape: Shape, programs: int, harmonics: int, multiplier: int
+    rng: Generator, script: Script, shape: SequencerShape, programs: int, harmonics: int, multiplier: int
 ) -> None:
     """Programs whose tables are rendered while another one plays; some are called off, or written to meanwhile."""
     script.tick_every(1)
@@ -286,7 +286,7 @@ def parks_at_every_tick(script: Script, program: DualProgram) -> None:
 
 
 def sweep(
-    rng: Generator, shape: Shape, samples: int, pace: int = 1, commit_clocks: int = 1, refused: bool = False
+    rng: Generator, shape: SequencerShape, samples: int, pace: int = 1, commit_clocks: int = 1, refused: bool = False
 ) -> Script:
     """Some of everything, with ticks all along; whether it ends with refused writes."""
     script = Script(commit_clocks=commit_clocks)

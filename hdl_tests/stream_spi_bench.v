@@ -9,7 +9,7 @@
 
 module stream_spi_bench #(
     parameter SCRIPT = "",
-    parameter RECORD = "",
+    parameter CAPTURE = "",
     parameter CAPTURE = "",
     parameter DAC_BITS = 16,
     parameter X_INTERPOLATED = 1,
@@ -25,7 +25,7 @@ module stream_spi_bench #(
     parameter PREFIX = 0
 );
     stream_bench #(
-        .SCRIPT(SCRIPT), .RECORD(RECORD), .DAC_BITS(DAC_BITS), .X_INTERPOLATED(X_INTERPOLATED),
+        .SCRIPT(SCRIPT), .CAPTURE(CAPTURE), .DAC_BITS(DAC_BITS), .X_INTERPOLATED(X_INTERPOLATED),
         .X_INDEX_BITS(X_INDEX_BITS), .X_WORD_BITS(X_WORD_BITS), .Y_INTERPOLATED(Y_INTERPOLATED),
         .Y_INDEX_BITS(Y_INDEX_BITS), .Y_WORD_BITS(Y_WORD_BITS)
     ) bench ();

@@ -19,7 +19,7 @@ from spi_bench import (
     equal,
 )
 
-from tablegen.verify.simulate import Design, compile_design
+from tablegen.verification.simulate import Design, compile_design
 
 
 @dataclass(frozen=True)

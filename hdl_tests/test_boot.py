@@ -16,11 +16,11 @@ import pytest
 from building import REPOSITORY
 from programs import random_dual, random_fourier
 
+from tablegen.device.registers import program_words
 from tablegen.emit.memory import memory_files
-from tablegen.registers import program_words
 from tablegen.resources import verilog_runtime
-from tablegen.verify.bench import Shape
-from tablegen.verify.simulate import Design, compile_design
+from tablegen.verification.bench import SequencerShape
+from tablegen.verification.simulate import Design, compile_design
 
 BENCH = Path(__file__).parent / "boot_bench.v"
 BOOT = next(path for path in verilog_runtime() if path.name == "dac_boot.v")
@@ -44,7 +44,7 @@ class Setup:
     writes: Sequence[Write]
 
 
-def setup(seed: int, shape: Shape, harmonics: tuple[int, int] | None = None) -> Setup:
+def setup(seed: int, shape: SequencerShape, harmonics: tuple[int, int] | None = None) -> Setup:
     """A random program of a shape; from its tables, or from Fourier words of so many harmonics."""
     rng = np.random.default_rng(seed)
     program = random_dual(rng, shape, (9, 13), lines=(2, 3))
@@ -65,10 +65,10 @@ def setup(seed: int, shape: Shape, harmonics: tuple[int, int] | None = None) -> 
 
 
 SETUPS = {
-    "interpolated": setup(1, Shape(16, 1, 4, 16, 1, 3, 12)),
-    "direct": setup(2, Shape(12, 0, 5, 8, 0, 5, 24)),
-    "fourier": setup(3, Shape(16, 1, 4, 16, 1, 3, 12), (4, 1)),
-    "longest": setup(4, Shape(16, 1, 16, 16, 1, 3, 16)),
+    "interpolated": setup(1, SequencerShape(16, 1, 4, 16, 1, 3, 12)),
+    "direct": setup(2, SequencerShape(12, 0, 5, 8, 0, 5, 24)),
+    "fourier": setup(3, SequencerShape(16, 1, 4, 16, 1, 3, 12), (4, 1)),
+    "longest": setup(4, SequencerShape(16, 1, 16, 16, 1, 3, 16)),
 }
 
 

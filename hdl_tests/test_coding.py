@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from spi_bench import AD5541A, CODING, HERE, Mutant, Spi
 
-from tablegen.verify.simulate import Design, compile_design
+from tablegen.verification.simulate import Design, compile_design
 
 
 def codings() -> list[Spi]:

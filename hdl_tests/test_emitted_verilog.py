@@ -21,8 +21,8 @@ from building import (
     run_clean,
 )
 
+from tablegen.device.sequencer import play_line
 from tablegen.numerics.arrays import Ints
-from tablegen.sequencer import DualProgram, play_line
 
 PLAYER = REPOSITORY / "examples" / "verilog" / "play.v"
 BENCHES = REPOSITORY / "hdl_tests"
@@ -56,7 +56,7 @@ def simulated_codes(built: Build, ticks: int, gap: int = 0) -> Ints:
 
 def model_codes(built: Build, lines: int) -> Ints:
     """The same columns from the integer model; lines past the frame begin it again."""
-    program = DualProgram.of(built.plan)
+    program = built.plan.program
     ticks = [play_line(program, line % built.plan.schedule.lines) for line in range(lines)]
     return np.concatenate([np.stack([line.x, line.y], axis=1) for line in ticks])
 

@@ -10,9 +10,9 @@ import pytest
 from building import REPOSITORY, VARIANTS, build, run_clean
 from spi_monitor import Converter, ProtocolFault, Wires, quiet, receive
 
+from tablegen.device.sequencer import DualProgram, Sequencer
 from tablegen.resources import verilog_runtime
-from tablegen.sequencer import DualProgram, Sequencer
-from tablegen.verify.simulate import Design, compile_design
+from tablegen.verification.simulate import Design, compile_design
 
 SCANNER = REPOSITORY / "examples" / "verilog" / "scanner.v"
 BENCH = REPOSITORY / "hdl_tests" / "scanner_bench.v"
@@ -43,7 +43,7 @@ def captured(tmp_path_factory: pytest.TempPathFactory) -> tuple[DualProgram, np.
     )
     assert design.run("cocotb_scanner") == (1, 0), (simulation / "simulation.log").read_text()
     levels = np.frombuffer(bytes.fromhex(capture.read_text("ascii")), dtype=np.uint8).astype(np.int64)
-    return DualProgram.of(built.plan), levels
+    return built.plan.program, levels
 
 
 def test_it_elaborates_as_its_header_says(tmp_path: Path) -> None:

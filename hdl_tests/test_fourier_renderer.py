@@ -20,7 +20,7 @@ from variants import plan_of
 from tablegen.fixedpoint.rounding import signed_limits
 from tablegen.fixedpoint.synthesis import FourierWords, sine_quarter, sine_table, synthesize
 from tablegen.numerics.arrays import Ints
-from tablegen.verify.simulate import Design, compile_design
+from tablegen.verification.simulate import Design, compile_design
 
 HERE = Path(__file__).parent
 MODULES = HERE.parent / "firmware_templates" / "verilog"

@@ -18,14 +18,14 @@ from loader_dialogues import Dialogue, Differs
 from loader_mutants import MUTANTS, Mutant
 
 from tablegen.link.frames import FrameReader
-from tablegen.link.image import Image, take_apart
+from tablegen.link.image import ProgramImage, take_apart
 from tablegen.link.messages import AxisLimits, DeviceInfo, DeviceStatus, ImageInfo, Reason, Refusal, Request
-from tablegen.verify.bench import Shape
+from tablegen.verification.bench import SequencerShape
 
 MADE = GOLDEN["devices"]["open"]
 TOLD = DeviceInfo.unpack(bytes.fromhex(MADE["device"]))
 FRAMES = json.loads((Path(__file__).parents[1] / "tests" / "golden_frames.json").read_text("utf-8"))
-SHAPE = Shape(16, 1, 4, 16, 1, 4, 12)
+SHAPE = SequencerShape(16, 1, 4, 16, 1, 4, 12)
 TOP = (1 << 16) - 1
 CLOCKS_PER_BIT = 8
 SHORTER = "Shorter tables: BEGIN"  # from there on the dialogue is for devices that take them
@@ -161,10 +161,10 @@ def upload(simulation: Simulation, talk: Talk, before_commit: Callable[[], None]
     """The boot program once more; the answer to COMMIT."""
     image = bytes.fromhex(MADE["boot_image"])
     info = ImageInfo(bytes(32), len(image), crc32(image), TOLD.x, TOLD.y)
-    for wire in talk.upload(Image(info, image)):
+    for wire in talk.upload(ProgramImage(info, image)):
         simulation.talk(wire)
     before_commit()
-    return simulation.talk(talk.commit(Image(info, image)))
+    return simulation.talk(talk.commit(ProgramImage(info, image)))
 
 
 # The line

@@ -16,9 +16,9 @@ from link_talk import Talk
 from loader_bridge import Simulation
 from loader_device import Loader
 
-from tablegen.link.image import Image, make_image
-from tablegen.link.messages import ANSWER, DeviceStatus, Request, State, Upload
-from tablegen.sequencer import DualProgram
+from tablegen.device.sequencer import DualProgram
+from tablegen.link.image import ProgramImage, make_image
+from tablegen.link.messages import ANSWER, DeviceState, DeviceStatus, Request, Upload
 
 UPDATE_RATE_HZ = 50_000
 TICK_EVERY = 50  # clocks
@@ -48,7 +48,7 @@ class Scans:
     def all(self) -> dict[str, DualProgram]:
         """Programs by name."""
         names = ("boot", "first", "second")
-        return {name: DualProgram.of(each.plan) for name, each in zip(names, (self.boot, *self.others), strict=True)}
+        return {name: each.plan.program for name, each in zip(names, (self.boot, *self.others), strict=True)}
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +63,7 @@ def scans(tmp_path_factory: pytest.TempPathFactory) -> Scans:
 
 @pytest.fixture(scope="module", params=[1, 0], ids=["low area", "a sample a clock"])
 def loader(request: pytest.FixtureRequest, scans: Scans, tmp_path_factory: pytest.TempPathFactory) -> Loader:
-    boot = DualProgram.of(scans.boot.plan)
+    boot = scans.boot.plan.program
     x, y = ((0, 65535, axis.output.max_step + 100) for axis in (boot.x, boot.y))
     folder = tmp_path_factory.mktemp("loader")
     return Loader(
@@ -71,9 +71,9 @@ def loader(request: pytest.FixtureRequest, scans: Scans, tmp_path_factory: pytes
     )
 
 
-def image_of(built: Build, fourier: bool) -> Image:
+def image_of(built: Build, fourier: bool) -> ProgramImage:
     """An upload in one of the two forms."""
-    program = DualProgram.of(built.plan)
+    program = built.plan.program
     digest = str(built.manifest["hash"])
     if not fourier:
         return make_image(program, digest)
@@ -117,7 +117,7 @@ def test_uploads_while_a_scan_plays(loader: Loader, scans: Scans) -> None:
             assert now.upload == Upload.WAITING or now.generation == count
             simulation.run(TICK_EVERY * LINE * 3)
             now = status(simulation, talk)
-            assert (now.state, now.generation, now.hash) == (State.PLAYING, count, image.info.hash)
+            assert (now.state, now.generation, now.hash) == (DeviceState.PLAYING, count, image.info.hash)
             assert (now.faults, now.bad_frames) == (0, 0)
         check = follow(scans, simulation)
         assert check.taken == {1: "boot", 2: "first", 3: "second", 4: "boot", 5: "second"}

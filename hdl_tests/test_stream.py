@@ -2,7 +2,7 @@
 
 A script is played by a bench in Verilog and by the model; codes, markers and faults of every tick have to be equal.
 Where a program comes from a plan, each code is held against its float waveform as well, within the certificate; and
-what a swap must never do is read off the record by itself. Icarus plays every case, Verilator the long ones.
+what a swap must never do is read off the capture by itself. Icarus plays every case, Verilator the long ones.
 """
 
 from dataclasses import dataclass
@@ -38,27 +38,26 @@ from stream_scripts import (
     sweep,
 )
 
-from tablegen.certificate import certify
+from tablegen.certificate.certificate import certify
 from tablegen.config.load import load
 from tablegen.emit.memory import memory_file
 from tablegen.fixedpoint.synthesis import sine_quarter
 from tablegen.numerics.arrays import Floats, Ints
-from tablegen.plan import LinePlan, Plan, make_plan
+from tablegen.planning.line_plan import LinePlan, Plan, make_plan
 from tablegen.resources import verilog_runtime
-from tablegen.sequencer import DualProgram
-from tablegen.verify.bench import Played, SequencerBench, Shape
-from tablegen.verify.stream import FLAGS, Script, Words
+from tablegen.verification.bench import BenchRun, SequencerBench, SequencerShape
+from tablegen.verification.stream import FLAGS, Script, Words
 
 HERE = Path(__file__).parent
 SAMPLES_ON_ICARUS = 100_000
 SAMPLES_ON_VERILATOR = 1_000_000
 
 
-def equal(bench: SequencerBench, script: Script) -> Played:
+def equal(bench: SequencerBench, script: Script) -> BenchRun:
     """Play a script; all has to be as the model has it, and every step inside the limit of the program that plays."""
     played = bench.play(script)
     assert played.equal, played
-    steps_are_limited(played.record, script.taken)
+    steps_are_limited(played.capture, script.taken)
     return played
 
 
@@ -133,9 +132,9 @@ def asked(line: LinePlan, k: Ints) -> Floats:
     return line.float_codes(line.series.value(k % program.ticks // program.hold / program.phase.ticks))
 
 
-def within_certificate(record: Words, plan: Plan) -> None:
+def within_certificate(capture: Words, plan: Plan) -> None:
     """Every code of a scan, once it has caught up, is as near to the float waveform as the certificate says."""
-    playing = record[flag(record, "playing")]
+    playing = capture[flag(capture, "playing")]
     k = np.arange(len(playing))
     certificates = certify(plan)
     caught_up = len(playing)
@@ -149,9 +148,9 @@ def within_certificate(record: Words, plan: Plan) -> None:
     assert not np.any(playing >> np.uint64(56))  # no fault
 
 
-def markers_of_a_scan(record: Words, plan: Plan, frames: int) -> None:
-    """Lines, frames, pixels and the valid windows of whole frames, counted off the record."""
-    schedule, seen = plan.schedule, occurrences(record)
+def markers_of_a_scan(capture: Words, plan: Plan, frames: int) -> None:
+    """Lines, frames, pixels and the valid windows of whole frames, counted off the capture."""
+    schedule, seen = plan.schedule, occurrences(capture)
     assert seen["playing"] == frames * schedule.frame_ticks
     assert seen["line"] == frames * schedule.lines
     assert seen["frame"] == frames
@@ -163,7 +162,7 @@ def markers_of_a_scan(record: Words, plan: Plan, frames: int) -> None:
         if line >= schedule.settle_lines
         and (line % schedule.lines in schedule.up or line % schedule.lines in schedule.down)
     ]
-    playing = record[flag(record, "playing")]
+    playing = capture[flag(capture, "playing")]
     valid = flag(playing, "valid")
     assert sorted(set(np.flatnonzero(valid) // schedule.ticks)) == settled
     assert seen["valid"] == len(settled) * (schedule.forward.count + schedule.backward.count)
@@ -173,9 +172,12 @@ def markers_of_a_scan(record: Words, plan: Plan, frames: int) -> None:
 @pytest.mark.parametrize("name", PLANS)
 def test_whole_frames_of_a_plan(name: str, tmp_path: Path) -> None:
     plan = planned(tmp_path, PLANS[name])
-    program = DualProgram.of(plan)
+    program = plan.program
     bench = SequencerBench(
-        "icarus", Shape.of((program.x, program.y)), tmp_path / "bench", {"PLAIN_MULTIPLIER": int(name in PLAIN)}
+        "icarus",
+        SequencerShape.of((program.x, program.y)),
+        tmp_path / "bench",
+        {"PLAIN_MULTIPLIER": int(name in PLAIN)},
     )
     park = plan.x.program.output.park_code, plan.y.program.output.park_code
     script = Script()
@@ -186,18 +188,18 @@ def test_whole_frames_of_a_plan(name: str, tmp_path: Path) -> None:
     script.request("arm", "trigger", frames=2)
     script.wait_ticks(2 * plan.schedule.frame_ticks + 100)
     played = equal(bench, script)
-    within_certificate(played.record, plan)
-    markers_of_a_scan(played.record, plan, 2)
-    assert flag(played.record, "parked")[-1]
-    assert tuple(codes(played.record, axis)[-1] for axis in "xy") == park
+    within_certificate(played.capture, plan)
+    markers_of_a_scan(played.capture, plan, 2)
+    assert flag(played.capture, "parked")[-1]
+    assert tuple(codes(played.capture, axis)[-1] for axis in "xy") == park
 
 
 @pytest.mark.parametrize(("simulator", "lines"), [("icarus", 3), ("verilator", 200)])
 def test_the_shipped_example(simulator: str, lines: int, tmp_path: Path) -> None:
     plan = planned(tmp_path, Variant())
     assert plan.schedule.lines == 200
-    program = DualProgram.of(plan)
-    bench = SequencerBench(simulator, Shape.of((program.x, program.y)), tmp_path / "bench")
+    program = plan.program
+    bench = SequencerBench(simulator, SequencerShape.of((program.x, program.y)), tmp_path / "bench")
     script = Script()
     script.load(program)
     script.tick_every(1)
@@ -206,15 +208,17 @@ def test_the_shipped_example(simulator: str, lines: int, tmp_path: Path) -> None
     script.request("arm", "trigger", frames=1)
     script.wait_ticks(lines * plan.schedule.ticks + 20)
     played = equal(bench, script)
-    within_certificate(played.record, plan)
+    within_certificate(played.capture, plan)
     if lines == plan.schedule.lines:
-        markers_of_a_scan(played.record, plan, 1)
+        markers_of_a_scan(played.capture, plan, 1)
 
 
 def test_the_longest_table(tmp_path: Path) -> None:
     plan = planned(tmp_path, _short(x__table__length=65536, timing={**TIMING, "ticks_per_line": 1249}))
-    program = DualProgram.of(plan)
-    bench = SequencerBench("icarus", Shape.of((program.x, program.y)), tmp_path / "bench", {"PLAIN_MULTIPLIER": 1})
+    program = plan.program
+    bench = SequencerBench(
+        "icarus", SequencerShape.of((program.x, program.y)), tmp_path / "bench", {"PLAIN_MULTIPLIER": 1}
+    )
     script = Script()
     script.load(program)
     script.tick_every(1)
@@ -222,7 +226,7 @@ def test_the_longest_table(tmp_path: Path) -> None:
     script.wait_ticks(2)
     script.request("trigger")
     script.wait_ticks(2 * plan.schedule.ticks)
-    within_certificate(equal(bench, script).record, plan)
+    within_certificate(equal(bench, script).capture, plan)
 
 
 # Random programs, back to back.
@@ -240,14 +244,14 @@ def test_random_programs(name: str, tmp_path: Path) -> None:
     played = equal(bench, script)
     assert played.samples >= configuration.samples
     assert script.swaps > configuration.samples // 400
-    seen = occurrences(played.record)
+    seen = occurrences(played.capture)
     if configuration.samples > 5000:
         assert all(seen[name] for name in (*FLAGS, *FAULTS[:2])), seen
 
 
 @pytest.mark.parametrize("variant", ["PLAIN_MULTIPLIER", "LOW_AREA", "FOURIER", "digits"])
 def test_everything_that_a_host_may_ask(variant: str, tmp_path: Path) -> None:
-    shape = Shape(16, 1, 4, 16, 1, 3, 16)
+    shape = SequencerShape(16, 1, 4, 16, 1, 3, 16)
     parameters: dict[str, int | str] = {"COUNT_BITS": 4}
     if variant != "digits":
         parameters[variant] = 1
@@ -276,21 +280,21 @@ def small_on_verilator(tmp_path_factory: pytest.TempPathFactory) -> SequencerBen
 
 @pytest.mark.parametrize("pace", [1, 3])
 def test_a_swap_is_requested_at_every_tick_and_taken_at_line_starts(pace: int, tmp_path: Path) -> None:
-    shape = Shape(16, 1, 3, 16, 1, 2, 16)
+    shape = SequencerShape(16, 1, 3, 16, 1, 2, 16)
     rng = np.random.default_rng(pace)
     pair = tuple(random_dual(rng, shape, (20, 30), kind="smooth") for _ in range(2))
     script = Script()
     script.tick_every(pace)
     swaps_at_every_tick(script, (pair[0], pair[1]))
-    record = equal(SequencerBench("icarus", shape, tmp_path), script).record
-    swapped, line, playing = (flag(record, name) for name in ("swapped", "line", "playing"))
+    capture = equal(SequencerBench("icarus", shape, tmp_path), script).capture
+    swapped, line, playing = (flag(capture, name) for name in ("swapped", "line", "playing"))
     assert np.sum(swapped & playing) == max(program.schedule.ticks for program in pair)
     assert np.all(line[swapped & playing])
     starts = np.flatnonzero(line)
     for at in np.flatnonzero(swapped & playing):
         before = starts[starts < at][-1]
         assert at - before in {program.schedule.ticks for program in pair}  # the line before was whole
-    follow_their_programs(record, script.taken)
+    follow_their_programs(capture, script.taken)
 
 
 @pytest.mark.parametrize("swaps", [SWAPS, pytest.param(SWAPS_SLOW, marks=pytest.mark.slow)])
@@ -301,35 +305,35 @@ def test_no_line_mixes_programs_and_no_step_is_above_the_limit(swaps: int, small
         script, programs = random_swaps(rng, SWAPS)
         played = equal(small_on_verilator, script)
         samples += played.samples
-        assert np.sum(flag(played.record, "swapped")) == SWAPS == len(programs)
-        follow_their_programs(played.record, programs)
+        assert np.sum(flag(played.capture, "swapped")) == SWAPS == len(programs)
+        follow_their_programs(played.capture, programs)
     assert samples >= SAMPLES_ON_VERILATOR * swaps // SWAPS
 
 
 def test_laws_of_swaps_can_be_broken() -> None:
     script, programs = random_swaps(np.random.default_rng(0), 40)
     script.text()
-    record = np.array(script.expected, dtype=np.uint64)
-    follow_their_programs(record, programs)
-    steps_are_limited(record, programs)
-    swapped = np.flatnonzero(flag(record, "swapped"))
+    capture = np.array(script.expected, dtype=np.uint64)
+    follow_their_programs(capture, programs)
+    steps_are_limited(capture, programs)
+    swapped = np.flatnonzero(flag(capture, "swapped"))
     at = int(swapped[20])
 
-    one_axis_late = record.copy()  # y plays the program before for one tick more
+    one_axis_late = capture.copy()  # y plays the program before for one tick more
     before = programs[19]
     k = at - int(swapped[19])
     y_code = int(before.y.codes(np.array([k % before.schedule.frame_ticks]))[0])
-    assert y_code != codes(record, "y")[at]
-    one_axis_late[at] = record[at] & ~np.uint64(0xFFFFFF << 24) | np.uint64(y_code << 24)
+    assert y_code != codes(capture, "y")[at]
+    one_axis_late[at] = capture[at] & ~np.uint64(0xFFFFFF << 24) | np.uint64(y_code << 24)
     with pytest.raises(Broken):
         follow_their_programs(one_axis_late, programs)
 
-    in_mid_line = np.delete(record, at - 1)
+    in_mid_line = np.delete(capture, at - 1)
     with pytest.raises(Broken):
         follow_their_programs(in_mid_line, programs)
 
-    jumps = record.copy()
-    jumps[at] = record[at] ^ np.uint64(0x8000)
+    jumps = capture.copy()
+    jumps[at] = capture[at] ^ np.uint64(0x8000)
     with pytest.raises(Broken):
         steps_are_limited(jumps, programs)
 
@@ -345,8 +349,8 @@ def test_no_line_drifts(ticks: int, lines: int, played_lines: int, small_on_veri
     script.tick_every(1)
     play(script, program)
     script.wait_ticks(played_lines * ticks + 1)
-    record = equal(small_on_verilator, script).record
-    playing = record[flag(record, "playing")][: played_lines * ticks]
+    capture = equal(small_on_verilator, script).capture
+    playing = capture[flag(capture, "playing")][: played_lines * ticks]
     line_by_line = codes(playing, "x").reshape(played_lines, ticks)
     assert np.all(line_by_line == line_by_line[0])
     y = codes(playing, "y")
@@ -357,7 +361,7 @@ def test_no_line_drifts(ticks: int, lines: int, played_lines: int, small_on_veri
 
 
 def test_random_programs_on_verilator(tmp_path: Path) -> None:
-    shape = Shape(20, 1, 4, 24, 0, 5, 18)
+    shape = SequencerShape(20, 1, 4, 24, 0, 5, 18)
     script = Script((1 << 19, 3))
     random_play(np.random.default_rng(5), script, shape, 150_000, (1, 2, 5))
     bench = SequencerBench(
@@ -367,7 +371,7 @@ def test_random_programs_on_verilator(tmp_path: Path) -> None:
 
 
 def test_low_area_on_verilator(tmp_path: Path) -> None:
-    shape = Shape(20, 1, 4, 24, 0, 5, 16)
+    shape = SequencerShape(20, 1, 4, 24, 0, 5, 16)
     script = Script()
     random_play(np.random.default_rng(11), script, shape, 20_000, LEAST_PACES)
     assert equal(SequencerBench("verilator", shape, tmp_path, LOW_AREA), script).samples >= 20_000
@@ -378,7 +382,7 @@ def test_low_area_on_verilator(tmp_path: Path) -> None:
 HARMONICS = 5
 
 
-def with_sine(folder: Path, shape: Shape, harmonics: int = HARMONICS) -> dict[str, int | str]:
+def with_sine(folder: Path, shape: SequencerShape, harmonics: int = HARMONICS) -> dict[str, int | str]:
     """The parameters of a sequencer that renders, its sine written to a file."""
     sine = folder / "sine.mem"
     index_bits = [bits for axis in "xy" if (bits := getattr(shape, f"{axis}_index_bits"))]
@@ -388,7 +392,7 @@ def with_sine(folder: Path, shape: Shape, harmonics: int = HARMONICS) -> dict[st
 
 @pytest.mark.parametrize("plain", [0, 1])
 def test_tables_are_rendered_while_a_program_plays(plain: int, tmp_path: Path) -> None:
-    shape = Shape(16, 1, 4, 16, 1, 3, 14)
+    shape = SequencerShape(16, 1, 4, 16, 1, 3, 14)
     script = Script()
     random_renderings(np.random.default_rng(3), script, shape, 24 if plain else 10, HARMONICS, plain)
     parameters = {**with_sine(tmp_path, shape), "PLAIN_MULTIPLIER": plain}
@@ -400,8 +404,8 @@ def test_tables_are_rendered_while_a_program_plays(plain: int, tmp_path: Path) -
 def test_a_plan_from_its_fourier_words(low_area: int, tmp_path: Path) -> None:
     """The swap is from the uploaded plan to the same, rendered from a fiftieth of the words: no code may differ."""
     plan = planned(tmp_path, PLANS["settle_0"])
-    program = DualProgram.of(plan)
-    shape = Shape.of((program.x, program.y))
+    program = plan.program
+    shape = SequencerShape.of((program.x, program.y))
     x, y = plan.x.fourier, plan.y.fourier
     parameters = {**with_sine(tmp_path, shape, x.harmonics), "PLAIN_MULTIPLIER": 1, "LOW_AREA": low_area}
     bench = SequencerBench("verilator" if low_area else "icarus", shape, tmp_path / "bench", parameters)
@@ -418,16 +422,16 @@ def test_a_plan_from_its_fourier_words(low_area: int, tmp_path: Path) -> None:
     script.wait(clocks)
     script.wait_ticks(5 * plan.schedule.ticks)
     assert script.swaps == 2
-    record = equal(bench, script).record
-    at = int(np.flatnonzero(flag(record, "swapped"))[1])
-    within_certificate(record[at:], plan)
+    capture = equal(bench, script).capture
+    at = int(np.flatnonzero(flag(capture, "swapped"))[1])
+    within_certificate(capture[at:], plan)
 
 
 # Writes and faults.
 
 
 def test_words_can_be_written_in_any_order(tmp_path: Path) -> None:
-    shape = Shape(16, 1, 3, 16, 0, 3, 16)
+    shape = SequencerShape(16, 1, 3, 16, 0, 3, 16)
     rng = np.random.default_rng(3)
     script = Script()
     script.tick_every(1)
@@ -444,7 +448,7 @@ def test_words_can_be_written_in_any_order(tmp_path: Path) -> None:
 def test_an_underrun_is_a_fault(tmp_path: Path) -> None:
     """The model has no clock and cannot have one: it adds a sticky fault to a scan, and `valid` is low from then on."""
     plan = planned(tmp_path, PLANS["settle_0"])
-    program = DualProgram.of(plan)
+    program = plan.program
     script = Script()
     script.load(program)
     script.tick_every(1)
@@ -460,24 +464,26 @@ def test_an_underrun_is_a_fault(tmp_path: Path) -> None:
         assert script.commands[at] >> 60 == 3
         script.commands[at] |= 1 << 7 + 16
     script.wait_ticks(2 * plan.schedule.ticks)
-    bench = SequencerBench("icarus", Shape.of((program.x, program.y)), tmp_path / "bench", {"PLAIN_MULTIPLIER": 1})
+    bench = SequencerBench(
+        "icarus", SequencerShape.of((program.x, program.y)), tmp_path / "bench", {"PLAIN_MULTIPLIER": 1}
+    )
     played = bench.play(script)
     assert played.fault_counts == (0, 0, 0, 3)
     expected = np.array(script.expected, dtype=np.uint64)
-    fault = flag(played.record, "underrun")
+    fault = flag(played.capture, "underrun")
     at = int(np.argmax(fault))
     assert abs(at - 3 * plan.schedule.ticks - 50) < 64
     assert np.all(fault[at:])
     markers = ~np.uint64(1 << 48 + FLAGS.index("valid") | 1 << 56 + FAULTS.index("underrun"))
-    assert np.array_equal(played.record & markers, expected & markers)
-    assert np.array_equal(flag(played.record, "valid"), flag(expected, "valid") & ~fault)
+    assert np.array_equal(played.capture & markers, expected & markers)
+    assert np.array_equal(flag(played.capture, "valid"), flag(expected, "valid") & ~fault)
     assert np.any(flag(expected, "valid")[at:])
 
 
 def test_a_tick_that_comes_too_early_is_a_fault(tmp_path: Path) -> None:
     """With a tick a clock earlier than the least pace every second one is refused, and the others go on as if alone."""
     plan = planned(tmp_path, PLANS["settle_0"])
-    program = DualProgram.of(plan)
+    program = plan.program
     script = Script()
     script.tick_every(0)
     script.load(program)
@@ -489,14 +495,14 @@ def test_a_tick_that_comes_too_early_is_a_fault(tmp_path: Path) -> None:
     script.wait_ticks(2 * plan.schedule.ticks)
     tick_every = script.commands.index(4 << 60 | 2 * (LEAST_PACE - 1))
     script.commands[tick_every] -= LEAST_PACE - 1
-    bench = SequencerBench("icarus", Shape.of((program.x, program.y)), tmp_path / "bench", LOW_AREA)
+    bench = SequencerBench("icarus", SequencerShape.of((program.x, program.y)), tmp_path / "bench", LOW_AREA)
     played = bench.play(script)
     expected = np.array(script.expected, dtype=np.uint64)
     assert played.fault_counts == (0, 0, len(expected) - 1, 0)
     markers = ~np.uint64(1 << 48 + FLAGS.index("valid") | 1 << 56 + FAULTS.index("overrun"))
-    assert np.array_equal(played.record & markers, expected & markers)
-    assert np.all(flag(played.record, "overrun"))
-    assert not np.any(flag(played.record, "valid"))
+    assert np.array_equal(played.capture & markers, expected & markers)
+    assert np.all(flag(played.capture, "overrun"))
+    assert not np.any(flag(played.capture, "valid"))
     assert np.any(flag(expected, "valid"))
 
 
@@ -522,7 +528,7 @@ def test_volts_at_the_piezo(name: str, tmp_path: Path) -> None:
     coding = "twos-complement" if chip.twos_complement else "offset-binary"
     variant = _short(dac__bits=chip.bits, dac__coding=coding, x__table__bits=chip.bits, y__table__bits=chip.bits)
     plan = planned(tmp_path, variant)
-    program = DualProgram.of(plan)
+    program = plan.program
     capture = tmp_path / "capture.txt"
     parameters = {
         "CAPTURE": str(capture),
@@ -532,7 +538,7 @@ def test_volts_at_the_piezo(name: str, tmp_path: Path) -> None:
         "PREFIX": chip.prefix,
     }
     sources = [*verilog_runtime(), HERE / "stream_spi_bench.v"]
-    shape = Shape.of((program.x, program.y))
+    shape = SequencerShape.of((program.x, program.y))
     bench = SequencerBench("icarus", shape, tmp_path / "bench", parameters, sources, top="stream_spi_bench")
     script = Script()
     script.load(program)
@@ -547,7 +553,7 @@ def test_volts_at_the_piezo(name: str, tmp_path: Path) -> None:
 
     digits = np.frombuffer(bytes.fromhex(capture.read_text("ascii")), dtype=np.uint8)
     sclk, mosi_x, mosi_y, cs_n, ldac_n = (digits >> bit & 1 for bit in range(5))
-    playing = np.flatnonzero(flag(played.record, "playing"))
+    playing = np.flatnonzero(flag(played.capture, "playing"))
     caught_up = 30
     for line, mosi in ((plan.x, mosi_x), (plan.y, mosi_y)):
         converter = Converter(chip.frame_bits, cpol=0, cpha=0)

@@ -32,8 +32,8 @@ def deciding_files() -> list[Path]:
     files the times of an archive would otherwise hide a change of version from make.
     """
     package = Path(str(import_module("tablegen").__file__)).parent
-    apart = ("calibration", "cli", "link", "refinement", "verify", "virtual", "examples", "firmware_templates")
-    others = {package / name for name in (*apart, "recorded.py")}
+    apart = ("calibration", "cli", "link", "refinement", "verification", "virtual", "examples", "firmware_templates")
+    others = {package / name for name in (*apart, "manifest/read.py")}
     modules = {path for path in package.rglob("*.py") if not others.intersection((path, *path.parents))}
     templates = resource_folder("firmware_templates")
     emitted = {path for language in ("c", "verilog") for path in (templates / language).iterdir() if path.is_file()}

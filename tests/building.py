@@ -15,13 +15,14 @@ from typing import Any
 
 import numpy as np
 
-from tablegen.certificate import Certificate, certify
+from tablegen.certificate.certificate import Certificate, certify
 from tablegen.config.load import load
-from tablegen.emit import render, write_files
+from tablegen.emit.render import render
+from tablegen.emit.write import write_files
 from tablegen.fixedpoint.interpolation import guard_bits
 from tablegen.fixedpoint.output import UNIT_GAIN_BITS
 from tablegen.fixedpoint.rounding import signed_limits
-from tablegen.plan import LinePlan, Plan, make_plan
+from tablegen.planning.line_plan import LinePlan, Plan, make_plan
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 EXAMPLE = REPOSITORY / "examples" / "annexin_200nm.toml"

@@ -9,15 +9,15 @@ import numpy as np
 from c_library import LOADED, Device, Library, converter_of
 from programs import random_dual
 
+from tablegen.device.schedule import Schedule
+from tablegen.device.schedule import Window as Lines
+from tablegen.device.sequencer import DualProgram
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.phase import RationalPhase
 from tablegen.fixedpoint.program import Program
-from tablegen.schedule import Schedule
-from tablegen.schedule import Window as Lines
-from tablegen.sequencer import DualProgram
-from tablegen.verify.bench import Shape
+from tablegen.verification.bench import SequencerShape
 
-SHAPE = Shape(16, 1, 4, 16, 1, 3, 16)
+SHAPE = SequencerShape(16, 1, 4, 16, 1, 3, 16)
 
 
 class Libraries(NamedTuple):
@@ -30,7 +30,7 @@ class Libraries(NamedTuple):
 Check = Callable[[Libraries], None]
 
 
-def gentle(seed: int, shape: Shape = SHAPE, **output: object) -> DualProgram:
+def gentle(seed: int, shape: SequencerShape = SHAPE, **output: object) -> DualProgram:
     """A program that neither clamps nor is held back, once it has caught up; keys are of both output stages."""
     program = random_dual(np.random.default_rng(seed), shape, (40, 60), kind="tame", lines=(3, 3))
     schedule = replace(

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from building import run_clean
 
+from tablegen.device.sequencer import DualProgram, Fault, Sequencer, Tick
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.program import Program
 from tablegen.numerics.arrays import Ints
 from tablegen.resources import c_runtime
-from tablegen.sequencer import DualProgram, Fault, Sequencer, Tick
-from tablegen.verify.stream import FLAGS
+from tablegen.verification.stream import FLAGS
 
 HERE = Path(__file__).parent
 PROBE = HERE / "c_probe.c"

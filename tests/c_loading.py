@@ -17,7 +17,7 @@ from c_library import (
     Window,
 )
 
-from tablegen.schedule import Window as Lines
+from tablegen.device.schedule import Window as Lines
 
 
 def _changed(program: CProgram, path: str, value: object) -> CProgram:

@@ -22,10 +22,10 @@ from c_threads import play as play_threads
 from mutants import Verdict
 
 from tablegen.resources import c_runtime
-from tablegen.verify.bench import Shape
-from tablegen.verify.c_bench import CBench, defines
-from tablegen.verify.simulate import SimulationFailed
-from tablegen.verify.stream import Script, compare
+from tablegen.verification.bench import SequencerShape
+from tablegen.verification.c_bench import CBench, defines
+from tablegen.verification.simulate import SimulationFailed
+from tablegen.verification.stream import Script, compare
 
 HERE = Path(__file__).parent
 OPTIONS = ("-std=c99", "-O1", "-DDAC_WAIT=0")  # as many runs as can be
@@ -46,7 +46,7 @@ class Mutant(mutants.Mutant):
 
 
 @cache
-def scripts(where: str) -> tuple[tuple[Script, Shape], ...]:
+def scripts(where: str) -> tuple[tuple[Script, SequencerShape], ...]:
     """What the benches play; the same every time."""
     if where == "split wide":
         return ((long_play("dac_24_words_8", 20_000), LONG["dac_24_words_8"][0]),)
@@ -54,7 +54,7 @@ def scripts(where: str) -> tuple[tuple[Script, Shape], ...]:
         names = ("bits_20", "bits_24", "dac_24_words_8")
         long = [(long_play(name, 9000), LONG[name][0]) for name in names]
         return (*long, (IN_C["bits_24"].script("bits_24"), IN_C["bits_24"].shape))
-    shape = Shape(16, 1, 4, 16, 1, 3, 16)
+    shape = SequencerShape(16, 1, 4, 16, 1, 3, 16)
     return (
         (everything(shape, 1, 500), shape),
         *((long_play(name, 12_000), LONG[name][0]) for name in ("bits_16", "bits_8", "direct", "many_lines")),
@@ -117,7 +117,7 @@ def _play(where: str, folder: Path, runtime: list[Path]) -> Verdict:
         except SimulationFailed as error:
             return Verdict(True, str(error))
         expected = script.expected if not fill else [word & (1 << 56) - 1 for word in script.expected]
-        mismatch = compare(expected, played.record)
+        mismatch = compare(expected, played.capture)
         if mismatch is not None:
             return Verdict(True, f"tick {mismatch.tick}")
         if played.counts[:2] != script.counts:

@@ -10,9 +10,9 @@ from c_library import MARKER, AxisProgram, Converter, CProgram, Status, Twin, sa
 from c_scripts import long_dual
 from programs import random_fourier
 
+from tablegen.device.schedule import Window as Lines
 from tablegen.fixedpoint.synthesis import sine_periods, synthesize
-from tablegen.schedule import Window as Lines
-from tablegen.verify.bench import Shape
+from tablegen.verification.bench import SequencerShape
 
 CODINGS = [
     (16, 16, "twos-complement", "right"), (12, 16, "offset-binary", "left"), (12, 16, "twos-complement", "left"),
@@ -57,7 +57,7 @@ def converter_words_of_runs(libraries: Libraries) -> None:
     for library, codings in zip(libraries, (CODINGS, WIDE_CODINGS), strict=True):
         for seed, (bits, word_bits, coding, align) in enumerate(codings):
             words = 16 if library.word_bytes == 2 else 24
-            shape = Shape(bits, 1, 7, words, 1, 6, words)
+            shape = SequencerShape(bits, 1, 7, words, 1, 6, words)
             program = long_dual(np.random.default_rng(seed), shape, (300, 400), lines=(2, 2))
             x, y = (
                 replace(axis, output=replace(axis.output, coding=coding, align=align, word_bits=word_bits))
@@ -76,7 +76,7 @@ def converter_words_of_runs(libraries: Libraries) -> None:
 
 def several_programs(libraries: Libraries) -> None:
     """Smooth programs one after the other, by steps and fills of all lengths."""
-    shapes = (Shape(16, 1, 7, 16, 1, 5, 16), Shape(24, 1, 7, 24, 0, 8, 18))
+    shapes = (SequencerShape(16, 1, 7, 16, 1, 5, 16), SequencerShape(24, 1, 7, 24, 0, 8, 18))
     for library, shape in zip(libraries, shapes, strict=True):
         rng = np.random.default_rng(3)
         twin: Twin | None = None

@@ -7,7 +7,7 @@ import numpy as np
 from c_devices import Libraries, device_for, flat, playing
 from c_library import BUSY, CLAMP, LOADED, MARKER, OVERRUN, SLEW, UNDERRUN, same
 
-from tablegen.schedule import Window as Lines
+from tablegen.device.schedule import Window as Lines
 
 REQUESTS = 8  # in the queue
 

@@ -10,13 +10,13 @@ from c_devices import Libraries, device_for, flat, playing
 from c_library import LOADED, Device, Library, Twin, same
 from c_scripts import wave_program
 
+from tablegen.device.schedule import Schedule
+from tablegen.device.schedule import Window as Lines
+from tablegen.device.sequencer import DualProgram
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.phase import RationalPhase
 from tablegen.fixedpoint.program import Program
-from tablegen.schedule import Schedule
-from tablegen.schedule import Window as Lines
-from tablegen.sequencer import DualProgram
-from tablegen.verify.bench import Shape
+from tablegen.verification.bench import SequencerShape
 
 WHOLE = 1 << 96  # of a position
 RUN_TICKS = 256
@@ -203,7 +203,7 @@ def no_run_beyond_a_limit(libraries: Libraries) -> None:
 def limits(libraries: Libraries) -> None:
     """A wave whose peaks are so many codes beyond the limits or short of them, in runs wherever there is room."""
     for library in libraries:
-        shape = Shape(16, 1, 7, 8 * library.word_bytes - 8, 1, 6, 8 * library.word_bytes - 8)
+        shape = SequencerShape(16, 1, 7, 8 * library.word_bytes - 8, 1, 6, 8 * library.word_bytes - 8)
         for height, beyond, max_step in product((300, 1200), (*range(-2, 8), 21, 39), (3, 7, 31, 40)):
             wave = wave_program(shape, height)
             codes = wave.x.codes(np.arange(wave.schedule.ticks))

@@ -14,20 +14,20 @@ from programs import random_dual, random_fourier, random_schedule, rendered
 from stream_configurations import CONFIGURATIONS, SMALL
 from stream_scripts import play, random_requests, swaps_at_every_tick, sweep
 
+from tablegen.device.schedule import Schedule
+from tablegen.device.sequencer import DualProgram
 from tablegen.fixedpoint.interpolation import guard_bits
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.phase import RationalPhase
 from tablegen.fixedpoint.program import Program
 from tablegen.numerics.arrays import Ints
-from tablegen.schedule import Schedule
-from tablegen.sequencer import DualProgram
-from tablegen.verify.bench import Shape
-from tablegen.verify.stream import Script
+from tablegen.verification.bench import SequencerShape
+from tablegen.verification.stream import Script
 
 LEAST_INDEX_BITS = 3  # of an interpolated table in C; the Verilog has tables of 4 words as well
 
 
-def shape_in_c(shape: Shape) -> Shape:
+def shape_in_c(shape: SequencerShape) -> SequencerShape:
     """The shape, or the one nearest to it that the C runtime takes."""
     least = {
         f"{axis}_index_bits": LEAST_INDEX_BITS
@@ -42,25 +42,25 @@ SMALL_IN_C = shape_in_c(SMALL)
 
 # Name: shape, and the bounds of a line's ticks. Beside the usual ones: gains for which there are no runs (a gain_q of
 # 4 and of 33), tables with a word a tick, and the longest table.
-LONG: dict[str, tuple[Shape, tuple[int, int]]] = {
-    "bits_16": (Shape(16, 1, 8, 16, 1, 6, 16), (100, 3000)),
-    "bits_8": (Shape(8, 1, 5, 8, 1, 4, 8), (100, 700)),
-    "bits_20": (Shape(20, 1, 10, 18, 1, 7, 20), (100, 2000)),
-    "bits_24": (Shape(24, 1, 9, 24, 1, 7, 24), (100, 2000)),
-    "dac_24_words_8": (Shape(24, 1, 6, 8, 1, 5, 8), (100, 700)),
-    "dac_8_words_24": (Shape(8, 1, 6, 24, 1, 5, 24), (100, 700)),
-    "x_runs_y_does_not": (Shape(8, 1, 6, 12, 1, 5, 24), (100, 700)),
-    "direct": (Shape(16, 0, 11, 16, 0, 13, 16), (100, 1200)),
-    "longest_table": (Shape(16, 1, 16, 16, 1, 12, 16), (1000, 3000)),
-    "many_lines": (Shape(16, 1, 8, 16, 1, 8, 16), (40, 60)),
+LONG: dict[str, tuple[SequencerShape, tuple[int, int]]] = {
+    "bits_16": (SequencerShape(16, 1, 8, 16, 1, 6, 16), (100, 3000)),
+    "bits_8": (SequencerShape(8, 1, 5, 8, 1, 4, 8), (100, 700)),
+    "bits_20": (SequencerShape(20, 1, 10, 18, 1, 7, 20), (100, 2000)),
+    "bits_24": (SequencerShape(24, 1, 9, 24, 1, 7, 24), (100, 2000)),
+    "dac_24_words_8": (SequencerShape(24, 1, 6, 8, 1, 5, 8), (100, 700)),
+    "dac_8_words_24": (SequencerShape(8, 1, 6, 24, 1, 5, 24), (100, 700)),
+    "x_runs_y_does_not": (SequencerShape(8, 1, 6, 12, 1, 5, 24), (100, 700)),
+    "direct": (SequencerShape(16, 0, 11, 16, 0, 13, 16), (100, 1200)),
+    "longest_table": (SequencerShape(16, 1, 16, 16, 1, 12, 16), (1000, 3000)),
+    "many_lines": (SequencerShape(16, 1, 8, 16, 1, 8, 16), (40, 60)),
 }
 MANY_LINES = {"many_lines": (300, 400)}  # so that y, held for a line each, steps by little
-LONG_PERIODS = Shape(16, 1, 8, 16, 1, 16, 16)
+LONG_PERIODS = SequencerShape(16, 1, 8, 16, 1, 16, 16)
 STEEP = ("exact", "one less", "half", "twice", "wide", "all", "one")
 LIMITS = ("all", "tight", "cut", "one code")
 
 
-def long_program(rng: Generator, shape: Shape, axis: str, schedule: Schedule) -> Program:
+def long_program(rng: Generator, shape: SequencerShape, axis: str, schedule: Schedule) -> Program:
     """A smooth wave of few harmonics, its limits and its largest step anywhere about where the wave needs them."""
     interpolated, index_bits, bits = (
         getattr(shape, f"{axis}_{name}") for name in ("interpolated", "index_bits", "word_bits")
@@ -119,14 +119,16 @@ def _step(rng: Generator, codes: Ints, top: int) -> int:
     return min(max(steps[str(rng.choice(STEEP))], 1), top)
 
 
-def long_dual(rng: Generator, shape: Shape, ticks: tuple[int, int], lines: tuple[int, int] = (1, 5)) -> DualProgram:
+def long_dual(
+    rng: Generator, shape: SequencerShape, ticks: tuple[int, int], lines: tuple[int, int] = (1, 5)
+) -> DualProgram:
     """Both axes of it."""
     longest = ticks[1] if shape.x_interpolated else min(ticks[1], 1 << shape.x_index_bits)
     schedule = random_schedule(rng, int(rng.integers(ticks[0], longest + 1)), int(rng.integers(lines[0], lines[1] + 1)))
     return DualProgram(long_program(rng, shape, "x", schedule), long_program(rng, shape, "y", schedule), schedule)
 
 
-def wave_program(shape: Shape, codes: int, ticks: int = 499) -> DualProgram:
+def wave_program(shape: SequencerShape, codes: int, ticks: int = 499) -> DualProgram:
     """A sine of so many codes up and down on both axes, slow enough for runs."""
     rng = np.random.default_rng(0)
     schedule = replace(random_schedule(rng, ticks, 1), lines=1)
@@ -187,7 +189,7 @@ def long_periods(ticks: int, lines: int, samples: int = 20_000) -> Script:
     return script
 
 
-def every_tick(shape: Shape) -> Script:
+def every_tick(shape: SequencerShape) -> Script:
     """A swap at every tick of lines longer than a run."""
     rng, script = np.random.default_rng(5), Script()
     script.tick_every(1)
@@ -196,7 +198,7 @@ def every_tick(shape: Shape) -> Script:
     return script
 
 
-def renderings(shape: Shape, programs: int, harmonics: int) -> Script:
+def renderings(shape: SequencerShape, programs: int, harmonics: int) -> Script:
     """Programs of which one axis or both are rendered from Fourier words, one after the other."""
     rng, script = np.random.default_rng(harmonics), Script()
     script.tick_every(1)
@@ -216,6 +218,6 @@ def renderings(shape: Shape, programs: int, harmonics: int) -> Script:
     return script
 
 
-def everything(shape: Shape, seed: int, samples: int = 1500) -> Script:
+def everything(shape: SequencerShape, seed: int, samples: int = 1500) -> Script:
     """All that a host may ask."""
     return sweep(np.random.default_rng(seed), shape, samples)

@@ -15,15 +15,14 @@ from unittest.mock import patch
 
 from client_line import VirtualLine
 from editing import Outcome, run
-from link_programs import INFO, make_scan
-from link_programs import Scan as Small
+from link_programs import INFO, SmallScan, make_scan
 
 from tablegen.link.device import Device
 from tablegen.link.frames import Frame, FrameReader
 from tablegen.link.messages import AxisLimits, AxisShape, DeviceInfo, Feature, Request
 from tablegen.link.model import ModelDevice
 from tablegen.link.players import LinePlayer
-from tablegen.link.prepare import LEFT_ALIGNED, TWOS_COMPLEMENT, Scan
+from tablegen.link.prepare import LEFT_ALIGNED, TWOS_COMPLEMENT, PreparedScan
 
 BOOT = make_scan(1)
 KEY = bytes(range(16))
@@ -33,7 +32,7 @@ LARGE = make_scan(3, ticks=1250, lines=200, index_bits=(11, 11)).image(False)  #
 LARGE_INFO = replace(INFO, x=AxisShape(11, 16, 16, 16), y=AxisShape(11, 16, 16, 16), image_bytes=9000)
 
 
-def model(info: DeviceInfo = INFO, key: bytes = b"", boot: Small | None = BOOT, **options: object) -> ModelDevice:
+def model(info: DeviceInfo = INFO, key: bytes = b"", boot: SmallScan | None = BOOT, **options: object) -> ModelDevice:
     """A device that plays ``boot`` from the start."""
     features = info.features | (Feature.KEY if key else Feature(0))
     boot_hash = bytes.fromhex(boot.digest) if boot is not None else bytes(32)
@@ -48,7 +47,7 @@ def client(line: VirtualLine, seed: int = 1, **options: object) -> Device:
     return Device(line.open, random=Random(seed), sleep=line.sleep, **options)  # type: ignore[arg-type]
 
 
-def info_for(scan: Scan, **changes: object) -> DeviceInfo:
+def info_for(scan: PreparedScan, **changes: object) -> DeviceInfo:
     """A device that was built for a scan."""
     shapes, limits = [], []
     for axis in (scan.program.x, scan.program.y):

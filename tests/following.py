@@ -3,10 +3,10 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+from tablegen.device.sequencer import DualProgram, Sequencer, Tick
 from tablegen.fixedpoint.program import Program
-from tablegen.plan import Plan
-from tablegen.sequencer import DualProgram, Sequencer, Tick
-from tablegen.verify.stream import FLAGS
+from tablegen.planning.line_plan import Plan
+from tablegen.verification.stream import FLAGS
 
 
 class Differs(AssertionError):
@@ -49,7 +49,7 @@ def markers_of(tick: Tick) -> int:
 
 def programs_of(plan: Plan) -> tuple[DualProgram, DualProgram]:
     """The whole scan and the half one of ``examples/firmware/cortex_m/scan.c``."""
-    whole = DualProgram.of(plan)
+    whole = plan.program
     return whole, replace(whole, x=_half(whole.x), y=_half(whole.y))
 
 

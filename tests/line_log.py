@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tablegen.device.sequencer import DualProgram, LineTicks, Sequencer, Tick, play_line
 from tablegen.numerics.arrays import Ints
-from tablegen.sequencer import DualProgram, LineTicks, Sequencer, Tick, play_line
-from tablegen.verify.stream import FLAGS
+from tablegen.verification.stream import FLAGS
 
 _BIT = {name: 1 << bit for bit, name in enumerate(FLAGS)}
 _RECORD = np.dtype([("x", "<u4"), ("y", "<u4"), ("markers", "u1")])

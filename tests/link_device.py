@@ -18,12 +18,12 @@ from building import REPOSITORY
 from c_library import OPTIONS, Converter, CProgram, Library, compile_library, converter_of
 from link_talk import Talk
 
+from tablegen.device.sequencer import DualProgram
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.synthesis import sine_periods
 from tablegen.link.image import make_image
 from tablegen.link.messages import AxisLimits
 from tablegen.resources import c_link, c_runtime
-from tablegen.sequencer import DualProgram
 
 HERE = Path(__file__).parent
 LINES = REPOSITORY / "examples" / "firmware" / "cortex_m"

@@ -7,12 +7,12 @@ import numpy as np
 from numpy.random import Generator
 from programs import Kind, random_dual, random_fourier, rendered
 
-from tablegen.link.image import PROGRAM_BYTES, Image, make_image
+from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS, SCAN_WORDS
+from tablegen.device.sequencer import DualProgram
+from tablegen.link.image import PROGRAM_BYTES, ProgramImage, make_image
 from tablegen.link.messages import AxisLimits
 from tablegen.numerics.arrays import Ints
-from tablegen.registers import AXIS_WORDS, PAGE_WORDS, SCAN_WORDS
-from tablegen.sequencer import DualProgram
-from tablegen.verify.bench import Shape
+from tablegen.verification.bench import SequencerShape
 
 SCAN_PLACES = [SCAN_WORDS.index(name) for name in SCAN_WORDS]
 AXIS_PLACES = [
@@ -25,7 +25,9 @@ def digest(rng: Generator) -> str:
     return bytes(rng.integers(0, 256, 32, dtype=np.uint8).tolist()).hex()
 
 
-def random_image(rng: Generator, shape: Shape, harmonics: int = 0, kind: Kind = "smooth") -> tuple[Image, DualProgram]:
+def random_image(
+    rng: Generator, shape: SequencerShape, harmonics: int = 0, kind: Kind = "smooth"
+) -> tuple[ProgramImage, DualProgram]:
     """An image and the program in it; with ``harmonics`` some axes are Fourier words, where they are interpolated."""
     program = random_dual(rng, shape, kind=kind)
     words: dict[str, Ints | None] = {"x": None, "y": None}
@@ -49,9 +51,9 @@ def _guarded(program):  # type: ignore[no-untyped-def]
     return replace(program, output=replace(program.output, max_step=max(largest, 1)))
 
 
-def resealed(image: Image, data: bytes) -> Image:
+def resealed(image: ProgramImage, data: bytes) -> ProgramImage:
     """An image with other bytes and a CRC that fits them."""
-    return Image(replace(image.info, image_crc=zlib.crc32(data)), data)
+    return ProgramImage(replace(image.info, image_crc=zlib.crc32(data)), data)
 
 
 def _other_word(rng: Generator, word: int, bits: int) -> int:
@@ -67,7 +69,7 @@ def _other_word(rng: Generator, word: int, bits: int) -> int:
     return (word + int(rng.choice([-1, 1])) * int(rng.choice([1, 1, 2, 7, 100, 3000]))) & mask
 
 
-def damaged(rng: Generator, image: Image) -> Image:
+def damaged(rng: Generator, image: ProgramImage) -> ProgramImage:
     """An image with some words changed, as if somebody meant it; of the same length."""
     data = bytearray(image.data)
     for _ in range(int(rng.choice([1, 1, 1, 2, 5]))):

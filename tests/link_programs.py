@@ -6,15 +6,15 @@ from fractions import Fraction
 import numpy as np
 from numpy.random import Generator
 
+from tablegen.device.schedule import Schedule, Window
+from tablegen.device.sequencer import DualProgram
 from tablegen.fixedpoint.interpolation import guard_bits
 from tablegen.fixedpoint.output import UNIT_GAIN_BITS, Output
 from tablegen.fixedpoint.phase import RationalPhase
 from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.synthesis import FourierWords, synthesize
-from tablegen.link.image import Image, make_image
+from tablegen.link.image import ProgramImage, make_image
 from tablegen.link.messages import AxisLimits, AxisShape, DeviceInfo, Feature
-from tablegen.schedule import Schedule, Window
-from tablegen.sequencer import DualProgram
 
 BITS = 16  # of words and codes
 UPDATE_RATE_HZ = 20000
@@ -35,7 +35,7 @@ INFO = DeviceInfo(
 
 
 @dataclass(frozen=True, eq=False)
-class Scan:
+class SmallScan:
     """A program with the Fourier words that its tables were rendered from."""
 
     program: DualProgram
@@ -43,14 +43,14 @@ class Scan:
     y: FourierWords
     digest: str
 
-    def image(self, fourier: bool) -> Image:
+    def image(self, fourier: bool) -> ProgramImage:
         """In one of the two forms."""
         if fourier:
             return make_image(self.program, self.digest, self.x.in_order, self.y.in_order)
         return make_image(self.program, self.digest)
 
 
-def make_scan(seed: int, ticks: int = 96, lines: int = 6, index_bits: tuple[int, int] = (7, 6)) -> Scan:
+def make_scan(seed: int, ticks: int = 96, lines: int = 6, index_bits: tuple[int, int] = (7, 6)) -> SmallScan:
     """A scan that no other seed makes, within ``LIMITS``; tables of 2^index_bits words of x and y."""
     rng = np.random.default_rng(seed)
     schedule = Schedule(
@@ -71,7 +71,7 @@ def make_scan(seed: int, ticks: int = 96, lines: int = 6, index_bits: tuple[int,
     x = _axis(rng, x_words, ticks, 1, index_bits[0])
     stepped = seed % 2 == 1
     y = _axis(rng, y_words, lines if stepped else ticks * lines, ticks if stepped else 1, index_bits[1])
-    return Scan(DualProgram(x, y, schedule), x_words, y_words, f"{seed:064x}")
+    return SmallScan(DualProgram(x, y, schedule), x_words, y_words, f"{seed:064x}")
 
 
 def _words(rng: Generator) -> FourierWords:

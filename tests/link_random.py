@@ -11,8 +11,9 @@ from link_images import damaged, random_image, random_limits, resealed
 from link_talk import Talk, derived_nonce
 from programs import random_dual
 
+from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS
 from tablegen.link.frames import Frame, FrameReader
-from tablegen.link.image import Image
+from tablegen.link.image import ProgramImage
 from tablegen.link.messages import (
     VERSION,
     AxisShape,
@@ -23,8 +24,7 @@ from tablegen.link.messages import (
 )
 from tablegen.link.model import ModelDevice
 from tablegen.link.players import SequencerPlayer
-from tablegen.registers import AXIS_WORDS, PAGE_WORDS
-from tablegen.verify.bench import Shape
+from tablegen.verification.bench import SequencerShape
 
 HARMONICS = 4
 KEY = bytes(range(32))
@@ -39,7 +39,7 @@ class Differs(Exception):
 class Dialogue:
     """One that is told by a seed. ``seen`` counts answers by type, and refusals by request and reason."""
 
-    def __init__(self, shape: Shape, seed: int, key: bytes = b"", notes: bool = False, **how: Any) -> None:
+    def __init__(self, shape: SequencerShape, seed: int, key: bytes = b"", notes: bool = False, **how: Any) -> None:
         self.rng = np.random.default_rng(seed)
         self.shape, self.key = shape, key
         boot = random_dual(self.rng, shape, kind="smooth") if self.rng.random() < 0.9 else None
@@ -88,7 +88,7 @@ class Dialogue:
         self._count += 1
         return derived_nonce(self.key, self.model.boot, self._count)
 
-    def _some_image(self) -> Image:
+    def _some_image(self) -> ProgramImage:
         kind = str(self.rng.choice(["smooth", "smooth", "tame", "wild"]))
         image, _ = random_image(self.rng, self.shape, HARMONICS, kind)  # type: ignore[arg-type]
         if self.rng.random() < 0.05:

@@ -11,7 +11,7 @@ from link_device import HERE, LINES, HostDevice
 from link_random import KEY, Dialogue
 
 from tablegen.resources import c_link, c_runtime
-from tablegen.verify.bench import Shape
+from tablegen.verification.bench import SequencerShape
 
 _LONGEST = 120.0  # seconds
 STEPS = 200
@@ -34,7 +34,7 @@ def replay_of(device: HostDevice, heard: bytes) -> Replay:
     return Replay(8 * device.library.word_bytes, "\n".join(device.notes) + "\n", heard.hex(), tuple(lines))
 
 
-def random_replay(shape: Shape, seed: int, keyed: bool = False) -> Replay:
+def random_replay(shape: SequencerShape, seed: int, keyed: bool = False) -> Replay:
     """Of a random dialogue, which the model has told to be right."""
     dialogue = Dialogue(shape, seed, KEY if keyed else b"", notes=True)
     dialogue.play(STEPS)

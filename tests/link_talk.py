@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from tablegen.link.frames import Frame, FrameReader
-from tablegen.link.image import Image
+from tablegen.link.image import ProgramImage
 from tablegen.link.messages import ANSWER, REFUSAL, VERSION, Refusal, Request
 from tablegen.link.model import tag
 
@@ -37,13 +37,13 @@ class Talk:
         """The first request."""
         return self.request(Request.HELLO, bytes([VERSION]))
 
-    def upload(self, image: Image, size: int = 240) -> Iterator[bytes]:
+    def upload(self, image: ProgramImage, size: int = 240) -> Iterator[bytes]:
         """BEGIN and every DATA."""
         yield self.request(Request.BEGIN, image.info.pack())
         for at in range(0, len(image.data), size):
             yield self.request(Request.DATA, struct.pack("<I", at) + image.data[at : at + size])
 
-    def commit(self, image: Image, nonce: bytes = b"") -> bytes:
+    def commit(self, image: ProgramImage, nonce: bytes = b"") -> bytes:
         """The request that puts it in force, with a tag where there is a nonce."""
         return self.acting(Request.COMMIT, struct.pack("<I", image.info.image_crc), nonce, image.data)
 

@@ -13,7 +13,7 @@ from editing import SCAN, edited, write_pair
 
 from tablegen.config.load import Setup, load
 from tablegen.config.schema import Scanner
-from tablegen.plan import LinePlan, make_plan
+from tablegen.planning.line_plan import LinePlan, make_plan
 from tablegen.refinement.departure import Departure, departure
 from tablegen.refinement.displacement import Displacement
 from tablegen.refinement.round import Options, Round, refine

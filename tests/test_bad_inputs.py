@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tablegen.config.load import load
-from tablegen.plan import make_plan
+from tablegen.planning.line_plan import make_plan
 from tablegen.problems import Rejected
 
 REMOVED_RESONANCE = ("- x.resonance.frequency_hz", "- x.resonance.quality", "- x.resonance.delay_s")

@@ -13,7 +13,7 @@ from c_library import compile_both
 from c_scripts import IN_C, LONG, LONG_PERIODS, everything, long_periods, long_play, renderings
 
 from tablegen.resources import c_runtime
-from tablegen.verify.bench import Shape
+from tablegen.verification.bench import SequencerShape
 
 HERE = Path(__file__).parent
 AXIS = next(path for path in c_runtime() if path.name == "dac_axis.c")
@@ -38,9 +38,9 @@ def measured(tmp_path_factory: pytest.TempPathFactory) -> Measured:
     for script, shape in long:
         benches.play(script, shape, fill=FILL)
     ticks = sum(len(script.expected) for script, _ in long)
-    shape = Shape(16, 1, 4, 16, 1, 3, 16)
+    shape = SequencerShape(16, 1, 4, 16, 1, 3, 16)
     benches.play(everything(shape, 1), shape)
-    shape = Shape(16, 1, 4, 16, 1, 3, 14)
+    shape = SequencerShape(16, 1, 4, 16, 1, 3, 14)
     benches.play(renderings(shape, 8, 6), shape, fourier=True)
     for name in ("bits_24", "dac_8_words_24_plain"):
         benches.play(IN_C[name].script(name), IN_C[name].shape, fill=FILL)

@@ -10,14 +10,14 @@ from c_mutants import Mutant, runtime_with
 from following import Differs, Follower
 from programs import random_dual
 
+from tablegen.device.sequencer import DualProgram, Sequencer
 from tablegen.fixedpoint.program import Program
 from tablegen.resources import c_runtime
-from tablegen.sequencer import DualProgram, Sequencer
-from tablegen.verify.bench import Shape
-from tablegen.verify.emulate import TRAP, Processor, compile_bare
-from tablegen.verify.stream import pack
+from tablegen.verification.bench import SequencerShape
+from tablegen.verification.emulate import TRAP, Processor, compile_bare
+from tablegen.verification.stream import pack
 
-SHAPE = Shape(16, 1, 5, 16, 1, 4, 16)
+SHAPE = SequencerShape(16, 1, 5, 16, 1, 4, 16)
 PRODUCER = ("dac_sequencer_load", "dac_sequencer_commit", "dac_sequencer_withdraw", "dac_sequencer_trigger")
 
 
@@ -63,7 +63,7 @@ class Landings:
         source = folder / "landings.c"
         source.write_text((REPOSITORY / "tests" / "landings.c").read_text("utf-8"), "utf-8")
         support = folder / "support.c"  # the processor has no C library
-        memory = (REPOSITORY / "tablegen" / "verify" / "stream_bench_memory.c").read_text("utf-8")
+        memory = (REPOSITORY / "tablegen" / "verification" / "stream_bench_memory.c").read_text("utf-8")
         start = memory.index("/* The barriers")
         support.write_text("#include <stddef.h>\nvoid bench_main(void);\nvoid bench_main(void) { }\n" + memory[start:])
         self.programs = programs

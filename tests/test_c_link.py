@@ -13,15 +13,15 @@ from link_random import KEY, Dialogue
 from link_talk import Talk
 
 from tablegen.link.messages import DeviceInfo, DeviceStatus, Feature, Reason, Request
-from tablegen.verify.bench import Shape
+from tablegen.verification.bench import SequencerShape
 
 FRAMES: dict[str, Any] = json.loads(Path(__file__).with_name("golden_frames.json").read_text("utf-8"))
 SHAPES = {
-    "16 bits": Shape(16, 1, 5, 16, 1, 4, 16),
-    "12 bits": Shape(12, 1, 4, 10, 1, 3, 14),
-    "24 bits": Shape(24, 1, 4, 20, 1, 3, 24),
-    "direct": Shape(16, 0, 5, 16, 0, 5, 16),
-    "mixed": Shape(16, 1, 3, 16, 0, 4, 12),
+    "16 bits": SequencerShape(16, 1, 5, 16, 1, 4, 16),
+    "12 bits": SequencerShape(12, 1, 4, 10, 1, 3, 14),
+    "24 bits": SequencerShape(24, 1, 4, 20, 1, 3, 24),
+    "direct": SequencerShape(16, 0, 5, 16, 0, 5, 16),
+    "mixed": SequencerShape(16, 1, 3, 16, 0, 4, 12),
 }
 SEEDS, STEPS = 6, 250
 

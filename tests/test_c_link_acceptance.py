@@ -13,20 +13,20 @@ from link_images import damaged, random_image, random_limits
 from link_programs import make_scan
 from link_talk import Talk, is_answer
 
+from tablegen.device.sequencer import DualProgram
 from tablegen.link.acceptance import Playing, first_objection
 from tablegen.link.frames import Frame
-from tablegen.link.image import Image, make_image, take_apart
+from tablegen.link.image import ProgramImage, make_image, take_apart
 from tablegen.link.messages import REFUSAL, AxisLimits, Reason, Refusal, Request
 from tablegen.numerics.arrays import Ints
-from tablegen.sequencer import DualProgram
-from tablegen.verify.bench import Shape
+from tablegen.verification.bench import SequencerShape
 
 SHAPES = {
-    "16 bits": Shape(16, 1, 5, 16, 1, 4, 16),
-    "24 bits": Shape(24, 1, 4, 21, 1, 3, 24),
-    "8 bits": Shape(8, 1, 4, 8, 1, 4, 8),
-    "12 bits, wide codes": Shape(12, 1, 4, 12, 1, 5, 20),
-    "direct": Shape(16, 0, 5, 10, 0, 5, 14),
+    "16 bits": SequencerShape(16, 1, 5, 16, 1, 4, 16),
+    "24 bits": SequencerShape(24, 1, 4, 21, 1, 3, 24),
+    "8 bits": SequencerShape(8, 1, 4, 8, 1, 4, 8),
+    "12 bits, wide codes": SequencerShape(12, 1, 4, 12, 1, 5, 20),
+    "direct": SequencerShape(16, 0, 5, 10, 0, 5, 14),
 }
 HARMONICS = 5
 STATES = ("nothing plays", "parked", "playing")
@@ -37,7 +37,9 @@ CHECKED = {reason for reason in Reason if Reason.SCHEDULE <= reason <= Reason.JU
 class Bench:
     """A device in some state that stays the same: what it accepts is withdrawn before it is taken."""
 
-    def __init__(self, program: DualProgram, state: str, limits: tuple[AxisLimits, AxisLimits], shape: Shape) -> None:
+    def __init__(
+        self, program: DualProgram, state: str, limits: tuple[AxisLimits, AxisLimits], shape: SequencerShape
+    ) -> None:
         boot = None if state == "nothing plays" else program
         bits = max(shape.x_index_bits, 3), max(shape.y_index_bits, 3)
         self.device = HostDevice(program, boot, limits=limits, index_bits=bits, harmonics=HARMONICS)
@@ -57,7 +59,7 @@ class Bench:
         self.device.receive(wire)
         return self.talk.answers(self.device.transmit())
 
-    def objection(self, image: Image) -> tuple[int, int] | None:
+    def objection(self, image: ProgramImage) -> tuple[int, int] | None:
         """To an image; None if it waits to be taken."""
         for wire in self.talk.upload(image):
             (answer,) = self.ask(wire)
@@ -94,7 +96,7 @@ def test_the_jump_of_y_is_the_largest_there_can_be(first: Callable[[Ints], int])
     everything = AxisLimits(0, 1 << 24, 1 << 24, 1 << 24)
     for most, expected in ((jump, None), (jump - 1, (Reason.JUMP, 1))):
         limits = everything, replace(everything, max_jump=most)
-        bench = Bench(program, "playing", limits, Shape(16, 1, 7, 16, 1, 6, 16))
+        bench = Bench(program, "playing", limits, SequencerShape(16, 1, 7, 16, 1, 6, 16))
         assert bench.objection(image) == expected
         contents = take_apart(image.data, image.info.x, image.info.y)
         assert first_objection(contents, *limits, bench.playing) == expected
@@ -110,7 +112,7 @@ def test_every_check_was_met() -> None:
 
 
 @cache
-def compare(shape: Shape, state: str, count: int, seed: int) -> Counter[Reason | None]:
+def compare(shape: SequencerShape, state: str, count: int, seed: int) -> Counter[Reason | None]:
     """Hold so many programs against the specification; returns how often each reason came."""
     rng = np.random.default_rng([seed, *map(ord, state)])
     seen: Counter[Reason | None] = Counter()

@@ -12,18 +12,18 @@ from link_images import random_image
 from link_talk import Talk
 
 from tablegen.link.frames import Frame
-from tablegen.link.image import Image
+from tablegen.link.image import ProgramImage
 from tablegen.link.messages import ANSWER, REFUSAL, DeviceInfo, DeviceStatus, Request
 from tablegen.resources import c_link, c_runtime
-from tablegen.verify.bench import Shape
-from tablegen.verify.emulate import TRAP, Processor, compile_bare
+from tablegen.verification.bench import SequencerShape
+from tablegen.verification.emulate import TRAP, Processor, compile_bare
 
-SHAPE = Shape(16, 1, 5, 16, 1, 4, 16)
+SHAPE = SequencerShape(16, 1, 5, 16, 1, 4, 16)
 RING = 512
 MEMORY = REPOSITORY / "examples" / "firmware" / "memory.c"
 
 
-def conversation(images: Sequence[Image]) -> tuple[bytes, int]:
+def conversation(images: Sequence[ProgramImage]) -> tuple[bytes, int]:
     """Uploads, each with noise in front, and what reads them back; and how many bytes are answered at least."""
     talk = Talk()
     wires, answered = [talk.hello()], 2 + 10 + DeviceInfo.LAYOUT.size + DeviceStatus.LAYOUT.size
@@ -102,7 +102,7 @@ class Landings:
         return processor.read("sent", processor.word("sent_bytes"))
 
 
-def images() -> list[Image]:
+def images() -> list[ProgramImage]:
     rng = np.random.default_rng(4)
     return [random_image(rng, SHAPE)[0] for _ in range(2)]
 

@@ -15,23 +15,23 @@ from link_images import random_image
 from link_programs import make_scan
 from link_talk import Talk, derived_nonce, is_answer
 
+from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS
 from tablegen.link.frames import Frame
-from tablegen.link.image import PROGRAM_BYTES, Image, make_image
+from tablegen.link.image import PROGRAM_BYTES, ProgramImage, make_image
 from tablegen.link.messages import (
     ANSWER,
     REFUSAL,
     AxisLimits,
     DeviceInfo,
+    DeviceState,
     DeviceStatus,
     Feature,
     Reason,
     Refusal,
     Request,
-    State,
     Upload,
 )
-from tablegen.registers import AXIS_WORDS, PAGE_WORDS
-from tablegen.verify.bench import Shape
+from tablegen.verification.bench import SequencerShape
 
 KEY = bytes(range(7, 31))
 SCANS = [make_scan(seed) for seed in range(3)]
@@ -50,7 +50,7 @@ def ask(made: HostDevice, talk: Talk, wire: bytes) -> list[Frame]:
     return talk.answers(made.transmit())
 
 
-def upload(made: HostDevice, talk: Talk, image: Image) -> None:
+def upload(made: HostDevice, talk: Talk, image: ProgramImage) -> None:
     """All but COMMIT."""
     for wire in talk.upload(image):
         (answer,) = ask(made, talk, wire)
@@ -408,7 +408,10 @@ def test_what_a_device_is() -> None:
     assert (info.window, info.data_bytes, info.harmonics, info.update_rate_hz) == (3, 240, 33, 48000)
     assert (info.x.index_bits, info.y.index_bits, info.image_bytes) == (9, 8, 192 + 2 * 512 + 2 * 256)
     assert (info.x_limits, info.y_limits) == limits
-    assert DeviceStatus.unpack(answer.payload[DeviceInfo.LAYOUT.size :]).state in (State.PARKED, State.PARKING)
+    assert DeviceStatus.unpack(answer.payload[DeviceInfo.LAYOUT.size :]).state in (
+        DeviceState.PARKED,
+        DeviceState.PARKING,
+    )
 
 
 def test_tables_that_are_shorter_than_fourier_words() -> None:
@@ -447,7 +450,7 @@ def test_a_length_is_known_in_the_middle_of_any_frame() -> None:
 
 def test_a_table_of_no_words() -> None:
     """An image may say so; its period is then refused."""
-    image, program = random_image(np.random.default_rng(3), Shape(16, 0, 5, 16, 0, 5, 16))
+    image, program = random_image(np.random.default_rng(3), SequencerShape(16, 0, 5, 16, 0, 5, 16))
     for axis in (0, 1):
         made, talk = HostDevice(program, program, index_bits=(5, 5)), Talk()
         made.tick()
@@ -459,8 +462,8 @@ def test_a_table_of_no_words() -> None:
         tables = image.data[PROGRAM_BYTES : PROGRAM_BYTES + sizes[0]], image.data[PROGRAM_BYTES + sizes[0] :]
         data = bytes(words) + tables[1 - axis]
         info = replace(image.info, image_bytes=len(data), image_crc=zlib.crc32(data))
-        upload(made, talk, Image(info, data))
-        assert refusal(made, talk, talk.commit(Image(info, data))) == (Reason.PERIOD, axis)
+        upload(made, talk, ProgramImage(info, data))
+        assert refusal(made, talk, talk.commit(ProgramImage(info, data))) == (Reason.PERIOD, axis)
 
 
 def test_a_harmonic_too_many() -> None:

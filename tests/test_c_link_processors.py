@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from link_replay import Replay, compile_replay, differs, random_replay
 
-from tablegen.verify.bench import Shape
+from tablegen.verification.bench import SequencerShape
 
 SANITIZED = ("-std=c99", "-O1", "-g", "-fsanitize=undefined,address", "-fno-sanitize-recover=all")
 WAYS = {
@@ -22,7 +22,11 @@ WAYS = {
 @pytest.fixture(scope="module")
 def replays() -> list[Replay]:
     """Of tables in 16 bits and in 32, with a key and without."""
-    kinds = [Shape(16, 1, 5, 16, 1, 4, 16), Shape(12, 1, 4, 16, 0, 4, 14), Shape(24, 1, 4, 18, 1, 3, 24)]
+    kinds = [
+        SequencerShape(16, 1, 5, 16, 1, 4, 16),
+        SequencerShape(12, 1, 4, 16, 0, 4, 14),
+        SequencerShape(24, 1, 4, 18, 1, 3, 24),
+    ]
     return [random_replay(shape, seed, keyed) for shape in kinds for seed, keyed in ((1, False), (2, True), (3, False))]
 
 

@@ -16,15 +16,15 @@ from c_scripts import IN_C, LONG, long_play, renderings, shape_in_c
 from programs import random_dual
 from stream_scripts import sweep
 
-from tablegen.verify.bench import Shape
-from tablegen.verify.c_bench import OPTIONS, CBench, CPlayed
-from tablegen.verify.emulate import CortexMBench, Processor, compile_bare
-from tablegen.verify.simulate import SimulationFailed
-from tablegen.verify.stream import Script, compare
+from tablegen.verification.bench import SequencerShape
+from tablegen.verification.c_bench import OPTIONS, CBench, CPlayed
+from tablegen.verification.emulate import CortexMBench, Processor, compile_bare
+from tablegen.verification.simulate import SimulationFailed
+from tablegen.verification.stream import Script, compare
 
 CORTEX_M = ("cortex-m0plus", "cortex-m3", "cortex-m4", "cortex-m7")
-SHAPE = Shape(16, 1, 5, 16, 1, 4, 16)
-SHAPES = (SHAPE, Shape(24, 1, 3, 8, 0, 4, 24))  # so many bits that tables and words are kept in 16, and in 32
+SHAPE = SequencerShape(16, 1, 5, 16, 1, 4, 16)
+SHAPES = (SHAPE, SequencerShape(24, 1, 3, 8, 0, 4, 24))  # so many bits that tables and words are kept in 16, and in 32
 FILL = 40
 WITHOUT_FAULTS = (1 << 56) - 1
 
@@ -41,13 +41,13 @@ def options(level: str) -> tuple[str, ...]:
 def hold(played: CPlayed, script: Script, fill: int) -> None:
     """Every tick and every count as the model has them; a fill tells faults at its end."""
     expected = [word & WITHOUT_FAULTS for word in script.expected] if fill else script.expected
-    mismatch = compare(expected, played.record)
+    mismatch = compare(expected, played.capture)
     assert mismatch is None, mismatch
     assert played.counts == [*script.counts, 0, 0]
 
 
 @pytest.fixture(scope="module")
-def sweeps() -> dict[Shape, Script]:
+def sweeps() -> dict[SequencerShape, Script]:
     """Everything that a host may ask, the same for all processors."""
     return {shape: sweep(np.random.default_rng(7), shape, 1500) for shape in SHAPES}
 
@@ -57,7 +57,7 @@ def sweeps() -> dict[Shape, Script]:
 @pytest.mark.parametrize("compiler", ["gcc", "zig"])
 @pytest.mark.parametrize("core", CORTEX_M)
 def test_cortex_m_plays_everything_that_a_host_may_ask(
-    sweeps: dict[Shape, Script], core: str, compiler: str, level: str, fill: int, tmp_path: Path
+    sweeps: dict[SequencerShape, Script], core: str, compiler: str, level: str, fill: int, tmp_path: Path
 ) -> None:
     for shape in SHAPES:
         script = sweeps[shape]
@@ -94,14 +94,14 @@ def test_tables_are_rendered_from_fourier_words(core: str, tmp_path: Path) -> No
 
 @pytest.mark.parametrize("fill", [0, FILL], ids=["step", "fill"])
 @pytest.mark.parametrize("level", ["-O2", "-Os"])
-def test_64_bit_risc_v(sweeps: dict[Shape, Script], level: str, fill: int, tmp_path: Path) -> None:
+def test_64_bit_risc_v(sweeps: dict[SequencerShape, Script], level: str, fill: int, tmp_path: Path) -> None:
     for shape, script in sweeps.items():
         bench = CortexMBench(shape, tmp_path, options=options(level), fill=fill, core="riscv64")
         hold(bench.run(words_of(script, shape)), script, fill)
 
 
 @pytest.mark.parametrize("fill", [0, FILL], ids=["step", "fill"])
-def test_big_endian_mips(sweeps: dict[Shape, Script], fill: int, tmp_path: Path) -> None:
+def test_big_endian_mips(sweeps: dict[SequencerShape, Script], fill: int, tmp_path: Path) -> None:
     for shape, script in sweeps.items():
         bench = CBench(shape, tmp_path, "mips-linux-gnu-gcc", (*OPTIONS, "-static"), fill=fill)
         assert bench.program.read_bytes()[5] == 2, "the executable's bytes are in the other order"
@@ -120,7 +120,7 @@ BREAKS = {
 
 
 @pytest.mark.parametrize("name", BREAKS)
-def test_a_broken_sequencer_is_found(sweeps: dict[Shape, Script], name: str, tmp_path: Path) -> None:
+def test_a_broken_sequencer_is_found(sweeps: dict[SequencerShape, Script], name: str, tmp_path: Path) -> None:
     """A negative control of all of the above."""
     bench = CortexMBench(SHAPE, tmp_path, sources=runtime_with(Mutant(name, *BREAKS[name]), tmp_path / "broken"))
     with pytest.raises((AssertionError, SimulationFailed)):

@@ -35,9 +35,8 @@ from stream_configurations import SWAPS, SWAPS_SLOW, random_swaps
 from stream_laws import follow_their_programs
 from stream_scripts import FAULTS, flag, in_any_order, occurrences
 
-from tablegen.sequencer import DualProgram
-from tablegen.verify.bench import Shape
-from tablegen.verify.stream import FLAGS, Script
+from tablegen.verification.bench import SequencerShape
+from tablegen.verification.stream import FLAGS, Script
 
 HERE = Path(__file__).parent
 HARMONICS = 6
@@ -48,12 +47,12 @@ def benches(tmp_path_factory: pytest.TempPathFactory) -> Benches:
     return Benches(tmp_path_factory.mktemp("benches"))
 
 
-def everywhere(benches: Benches, script: Script, shape: Shape, fourier: bool = False) -> np.ndarray:
-    """Play a script with all compilers, in both ways; returns the record of one that has faults in it."""
+def everywhere(benches: Benches, script: Script, shape: SequencerShape, fourier: bool = False) -> np.ndarray:
+    """Play a script with all compilers, in both ways; returns the capture of one that has faults in it."""
     for compiler in COMPILERS:
         benches.play(script, shape, compiler, FILL, fourier)
         played = benches.play(script, shape, compiler, 0, fourier)
-    return played.record
+    return played.capture
 
 
 # Random programs back to back.
@@ -62,9 +61,9 @@ def everywhere(benches: Benches, script: Script, shape: Shape, fourier: bool = F
 @pytest.mark.parametrize("name", IN_C)
 def test_random_programs(name: str, benches: Benches) -> None:
     configuration = IN_C[name]
-    record = everywhere(benches, configuration.script(name), configuration.shape)
-    assert len(record) >= configuration.samples
-    seen = occurrences(record)
+    capture = everywhere(benches, configuration.script(name), configuration.shape)
+    assert len(capture) >= configuration.samples
+    seen = occurrences(capture)
     if configuration.samples > 5000:
         assert all(seen[name] for name in (*FLAGS, *FAULTS[:2])), seen
 
@@ -72,15 +71,20 @@ def test_random_programs(name: str, benches: Benches) -> None:
 @pytest.mark.parametrize("name", LONG)
 def test_long_lines(name: str, benches: Benches) -> None:
     script = long_play(name, 60_000)
-    record = everywhere(benches, script, LONG[name][0])
-    assert len(record) >= 60_000
+    capture = everywhere(benches, script, LONG[name][0])
+    assert len(capture) >= 60_000
     assert script.swaps > 8
 
 
 @pytest.mark.parametrize(
-    "shape", [Shape(16, 1, 4, 16, 1, 3, 16), Shape(20, 1, 3, 24, 1, 4, 18), Shape(12, 0, 6, 12, 0, 6, 20)]
+    "shape",
+    [
+        SequencerShape(16, 1, 4, 16, 1, 3, 16),
+        SequencerShape(20, 1, 3, 24, 1, 4, 18),
+        SequencerShape(12, 0, 6, 12, 0, 6, 20),
+    ],
 )
-def test_everything_that_a_host_may_ask(shape: Shape, benches: Benches) -> None:
+def test_everything_that_a_host_may_ask(shape: SequencerShape, benches: Benches) -> None:
     everywhere(benches, everything(shape, 1), shape)
 
 
@@ -99,7 +103,7 @@ def test_the_longest_periods(lines: int, benches: Benches) -> None:
 
 
 def test_words_can_be_written_in_any_order(benches: Benches) -> None:
-    shape, rng, script = Shape(16, 1, 3, 16, 0, 3, 16), np.random.default_rng(3), Script()
+    shape, rng, script = SequencerShape(16, 1, 3, 16, 0, 3, 16), np.random.default_rng(3), Script()
     script.tick_every(1)
     for _ in range(4):
         program = long_dual(rng, shape, (8, 8), lines=(1, 2))
@@ -117,10 +121,10 @@ def test_words_can_be_written_in_any_order(benches: Benches) -> None:
 def test_a_swap_is_requested_at_every_tick(benches: Benches) -> None:
     shape = LONG["bits_16"][0]
     script = every_tick(shape)
-    record = everywhere(benches, script, shape)
-    swapped = flag(record, "swapped") & flag(record, "playing")
+    capture = everywhere(benches, script, shape)
+    swapped = flag(capture, "swapped") & flag(capture, "playing")
     assert np.sum(swapped) == max(program.schedule.ticks for program in script.taken)
-    assert np.all(flag(record, "line")[swapped])
+    assert np.all(flag(capture, "line")[swapped])
 
 
 @pytest.mark.parametrize("swaps", [SWAPS, pytest.param(SWAPS_SLOW, marks=pytest.mark.slow)])
@@ -128,13 +132,13 @@ def test_no_line_mixes_programs(swaps: int, benches: Benches) -> None:
     rng = np.random.default_rng(swaps)
     for _ in range(0, swaps, SWAPS):
         script, programs = random_swaps(rng, SWAPS, SMALL_IN_C)
-        record = everywhere(benches, script, SMALL_IN_C)
-        assert np.sum(flag(record, "swapped")) == SWAPS == len(programs)
-        follow_their_programs(record, programs)
+        capture = everywhere(benches, script, SMALL_IN_C)
+        assert np.sum(flag(capture, "swapped")) == SWAPS == len(programs)
+        follow_their_programs(capture, programs)
 
 
 def test_tables_are_rendered_while_a_program_plays(benches: Benches) -> None:
-    shape = Shape(16, 1, 4, 16, 1, 3, 14)
+    shape = SequencerShape(16, 1, 4, 16, 1, 3, 14)
     script = renderings(shape, 40, HARMONICS)
     everywhere(benches, script, shape, fourier=True)
     assert script.swaps == 40
@@ -184,7 +188,7 @@ def test_a_build_s_header_plays_a_frame_a_swap_and_parks(name: str, tmp_path: Pa
         f"extern const dac_converter x, y;\n"
         f"const dac_converter x = DAC_CONVERTER({upper}_X, 3), y = DAC_CONVERTER({upper}_Y, 5);\n"
     )
-    program = DualProgram.of(built.plan)
+    program = built.plan.program
     emitted = [built.folder / file for file in built.files if file == f"{NAME}.c"]
     path = compile_library(
         tmp_path / "library.so",

@@ -9,11 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tablegen.calibration.columns import APPARENT, FREQUENCY, GAIN, OFFSET, PHASE, TIME, Column
-from tablegen.calibration.table import Table, read_table
+from tablegen.calibration.table import MeasuredTable, read_table
 from tablegen.problems import Rejected
 
 
-def read(folder: Path, content: str | bytes, *needed: Column, optional: tuple[Column, ...] = ()) -> Table:
+def read(folder: Path, content: str | bytes, *needed: Column, optional: tuple[Column, ...] = ()) -> MeasuredTable:
     path = folder / "data.csv"
     path.write_bytes(content if isinstance(content, bytes) else content.encode("utf-8"))
     return read_table(path, needed or (OFFSET, APPARENT), optional)

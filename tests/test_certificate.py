@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from variants import plan_of, setup_of
 
-from tablegen.certificate import broken_limits, certify
+from tablegen.certificate.certificate import broken_limits, certify
+from tablegen.certificate.line_errors import EmittedPeriod
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.fixedpoint import runs as runs_module
 from tablegen.fixedpoint.runs import runs_of
-from tablegen.measurement import Played
-from tablegen.plan import LinePlan, Plan, make_plan
+from tablegen.planning.line_plan import LinePlan, Plan, make_plan
 
 FREE = {"limits.max_error_lsb": "", "limits.max_scaling_error_percent": ""}
 
@@ -145,7 +145,7 @@ def test_runs_and_ticks_measure_the_same(example: Plan, monkeypatch: pytest.Monk
     """Long frames are measured by runs of one code. Forced to single ticks, every figure has to come out again."""
     by_runs = certify(example)["y"]
     assert len(runs_of(example.y.program).starts) < 0.2 * example.y.program.ticks
-    monkeypatch.setattr(runs_module, "_TICKS_AT_LEAST", 10**9)
+    monkeypatch.setattr(runs_module, "_MIN_TICKS_PER_RUN", 10**9)
     assert len(runs_of(example.y.program).starts) == example.y.program.ticks
     by_ticks = certify(example)["y"]
     exact = ("max_error_lsb", "lowest_code", "highest_code", "largest_step", "headroom_low")
@@ -165,8 +165,8 @@ def test_the_largest_error_may_stand_in_the_middle_of_a_run(example: Plan) -> No
     line = replace(example.y, program=replace(example.y.program, output=output))
     ticks = np.arange(line.program.ticks)
     error = line.program.codes(ticks) - line.float_codes(line.series.on_grid(line.program.ticks))
-    assert Played(line).largest_error() == pytest.approx(float(np.max(np.abs(error))), abs=1e-6)
-    assert Played(line).largest_error() > 299.0
+    assert EmittedPeriod(line).largest_error() == pytest.approx(float(np.max(np.abs(error))), abs=1e-6)
+    assert EmittedPeriod(line).largest_error() > 299.0
 
 
 def test_a_resonance_inside_the_band_is_seen(tmp_path: Path) -> None:

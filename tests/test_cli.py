@@ -543,7 +543,7 @@ LONG = edited(SCAN, "timing.lines = 20000", "x.size_nm = 201.0", "- [limits]")
     ("event", "count"),
     [
         ("import ('numpy'", 1),
-        ("import ('tablegen.plan'", 1),
+        ("import ('tablegen.planning.line_plan'", 1),
         ("import ('jinja2'", 1),
         ("import ('tablegen.emit", 1),
         ("open ('{scan}'", 1),

@@ -15,7 +15,7 @@ from tablegen.virtual import laboratory
 from tablegen.virtual.closed_loop import SHARP, SHARP_RATE_HZ, play_x, size_map, uncorrected, with_scan
 from tablegen.virtual.experiments import sensor_trace
 from tablegen.virtual.laboratory import Calibration, calibrate
-from tablegen.virtual.measurement import about_window_line, line_error
+from tablegen.virtual.line_error import about_window_line, line_error
 from tablegen.virtual.parameters import load_truth
 from tablegen.virtual.scanner import VirtualAxis, VirtualScanner
 from tablegen.virtual.simulation import with_model

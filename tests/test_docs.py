@@ -10,11 +10,11 @@ from click.testing import CliRunner
 from editing import SCAN, edited, write_pair
 from test_band_limit import SECTION_8, worst
 
-from tablegen.certificate import certify
+from tablegen.certificate.certificate import certify
 from tablegen.cli import cli
 from tablegen.config.load import load
 from tablegen.config.schema import BandLimit
-from tablegen.plan import make_plan
+from tablegen.planning.line_plan import make_plan
 from tablegen.problems import Rejected
 from tablegen.waveform.band_limit import band_limited
 

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from building import NAME, REPOSITORY, VARIANTS, Build, Variant, build, build_stressed, constants, run, run_clean
 
+from tablegen.device.sequencer import play_line
 from tablegen.numerics.arrays import Ints
-from tablegen.sequencer import DualProgram, play_line
 
 PLAYER = REPOSITORY / "examples" / "c" / "play.c"
 WARNINGS = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wsign-conversion", "-Wdouble-promotion", "-Werror"]
@@ -54,7 +54,7 @@ def played(program: Path, lines: int) -> Ints:
 
 def model(built: Build, lines: int) -> Ints:
     """The same columns from the integer model; lines past the frame begin it again."""
-    program = DualProgram.of(built.plan)
+    program = built.plan.program
     ticks = [play_line(program, line % built.plan.schedule.lines) for line in range(lines)]
     x, y = (np.concatenate([getattr(line, axis) for line in ticks]) for axis in "xy")
     x_word, y_word = (

@@ -18,8 +18,8 @@ from following import Differs, Follower, follow
 from qemu import Machine
 
 from tablegen.config.load import load
-from tablegen.plan import Plan, make_plan
-from tablegen.verify.stream import FLAGS
+from tablegen.planning.line_plan import Plan, make_plan
+from tablegen.verification.stream import FLAGS
 
 FIRMWARE = REPOSITORY / "examples" / "firmware"
 SHORT = {**VARIANTS["short_frame"].scan, "limits": REMOVED}  # which coarse converters break

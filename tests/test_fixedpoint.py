@@ -15,7 +15,7 @@ from tablegen.fixedpoint.interpolation import FRACTION_BITS, guard_bits, interpo
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.phase import MAXIMUM_TICKS, RationalPhase
 from tablegen.fixedpoint.rounding import round_half_up, saturate, shift_round, signed_limits
-from tablegen.fixedpoint.synthesis import decode, encode, sine_table, synthesize
+from tablegen.fixedpoint.synthesis import encode, sine_table, synthesize
 from tablegen.waveform.closed_form import fourier_series
 from tablegen.waveform.series import FourierSeries
 
@@ -157,7 +157,7 @@ SECTION_8 = LineShape(0.5, BranchShape.harmonic(0.035, 0.37), BranchShape.harmon
 @pytest.mark.parametrize("bits", [8, 16, 24])
 def test_synthesis_is_the_exact_sum_and_close_to_the_waveform(length: int, bits: int) -> None:
     series = fourier_series(SECTION_8, 20)
-    words = encode(series, 1.002)
+    words = encode(series.a0, series.a, series.b, 1.002)
     rendered = synthesize(words, length, bits)
     sines = sine_table(length).tolist()
     cosines = [round(mp.cospi(mp.mpf(2 * j) / length) * 2**30) for j in range(length)]
@@ -173,15 +173,15 @@ def test_synthesis_is_the_exact_sum_and_close_to_the_waveform(length: int, bits:
 
 def test_words_decode_to_the_waveform() -> None:
     series = fourier_series(SECTION_8, 64)
-    back = decode(encode(series, 1.5), 1.5)
-    assert back.a0 == pytest.approx(series.a0, abs=1e-9)
-    assert back.a == pytest.approx(series.a, abs=1e-9)
-    assert back.b == pytest.approx(series.b, abs=1e-9)
+    words, unit = encode(series.a0, series.a, series.b, 1.5), 1.5 / 2**31
+    assert 0.5 + unit * words.a0 == pytest.approx(series.a0, abs=1e-9)
+    assert unit * words.a == pytest.approx(series.a, abs=1e-9)
+    assert unit * words.b == pytest.approx(series.b, abs=1e-9)
 
 
 def test_synthesis_saturates_instead_of_wrapping() -> None:
     series = FourierSeries(0.5, np.array([0.6]), np.array([0.0]))  # 2 w - 1 reaches 1.2
-    words = synthesize(encode(series, 1.0), 64, 8)
+    words = synthesize(encode(series.a0, series.a, series.b, 1.0), 64, 8)
     assert (words.max(), words.min()) == (127, -128)
 
 
@@ -190,7 +190,7 @@ def test_words_that_could_overflow_are_refused(a0: float, a: list[float]) -> Non
     """A word beyond Q2.30, and a sum beyond the 64-bit accumulator: found before a device could."""
     series = FourierSeries(a0, np.array(a), np.zeros(len(a)))
     with pytest.raises(OverflowError, match=r"does not fit 32 bits|the accumulator holds 4"):
-        encode(series, 1.0)
+        encode(series.a0, series.a, series.b, 1.0)
 
 
 outputs = st.builds(

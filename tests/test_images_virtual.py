@@ -10,7 +10,7 @@ from tablegen.compensation.hysteresis import BranchShape, LineShape
 from tablegen.numerics.arrays import Floats
 from tablegen.virtual.experiments import sensor_trace
 from tablegen.virtual.imaging import grating, hexagonal, image_pair
-from tablegen.virtual.measurement import LineError, line_error
+from tablegen.virtual.line_error import LineError, line_error
 from tablegen.virtual.parameters import load_truth
 from tablegen.virtual.scanner import VirtualAxis, VirtualScanner
 from tablegen.virtual.sensor import Sensor

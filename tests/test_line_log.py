@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from line_log import LineCheck, PlayedLine, WrongLine
 from link_programs import make_scan
 
-from tablegen.link.messages import State
+from tablegen.device.sequencer import DualProgram, Tick
+from tablegen.link.messages import DeviceState
 from tablegen.link.players import LinePlayer, SequencerPlayer
-from tablegen.sequencer import DualProgram, Tick
-from tablegen.verify.stream import FLAGS
+from tablegen.verification.stream import FLAGS
 
 _PROGRAMS = {scan.digest: scan.program for scan in (make_scan(seed, ticks=40, lines=5) for seed in range(1, 6))}
 _BOOT = make_scan(0, ticks=40, lines=5).program
@@ -149,7 +149,7 @@ def test_the_player_of_lines_does_what_the_player_of_ticks_does(steps: list[Step
         for player in players:
             _ask(player, request, number)
             player.advance(ticks)
-            state = State.PARKED if player.state is State.PARKING else player.state
+            state = DeviceState.PARKED if player.state is DeviceState.PARKING else player.state
             seen.append((player.swaps, player.line, player.swapped_at, state, player.writable, _name(player.playing)))
         assert seen[0] == seen[1]
 

@@ -15,7 +15,7 @@ from link_programs import INFO
 from tablegen.cli.bar import Bar
 from tablegen.link.frames import FrameReader
 from tablegen.link.messages import DeviceInfo, Feature, Reason, Request
-from tablegen.link.prepare import Scan
+from tablegen.link.prepare import PreparedScan
 
 COMMANDS = ("upload", "status", "readback", "park", "trigger", "clear", "ports")
 
@@ -26,12 +26,12 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def scan(folder: Path) -> Scan:
-    return Scan.of_build(folder)
+def scan(folder: Path) -> PreparedScan:
+    return PreparedScan.of_build(folder)
 
 
 @pytest.fixture
-def info(scan: Scan) -> DeviceInfo:
+def info(scan: PreparedScan) -> DeviceInfo:
     return info_for(scan)
 
 
@@ -56,7 +56,7 @@ def type_of(piece: bytes) -> int:
 # upload
 
 
-def test_an_upload_says_what_came_of_it(bench: Bench, folder: Path, scan: Scan) -> None:
+def test_an_upload_says_what_came_of_it(bench: Bench, folder: Path, scan: PreparedScan) -> None:
     first = bench.run("upload", folder)
     assert (first.status, first.err) == (0, "")
     name = f"annexin_200nm {scan.digest[:12]}"
@@ -90,7 +90,7 @@ def test_port_and_rate_come_from_the_environment(bench: Bench, folder: Path, mon
 
 
 @pytest.mark.usefixtures("no_environment")
-def test_a_dry_run_without_a_port_tells_sizes_and_times(folder: Path, scan: Scan) -> None:
+def test_a_dry_run_without_a_port_tells_sizes_and_times(folder: Path, scan: PreparedScan) -> None:
     outcome = run("upload", folder, "--dry-run", "--baud", "9600")
     assert (outcome.status, outcome.err) == (0, "")
     lines = outcome.out.splitlines()
@@ -135,7 +135,7 @@ def test_a_direct_table_is_said_to_have_no_fourier_form(tmp_path: Path) -> None:
 # status, park, trigger, clear, readback
 
 
-def test_status_in_words(bench: Bench, folder: Path, scan: Scan) -> None:
+def test_status_in_words(bench: Bench, folder: Path, scan: PreparedScan) -> None:
     shown = bench.run("status")
     assert (shown.status, shown.err) == (0, "")
     rows = dict(line.split(maxsplit=1) for line in shown.out.splitlines())
@@ -215,7 +215,7 @@ def test_park_that_does_not_come_about(bench: Bench) -> None:
     assert "did not become parked within 1 s" in outcome.err
 
 
-def test_readback_compares_and_saves(bench: Bench, folder: Path, scan: Scan, tmp_path: Path) -> None:
+def test_readback_compares_and_saves(bench: Bench, folder: Path, scan: PreparedScan, tmp_path: Path) -> None:
     outcome = bench.run("readback", folder)
     assert (outcome.status, outcome.out) == (9, ""), "the scan came with the firmware"
     assert "there is nothing that could be read" in outcome.err
@@ -230,7 +230,7 @@ def test_readback_compares_and_saves(bench: Bench, folder: Path, scan: Scan, tmp
     assert (tmp_path / "playing.bin").read_bytes() == scan.image("table").data
 
 
-def test_readback_says_the_first_difference(bench: Bench, folder: Path, scan: Scan) -> None:
+def test_readback_says_the_first_difference(bench: Bench, folder: Path, scan: PreparedScan) -> None:
     bench.run("upload", folder)
 
     def damaged(piece: bytes) -> list[bytes]:

@@ -24,8 +24,8 @@ from tablegen.link.errors import (
 )
 from tablegen.link.exchange import Exchange
 from tablegen.link.frames import FrameReader
-from tablegen.link.messages import AxisLimits, Feature, Reason, Request, State, Upload
-from tablegen.link.session import Session
+from tablegen.link.messages import AxisLimits, DeviceState, Feature, Reason, Request, Upload
+from tablegen.link.session import LinkSession
 
 
 def never_answering(piece: bytes) -> list[bytes]:
@@ -49,17 +49,17 @@ def test_it_knows_the_device_after_hello() -> None:
 def test_it_plays_parks_and_clears() -> None:
     line = VirtualLine(model())
     with client(line) as device:
-        assert device.wait_for(State.PARKED, 5.0).line == 0
+        assert device.wait_for(DeviceState.PARKED, 5.0).line == 0
         device.arm(0)
         device.trigger()
-        device.wait_for(State.PLAYING, 5.0)
+        device.wait_for(DeviceState.PLAYING, 5.0)
         device.park()
-        device.wait_for(State.PARKED, 5.0)
+        device.wait_for(DeviceState.PARKED, 5.0)
         device.arm(1)
         device.trigger()
         device.clear()
         with pytest.raises(OutOfTime, match=r"the device is parked and did not become no_program within 0\.5 s"):
-            device.wait_for(State.NO_PROGRAM, 0.5)
+            device.wait_for(DeviceState.NO_PROGRAM, 0.5)
 
 
 def test_it_narrows_limits_and_reads_them() -> None:
@@ -108,7 +108,7 @@ def test_what_waits_for_a_line_is_asked_for_and_not_sent_again() -> None:
     with client(line) as device:
         device.arm()
         device.trigger()
-        device.wait_for(State.PLAYING, 60.0)
+        device.wait_for(DeviceState.PLAYING, 60.0)
         start = line.now()
         result = device.upload(TABLE, timeout_s=30.0)
         assert line.now() - start > 1.0
@@ -191,7 +191,7 @@ def test_a_long_way_is_learned(way_s: float) -> None:
 
 def test_without_learning_a_long_way_is_never_at_its_end(monkeypatch: pytest.MonkeyPatch) -> None:
     """Negative control."""
-    monkeypatch.setattr(exchange, "_MOST_LATE_S", 0.0)
+    monkeypatch.setattr(exchange, "_MAX_LATENESS_S", 0.0)
     line = Watched(model(LARGE_INFO), out_s=0.06, back_s=0.06, tick_hz=500_000)
     with client(line) as device, pytest.raises(OutOfTime):
         device.upload(LARGE)
@@ -386,5 +386,5 @@ def test_sessions_are_chosen_by_chance() -> None:
             sessions.add(device._session.exchange.session)
     assert len(sessions) == 8
     assert 0 not in sessions
-    assert isinstance(device._session, Session)
+    assert isinstance(device._session, LinkSession)
     assert isinstance(device._session.exchange, Exchange)

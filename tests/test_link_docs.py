@@ -9,12 +9,12 @@ from client_line import VirtualLine
 from client_rig import client, info_for, model
 from editing import run
 
-from tablegen.cli.status import Status
+from tablegen.cli.exit_status import ExitStatus
 from tablegen.config.load import load
 from tablegen.link.messages import Request
-from tablegen.link.prepare import Scan
+from tablegen.link.prepare import PreparedScan
 from tablegen.link.transport import Transport
-from tablegen.plan import make_plan
+from tablegen.planning.line_plan import make_plan
 
 PAGE = (REPOSITORY / "docs" / "upload.md").read_text("utf-8")
 TEXT = " ".join(PAGE.split())
@@ -24,7 +24,7 @@ def test_the_example_of_the_class_runs(tmp_path: Path, capsys: pytest.MonkeyPatc
     found = re.search(r"```python\n(.*?)```", PAGE, re.DOTALL)
     assert found
     folder = build(tmp_path, Variant({"timing.lines": 40})).folder
-    device = model(info_for(Scan.of_build(folder)))
+    device = model(info_for(PreparedScan.of_build(folder)))
     line = VirtualLine(device, tick_hz=500_000)
 
     def port() -> Transport:
@@ -41,8 +41,8 @@ def test_the_example_of_the_class_runs(tmp_path: Path, capsys: pytest.MonkeyPatc
 def test_its_statuses_are_those_of_the_program() -> None:
     rows = [int(number) for number in re.findall(r"^\| (\d+) \|", PAGE, re.M)]
     assert rows == [0, 2, 5, 6, 7, 8, 9, 10, 130]
-    others = {Status.STALE, Status.BROKEN_LIMIT, Status.CANNOT_WRITE}
-    assert set(rows) == set(Status) - others
+    others = {ExitStatus.STALE, ExitStatus.BROKEN_LIMIT, ExitStatus.CANNOT_WRITE}
+    assert set(rows) == set(ExitStatus) - others
 
 
 def test_its_commands_are_there() -> None:
@@ -51,7 +51,7 @@ def test_its_commands_are_there() -> None:
 
 
 def test_its_speeds_are_measured() -> None:
-    scan = Scan.of_plan(make_plan(load(EXAMPLE)))
+    scan = PreparedScan.of_plan(make_plan(load(EXAMPLE)))
     table, fourier = scan.image("table"), scan.image("fourier")
     assert f"the example ({len(table.data)} bytes)" in TEXT
     assert f"As Fourier words the same scan has {len(fourier.data)} bytes" in TEXT

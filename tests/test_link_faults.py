@@ -13,7 +13,7 @@ from line_log import WrongLine
 from link_device import DeviceLibrary, compile_device
 from link_faults import KINDS, MIXED, Chances
 from link_line import Line
-from link_programs import INFO, Scan, make_scan
+from link_programs import INFO, SmallScan, make_scan
 
 from tablegen.link.device import Device
 from tablegen.link.errors import LinkError, Refused
@@ -147,7 +147,7 @@ def _changed(folder: Path, file: str, changes: dict[str, str]) -> DeviceLibrary:
 class _Damage:
     """A low bit of a table word turns over when the first COMMIT arrives: only a CRC can see that."""
 
-    def __init__(self, scan: Scan) -> None:
+    def __init__(self, scan: SmallScan) -> None:
         self.done = False
         self._word = int(scan.program.x.words[17]) ^ 0x40
 
@@ -207,7 +207,7 @@ def test_a_device_that_swaps_in_mid_line_is_caught(tmp_path: Path, changes: dict
         _upload_some(Trial(2, Chances(), library=changed))
 
 
-def _deaf_upload(trial: Trial) -> Scan:
+def _deaf_upload(trial: Trial) -> SmallScan:
     """A client that sends everything once, and takes it for done."""
     scan = make_scan(1)
     image = scan.image(fourier=False)

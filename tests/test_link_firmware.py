@@ -24,8 +24,8 @@ from link_qemu import LinkMachine
 from tablegen.config.load import load
 from tablegen.link.device import Device
 from tablegen.link.errors import LinkError, NotPlaying, Refused
-from tablegen.link.prepare import Scan
-from tablegen.plan import make_plan
+from tablegen.link.prepare import PreparedScan
+from tablegen.planning.line_plan import make_plan
 
 SCAN = {
     **VARIANTS["short_frame"].scan,
@@ -46,9 +46,9 @@ class Built:
     """Firmware with a scan of 50 nm, and smaller ones to be uploaded: their files, and what they play."""
 
     executable: Path
-    boot: Scan
+    boot: PreparedScan
     files: list[Path]
-    scans: list[Scan]
+    scans: list[PreparedScan]
 
     def check(self) -> LineCheck:
         """Of what a device with this firmware plays."""
@@ -66,7 +66,7 @@ def _built(folder: Path, board: Board) -> Built:
         ["make", "-C", REPOSITORY / "examples" / "firmware" / "cortex_m", f"BOARD={board.name}", f"SCAN={files[0]}",
          f"BUILD={target}", f"TABLEGEN={sys.executable} -m tablegen", "CONTROL=link", "DAC=lines"]
     )  # fmt: skip
-    boot, *scans = [Scan.of_plan(make_plan(load(file))) for file in files]
+    boot, *scans = [PreparedScan.of_plan(make_plan(load(file))) for file in files]
     return Built(target / "firmware.elf", boot, files[1:], scans)
 
 

@@ -16,7 +16,7 @@ from tablegen.link.errors import (
     NotPlaying,
 )
 from tablegen.link.frames import Frame, FrameReader
-from tablegen.link.messages import Request, State, Upload
+from tablegen.link.messages import DeviceState, Request, Upload
 from tablegen.link.upload import Uploader
 
 # What is lost, and goes
@@ -194,7 +194,7 @@ def test_two_hosts_get_an_error_that_says_so() -> None:
         with pytest.raises(LinkLost, match="another program talks to the device"):
             device.status()
         line.spoil_out = lambda piece: [piece]
-        assert device.status().state == State.PARKED
+        assert device.status().state == DeviceState.PARKED
     assert device_model is line.device
 
 

@@ -10,11 +10,11 @@ from client_rig import BOOT, KEY, client, model
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
-from link_programs import Scan, make_scan
+from link_programs import SmallScan, make_scan
 
 from tablegen.link.device import Device
 from tablegen.link.errors import LinkError, NotPlaying, Refused
-from tablegen.link.messages import Reason, State
+from tablegen.link.messages import DeviceState, Reason
 from tablegen.link.upload import Uploader
 
 Result = TypeVar("Result")
@@ -63,7 +63,7 @@ class Instrument(RuleBasedStateMachine):
 
     @precondition(lambda self: self.device is not None)
     @rule(scan=st.sampled_from(SCANS), fourier=st.booleans(), force=st.booleans())
-    def upload(self, scan: Scan, fourier: bool, force: bool) -> None:
+    def upload(self, scan: SmallScan, fourier: bool, force: bool) -> None:
         device = self.device
         assert device is not None
         image = scan.image(fourier)
@@ -86,7 +86,7 @@ class Instrument(RuleBasedStateMachine):
         done = self.attempt(getattr(self.device, request))
         self.line.sleep(0.001)
         if done and request == "park":
-            assert self.model.player.state in (State.PARKED, State.PARKING)
+            assert self.model.player.state in (DeviceState.PARKED, DeviceState.PARKING)
 
     @precondition(lambda self: self.device is not None)
     @rule()

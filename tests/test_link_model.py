@@ -11,7 +11,7 @@ from link_programs import INFO, make_scan
 from tablegen.link import acceptance, model_bank
 from tablegen.link.acceptance import Finding
 from tablegen.link.frames import Frame, FrameReader
-from tablegen.link.image import Image
+from tablegen.link.image import ProgramImage
 from tablegen.link.messages import DeviceInfo, DeviceStatus, Reason, Refusal, Request, Upload
 from tablegen.link.model import ModelDevice
 from tablegen.link.model_bank import Bank
@@ -118,12 +118,12 @@ class _Host:
         self.device.tick(ticks)
         return self._reader.feed(self.device.transmit())
 
-    def put(self, image: Image) -> None:
+    def put(self, image: ProgramImage) -> None:
         self.ask(Request.BEGIN, image.info.pack())
         for at in range(0, len(image.data), 240):
             self.ask(Request.DATA, struct.pack("<I", at) + image.data[at : at + 240])
 
-    def commit(self, image: Image, seq: int, ticks: int = 0) -> list[Frame]:
+    def commit(self, image: ProgramImage, seq: int, ticks: int = 0) -> list[Frame]:
         return self.ask(Request.COMMIT, struct.pack("<I", image.info.image_crc), seq, ticks)
 
     def upload(self) -> Upload:

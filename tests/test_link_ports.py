@@ -18,8 +18,8 @@ from serial.rfc2217 import PortManager
 
 from tablegen.link.device import Device
 from tablegen.link.errors import LinkLost, NoAnswer, NoPort
-from tablegen.link.messages import State
-from tablegen.link.prepare import Scan
+from tablegen.link.messages import DeviceState
+from tablegen.link.prepare import PreparedScan
 from tablegen.link.transport import open_port
 
 WAIT_S = 120
@@ -32,8 +32,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def scan(folder: Path) -> Scan:
-    return Scan.of_build(folder)
+def scan(folder: Path) -> PreparedScan:
+    return PreparedScan.of_build(folder)
 
 
 def tablegen(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
@@ -49,7 +49,7 @@ def tablegen(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.parametrize("kind", ["pty", "tcp"])
-def test_the_command_line_on_a_real_port(kind: str, folder: Path, scan: Scan) -> None:
+def test_the_command_line_on_a_real_port(kind: str, folder: Path, scan: PreparedScan) -> None:
     with Served(model(info_for(scan)), kind, RATE_HZ) as served:
         port = ("--port", served.url)
         done = tablegen("upload", folder, "--as", "table", *port)
@@ -61,10 +61,10 @@ def test_the_command_line_on_a_real_port(kind: str, folder: Path, scan: Scan) ->
         assert done.stdout.endswith("all the same\n")
         done = tablegen("trigger", *port)
         assert (done.returncode, done.stdout) == (0, "plays until it is parked\n")
-        assert served.device.player.state == State.PLAYING
+        assert served.device.player.state == DeviceState.PLAYING
 
 
-def test_a_connection_that_breaks_is_made_again_and_the_upload_goes_on(folder: Path, scan: Scan) -> None:
+def test_a_connection_that_breaks_is_made_again_and_the_upload_goes_on(folder: Path, scan: PreparedScan) -> None:
     with Served(model(info_for(scan)), "tcp", RATE_HZ, dies_after=4000) as served:
         done = tablegen("upload", folder, "--as", "table", "--port", served.url)
         assert (done.returncode, done.stderr) == (0, "")
@@ -72,7 +72,7 @@ def test_a_connection_that_breaks_is_made_again_and_the_upload_goes_on(folder: P
         assert served.device.status().hash.hex() == scan.digest
 
 
-def test_a_pty_that_goes_for_good_is_a_lost_link(folder: Path, scan: Scan) -> None:
+def test_a_pty_that_goes_for_good_is_a_lost_link(folder: Path, scan: PreparedScan) -> None:
     with Served(model(info_for(scan)), "pty", RATE_HZ, dies_after=4000) as served:
         done = tablegen("upload", folder, "--as", "table", "--timeout", "2", "--port", served.url)
         assert (done.returncode, done.stdout) == (10, "")
@@ -81,7 +81,7 @@ def test_a_pty_that_goes_for_good_is_a_lost_link(folder: Path, scan: Scan) -> No
         assert served.device.status().hash.hex() == BOOT.digest
 
 
-def test_an_interruption_leaves_what_was_received_for_the_next_time(folder: Path, scan: Scan) -> None:
+def test_an_interruption_leaves_what_was_received_for_the_next_time(folder: Path, scan: PreparedScan) -> None:
     """Of a device that takes its time."""
     device = model(info_for(scan, window=1))
     receive = device.receive
@@ -133,7 +133,7 @@ def test_the_class_on_a_real_port(kind: str) -> None:
         assert device.upload(new.image(False)).generation == 2
         assert device.readback() == new.image(False).data
         device.park()
-        device.wait_for(State.PARKED, 30.0)
+        device.wait_for(DeviceState.PARKED, 30.0)
 
 
 def test_reading_waits_no_longer_than_it_may_and_takes_all_that_has_come() -> None:

@@ -14,10 +14,10 @@ from tablegen.link.difference import differences
 from tablegen.link.errors import Unsuitable
 from tablegen.link.image import make_image, take_apart
 from tablegen.link.messages import AxisLimits, AxisShape, DeviceInfo, Feature, Reason
-from tablegen.link.prepare import LEFT_ALIGNED, TWOS_COMPLEMENT, Scan, check, harmonics_of
+from tablegen.link.prepare import LEFT_ALIGNED, TWOS_COMPLEMENT, PreparedScan, check, harmonics_of
 from tablegen.link.reasons import explain, refused
-from tablegen.plan import make_plan
-from tablegen.recorded import NotABuild
+from tablegen.manifest.read import NotABuild
+from tablegen.planning.line_plan import make_plan
 
 
 @pytest.fixture(scope="module")
@@ -26,16 +26,16 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def scan(folder: Path) -> Scan:
-    return Scan.of_build(folder)
+def scan(folder: Path) -> PreparedScan:
+    return PreparedScan.of_build(folder)
 
 
 @pytest.fixture(scope="module")
-def info(scan: Scan) -> DeviceInfo:
+def info(scan: PreparedScan) -> DeviceInfo:
     return info_for(scan)
 
 
-def objections(scan: Scan, info: DeviceInfo, form: str = "table", any_rate: bool = False) -> list[str]:
+def objections(scan: PreparedScan, info: DeviceInfo, form: str = "table", any_rate: bool = False) -> list[str]:
     """What is found; nothing where it fits."""
     image = scan.image(form, info)  # type: ignore[arg-type]
     try:
@@ -50,8 +50,8 @@ def objections(scan: Scan, info: DeviceInfo, form: str = "table", any_rate: bool
 
 @pytest.mark.parametrize("variant", ["example", "direct_steps", "bits_24", "left_aligned", "inverting"])
 def test_a_plan_and_its_build_are_the_same_upload(tmp_path: Path, variant: str) -> None:
-    of_build = Scan.of_build(build(tmp_path, VARIANTS[variant]).folder)
-    of_plan = Scan.of_plan(make_plan(load(write_variant(tmp_path / "again", VARIANTS[variant]))))
+    of_build = PreparedScan.of_build(build(tmp_path, VARIANTS[variant]).folder)
+    of_plan = PreparedScan.of_plan(make_plan(load(write_variant(tmp_path / "again", VARIANTS[variant]))))
     assert (of_build.name, of_build.digest) == (of_plan.name, of_plan.digest)
     assert of_build.image("table") == of_plan.image("table")
     assert of_build.image("auto") == of_plan.image("auto")
@@ -61,17 +61,17 @@ def test_a_manifest_that_was_edited_is_not_uploaded(tmp_path: Path, folder: Path
     text = (folder / "manifest.json").read_text("ascii")
     (tmp_path / "manifest.json").write_text(text.replace('"park_code": ', '"park_code": 1', 1), "ascii")
     with pytest.raises(NotABuild):
-        Scan.of_build(tmp_path)
+        PreparedScan.of_build(tmp_path)
     assert '"settle_lines": 2' in text
     (tmp_path / "manifest.json").write_text(text.replace('"settle_lines": 2', '"settle_lines": 0'), "ascii")
     with pytest.raises(NotABuild, match="was changed after the build"):
-        Scan.of_build(tmp_path)
+        PreparedScan.of_build(tmp_path)
 
 
 # Forms
 
 
-def test_automatic_is_the_smaller_form_that_the_device_takes(scan: Scan, info: DeviceInfo) -> None:
+def test_automatic_is_the_smaller_form_that_the_device_takes(scan: PreparedScan, info: DeviceInfo) -> None:
     table, fourier = scan.image("table"), scan.image("fourier")
     assert 8 * len(fourier.data) <= len(table.data), "an eighth of the bytes, both axes"
     assert scan.image("auto").data == scan.image("auto", info).data == fourier.data
@@ -85,12 +85,12 @@ def test_automatic_is_the_smaller_form_that_the_device_takes(scan: Scan, info: D
 
 
 def test_a_direct_table_has_no_fourier_words(tmp_path: Path) -> None:
-    direct = Scan.of_build(build(tmp_path, VARIANTS["direct"]).folder)
+    direct = PreparedScan.of_build(build(tmp_path, VARIANTS["direct"]).folder)
     assert direct.image("auto").data == direct.image("table").data
     with pytest.raises(Unsuitable, match="x: a direct table cannot be rendered"):
         direct.image("fourier")
     mixed = Variant({"x.table": {"mode": "direct", "bits": 16}, "timing.lines": 40})
-    both = Scan.of_build(build(tmp_path / "mixed", mixed).folder)
+    both = PreparedScan.of_build(build(tmp_path / "mixed", mixed).folder)
     assert [harmonics > 0 for harmonics in harmonics_of(both.image("auto").data)] == [False, True]
     assert objections(both, info_for(both), "auto") == []
 
@@ -100,7 +100,7 @@ def test_a_direct_table_has_no_fourier_words(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("variant", sorted(VARIANTS))
 def test_every_variant_fits_the_device_that_is_built_for_it(tmp_path: Path, variant: str) -> None:
-    scan = Scan.of_build(build(tmp_path, VARIANTS[variant]).folder)
+    scan = PreparedScan.of_build(build(tmp_path, VARIANTS[variant]).folder)
     info = replace(info_for(scan), harmonics=512, image_bytes=1 << 22)
     assert objections(scan, info, "table") == []
     assert objections(scan, info, "auto") == []
@@ -195,17 +195,17 @@ WRONG = {
 
 
 @pytest.mark.parametrize("case", WRONG)
-def test_what_would_be_refused_is_said_with_a_remedy(scan: Scan, info: DeviceInfo, case: str) -> None:
+def test_what_would_be_refused_is_said_with_a_remedy(scan: PreparedScan, info: DeviceInfo, case: str) -> None:
     change, form, said = WRONG[case]
     assert objections(scan, change(info), form) == said
 
 
-def test_everything_is_said_at_once(scan: Scan, info: DeviceInfo) -> None:
+def test_everything_is_said_at_once(scan: PreparedScan, info: DeviceInfo) -> None:
     wrong = replace(axis(info, index_bits=10, word_bits=18), image_bytes=5000, update_rate_hz=1)
     assert len(objections(scan, wrong)) == 4
 
 
-def test_another_rate_can_be_allowed_and_an_unknown_one_is_none(scan: Scan, info: DeviceInfo) -> None:
+def test_another_rate_can_be_allowed_and_an_unknown_one_is_none(scan: PreparedScan, info: DeviceInfo) -> None:
     for rate in (0, 499999, 500000, 500001):
         assert objections(scan, replace(info, update_rate_hz=rate)) == []
     assert objections(scan, replace(info, update_rate_hz=499998)) != []
@@ -218,7 +218,9 @@ NOT_OF_AN_AXIS = {"version", "length", "harmonics", "incomplete"}
 
 
 @pytest.mark.parametrize("reason", list(Reason), ids=lambda reason: reason.name)
-def test_every_reason_has_a_sentence_of_its_own_with_a_remedy(scan: Scan, info: DeviceInfo, reason: Reason) -> None:
+def test_every_reason_has_a_sentence_of_its_own_with_a_remedy(
+    scan: PreparedScan, info: DeviceInfo, reason: Reason
+) -> None:
     image = scan.image("table")
     contents = take_apart(image.data, image.info.x, image.info.y)
     limits = info.x_limits, info.y_limits
@@ -241,7 +243,7 @@ def test_unknown_reasons_and_requests_are_told_by_their_numbers() -> None:
     assert str(error).startswith("the device refused request 77 (200): reason 200, detail 12345")
 
 
-def test_checks_name_axis_word_and_value(scan: Scan, info: DeviceInfo) -> None:
+def test_checks_name_axis_word_and_value(scan: PreparedScan, info: DeviceInfo) -> None:
     """Held against what the acceptance of docs/protocol.md finds in spoilt programs."""
     x = scan.program.x
     words = x.words.copy()
@@ -270,7 +272,7 @@ def test_checks_name_axis_word_and_value(scan: Scan, info: DeviceInfo) -> None:
 
 
 @pytest.mark.parametrize("form", ["table", "fourier"])
-def test_the_same_image_has_no_difference(scan: Scan, form: str) -> None:
+def test_the_same_image_has_no_difference(scan: PreparedScan, form: str) -> None:
     assert differences(scan, scan.image(form).data) == []  # type: ignore[arg-type]
 
 
@@ -286,7 +288,7 @@ def test_the_same_image_has_no_difference(scan: Scan, form: str) -> None:
         ("fourier", 192 + 8, "x: Fourier word 2 (byte 200) is {found}, not {word}"),
     ],
 )
-def test_the_first_difference_is_named(scan: Scan, form: str, at: int, said: str) -> None:
+def test_the_first_difference_is_named(scan: PreparedScan, form: str, at: int, said: str) -> None:
     image = scan.image(form).data  # type: ignore[arg-type]
     changed = bytearray(image)
     changed[at] ^= 1
@@ -298,7 +300,7 @@ def test_the_first_difference_is_named(scan: Scan, form: str, at: int, said: str
     assert [str(difference) for difference in told] == [said.format(word=word, found=found)]
 
 
-def test_an_image_of_another_length_is_told(scan: Scan) -> None:
+def test_an_image_of_another_length_is_told(scan: PreparedScan) -> None:
     image = scan.image("table").data
     assert str(differences(scan, image[:-1])[0]) == "its image ends before y: table word 2047 (byte 8382)"
     assert str(differences(scan, image + b"12")[0]) == "what follows the last word (byte 8384) is 2, not 0"
@@ -307,7 +309,7 @@ def test_an_image_of_another_length_is_told(scan: Scan) -> None:
     assert str(differences(scan, image[:190])[0]) == "its image ends before y: unused word 15 (byte 188)"
 
 
-def test_the_example_is_what_these_numbers_are_of(scan: Scan) -> None:
+def test_the_example_is_what_these_numbers_are_of(scan: PreparedScan) -> None:
     values = tomllib.loads(EXAMPLE.read_text("utf-8"))
     assert values["dac"]["update_rate_hz"] == 500000.0
     assert isinstance(scan.image("table").info.x, AxisShape)

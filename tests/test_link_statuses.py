@@ -12,7 +12,7 @@ from editing import run
 
 from tablegen.link.frames import FrameReader
 from tablegen.link.messages import AxisShape, DeviceInfo, Request
-from tablegen.link.prepare import Scan
+from tablegen.link.prepare import PreparedScan
 
 COMMANDS = ("upload", "status", "readback", "park", "trigger", "clear", "ports")
 
@@ -23,12 +23,12 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def scan(folder: Path) -> Scan:
-    return Scan.of_build(folder)
+def scan(folder: Path) -> PreparedScan:
+    return PreparedScan.of_build(folder)
 
 
 @pytest.fixture
-def info(scan: Scan) -> DeviceInfo:
+def info(scan: PreparedScan) -> DeviceInfo:
     return info_for(scan)
 
 
@@ -160,7 +160,7 @@ def test_status_10_link_lost_and_out_of_time(bench: Bench, folder: Path) -> None
 
 
 @pytest.mark.parametrize(("after", "said"), [(0, "goes on with its old scan"), (240, "goes on from there")])
-def test_status_130_interrupted(bench: Bench, folder: Path, scan: Scan, after: int, said: str) -> None:
+def test_status_130_interrupted(bench: Bench, folder: Path, scan: PreparedScan, after: int, said: str) -> None:
     def interrupt(piece: bytes) -> list[bytes]:
         if bench.device.status().received > after or (after == 0 and type_of(piece) == Request.BEGIN):
             raise KeyboardInterrupt

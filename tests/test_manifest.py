@@ -20,8 +20,8 @@ import pytest
 from building import EXAMPLE, VARIANTS, Build, Variant, build, changed, to_toml
 
 from tablegen.config.load import load
-from tablegen.emit import render, runtime_files
-from tablegen.plan import LinePlan, Plan, make_plan
+from tablegen.emit.render import render, runtime_files
+from tablegen.planning.line_plan import LinePlan, Plan, make_plan
 
 Json = dict[str, Any]
 DIGITS = 5.001e-6  # half a unit in the sixth significant digit, relative to the figure that begins with 1

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from variants import plan_of
 
-from tablegen.plan import Plan
+from tablegen.planning.line_plan import Plan
 
 
 @pytest.fixture(scope="module")
@@ -85,7 +85,7 @@ def test_branches_are_interpolated_between_calibrated_turns(tmp_path: Path) -> N
     from variants import setup_of
 
     from tablegen.config.load import load
-    from tablegen.plan import make_plan
+    from tablegen.planning.line_plan import make_plan
 
     setup_of(tmp_path, {"x.turn": "0.6"})
     path = tmp_path / "scanner.toml"

@@ -30,7 +30,7 @@ class Screen(io.StringIO):
 def test_long_work_is_named_and_the_line_goes_again(monkeypatch: pytest.MonkeyPatch) -> None:
     screen = Screen(terminal=True)
     monkeypatch.setattr(sys, "stderr", screen)
-    monkeypatch.setattr(module, "_PATIENCE_S", 0.01)
+    monkeypatch.setattr(module, "_SHOW_AFTER_S", 0.01)
     with Progress() as progress:
         progress.now("shaping")
         assert screen.written.wait(60)
@@ -49,7 +49,7 @@ def test_long_work_is_named_and_the_line_goes_again(monkeypatch: pytest.MonkeyPa
 def test_short_work_shows_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     screen = Screen(terminal=True)
     monkeypatch.setattr(sys, "stderr", screen)
-    monkeypatch.setattr(module, "_PATIENCE_S", 3600.0)
+    monkeypatch.setattr(module, "_SHOW_AFTER_S", 3600.0)
     with Progress() as progress:
         progress.now("shaping")
     assert screen.getvalue() == ""
@@ -58,7 +58,7 @@ def test_short_work_shows_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_pipe_sees_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     screen = Screen(terminal=False)
     monkeypatch.setattr(sys, "stderr", screen)
-    monkeypatch.setattr(module, "_PATIENCE_S", 0.001)
+    monkeypatch.setattr(module, "_SHOW_AFTER_S", 0.001)
     before = threading.active_count()
     with Progress() as progress:
         progress.now("shaping")
@@ -70,7 +70,7 @@ def test_a_pipe_sees_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_failure_takes_the_line_away_too(monkeypatch: pytest.MonkeyPatch) -> None:
     screen = Screen(terminal=True)
     monkeypatch.setattr(sys, "stderr", screen)
-    monkeypatch.setattr(module, "_PATIENCE_S", 0.01)
+    monkeypatch.setattr(module, "_SHOW_AFTER_S", 0.01)
 
     def interrupted() -> None:
         with Progress() as progress:

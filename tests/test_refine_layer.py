@@ -9,17 +9,17 @@ from editing import SCAN, SCANNER, edited, run, write_pair
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tablegen.certificate import certify
+from tablegen.certificate.certificate import certify
 from tablegen.compensation.hysteresis import BranchShape, LineShape
 from tablegen.config.load import load
 from tablegen.config.schema import BandLimit
-from tablegen.emit import render
+from tablegen.emit.render import render
 from tablegen.fixedpoint.synthesis import FourierWords, synthesize
-from tablegen.layer import model_digest
-from tablegen.link.prepare import Scan
-from tablegen.plan import Plan, make_plan
+from tablegen.link.prepare import PreparedScan
+from tablegen.manifest.read import read_manifest
+from tablegen.planning.line_plan import Plan, make_plan
+from tablegen.planning.refinement_layer import model_digest
 from tablegen.problems import Rejected
-from tablegen.recorded import read_manifest
 from tablegen.virtual.played import intended, played
 from tablegen.waveform.band_limit import band_limited
 from tablegen.waveform.series import FourierSeries
@@ -159,10 +159,10 @@ def test_what_is_printed_and_recorded(tmp_path: Path, plain: Plan, refined: Plan
     assert "refined forward   moves up to" in run("show", path, "--no-plot").out
     built = run("build", path, "-o", tmp_path / "out")
     assert "x     refinement, backward: moves up to" in built.out
-    recorded = read_manifest(tmp_path / "out")
-    assert recorded.own_hash == recorded.manifest.hash
+    stored = read_manifest(tmp_path / "out")
+    assert stored.own_hash == stored.manifest.hash
     k = np.arange(1250)
-    assert np.max(np.abs(recorded.manifest.axes.x.asked(k) - refined.x.codes(0, 1250))) < 1.0
+    assert np.max(np.abs(stored.manifest.axes.x.asked(k) - refined.x.codes(0, 1250))) < 1.0
 
 
 @pytest.mark.parametrize("target", ["verilog", "c"])
@@ -177,9 +177,9 @@ def test_such_a_scan_uploads_as_it_plays(tmp_path: Path, plain: Plan, refined: P
     """From the plan and from the build the same image, whose Fourier words render the words that are played."""
     path = write_pair(tmp_path, edited(SCAN, *at("x")))
     assert run("build", path, "-o", tmp_path / "out", "-q").status == 0
-    of_plan, of_build = Scan.of_plan(refined), Scan.of_build(tmp_path / "out")
-    assert of_plan.digest == of_build.digest != Scan.of_plan(plain).digest
-    assert of_plan.image("fourier") == of_build.image("fourier") != Scan.of_plan(plain).image("fourier")
+    of_plan, of_build = PreparedScan.of_plan(refined), PreparedScan.of_build(tmp_path / "out")
+    assert of_plan.digest == of_build.digest != PreparedScan.of_plan(plain).digest
+    assert of_plan.image("fourier") == of_build.image("fourier") != PreparedScan.of_plan(plain).image("fourier")
     a, b = np.split(of_build.x_fourier[1:], 2)
     fourier = FourierWords(int(of_build.x_fourier[0]), a, b)
     program = refined.x.program

@@ -13,9 +13,9 @@ from refining import scan_text
 
 from tablegen.compensation.dynamics import SecondOrder
 from tablegen.config.load import load
-from tablegen.plan import LinePlan, make_plan
+from tablegen.planning.line_plan import LinePlan, make_plan
 from tablegen.problems import Unphysical
-from tablegen.refinement.bound import LEAST_SHRINKING, bound, left_of_error, plausible_ratios
+from tablegen.refinement.bound import MAX_ERROR_LEFT, bound, left_of_error, plausible_ratios
 from tablegen.refinement.displacement import Displacement
 from tablegen.refinement.learning import learn
 from tablegen.refinement.round import Options, refine
@@ -186,7 +186,7 @@ def test_what_a_resonance_allows(tmp_path: Path) -> None:
             played = size * np.exp(-1j * np.angle(model))
             worst = np.maximum(worst, np.abs(1.0 - 0.7 * true * played))
     found = bound(line, 0.7, 16)
-    most = int(np.flatnonzero(worst > LEAST_SHRINKING)[0])
+    most = int(np.flatnonzero(worst > MAX_ERROR_LEFT)[0])
     assert 3 < most < H
     assert (found.harmonics, found.used) == (most, min(most, 16))
     assert found.left == pytest.approx(float(np.max(worst[: found.used])))

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from refining import scan_text
 
 from tablegen.config.load import load
-from tablegen.plan import LinePlan, make_plan
+from tablegen.planning.line_plan import LinePlan, make_plan
 from tablegen.problems import Unphysical
 from tablegen.refinement.displacement import fit_displacement
 from tablegen.refinement.phase import phase_by_drive, phase_by_trigger

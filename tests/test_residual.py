@@ -12,7 +12,7 @@ from tablegen.compensation.hysteresis import beta_at
 from tablegen.compensation.residual import SIZE_REACH, ResidualLaw
 from tablegen.config.load import load
 from tablegen.config.schema import Branch, HysteresisPoint
-from tablegen.plan import make_plan
+from tablegen.planning.line_plan import make_plan
 from tablegen.problems import Rejected, Unphysical
 
 V_MAX = 120.0

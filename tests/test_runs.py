@@ -48,7 +48,9 @@ def test_every_tick_is_in_its_run(program: Program) -> None:
     ticks = np.arange(program.ticks)
     codes = program.codes(ticks)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(module, "_TICKS_AT_LEAST", 0)  # runs even where ticks are cheaper: more of them, shorter, skipped
+        patch.setattr(
+            module, "_MIN_TICKS_PER_RUN", 0
+        )  # runs even where ticks are cheaper: more of them, shorter, skipped
         runs = runs_of(program)
     assert int(runs.lengths.min()) >= 1
     assert int(runs.lengths.sum()) == program.ticks

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from variants import plan_of
 
-from tablegen.schedule import Window
-from tablegen.sequencer import DualProgram, Fault, Sequencer, State, Tick, pixel_starts, play_line
+from tablegen.device.schedule import Window
+from tablegen.device.sequencer import DualProgram, Fault, Sequencer, SequencerState, Tick, pixel_starts, play_line
 
 SMALL = {
     "timing.lines": "6",
@@ -165,11 +165,11 @@ def test_frames_are_counted_and_then_parked(programs: list[DualProgram]) -> None
     sequencer = started(program, frames=2)
     played = run(sequencer, 2 * program.schedule.frame_ticks)
     assert sum(t.frame for t in played) == 2
-    assert sequencer.state is State.PARKING
+    assert sequencer.state is SequencerState.PARKING
     rest = run(sequencer, 70000)
     assert not any(t.line or t.pixel or t.valid for t in rest)
     assert (rest[-1].x, rest[-1].y) == (program.x.output.park_code, program.y.output.park_code)
-    assert sequencer.state is State.PARKED
+    assert sequencer.state is SequencerState.PARKED
 
 
 @pytest.mark.parametrize("next_frames", [0, 1, 5])
@@ -181,7 +181,7 @@ def test_arming_the_next_scan_leaves_the_count_of_this_one(programs: list[DualPr
     sequencer.arm(next_frames)
     played = run(sequencer, 2 * program.schedule.frame_ticks - program.schedule.ticks)
     assert sum(tick.frame for tick in played) == 1
-    assert sequencer.state is State.PARKING
+    assert sequencer.state is SequencerState.PARKING
     assert sequencer.armed
 
 
@@ -209,7 +209,7 @@ def test_park_and_reset_ramp_from_wherever_they_come(programs: list[DualProgram]
     assert steps[0] <= program.x.output.max_step
     assert steps[1] <= program.y.output.max_step
     assert tuple(codes[-1]) == (program.x.output.park_code, program.y.output.park_code)
-    assert sequencer.state is State.PARKED
+    assert sequencer.state is SequencerState.PARKED
 
 
 def test_reset_forgets_faults_and_what_waits(programs: list[DualProgram]) -> None:
@@ -229,7 +229,7 @@ def test_a_commit_while_parked_is_taken_at_once(programs: list[DualProgram]) -> 
     sequencer.commit(programs[1])
     assert sequencer.step().swapped
     assert sequencer.playing is programs[1]
-    assert sequencer.state is not State.RUNNING
+    assert sequencer.state is not SequencerState.RUNNING
 
 
 def test_slew_and_clamp_faults_are_sticky_and_counted(programs: list[DualProgram]) -> None:

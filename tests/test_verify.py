@@ -30,7 +30,7 @@ from verifying import (
 
 from tablegen.emit.memory import memory_file
 from tablegen.fixedpoint.program import Program
-from tablegen.recorded import read_manifest
+from tablegen.manifest.read import read_manifest
 
 TICKS = 2000
 CHECKS = 15
@@ -203,7 +203,7 @@ def test_a_constant_that_is_missing_or_new_is_found(folder: Path) -> None:
 @pytest.mark.parametrize("variant", ["direct", "direct_steps", "bits_24", "left_aligned", "inverting"])
 def test_the_header_of_other_builds_is_read_right(variant: str, tmp_path: Path) -> None:
     """Also where no table is interpolated, and where numbers are negative or have 64 bits; nothing is simulated."""
-    from tablegen.verify.directory import wrong_constants
+    from tablegen.verification.directory import wrong_constants
 
     built = build(tmp_path, VARIANTS[variant])
     assert wrong_constants(built.folder, read_manifest(built.folder))[1] == []
@@ -404,12 +404,12 @@ def test_junit_that_cannot_be_written_is_status_4(short: Build, tmp_path: Path) 
 
 def test_what_is_simulated_is_kept_on_request(short: Build, tmp_path: Path) -> None:
     assert verify(short.folder, "--keep", tmp_path / "kept").status == 0
-    assert {"script.hex", "record.hex", "rtl", "icarus"} <= {path.name for path in (tmp_path / "kept").iterdir()}
+    assert {"script.hex", "capture.hex", "rtl", "icarus"} <= {path.name for path in (tmp_path / "kept").iterdir()}
 
 
 def test_memories_are_what_a_build_writes(short: Build) -> None:
     """The reader of memory files against their writer, signed words included."""
-    from tablegen.verify.directory import memory_words
+    from tablegen.verification.directory import memory_words
 
     words = short.plan.x.program.words
     read = memory_words(short.folder / f"{NAME}_x.mem", len(words))
@@ -435,7 +435,7 @@ def test_missing_cocotb_is_status_6_with_its_remedy(short: Build) -> None:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize("begun", ["job.json", "record.hex"])
+@pytest.mark.parametrize("begun", ["job.json", "capture.hex"])
 def test_an_interruption_leaves_nothing_behind(tmp_path: Path, number: signal.Signals, begun: str) -> None:
     """Before or while the simulator plays."""
     built = build(tmp_path / "built", VARIANTS["header_only"])

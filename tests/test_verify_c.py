@@ -33,15 +33,15 @@ from verifying import (
 
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.program import Program
-from tablegen.recorded import Recorded, read_manifest
-from tablegen.verify.bench import Shape
-from tablegen.verify.c_bench import CBench, script_words
-from tablegen.verify.c_files import arrays_file, wrong_arrays, wrong_constants
-from tablegen.verify.c_target import CTarget, _codes, _packed, _sources
-from tablegen.verify.placement import Placement
-from tablegen.verify.session import make_session, varied
-from tablegen.verify.simulate import SimulationFailed
-from tablegen.verify.stream import Script
+from tablegen.manifest.read import StoredBuild, read_manifest
+from tablegen.verification.bench import SequencerShape
+from tablegen.verification.c_bench import CBench, script_words
+from tablegen.verification.c_files import arrays_file, wrong_arrays, wrong_constants
+from tablegen.verification.c_target import CTarget, _codes, _packed, _sources
+from tablegen.verification.placement import Placement
+from tablegen.verification.session import make_session, varied
+from tablegen.verification.simulate import SimulationFailed
+from tablegen.verification.stream import Script
 
 CAPITAL = NAME.upper()
 CHECKS = 18
@@ -141,30 +141,30 @@ def test_every_seed_verifies(short: Build, seed: int) -> None:
 class Benches:
     """A build, and what plays it by steps and by fills; of few words where a test fails."""
 
-    def __init__(self, recorded: Recorded, step: CBench, fill: CBench) -> None:
-        self.recorded, self.step, self.fill = recorded, step, fill
+    def __init__(self, stored: StoredBuild, step: CBench, fill: CBench) -> None:
+        self.stored, self.step, self.fill = stored, step, fill
 
 
 @pytest.fixture(scope="module")
 def benches(short: Build, tmp_path_factory: pytest.TempPathFactory) -> Benches:
     """Those of the short build."""
-    folder, recorded = tmp_path_factory.mktemp("benches"), read_manifest(short.folder)
-    sources, absent = _sources(short.folder, folder, recorded, fourier=False)
+    folder, stored = tmp_path_factory.mktemp("benches"), read_manifest(short.folder)
+    sources, absent = _sources(short.folder, folder, stored, fourier=False)
     assert not absent
-    chosen = CTarget("c")._defines(recorded)
-    shape = Shape.of((recorded.program.x, recorded.program.y))
+    chosen = CTarget("c")._defines(stored)
+    shape = SequencerShape.of((stored.program.x, stored.program.y))
     step = CBench(shape, folder / "step", options=["-std=c99", "-O2"], sources=sources, chosen=chosen)
     chosen["BENCH_FILL"] = 600
     fill = CBench(shape, folder / "fill", options=["-std=c99", "-O2"], sources=sources, chosen=chosen)
-    return Benches(recorded, step, fill)
+    return Benches(stored, step, fill)
 
 
 @settings(deadline=None, max_examples=40)
 @given(st.integers(0, 1 << 32), st.integers(1000, 6000))
 def test_sessions_of_any_seed_and_length_equal_the_model(benches: Benches, seed: int, ticks: int) -> None:
     """By steps and by fills; the ticks suffice for a whole session or end anywhere in it."""
-    recorded = benches.recorded
-    session = make_session(recorded.program, None, ticks, seed, Placement())
+    stored = benches.stored
+    session = make_session(stored.program, None, ticks, seed, Placement())
     text = script_words(session.script, benches.step.shape)
     wanted = np.array(session.script.expected, dtype=np.uint64)
     assert len(wanted) <= ticks
@@ -172,7 +172,7 @@ def test_sessions_of_any_seed_and_length_equal_the_model(benches: Benches, seed:
     assert not np.any(wanted[: session.own] >> np.uint64(56)), "the program of the build raises no fault"
     for bench, mask in ((benches.step, (1 << 64) - 1), (benches.fill, (1 << 56) - 1)):  # fills do not record faults
         played = bench.run(text)
-        assert np.array_equal(_packed(played.record, recorded), wanted & np.uint64(mask))
+        assert np.array_equal(_packed(played.capture, stored), wanted & np.uint64(mask))
         assert played.counts == [*session.script.counts, 0, 0]
 
 
@@ -244,14 +244,14 @@ def defined(folder: Path) -> list[str]:
 
 def test_every_constant_is_held_against_the_manifest(short: Build, tmp_path: Path) -> None:
     """One by one, with what it is and what it is in the manifest; nothing is compiled."""
-    recorded = read_manifest(short.folder)
-    count, wrong = wrong_constants(short.folder, recorded)
+    stored = read_manifest(short.folder)
+    count, wrong = wrong_constants(short.folder, stored)
     names = defined(short.folder)
     assert (count, wrong) == (len(names), [])
     for name in set(names) - {"HASH"}:
         shutil.copy(short.folder / f"{NAME}.h", tmp_path)
         old, new = define(tmp_path, name, lambda value: value + 1)
-        assert wrong_constants(tmp_path, recorded)[1] == [
+        assert wrong_constants(tmp_path, stored)[1] == [
             f"{NAME}.h: {CAPITAL}_{name} is {new}, it is {old} in the manifest"
         ]
 
@@ -260,10 +260,10 @@ def test_every_constant_is_held_against_the_manifest(short: Build, tmp_path: Pat
 def test_headers_and_arrays_of_other_builds_are_read_right(variant: str, tmp_path: Path) -> None:
     """Also where no table is interpolated, where numbers have 64 bits, and where arrays stand in the header."""
     built = build(tmp_path, VARIANTS[variant])
-    recorded = read_manifest(built.folder)
-    assert wrong_constants(built.folder, recorded) == (len(defined(built.folder)), [])
-    assert wrong_arrays(built.folder, recorded)[1] == []
-    assert arrays_file(recorded).endswith(".h") == ("header_only" in str(VARIANTS[variant].scan))
+    stored = read_manifest(built.folder)
+    assert wrong_constants(built.folder, stored) == (len(defined(built.folder)), [])
+    assert wrong_arrays(built.folder, stored)[1] == []
+    assert arrays_file(stored).endswith(".h") == ("header_only" in str(VARIANTS[variant].scan))
 
 
 # What each constant of a program does when it is wrong: which check beside header and files fails first.
@@ -452,7 +452,7 @@ def endless(folder: Path) -> None:
 def test_a_runtime_that_does_not_end_is_ended(folder: Path, tmp_path: Path) -> None:
     endless(folder)
     sources = sorted(folder.glob("dac_*.[ch]"))
-    bench = CBench(Shape(16, 1, 3, 16, 1, 3, 16), tmp_path / "bench", options=["-w"], sources=sources)
+    bench = CBench(SequencerShape(16, 1, 3, 16, 1, 3, 16), tmp_path / "bench", options=["-w"], sources=sources)
     script = Script()
     script.tick_every(1)
     with pytest.raises(SimulationFailed, match="did not end in 1 s"):
@@ -513,7 +513,7 @@ def test_junit_has_a_case_a_check(folder: Path, tmp_path: Path) -> None:
 def test_what_is_played_is_kept_on_request(short: Build, tmp_path: Path) -> None:
     assert verify(short.folder, "--keep", tmp_path / "kept").status == 0
     kept = {path.name for path in (tmp_path / "kept").iterdir()}
-    assert {"script.hex", "step_record.hex", "fill_record.hex", "c", "bench", "step", "fill"} <= kept
+    assert {"script.hex", "step_capture.hex", "fill_capture.hex", "c", "bench", "step", "fill"} <= kept
 
 
 @pytest.mark.parametrize("target", ["c", "cortex-m"])

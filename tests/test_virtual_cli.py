@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from editing import SCAN, SCANNER, edited, run, write_pair
 
-from tablegen.cli.status import Status
+from tablegen.cli.exit_status import ExitStatus
 from tablegen.problems import Rejected
 from tablegen.virtual.parameters import load_truth
 
@@ -86,7 +86,7 @@ def test_a_calibration_needs_scipy(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     monkeypatch.setitem(sys.modules, "scipy", None)
     scan = write_pair(tmp_path, SHORT)
     outcome = run("simulate", scan)
-    assert outcome.status == Status.TOOL_MISSING
+    assert outcome.status == ExitStatus.TOOL_MISSING
     assert "tablegen[calibrate]" in outcome.err
     assert "--no-calibration" in outcome.err
     assert run("simulate", scan, "--no-calibration").status == 0
@@ -124,7 +124,7 @@ def test_wrong_use(tmp_path: Path) -> None:
         (("--noise", "nan"), "nan is not a finite number"),
     ):
         outcome = run("simulate", scan, *arguments)
-        assert outcome.status == Status.WRONG_INPUT
+        assert outcome.status == ExitStatus.WRONG_INPUT
         assert why in outcome.err
     assert not (tmp_path / "figure.pdf").exists()
 
@@ -132,7 +132,7 @@ def test_wrong_use(tmp_path: Path) -> None:
 def test_a_figure_needs_matplotlib(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     outcome = run("simulate", write_pair(tmp_path, SHORT), "--plot", tmp_path / "figure.png")
-    assert outcome.status == Status.TOOL_MISSING
+    assert outcome.status == ExitStatus.TOOL_MISSING
     assert "tablegen[plot]" in outcome.err
     assert not (tmp_path / "figure.png").exists()
 
@@ -148,7 +148,7 @@ def test_an_uncalibrated_scanner_is_a_triangle(tmp_path: Path) -> None:
 
 
 def test_a_calibrated_scan_that_cannot_be_played_leaves_the_given_one(tmp_path: Path) -> None:
-    """98 V for k as given; the virtual scanner goes less far a volt than such a file says, and takes more than 100 V."""
+    """98 V for k as given; the virtual scanner goes less far a volt than this file says, and takes more than 100 V."""
     scanner = edited(SCANNER, "x.size.k_nm_per_v = 15.0", "x.size.beta = 0.0")
     outcome = run("simulate", write_pair(tmp_path, edited(SHORT, "x.size_nm = 1450.0"), scanner), "--json")
     assert outcome.status == 0
@@ -194,7 +194,7 @@ def test_faults_of_a_truth_file(tmp_path: Path, edit: str, key: str, why: str) -
         load_truth(path)
     assert [(problem.key, why in problem.why) for problem in caught.value.problems] == [(key, True)]
     outcome = run("simulate", write_pair(tmp_path, SHORT), "--scanner-truth", path)
-    assert outcome.status == Status.WRONG_INPUT
+    assert outcome.status == ExitStatus.WRONG_INPUT
     assert outcome.err.startswith(f"{path}:")
 
 
@@ -209,12 +209,12 @@ def test_density_is_a_triangle_of_numbers(tmp_path: Path) -> None:
 
 def test_what_cannot_be_played_is_said(tmp_path: Path) -> None:
     missing = run("simulate", write_pair(tmp_path, SHORT), "--scanner-truth", tmp_path / "none.toml")
-    assert missing.status == Status.WRONG_INPUT
+    assert missing.status == ExitStatus.WRONG_INPUT
     small = run("simulate", write_pair(tmp_path, SHORT), "--scanner-truth", truth(tmp_path, "v_max = 55"))
-    assert small.status == Status.WRONG_INPUT
+    assert small.status == ExitStatus.WRONG_INPUT
     assert "leaves the 0..55 V" in small.err
     wrong = run("simulate", write_pair(tmp_path, edited(SHORT, "x.size_nm = 1e6")))
-    assert wrong.status == Status.WRONG_INPUT
+    assert wrong.status == ExitStatus.WRONG_INPUT
     assert "x.size_nm" in wrong.err
 
 

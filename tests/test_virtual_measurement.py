@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.numerics.arrays import Floats
-from tablegen.virtual.measurement import ideal_triangle, line_error
+from tablegen.virtual.line_error import ideal_triangle, line_error
 
 FORWARD, BACKWARD = BranchShape.harmonic(0.035, 0.37), BranchShape.harmonic(0.085, 0.48)
 

@@ -7,11 +7,11 @@ import pytest
 from variants import plan_of, setup_of
 
 from tablegen.compensation.hysteresis import BranchShape, LineShape, beta_at
+from tablegen.device.sequencer import play_line
 from tablegen.numerics.arrays import Floats
-from tablegen.sequencer import DualProgram, play_line
 from tablegen.virtual.experiments import actual_sizes, apparent_sizes, frequency_response, sensor_trace, triangle_size
 from tablegen.virtual.identify import X_TARGETS, Y_TARGETS, Targets, identify
-from tablegen.virtual.measurement import LineError, ideal_triangle, line_error
+from tablegen.virtual.line_error import LineError, ideal_triangle, line_error
 from tablegen.virtual.paper import table
 from tablegen.virtual.parameters import load_truth
 from tablegen.virtual.played import played
@@ -156,7 +156,7 @@ def test_every_loop_lags() -> None:
 def test_settled_is_what_lines_settle_to(tmp_path: Path) -> None:
     """The codes of the sequencer, line after line, through the transient simulation; creep alone still drifts."""
     plan = plan_of(tmp_path)
-    program = DualProgram.of(plan)
+    program = plan.program
     codes = np.concatenate([play_line(program, line).x for line in range(20)])
     drive = played(plan.x)
     assert np.array_equal(codes[: len(drive.codes)], drive.codes)
@@ -185,7 +185,7 @@ def test_the_amplifier_is_that_of_the_scan(tmp_path: Path) -> None:
 
 def test_y_is_a_frame(tmp_path: Path) -> None:
     plan = plan_of(tmp_path, {"timing.lines": "20"})
-    program = DualProgram.of(plan)
+    program = plan.program
     codes = np.concatenate([play_line(program, line).y for line in range(20)])
     drive = played(plan.y)
     assert np.array_equal(codes, drive.codes)

@@ -14,8 +14,8 @@ def shipped_files() -> set[str]:
     found = {path.relative_to(REPOSITORY).as_posix() for path in REPOSITORY.glob("tablegen/**/*.py")}
     found |= {"tablegen/py.typed", "tablegen/examples/__init__.py", "tablegen/firmware_templates/__init__.py"}
     found |= {f"tablegen/examples/{path.name}" for path in REPOSITORY.glob("examples/*.toml")}
-    found |= {f"tablegen/verify/{path.name}" for path in REPOSITORY.glob("tablegen/verify/*.[chv]")}
-    found |= {f"tablegen/verify/{path.name}" for path in REPOSITORY.glob("tablegen/verify/*.ld")}
+    found |= {f"tablegen/verification/{path.name}" for path in REPOSITORY.glob("tablegen/verification/*.[chv]")}
+    found |= {f"tablegen/verification/{path.name}" for path in REPOSITORY.glob("tablegen/verification/*.ld")}
     found |= {f"tablegen/virtual/{path.name}" for path in REPOSITORY.glob("tablegen/virtual/*.toml")}
     for language in (REPOSITORY / "firmware_templates").iterdir():
         if language.is_dir() and language.name != "__pycache__":
@@ -57,7 +57,7 @@ def test_installed_wheel_verifies_a_build(installed: Path, tmp_path: Path) -> No
     # Negative control: without its cocotb side the copy fails, so that nothing came from the tree.
     copy = tmp_path / "copy"
     shutil.copytree(installed, copy)
-    (copy / "tablegen" / "verify" / "cocotb_stream.py").unlink()
+    (copy / "tablegen" / "verification" / "cocotb_stream.py").unlink()
     with pytest.raises(AssertionError, match="simulation: "):
         python(tmp_path, "-m", "tablegen", "verify", "out", "--ticks", 3000, path=copy)
 

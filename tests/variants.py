@@ -6,7 +6,7 @@ from pathlib import Path
 from editing import SCAN, SCANNER, edited, write_pair
 
 from tablegen.config.load import Setup, load
-from tablegen.plan import Plan, make_plan
+from tablegen.planning.line_plan import Plan, make_plan
 
 Edits = Mapping[str, str]
 

@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 
 from paper.drawing import BLUE, GREY, RED, SHADE, key, printed, sheet, span
 from paper.measured import full_scale
-from tablegen.virtual.measurement import Branch, ideal_triangle
+from tablegen.virtual.line_error import BranchError, ideal_triangle
 from tablegen.virtual.simulation import Model
 
 COLOURS = {"forward": RED, "backward": BLUE}
@@ -19,7 +19,7 @@ def figure_5a() -> Figure:
     error = full_scale("triangle").error
     loop.plot([0, 1], [0, 1], color=GREY, lw=1.0, ls="--", label="linear")
     for side, colour in COLOURS.items():
-        branch: Branch = getattr(error, side)
+        branch: BranchError = getattr(error, side)
         loop.plot(branch.position, branch.position + 0.01 * branch.residual, color=colour, label=side)
         residual.plot(branch.position, branch.residual, color=colour)
     printed(residual, [0.35], [-3.5], RED)
@@ -79,7 +79,7 @@ def figure_5efj() -> Figure:
             panel.axvspan(low, high, color=SHADE, lw=0)
         panel.axhline(0.0, color=GREY, lw=0.7)
         for side, colour in COLOURS.items():
-            branch: Branch = getattr(error, side)
+            branch: BranchError = getattr(error, side)
             panel.plot(branch.scaling_position, branch.scaling, color=colour, label=f"{side} (simulation)")
         for side, x, height in (("forward", 0.035, forward), ("backward", 0.965, backward)):
             branch = getattr(error, side)

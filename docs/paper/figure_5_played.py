@@ -8,7 +8,7 @@ import numpy as np
 from paper.measured import V_MAX, axis, calibrated, full_scale, modelled, optimised
 from paper.rows import Row, Source, about, exact, limits
 from tablegen.compensation.hysteresis import BranchShape, LineShape
-from tablegen.virtual.measurement import Branch, LineError
+from tablegen.virtual.line_error import BranchError, LineError
 from tablegen.virtual.paper import triangle_line
 
 TITLE = "Figures 5a, 5c to 5f, 5i, 5j: a line of 100 V"
@@ -22,7 +22,7 @@ SIDES = ("forward", "backward")
 COMPROMISE = "it was identified on this number, beside (22), sizes and offsets, which its loops cannot meet all at once"
 
 
-def largest(branch: Branch) -> float:
+def largest(branch: BranchError) -> float:
     """The peak residual without its sign, percent."""
     return abs(branch.peak[0])
 
@@ -102,7 +102,7 @@ def _scaling_rows() -> list[Row]:
     ]
 
 
-def _halves(branch: Branch) -> tuple[np.ndarray, np.ndarray]:
+def _halves(branch: BranchError) -> tuple[np.ndarray, np.ndarray]:
     left = branch.scaling_position < 0.5
     return branch.scaling[left], branch.scaling[~left]
 

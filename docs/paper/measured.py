@@ -12,11 +12,11 @@ from tablegen.compensation.hysteresis import BranchShape, LineShape
 from tablegen.config.load import load
 from tablegen.config.schema import Branch, Branches, Hysteresis
 from tablegen.numerics.arrays import Floats
-from tablegen.plan import make_plan
+from tablegen.planning.line_plan import make_plan
 from tablegen.virtual.experiments import triangle_size
-from tablegen.virtual.measurement import LineError, ideal_triangle, line_error
+from tablegen.virtual.line_error import LineError, ideal_triangle, line_error
 from tablegen.virtual.paper import SECTION_8, default_x, played_line
-from tablegen.virtual.played import Drive, played
+from tablegen.virtual.played import PlayedDrive, played
 from tablegen.virtual.scanner import VirtualAxis
 from tablegen.virtual.simulation import Model, with_model
 
@@ -32,7 +32,7 @@ GROWTH_V = tuple(float(v) for v in range(10, 101, 10))  # sizes of figure 5k, pe
 class Played:
     """A line of full scale: what was put out, where the virtual scanner went, and its errors against the triangle."""
 
-    drive: Drive
+    drive: PlayedDrive
     displacement_nm: Floats
     error: LineError
 

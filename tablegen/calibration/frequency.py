@@ -11,7 +11,7 @@ from tablegen.calibration.outliers import outliers
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 
-_LEAST_SPREAD = 1e-7
+_MIN_SCATTER = 1e-7
 _LARGEST_ALPHA = 0.5  # the schema's
 
 
@@ -74,7 +74,7 @@ def fit_frequency(frequency_hz: Floats, gain: Floats, reference_hz: float | None
         residual_percent=100.0 * (gain / expected - 1.0),
         before_percent=float(np.max(np.abs(100.0 * (measured - 1.0)))),
         remarks=tuple(remarks),
-        outliers=outliers(solution.jacobian, solution.residuals, _LEAST_SPREAD),
+        outliers=outliers(solution.jacobian, solution.residuals, _MIN_SCATTER),
         curves=(Curve("gain", "log10 of Hz", "gain", (np.log10(frequency_hz), measured), (np.log10(line), fitted)),),
         alpha=alpha,
         reference_hz=reference_hz,

@@ -13,13 +13,13 @@ from tablegen.calibration.least_squares import few_points, solve
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 
-_SIGNIFICANT = 0.01
-_NEAR_ZERO = 1e-9  # below it (22) is a straight line to the last place
+_SIGNIFICANCE_LEVEL = 0.01
+_STRAIGHT_RHO = 1e-9  # below it (22) is a straight line to the last place
 _LARGEST_RHO, _OPEN_RHO = 60.0, 5.0  # beyond the first (22) is a step; a larger error than the second tells nothing
-_HIDDEN = 3.0  # standard errors of a residual that may be noise
-_FAR = 4.0  # in chi squared, two standard errors
-_NOTHING = 'no hysteresis can be told from noise, and hence no u_peak; model = "triangle" does, or average more'
-_ROUNDING = 1e-9  # least error of a measured beta: that of the fit's own arithmetic
+_NOISE_LIMIT_ERRORS = 3.0  # standard errors of a residual that may be noise
+_CHI2_LIMIT = 4.0  # in chi squared, two standard errors
+_NO_HYSTERESIS = 'no hysteresis can be told from noise, and hence no u_peak; model = "triangle" does, or average more'
+_LEAST_BETA_ERROR = 1e-9  # least error of a measured beta: that of the fit's own arithmetic
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ def fit_growth(v: Floats, branches: Sequence[MeasuredBranch], rho: float) -> Gro
     """
     remarks: list[str] = []
     beta = np.array([branch.beta.value for branch in branches])
-    error = np.maximum([branch.beta.standard_error for branch in branches], _ROUNDING)
+    error = np.maximum([branch.beta.standard_error for branch in branches], _LEAST_BETA_ERROR)
     found = None
     if float(np.max(v)) - float(np.min(v)) > 0.05:
         found = _both(v, beta, error, rho, remarks)
@@ -57,8 +57,8 @@ def fit_growth(v: Floats, branches: Sequence[MeasuredBranch], rho: float) -> Gro
             f"more, best from 0.2 to 1 of v_max"
         )
     beta_max, estimate = found
-    if beta_max.value <= 0.0 and np.all(beta > -_HIDDEN * error):
-        raise Unphysical(_NOTHING)
+    if beta_max.value <= 0.0 and np.all(beta > -_NOISE_LIMIT_ERRORS * error):
+        raise Unphysical(_NO_HYSTERESIS)
     if beta_max.value <= 0.0:
         raise Unphysical(
             f"the residual has the wrong sign (beta_max = {beta_max.value:.3g}): the displacement leads the drive; "
@@ -98,7 +98,7 @@ def _steepest(v: Floats, beta: Floats, error: Floats, rho: float) -> float | Non
     costs = [cost(one) for one in grid.tolist()]
     best = int(np.argmin(costs))
     spread = max(costs[best] / max(len(v) - 1, 1), 1.0)  # what it misses itself counts as error
-    return float(f"{grid[best]:.3g}") if cost(rho) - costs[best] > _FAR * spread else None
+    return float(f"{grid[best]:.3g}") if cost(rho) - costs[best] > _CHI2_LIMIT * spread else None
 
 
 def _height(v: Floats, beta: Floats, error: Floats, rho: float, remarks: list[str]) -> tuple[Estimate, Estimate]:
@@ -112,11 +112,11 @@ def _height(v: Floats, beta: Floats, error: Floats, rho: float, remarks: list[st
 
 def _peak(branches: Sequence[MeasuredBranch], beta: Floats, error: Floats, remarks: list[str]) -> Estimate:
     """The mean of u_peak over the amplitudes, each weighted by its error: the paper finds it the same at all."""
-    seen = [branch.u_peak for branch, b, e in zip(branches, beta, error, strict=True) if b > _HIDDEN * e]
+    seen = [branch.u_peak for branch, b, e in zip(branches, beta, error, strict=True) if b > _NOISE_LIMIT_ERRORS * e]
     if not seen:
-        raise Unphysical(_NOTHING)
+        raise Unphysical(_NO_HYSTERESIS)
     value = np.array([estimate.value for estimate in seen])
-    spread = np.maximum([estimate.standard_error for estimate in seen], _ROUNDING)
+    spread = np.maximum([estimate.standard_error for estimate in seen], _LEAST_BETA_ERROR)
     weight = 1.0 / spread**2
     mean = float(value @ weight) / float(np.sum(weight))
     left = (value - mean) / spread
@@ -131,7 +131,7 @@ def _peak(branches: Sequence[MeasuredBranch], beta: Floats, error: Floats, remar
 def _variance(left: Floats, freedom: int, what: str, remarks: list[str]) -> float:
     """1 where errors explain what is left; otherwise by how much they have to be widened, which is remarked."""
     total = float(left @ left)
-    if freedom < 1 or chdtrc(freedom, total) > _SIGNIFICANT:
+    if freedom < 1 or chdtrc(freedom, total) > _SIGNIFICANCE_LEVEL:
         return 1.0
     remarks.append(f"{what} by {sqrt(total / freedom):.3g} times their standard errors; these were widened")
     return total / freedom * few_points(freedom) ** 2
@@ -139,7 +139,7 @@ def _variance(left: Floats, freedom: int, what: str, remarks: list[str]) -> floa
 
 def _share(v: Floats, rho: float) -> Floats:
     """(1 - exp(-rho v)) / (1 - exp(-rho))."""
-    if rho < _NEAR_ZERO:
+    if rho < _STRAIGHT_RHO:
         return np.asarray(v, dtype=np.float64)
     share: Floats = np.expm1(-rho * np.asarray(v)) / expm1(-rho)
     return share

@@ -14,9 +14,9 @@ from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 
 TYPICAL_RHO = 1.5  # the paper's backward scan, and the default of the scanner file
-SAME_TURN = 0.02  # turns that differ by less are one calibration
-_POOR_PERCENT = 1.0
-_CROOKED = 0.01  # rms departure of the drive from a triangle
+TURN_TOLERANCE = 0.02  # turns that differ by less are one calibration
+_POOR_FIT_PERCENT = 1.0
+_MAX_DRIVE_DEPARTURE = 0.01  # rms departure of the drive from a triangle
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ def combined(fits: Sequence[AmplitudeFit], v_max: float, rho: float, remarks: Se
     remarks = list(remarks)
     groups: list[list[AmplitudeFit]] = []
     for fit in sorted(fits, key=lambda fit: fit.turn.value):
-        if groups and fit.turn.value - groups[-1][0].turn.value < SAME_TURN:
+        if groups and fit.turn.value - groups[-1][0].turn.value < TURN_TOLERANCE:
             groups[-1].append(fit)
         else:
             groups.append([fit])
@@ -118,14 +118,14 @@ def _check_shape(growth: Growth, v: float) -> None:
 
 def _remarks(fit: TraceFit) -> list[str]:
     found = []
-    if fit.triangle.departure > _CROOKED:
+    if fit.triangle.departure > _MAX_DRIVE_DEPARTURE:
         found.append(
             f"the drive departs from a triangle by {100.0 * fit.triangle.departure:.2g} % rms; the fit takes it for one"
         )
     if fit.inverted:
         found.append("the displacement falls where the drive rises; its sign was turned")
     worst = float(np.max(np.abs(fit.residual_percent)))
-    if worst > _POOR_PERCENT:
+    if worst > _POOR_FIT_PERCENT:
         found.append(
             f"the harmonic model leaves {worst:.2g} % of the scan; is the drive the triangle itself, the delay of the "
             f"sensor known, and the record settled?"

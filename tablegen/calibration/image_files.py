@@ -22,15 +22,15 @@ from tablegen.config.figures import shown_path
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Problem, Rejected
 
-_LEAST = 32  # rows and columns
-_MOST_PIXELS = 1 << 26
-_LISTED = 12  # channels in a message
+_MIN_PIXELS = 32  # rows and columns
+_MAX_PIXELS = 1 << 26
+_MAX_CHANNELS_LISTED = 12  # channels in a message
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+(,\d+)?([eE][+-]?\d+)?")
 MODULES = {".png": "PIL", ".tif": "tifffile", ".tiff": "tifffile"}  # what reads them, beside numpy
 
 
 @dataclass(frozen=True, eq=False)
-class Image:
+class ScanImage:
     """Heights, rows x columns, row 0 first in time; ``file`` as messages call it."""
 
     file: str
@@ -41,7 +41,7 @@ class Image:
 _Channel = tuple[int, str, npt.NDArray[np.generic]]  # number, title, matrix
 
 
-def read_image(path: Path, channel: str | None = None) -> Image:
+def read_image(path: Path, channel: str | None = None) -> ScanImage:
     """An image of heights.
 
     ``channel`` is the title or the number of the data in a file that has several. Raises ``Rejected`` with file and
@@ -66,9 +66,9 @@ def read_image(path: Path, channel: str | None = None) -> Image:
     what = f"channel {number} ({title!r}): " if len(channels) > 1 else ""
     if matrix.ndim != 2:
         raise refuse(f"{what}has the shape {' x '.join(map(str, matrix.shape))}; rows x columns are needed")
-    if min(matrix.shape) < _LEAST or matrix.size > _MOST_PIXELS:
+    if min(matrix.shape) < _MIN_PIXELS or matrix.size > _MAX_PIXELS:
         size = " x ".join(map(str, matrix.shape))
-        raise refuse(f"{what}has {size} pixels; at least {_LEAST} x {_LEAST} and at most 2^26 are read")
+        raise refuse(f"{what}has {size} pixels; at least {_MIN_PIXELS} x {_MIN_PIXELS} and at most 2^26 are read")
     if matrix.dtype.kind not in "iufb":
         raise refuse(f"{what}has values of the type {matrix.dtype}; heights are real numbers")
     heights = matrix.astype(np.float64)
@@ -77,15 +77,17 @@ def read_image(path: Path, channel: str | None = None) -> Image:
         raise refuse(f"{what}{bad} pixels are not finite; crop or interpolate them")
     if not np.ptp(heights) > 0.0:
         raise refuse(f"{what}all pixels are {heights.flat[0]:g}; was another channel saved?")
-    return Image(name, Source(path.name, hashlib.sha256(content).hexdigest()[:16]), heights)
+    return ScanImage(name, Source(path.name, hashlib.sha256(content).hexdigest()[:16]), heights)
 
 
 def _chosen(channels: list[_Channel], wanted: str | None) -> _Channel:
     """By title, or by number. Raises ``ValueError``."""
     if not channels:
         raise ValueError("has no image in it")
-    there = ", ".join(f"{number} ({title})" if title else f"{number}" for number, title, _ in channels[:_LISTED])
-    there += ", ..." if len(channels) > _LISTED else ""
+    there = ", ".join(
+        f"{number} ({title})" if title else f"{number}" for number, title, _ in channels[:_MAX_CHANNELS_LISTED]
+    )
+    there += ", ..." if len(channels) > _MAX_CHANNELS_LISTED else ""
     if wanted is None:
         if len(channels) > 1:
             raise ValueError(f"has several channels, {there}; choose with --channel")
@@ -109,7 +111,7 @@ def _npy(content: bytes, _: str) -> list[_Channel]:
 
 
 def _png(content: bytes, _: str) -> list[_Channel]:
-    from PIL import Image as Pillow
+    from PIL import ScanImage as Pillow
 
     try:
         with warnings.catch_warnings():

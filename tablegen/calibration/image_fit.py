@@ -9,19 +9,19 @@ from scipy.special import chdtrc
 from tablegen.calibration.branch import BINS, WINDOW, AmplitudeFit, measured_branch, peak
 from tablegen.calibration.estimate import Curve, Estimate
 from tablegen.calibration.image_model import begin, check_signs, grown, prepared
-from tablegen.calibration.periodic import Model, State
-from tablegen.calibration.spots import LEAST_PERIODS
+from tablegen.calibration.periodic import FitState, PeriodicModel
+from tablegen.calibration.spots import MIN_PERIODS
 from tablegen.calibration.trace import correlation_length
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.numerics.arrays import Bools, Floats
 from tablegen.problems import Unphysical
 
-_LEAST_EXPLAINED = 0.03  # of the variance
-_ROUNDING = 1e-7  # of the line: what arithmetic may leave
-_TOO_FAR_PERCENT = 3.0  # of the line, that the model may leave
-_OPEN = 0.05  # largest standard error of xi
-_CHANCE = 1e-3  # that noise alone would be taken for misfit
-_WRONG_WAY = 0.004  # least |beta| that is a sign
+_MIN_EXPLAINED_VARIANCE = 0.03  # of the variance
+_ARITHMETIC_ERROR = 1e-7  # of the line: what arithmetic may leave
+_MAX_MISFIT_PERCENT = 3.0  # of the line, that the model may leave
+_MAX_XI_ERROR = 0.05  # largest standard error of xi
+_MISFIT_SIGNIFICANCE = 1e-3  # that noise alone would be taken for misfit
+_MIN_SIGNED_BETA = 0.004  # least |beta| that is a sign
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,44 +67,44 @@ def fit_pair(
     return _result(model, state, free, v_scan)
 
 
-def _carrying(model: Model, state: State) -> float:
+def _carrying(model: PeriodicModel, state: FitState) -> float:
     """Periods in the line of the spot that says most of x."""
     along = np.abs(model.spots @ model.q(state.parameters))
     return float(along[np.argmax(along * np.abs(state.amplitudes))])
 
 
-def _check(model: Model, state: State, free: Bools) -> None:
+def _check(model: PeriodicModel, state: FitState, free: Bools) -> None:
     """Whether it is a fit at all."""
     shares = [1.0 - float(np.mean(left**2)) / float(np.mean(image**2)) for (_, image), left in _both(model, state)]
-    if min(shares) < _LEAST_EXPLAINED:
+    if min(shares) < _MIN_EXPLAINED_VARIANCE:
         name = "trace" if shares[0] < shares[1] else "retrace"
         raise Unphysical(
             f"{100.0 * max(min(shares), 0.0):.0f} % of the {name}'s contrast is a periodic sample; the rest is "
             f"something else, or trace and retrace are not of one scan"
         )
     first = float(model.q(state.parameters)[0])
-    if max(_carrying(model, state), first) < LEAST_PERIODS - 0.2:
-        raise Unphysical(f"the line has {first:.2g} periods; at least {LEAST_PERIODS:g} are needed: scan more of them")
+    if max(_carrying(model, state), first) < MIN_PERIODS - 0.2:
+        raise Unphysical(f"the line has {first:.2g} periods; at least {MIN_PERIODS:g} are needed: scan more of them")
     forward, backward = (peak(state.parameters[i : i + 2])[0] for i in (0, 2))
-    check_signs(forward, backward, _WRONG_WAY, "try --retrace-mirrored")
+    check_signs(forward, backward, _MIN_SIGNED_BETA, "try --retrace-mirrored")
 
 
-def _both(model: Model, state: State) -> list[tuple[tuple[bool, Floats], Floats]]:
+def _both(model: PeriodicModel, state: FitState) -> list[tuple[tuple[bool, Floats], Floats]]:
     return list(zip(model.images, state.left, strict=True))
 
 
-def _result(model: Model, state: State, free: Bools, v_scan: float) -> ImageFit:
+def _result(model: PeriodicModel, state: FitState, free: Bools, v_scan: float) -> ImageFit:
     geometry, x = model.geometry, state.parameters
     noise = _noise(state)
     residual, scaling, curves, misfit, clean = _positions(model, state)
     worst = float(np.max(np.abs(residual)))
-    if worst > _TOO_FAR_PERCENT:
+    if worst > _MAX_MISFIT_PERCENT:
         raise Unphysical(
             f"no branches of the harmonic model join these images: up to {worst:.2g} % of the line is left; are trace "
             f"and retrace of one scan, --window and --turn right, and the drive a triangle?"
         )
     covariance, widened = _covariance(model, state, free, misfit, clean)
-    if float(np.sqrt(np.max(np.diag(covariance)[[0, 2]]))) > _OPEN:
+    if float(np.sqrt(np.max(np.diag(covariance)[[0, 2]]))) > _MAX_XI_ERROR:
         raise Unphysical("these images do not determine the shape of the branches; scan more periods, or average")
     forward, backward = (measured_branch(x[i : i + 2], covariance[i : i + 2, i : i + 2]) for i in (0, 2))
     line = np.linspace(0.0, 1.0, 201)
@@ -136,7 +136,7 @@ def _result(model: Model, state: State, free: Bools, v_scan: float) -> ImageFit:
     )
 
 
-def _loud_rows(state: State) -> tuple[int, ...]:
+def _loud_rows(state: FitState) -> tuple[int, ...]:
     """Rows that leave far more than the others do."""
     power = np.sqrt(np.mean(np.stack(state.left) ** 2, axis=(0, 2)))
     middle = float(np.median(power))
@@ -144,13 +144,15 @@ def _loud_rows(state: State) -> tuple[int, ...]:
     return tuple(np.flatnonzero(power > middle + max(8.0 * spread, 0.5 * middle)).tolist())
 
 
-def _noise(state: State) -> float:
+def _noise(state: FitState) -> float:
     """Of neighbouring pixels, rms."""
     left = np.concatenate(state.left)
     return float(np.sqrt(np.mean(np.diff(left, axis=1) ** 2) / 2.0))
 
 
-def _covariance(model: Model, state: State, free: Bools, misfit: float, clean: list[Floats]) -> tuple[Floats, float]:
+def _covariance(
+    model: PeriodicModel, state: FitState, free: Bools, misfit: float, clean: list[Floats]
+) -> tuple[Floats, float]:
     """Of all parameters, 0 for those that are not free; and by how much it was widened.
 
     From what each line says by itself, so that noise may have any spectrum along the line. It is widened where
@@ -170,7 +172,7 @@ def _covariance(model: Model, state: State, free: Bools, misfit: float, clean: l
 
 
 def _positions(
-    model: Model, state: State
+    model: PeriodicModel, state: FitState
 ) -> tuple[Floats, tuple[float, float], tuple[Curve, ...], float, list[Floats]]:
     """The position error of each twentieth of the window, what it does to scaling, and curves.
 
@@ -192,7 +194,7 @@ def _positions(
         # The model's own x is without what was added to it: that is a part of the error.
         known = np.bincount(place, model.off[0 if forward else 1], minlength=BINS) / count
         off = known + more
-        beyond += float(np.sum(off**2 / (spread / weight**2 + _ROUNDING**2)))
+        beyond += float(np.sum(off**2 / (spread / weight**2 + _ARITHMETIC_ERROR**2)))
         at, x = (np.bincount(place, values, minlength=BINS) / count for values in (geometry.place, columns.x))
         x = x - known
         stretch = np.diff(x + off) / np.diff(at)
@@ -201,7 +203,7 @@ def _positions(
         scaling.append(100.0 * float(np.ptp(inside)))
         lines.append((geometry.place, columns, at, x + off, 0.5 * (at[1:] + at[:-1]), stretch))
     expected = 2 * BINS - 6
-    misfit = beyond / expected if chdtrc(expected, beyond) < _CHANCE else 1.0
+    misfit = beyond / expected if chdtrc(expected, beyond) < _MISFIT_SIGNIFICANCE else 1.0
     residual = Curve(
         "position less that of a straight line, against the normalised drive",
         "drive",

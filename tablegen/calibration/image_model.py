@@ -6,25 +6,25 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from tablegen.calibration.branch import peak
-from tablegen.calibration.periodic import BASES, LAG, Columns, Geometry, Model, State, settle
+from tablegen.calibration.periodic import BASES, LAG, Columns, FitState, Geometry, PeriodicModel, settle
 from tablegen.calibration.spots import Bend, Spot, bend_of, column_phase, row_polynomial, second_base, strongest
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.numerics.arrays import Bools, Floats, Ints
 from tablegen.problems import Unphysical
 
-_LEAST_PIXELS = 32  # along and across
-_ORDER = 3  # of the rows' polynomial: drift, and the slow axis with its own hysteresis
-_MOST_SPOTS = 14
-_HIGHEST = {1: 12, 2: 3}  # whole numbers of a spot, by bases
-_VISIBLE = 6.0  # standard errors of an amplitude
-_FAINT = 0.003  # of the strongest
-_LOUD = 100.0  # times the usual power of a line
+_MIN_PIXELS = 32  # along and across
+_ROW_POLYNOMIAL_ORDER = 3  # of the rows' polynomial: drift, and the slow axis with its own hysteresis
+_MAX_SPOTS = 14
+_MAX_SPOT_INDEX = {1: 12, 2: 3}  # whole numbers of a spot, by bases
+_MIN_SPOT_ERRORS = 6.0  # standard errors of an amplitude
+_MIN_SPOT_AMPLITUDE = 0.003  # of the strongest
+_MAX_LINE_POWER = 100.0  # times the usual power of a line
 _FLAT, _MANY_FLAT = 1e-9, 0.02  # of the largest power of a line; of all lines
-_LONGEST_DELAY = 0.1  # of the line
-_TRACKED_FROM = 8.0  # periods
-_SAME_PHASE = 0.01  # of a period, rms
-_DISTINCT = 1.5  # how much worse another count of periods has to be
-_ALIASED = " (periods finer than two pixels look like that too)"
+_MAX_DELAY = 0.1  # of the line
+_MIN_TRACKED_PERIODS = 8.0  # periods
+_PHASE_TOLERANCE = 0.01  # of a period, rms
+_MIN_MISFIT_RATIO = 1.5  # how much worse another count of periods has to be
+_ALIASING_HINT = " (periods finer than two pixels look like that too)"
 
 
 def prepared(
@@ -34,13 +34,13 @@ def prepared(
     if trace.shape != retrace.shape:
         sizes = " and ".join(f"{image.shape[0]} x {image.shape[1]}" for image in (trace, retrace))
         raise Unphysical(f"trace and retrace have {sizes} pixels; both have to be of one scan")
-    if trace.ndim != 2 or min(trace.shape) < _LEAST_PIXELS:
-        raise Unphysical(f"{' x '.join(map(str, trace.shape))} pixels are too few; {_LEAST_PIXELS} rows and columns do")
+    if trace.ndim != 2 or min(trace.shape) < _MIN_PIXELS:
+        raise Unphysical(f"{' x '.join(map(str, trace.shape))} pixels are too few; {_MIN_PIXELS} rows and columns do")
     if not 0.0 < turn < 1.0:
         raise Unphysical(f"a turn of {turn:g} is outside 0..1")
     if not (window[0] >= 0.0 and window[1] <= 1.0 and window[1] - window[0] >= 0.3):
         raise Unphysical(f"a window of {window[0]:g}..{window[1]:g} is no large part of the sweep, 0..1")
-    if not abs(delay) <= _LONGEST_DELAY * trace.shape[1]:
+    if not abs(delay) <= _MAX_DELAY * trace.shape[1]:
         raise Unphysical(f"a delay of {delay:g} pixels is no small part of a line of {trace.shape[1]}")
     if np.array_equal(trace, retrace) or np.array_equal(trace, retrace[:, ::-1]):
         raise Unphysical(
@@ -64,7 +64,7 @@ def prepared(
                 f"{len(flat)} rows of the {name}, from {flat[0] + 1} to {flat[-1] + 1}, have no contrast, as of a scan "
                 f"that was stopped; crop both images"
             )
-        loud = np.flatnonzero(power > _LOUD * np.median(power))
+        loud = np.flatnonzero(power > _MAX_LINE_POWER * np.median(power))
         if np.sum(power[loud]) > 0.5 * np.sum(power):
             raise Unphysical(f"rows {loud[0] + 1} to {loud[-1] + 1} have most of the {name}'s contrast; crop them")
         images.append(level)
@@ -80,7 +80,7 @@ def begin(geometry: Geometry, heights: list[Floats], mirrored: bool) -> tuple[Sp
     turned = bend_of(geometry, heights[1][:, ::-1], False, spot)
     advice = "leave --retrace-mirrored out" if mirrored else "it needs --retrace-mirrored"
     if turned.match > 1.5 * max(backward.match, 0.2 * forward.match):
-        raise Unphysical(f"the retrace shows the trace's pattern only when it is mirrored; {advice}{_ALIASED}")
+        raise Unphysical(f"the retrace shows the trace's pattern only when it is mirrored; {advice}{_ALIASING_HINT}")
     if backward.match < 0.3 * forward.match:
         raise Unphysical("the retrace does not show the trace's pattern; are they of one scan?")
     # A grating square to the lines looks the same mirrored; then the bend tells.
@@ -92,35 +92,39 @@ def begin(geometry: Geometry, heights: list[Floats], mirrored: bool) -> tuple[Sp
 def check_signs(forward: float, backward: float, least: float, advice: str) -> None:
     """Each sweep has to lag."""
     if forward < -least and backward < -least:
-        raise Unphysical(f"both sweeps lead the drive; trace and retrace are exchanged, or both mirrored{_ALIASED}")
+        raise Unphysical(
+            f"both sweeps lead the drive; trace and retrace are exchanged, or both mirrored{_ALIASING_HINT}"
+        )
     if forward > 0.0 and backward < -least:
-        raise Unphysical(f"the retrace bends the wrong way, as one that is mirrored; {advice}{_ALIASED}")
+        raise Unphysical(f"the retrace bends the wrong way, as one that is mirrored; {advice}{_ALIASING_HINT}")
     if forward < -least and backward > 0.0:
         raise Unphysical("the trace bends the wrong way; is it mirrored? Left has to be where the trace begins")
 
 
 def grown(
     geometry: Geometry, heights: list[Floats], spot: Spot, bends: tuple[Bend, Bend]
-) -> tuple[Model, State, Bools]:
+) -> tuple[PeriodicModel, FitState, Bools]:
     """The fit, first of the strongest spot, then with another base vector if there is one, and all spots seen."""
     images = list(zip((True, False), heights, strict=True))
-    start = np.zeros(BASES + 1 + _ORDER)
+    start = np.zeros(BASES + 1 + _ROW_POLYNOMIAL_ORDER)
     start[:4] = [bends[0].xi, bends[0].xi_gamma, bends[1].xi, bends[1].xi_gamma]
     start[LAG] = 1.0
     start[BASES] = 0.5 * (bends[0].q + bends[1].q)
-    start[BASES + 1 :] = row_polynomial(geometry, heights[0], bends[0], spot, _ORDER)
+    start[BASES + 1 :] = row_polynomial(geometry, heights[0], bends[0], spot, _ROW_POLYNOMIAL_ORDER)
     free = np.ones(len(start), bool)
     free[LAG] = False
     nowhere = np.zeros(geometry.columns)
     off = nowhere, nowhere
-    if start[BASES] > _TRACKED_FROM:
+    if start[BASES] > _MIN_TRACKED_PERIODS:
         start[:4], start[BASES], off = _tracked(geometry, heights, bends, start[BASES + 1 :])
     else:
         for i in (0, 1):  # each image by itself
             alone = free.copy()
             alone[[2, 3] if i == 0 else [0, 1]] = False
-            start[:4] = settle(Model(geometry, [images[i]], [(1,)], _ORDER, off), start, alone).parameters[:4]
-    model = Model(geometry, images, [(1,)], _ORDER, off)
+            start[:4] = settle(
+                PeriodicModel(geometry, [images[i]], [(1,)], _ROW_POLYNOMIAL_ORDER, off), start, alone
+            ).parameters[:4]
+    model = PeriodicModel(geometry, images, [(1,)], _ROW_POLYNOMIAL_ORDER, off)
     state = settle(model, start, free)
     model = _with_spots(model, state)
     state = settle(model, state.parameters, free)
@@ -130,14 +134,14 @@ def grown(
         state.parameters[:2],
         _multiples(model, state.parameters),
         float(np.max(np.abs(state.amplitudes))),
-        _ORDER,
+        _ROW_POLYNOMIAL_ORDER,
     )
     if other is not None:
         found, polynomial = other
         start = np.concatenate([state.parameters, [found.q], polynomial])
-        free = np.append(free, np.ones(1 + _ORDER, bool))
+        free = np.append(free, np.ones(1 + _ROW_POLYNOMIAL_ORDER, bool))
         pairs = [(*spot, 0) for spot in model.spots.tolist()]
-        model = Model(geometry, images, [*pairs, (0, 1)], _ORDER, off)
+        model = PeriodicModel(geometry, images, [*pairs, (0, 1)], _ROW_POLYNOMIAL_ORDER, off)
         state = settle(model, start, free)
         free = free.copy()
         free[LAG] = True  # two directions tell a shift in y from one in x
@@ -172,7 +176,7 @@ def _tracked(
     start = [bends[0].xi, bends[0].xi_gamma, bends[1].xi, bends[1].xi_gamma, q, float(phases[0][0])]
     best: Floats = least_squares(left, start, x_scale=[0.05, 0.1, 0.05, 0.1, 1.0, 0.3]).x
     off = left(best)
-    if float(np.sqrt(np.mean(off**2))) < _SAME_PHASE:
+    if float(np.sqrt(np.mean(off**2))) < _PHASE_TOLERANCE:
         off = np.zeros_like(off)
     first, second = np.split(off / best[4], 2)
     return best[:4], float(best[4]), (first, second)
@@ -193,7 +197,7 @@ def _turns(place: Floats, apart: Floats, q: float) -> int:
         left = left - across @ (across.T @ left)
         tried.append((float(np.sqrt(np.mean(left**2))), turns))
     tried.sort()
-    if tried[1][0] < _DISTINCT * tried[0][0]:
+    if tried[1][0] < _MIN_MISFIT_RATIO * tried[0][0]:
         raise Unphysical(
             f"the retrace may be one of the {q:.3g} periods further left or right; scan fewer of them, or take images "
             f"of more of the sweep, with a --window near 0 1"
@@ -201,16 +205,16 @@ def _turns(place: Floats, apart: Floats, q: float) -> int:
     return tried[0][1]
 
 
-def _multiples(model: Model, parameters: Floats) -> Floats:
+def _multiples(model: PeriodicModel, parameters: Floats) -> Floats:
     """(n, 2): q and s of the harmonics of the first base vector."""
     n = np.arange(1, 41)[:, None]
     found: Floats = n * np.array([model.q(parameters)[0], model.s(parameters)[0, 0]])
     return found
 
 
-def _with_spots(model: Model, state: State) -> Model:
+def _with_spots(model: PeriodicModel, state: FitState) -> PeriodicModel:
     """With the spots that can be seen in what is left, the strongest first."""
-    geometry, highest = model.geometry, _HIGHEST[model.bases]
+    geometry, highest = model.geometry, _MAX_SPOT_INDEX[model.bases]
     ranges = [np.arange(0, highest + 1), *[np.arange(-highest, highest + 1)] * (model.bases - 1)]
     spots: Ints = np.stack(np.meshgrid(*ranges, indexing="ij"), axis=-1).reshape(-1, model.bases)
     along, across = spots @ model.q(state.parameters), spots @ model.s(state.parameters)[:, 0]
@@ -224,13 +228,14 @@ def _with_spots(model: Model, state: State) -> Model:
             seen &= np.hypot(sign * along - q, sign * across - s) > 1.2
     leading = spots[np.arange(len(spots)), np.argmax(spots != 0, axis=1)]
     spots = spots[seen & (leading > 0)]
-    room = _MOST_SPOTS - len(known)
+    room = _MAX_SPOTS - len(known)
     if not len(spots) or room < 1:
         return model
     strength = model.strengths(state, spots)
     noise = sqrt(2.0 * state.cost / (geometry.rows * geometry.columns * len(model.images)))
     least = max(
-        _VISIBLE * noise / sqrt(geometry.rows * geometry.columns), _FAINT * float(np.max(np.abs(state.amplitudes)))
+        _MIN_SPOT_ERRORS * noise / sqrt(geometry.rows * geometry.columns),
+        _MIN_SPOT_AMPLITUDE * float(np.max(np.abs(state.amplitudes))),
     )
     best = [i for i in np.argsort(-strength)[:room] if strength[i] > least]
     return model.with_spots([*map(tuple, known.tolist()), *map(tuple, spots[best].tolist())])

@@ -11,8 +11,8 @@ from tablegen.calibration.image_fit import ImageFit, fit_pair
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 
-_POOR_PERCENT = 1.0
-_COARSE = 4.0  # pixels in the shortest period
+_POOR_FIT_PERCENT = 1.0
+_MIN_PIXELS_PER_PERIOD = 4.0  # pixels in the shortest period
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ def fit_images(
 def _remarks(fit: ImageFit) -> list[str]:
     found = []
     worst = float(np.max(np.abs(fit.residual_percent)))
-    if worst > _POOR_PERCENT:
+    if worst > _POOR_FIT_PERCENT:
         found.append(
             f"the harmonic model leaves {worst:.2g} % of the line; was the drive the triangle itself, is --window what "
             f"the columns span, and does the feedback follow?"
@@ -78,7 +78,7 @@ def _remarks(fit: ImageFit) -> list[str]:
             f"a part of what is left is no noise but what the model does not describe; standard errors were "
             f"widened by {fit.widened:.3g}; a --window that is not that of the images does that too"
         )
-    if fit.pixels_a_period < _COARSE:
+    if fit.pixels_a_period < _MIN_PIXELS_PER_PERIOD:
         found.append(f"the shortest period has {fit.pixels_a_period:.2g} pixels; scan less, or take more pixels")
     if fit.explained < 0.5:
         found.append(f"{100.0 * fit.explained:.0f} % of the contrast is periodic, the rest noise, debris or defects")

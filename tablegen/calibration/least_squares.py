@@ -12,8 +12,8 @@ from tablegen.calibration.estimate import Estimate
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 
-_NORMAL_2 = 0.9772498680518208  # the normal distribution's at 2: what two standard errors cover, on one side
-_SINGULAR = 1e-10  # of the largest singular value; what finite differences leave of a zero is below it
+_NORMAL_AT_2_SIGMA = 0.9772498680518208  # the normal distribution's at 2: what two standard errors cover, on one side
+_SINGULAR_VALUE_LIMIT = 1e-10  # of the largest singular value; what finite differences leave of a zero is below it
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Solution:
 
 def few_points(freedom: int) -> float:
     """By how much Student's distribution widens what two standard errors have to be; nan where nothing is left."""
-    return float(stdtrit(freedom, _NORMAL_2)) / 2.0 if freedom > 0 else nan
+    return float(stdtrit(freedom, _NORMAL_AT_2_SIGMA)) / 2.0 if freedom > 0 else nan
 
 
 def solve(
@@ -85,7 +85,7 @@ def solve(
     jac = np.asarray(found.jac)
     _, size, directions = np.linalg.svd(jac * scales, full_matrices=False)
     size = np.append(size, np.zeros(len(values) - len(size)))
-    weak = size <= _SINGULAR * size[0]
+    weak = size <= _SINGULAR_VALUE_LIMIT * size[0]
     inverse = np.where(weak, 0.0, 1.0 / np.where(weak, 1.0, size)) ** 2
     rows = directions[: len(size)]
     covariance = (rows.T * inverse[: len(rows)]) @ rows * np.outer(scales, scales)

@@ -13,7 +13,7 @@ from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 
 _NAMES = ("m_minus", "m_plus", "centre_nm")
-_LEAST_SPREAD = 1e-7  # relative scatter that is rounding of the file, not of the microscope
+_MIN_SCATTER = 1e-7  # relative scatter that is rounding of the file, not of the microscope
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,7 +63,7 @@ def fit_offset(
     solution = solve(residuals, start, _NAMES, [0.5, 0.5, scale])
     centre = float(solution.values[2])
     expected = centre * looks(shape @ np.array([1.0, *solution.values[:2]]))
-    found = outliers(solution.jacobian, solution.residuals, _LEAST_SPREAD)
+    found = outliers(solution.jacobian, solution.residuals, _MIN_SCATTER)
     line = np.linspace(0.0, v_max, 101)
     curve = looks(_shape(2.0 * line / v_max - 1.0) @ np.array([1.0, *solution.values[:2]]))
     return OffsetFit(

@@ -5,7 +5,7 @@ from scipy.special import stdtrit
 
 from tablegen.numerics.arrays import Floats
 
-_FALSE_ALARM = 0.01  # per set of points, whatever their number
+_FALSE_ALARM_RATE = 0.01  # per set of points, whatever their number
 
 
 def outliers(jacobian: Floats, residuals: Floats, least: float) -> tuple[int, ...]:
@@ -22,7 +22,7 @@ def outliers(jacobian: Floats, residuals: Floats, least: float) -> tuple[int, ..
     while len(kept) - parameters >= 3 and 4 * (len(found) + 1) <= count:
         scores = _studentised(jacobian[kept], residuals[kept], least)
         worst = int(np.argmax(scores))
-        if scores[worst] <= stdtrit(len(kept) - parameters - 1, 1.0 - _FALSE_ALARM / (2 * len(kept))):
+        if scores[worst] <= stdtrit(len(kept) - parameters - 1, 1.0 - _FALSE_ALARM_RATE / (2 * len(kept))):
             break
         found.append(int(kept[worst]))
         kept = np.delete(kept, worst)

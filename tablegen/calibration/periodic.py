@@ -23,10 +23,10 @@ from tablegen.problems import Unphysical
 Complexes = npt.NDArray[np.complex128]
 
 LAG, BASES = 4, 5  # of the parameters; before them xi and xi gamma, forward and backward
-_COLUMN_PARTS = 5  # 1, x, and x by xi and xi gamma; the time within the line
-_STEEPEST = 0.05  # least du/dtau of a branch that is tried
-_LEVELLED = 3  # terms of a row's parabola
-_MOST_STEPS = 100
+_COLUMN_TERMS = 5  # 1, x, and x by xi and xi gamma; the time within the line
+_MIN_BRANCH_SLOPE = 0.05  # least du/dtau of a branch that is tried
+_ROW_PARABOLA_TERMS = 3  # terms of a row's parabola
+_MAX_STEPS = 100
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +56,7 @@ class Geometry:
     @cached_property
     def parabola(self) -> Floats:
         """Orthonormal columns."""
-        return np.linalg.qr(np.vander(self.place - np.mean(self.place), _LEVELLED))[0]
+        return np.linalg.qr(np.vander(self.place - np.mean(self.place), _ROW_PARABOLA_TERMS))[0]
 
     def levelled(self, rows: npt.NDArray[np.inexact]) -> npt.NDArray[np.inexact]:
         """Rows less their parabolas."""
@@ -94,7 +94,7 @@ class Columns:
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class FitState:
     """The model at some parameters: ``amplitudes`` of the spots, what is left of each image, half its sum of squares.
 
     ``hessian`` and ``scores`` (of each row, both images together) are of all parameters, then of the real and the
@@ -110,7 +110,7 @@ class State:
     scores: Floats
 
 
-class Model:
+class PeriodicModel:
     """Levelled images, forward or backward each, and the spots: rows of whole numbers, one a base vector.
 
     ``order`` is that of the polynomial in y; ``off`` what is added to x, forward and backward: where it is known that
@@ -144,10 +144,11 @@ class Model:
     def allowed(self, parameters: Floats) -> bool:
         """Whether both branches run forward."""
         return all(
-            BranchShape(float(parameters[i]), float(parameters[i + 1])).least_slope() > _STEEPEST for i in (0, 2)
+            BranchShape(float(parameters[i]), float(parameters[i + 1])).least_slope() > _MIN_BRANCH_SLOPE
+            for i in (0, 2)
         )
 
-    def at(self, parameters: Floats) -> State:
+    def at(self, parameters: Floats) -> FitState:
         """Everything at these parameters, the amplitudes the best for them."""
         count = len(self.spots)
         rows = self._rows(parameters)
@@ -176,7 +177,7 @@ class Model:
             hessian += _gram(coefficients, (first, second))
             scores += _scores(coefficients, (r, c, places), left[-1])
         cost = 0.5 * sum(float(np.vdot(image, image)) for image in left)
-        return State(parameters, amplitudes, tuple(left), tuple(steepness), cost, hessian, scores)
+        return FitState(parameters, amplitudes, tuple(left), tuple(steepness), cost, hessian, scores)
 
     def columns(self, parameters: Floats, forward: bool) -> Columns:
         """Where the columns of a direction are, ``off`` with it."""
@@ -184,12 +185,12 @@ class Model:
         column = Columns.of(self.geometry, forward, parameters[i : i + 2])
         return replace(column, x=column.x + self.off[0 if forward else 1])
 
-    def with_spots(self, spots: Sequence[tuple[int, ...]]) -> "Model":
+    def with_spots(self, spots: Sequence[tuple[int, ...]]) -> "PeriodicModel":
         """The same of other spots."""
-        return Model(self.geometry, self.images, spots, self.order, self.off)
+        return PeriodicModel(self.geometry, self.images, spots, self.order, self.off)
 
-    def scores_of(self, state: State, left: Sequence[Floats]) -> Floats:
-        """``State.scores`` were this left of each image."""
+    def scores_of(self, state: FitState, left: Sequence[Floats]) -> Floats:
+        """``FitState.scores`` were this left of each image."""
         forward_terms, backward_terms = self._terms(state.parameters, state.amplitudes)
         rows = self._rows(state.parameters)
         scores = np.zeros((self.geometry.rows, len(forward_terms)))
@@ -218,8 +219,8 @@ class Model:
         """Parts as rows of two matrices, and which of them make each term: (1, each column part), (y^n, 1)."""
         count = len(self.spots)
         spot = np.arange(count)
-        row = [spot] * _COLUMN_PARTS + [spot + n * count for n in range(1, self.order + 1)]
-        column = [spot + b * count for b in range(_COLUMN_PARTS)] + [spot] * self.order
+        row = [spot] * _COLUMN_TERMS + [spot + n * count for n in range(1, self.order + 1)]
+        column = [spot + b * count for b in range(_COLUMN_TERMS)] + [spot] * self.order
         return (
             rows.reshape(-1, rows.shape[-1]),
             columns.reshape(-1, columns.shape[-1]),
@@ -234,7 +235,7 @@ class Model:
         q, s = self.q(parameters), self.s(parameters)
         along, across = self.spots @ q, self.spots @ s[:, 0]
         for first in (0, 2):
-            table = np.zeros((len(parameters) + 2 * count, _COLUMN_PARTS + order, count), dtype=np.complex128)
+            table = np.zeros((len(parameters) + 2 * count, _COLUMN_TERMS + order, count), dtype=np.complex128)
             table[first, 2] = table[first + 1, 3] = waves * along
             table[LAG, 4] = waves * across
             for j in range(self.bases):
@@ -242,7 +243,7 @@ class Model:
                 share = waves * self.spots[:, j]
                 table[at, 1] = share
                 for n in range(1, order + 1):
-                    table[at + n, _COLUMN_PARTS + n - 1] = share
+                    table[at + n, _COLUMN_TERMS + n - 1] = share
                 table[at + 1, 4] = share * float(parameters[LAG])
             spot = np.arange(count)
             table[len(parameters) + spot, 0, spot] = 1.0
@@ -250,7 +251,7 @@ class Model:
             tables.append(table.reshape(len(table), -1))
         return tables[0], tables[1]
 
-    def strengths(self, state: State, spots: Ints) -> Floats:
+    def strengths(self, state: FitState, spots: Ints) -> Floats:
         """How strong other spots are in what is left of both images: amplitudes, as far as levelling leaves them."""
         other = self.with_spots([tuple(spot) for spot in spots.tolist()])
         total = np.zeros(len(spots), dtype=np.complex128)
@@ -265,7 +266,7 @@ class Model:
         return found
 
 
-def settle(model: Model, start: Floats, free: Bools) -> State:
+def settle(model: PeriodicModel, start: Floats, free: Bools) -> FitState:
     """Levenberg and Marquardt's way to the least squares; parameters that are not ``free`` stay.
 
     Raises ``Unphysical`` where it finds none.
@@ -273,7 +274,7 @@ def settle(model: Model, start: Floats, free: Bools) -> State:
     state = model.at(start)
     joint = np.concatenate([free, np.ones(2 * len(model.spots), bool)])
     damping = 1e-3
-    for _ in range(_MOST_STEPS):
+    for _ in range(_MAX_STEPS):
         hessian = state.hessian[np.ix_(joint, joint)]
         gradient = np.sum(state.scores[:, joint], axis=0)
         scale = np.sqrt(np.maximum(np.diag(hessian), 1e-300))

@@ -7,8 +7,8 @@ from tablegen.calibration.hysteresis import TurnFit
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.problems import Unphysical
 
-_SIGNIFICANT = 3.0  # standard errors of a beta that has a peak worth looking at
-_OPEN_PEAK = 0.1  # standard error of a u_peak that was not determined
+_MIN_BETA_ERRORS = 3.0  # standard errors of a beta that has a peak worth looking at
+_MAX_PEAK_ERROR = 0.1  # standard error of a u_peak that was not determined
 
 
 def measured_points(branch: TurnFit, direction: str) -> list[dict[str, Any]]:
@@ -23,10 +23,10 @@ def measured_points(branch: TurnFit, direction: str) -> list[dict[str, Any]]:
         beta, peak = side.beta, side.u_peak
         size_v = float(f"{trace.v_scan:.5g}")
         if beta.value < 0.0:
-            if beta.value < -_SIGNIFICANT * beta.standard_error:
+            if beta.value < -_MIN_BETA_ERRORS * beta.standard_error:
                 raise Unphysical(f"{size_v:g} V, {direction}: the residual has the wrong sign")
             continue
-        if beta.value < _SIGNIFICANT * beta.standard_error or peak.standard_error > _OPEN_PEAK:
+        if beta.value < _MIN_BETA_ERRORS * beta.standard_error or peak.standard_error > _MAX_PEAK_ERROR:
             peak = getattr(branch, direction).u_peak
         if any(point["size_v"] == size_v for point in points):
             raise Unphysical(f"{size_v:g} V was measured twice; give one of the two")

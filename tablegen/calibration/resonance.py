@@ -11,7 +11,7 @@ from tablegen.calibration.outliers import outliers
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 
-_LEAST_SPREAD = 1e-7
+_MIN_SCATTER = 1e-7
 _POOR_PERCENT, _POOR_DEGREES = 5.0, 5.0
 
 
@@ -86,7 +86,7 @@ def fit_resonance(frequency_hz: Floats, gain: Floats, phase_deg: Floats | None =
     if phase is not None:
         degrees = (np.log10(line), np.degrees(model_phase))
         curves.append(Curve("phase", "log10 of Hz", "degrees", (np.log10(f), np.degrees(phase)), degrees))
-    rows = outliers(solution.jacobian, solution.residuals, _LEAST_SPREAD)
+    rows = outliers(solution.jacobian, solution.residuals, _MIN_SCATTER)
     return ResonanceFit(
         points=len(f),
         residual_percent=residual,
@@ -140,7 +140,7 @@ def _best(f: Floats, g: Floats, phase: Floats | None) -> Solution:
         raise Unphysical("no resonance fits this response; is it gain, and phase_deg, against frequency?")
     for _ in range(2 if phase is not None else 0):  # gain and phase each by its own scatter
         spread = [float(np.sqrt(np.mean(part**2))) for part in np.split(best.residuals, 2)]
-        if min(spread) <= _LEAST_SPREAD:
+        if min(spread) <= _MIN_SCATTER:
             break
         weight *= np.clip(max(spread) / np.array(spread), 1.0, 100.0)
         best = solve(residuals, best.values, names, [1.0, 0.3, 1.0, 1.0])

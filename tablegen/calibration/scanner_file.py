@@ -10,13 +10,13 @@ from typing import Any
 import tomlkit
 from tomlkit.items import AoT, InlineTable, Table
 
-from tablegen.calibration.hysteresis import SAME_TURN
+from tablegen.calibration.hysteresis import TURN_TOLERANCE
 from tablegen.config.decode import decode
 from tablegen.config.schema import Scanner
 from tablegen.config.toml import parse_toml
 from tablegen.problems import Problem, Problems, Rejected
 
-_MARK = "# calibrate "
+_PROVENANCE_MARK = "# calibrate "
 _FIRST_MARK = re.compile(r"# calibrate (\w+)(?:, turn ([\d.]+))?: ")
 _FILE_MARK = re.compile(r"# from .*, sha256 [0-9a-f]{16}$")
 
@@ -95,7 +95,9 @@ def _put_branches(table: Any, branches: Sequence[Mapping[str, Any]]) -> None:
         table["branches"] = tomlkit.array() if isinstance(table, InlineTable) else tomlkit.aot()
     entries: Any = table["branches"]
     for branch in branches:
-        same = [i for i, entry in enumerate(entries) if abs(_number(entry.get("turn")) - branch["turn"]) < SAME_TURN]
+        same = [
+            i for i, entry in enumerate(entries) if abs(_number(entry.get("turn")) - branch["turn"]) < TURN_TOLERANCE
+        ]
         if not same:
             entry: Any = tomlkit.table() if isinstance(entries, AoT) else tomlkit.inline_table()
             entries.append(entry)
@@ -150,7 +152,7 @@ def _with_provenance(text: str, name: str, axis: str, change: Change) -> str:
         rows = text.split("\n")
         first, end = _old(rows, at, change.kind, turn)
         indent = rows[at][: len(rows[at]) - len(rows[at].lstrip())]
-        title = f"{_MARK}{change.kind}" + ("" if turn is None else f", turn {turn:g}")
+        title = f"{_PROVENANCE_MARK}{change.kind}" + ("" if turn is None else f", turn {turn:g}")
         rows[first:end] = [f"{indent}{title}: {lines[0]}", *(f"{indent}# {line}" for line in lines[1:])]
         text = "\n".join(rows)
     return text
@@ -161,7 +163,7 @@ def _spaced(text: str, before: str) -> str:
     known = set(pairwise(before.split("\n")))
     rows: list[str] = []
     for row in text.split("\n"):
-        starts = row.startswith(("[", _MARK))
+        starts = row.startswith(("[", _PROVENANCE_MARK))
         if starts and rows and rows[-1] and not rows[-1].startswith("#") and (rows[-1], row) not in known:
             rows.append("")
         rows.append(row)
@@ -178,7 +180,7 @@ def _old(rows: list[str], at: int, kind: str, turn: float | None) -> tuple[int, 
         found = _FIRST_MARK.match(rows[first - 1].strip()) if first > 0 else None
         if not found:
             break
-        if found[1] == kind and (turn is None or (found[2] and abs(float(found[2]) - turn) < SAME_TURN)):
+        if found[1] == kind and (turn is None or (found[2] and abs(float(found[2]) - turn) < TURN_TOLERANCE)):
             return first - 1, end
         end = first - 1
     return at, at

@@ -14,8 +14,8 @@ from tablegen.problems import Unphysical
 
 TYPICAL_THRESHOLD = 0.5  # the paper's
 _NAMES = ("k_nm_per_v", "beta", "v_threshold")
-_LEAST_SPREAD = 1e-7
-_SCALES = (0.5, 2.0, 0.25)  # of k relative to its start, and of the others as they are
+_MIN_SCATTER = 1e-7
+_STEP_SCALES = (0.5, 2.0, 0.25)  # of k relative to its start, and of the others as they are
 _LEAST_BETA, _LARGEST_BETA = -0.49, 100.0
 
 
@@ -53,7 +53,7 @@ def fit_size(
     if threshold is not None and not 0.0 < threshold <= 1.0:
         raise Unphysical(f"a threshold of {threshold:g} is not above 0 and at most 1; it is a fraction of v_max")
     weight = actual_nm if noise == "relative" else np.full(len(v), float(np.max(actual_nm)))
-    fit = _Model(v, actual_nm, weight, v_max, base_nm)
+    fit = _SizeModel(v, actual_nm, weight, v_max, base_nm)
     kept = threshold if threshold is not None else TYPICAL_THRESHOLD
     remarks: list[str] = []
     solution = fit.solve(kept)
@@ -86,7 +86,7 @@ def fit_size(
         residual_percent=100.0 * (actual_nm / expected - 1.0),
         before_percent=float(np.max(np.abs(100.0 * (actual_nm / (linear * v) - 1.0)))),
         remarks=tuple(remarks),
-        outliers=outliers(solution.jacobian, solution.residuals, _LEAST_SPREAD),
+        outliers=outliers(solution.jacobian, solution.residuals, _MIN_SCATTER),
         curves=(
             Curve(
                 "size against that of the linear law",
@@ -103,7 +103,7 @@ def fit_size(
     )
 
 
-class _Model:
+class _SizeModel:
     """R = base u(V) / u(base / k), with u as in (6) and (10): k, beta and threshold are what the file has."""
 
     def __init__(self, v: Floats, actual_nm: Floats, weight: Floats, v_max: float, base_nm: float) -> None:
@@ -128,7 +128,7 @@ class _Model:
         def residuals(x: Floats) -> Floats:
             return (self.size(np.append(x, fixed), self._v) - self._actual) / self._weight
 
-        scales = [_SCALES[0] * self._start_k, *_SCALES[1:]]
+        scales = [_STEP_SCALES[0] * self._start_k, *_STEP_SCALES[1:]]
         low = [1e-3 * self._start_k, _LEAST_BETA, 0.02]
         high = [1e3 * self._start_k, _LARGEST_BETA, 1.0]
         found = solve(residuals, [k, beta, begin][:count], _NAMES[:count], scales[:count], (low[:count], high[:count]))

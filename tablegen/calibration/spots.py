@@ -15,16 +15,16 @@ from tablegen.compensation.hysteresis import BranchShape
 from tablegen.numerics.arrays import Bools, Floats
 from tablegen.problems import Unphysical
 
-LEAST_PERIODS = 3.0
-_LOOKED_FROM = 1.4  # periods; what is slower goes with the parabola of the rows
-_WIDEST = 0.13  # |xi|: a tenth of the scan, and what a skew peak adds
-_SKEW = 0.2  # |xi gamma|
-_COARSE = 0.02
-_FINE = 0.25  # of a period, between neighbours of the search
-_FINEST = 0.33  # periods a column, where a branch may compress them by a third
-_SECOND = 0.1  # of the strongest amplitude
-_ASIDE = 0.12  # of the frame: over it another wave of the same q, of another s, averages out
-_CLEAR = 25.0  # times the mean power: what white noise does not reach
+MIN_PERIODS = 3.0
+_MIN_SEARCHED_PERIODS = 1.4  # periods; what is slower goes with the parabola of the rows
+_MAX_XI = 0.13  # |xi|: a tenth of the scan, and what a skew peak adds
+_MAX_XI_GAMMA = 0.2  # |xi gamma|
+_COARSE_STEP = 0.02
+_FINE_STEP_PERIODS = 0.25  # of a period, between neighbours of the search
+_MAX_PERIODS_PER_COLUMN = 0.33  # periods a column, where a branch may compress them by a third
+_MIN_SECOND_AMPLITUDE = 0.1  # of the strongest amplitude
+_MIN_SIDE_DISTANCE = 0.12  # of the frame: over it another wave of the same q, of another s, averages out
+_MIN_SPOT_POWER = 25.0  # times the mean power: what white noise does not reach
 
 
 @dataclass(frozen=True)
@@ -51,10 +51,10 @@ def strongest(geometry: Geometry, heights: Floats) -> Spot:
     weight = np.hanning(geometry.rows + 2)[1:-1, None] * np.hanning(geometry.columns + 2)[1:-1]
     best = (0.0, 0, 0, 0.0, 1.0)
     kept = np.zeros((1, 1))
-    for xi in np.arange(-6, 7) * _COARSE:
+    for xi in np.arange(-6, 7) * _COARSE_STEP:
         straight, span = _straightened(geometry, heights, BranchShape(float(xi)))
         power = np.abs(np.fft.rfft2(weight * straight)) ** 2
-        first = int(np.ceil(_LOOKED_FROM * span))
+        first = int(np.ceil(_MIN_SEARCHED_PERIODS * span))
         power[:, :first] = 0.0
         # Of the waves of a lattice the one along x says most; the harmonics of a grating fall faster than 1 / q.
         row, column = divmod(int(np.argmax(power * np.arange(power.shape[1]))), power.shape[1])
@@ -66,19 +66,17 @@ def strongest(geometry: Geometry, heights: Floats) -> Spot:
     # as the mean of what is random, does not see another spot of a lattice.
     beside = np.concatenate([np.arange(3, 13), -np.arange(3, 13)])
     near = kept[np.ix_((row + beside) % geometry.rows, np.arange(max(column - 2, 0), min(column + 3, kept.shape[1])))]
-    if not kept[row, column] > _CLEAR * max(float(np.mean(kept)), 1.44 * float(np.median(near))):
+    if not kept[row, column] > _MIN_SPOT_POWER * max(float(np.mean(kept)), 1.44 * float(np.median(near))):
         raise Unphysical("no period stands out in the trace; a grating or a lattice is needed, and its contrast")
     count = geometry.rows
     peak = np.log(np.maximum(kept[[(row - 1) % count, row, (row + 1) % count], column], 1e-300))
     bend = float(peak[0] - 2.0 * peak[1] + peak[2])
     s = row + (0.5 * float(peak[0] - peak[2]) / bend if bend < 0.0 else 0.0)
     q = column / span
-    if q * (geometry.window[1] - geometry.window[0]) > _FINEST * geometry.columns:
+    if q * (geometry.window[1] - geometry.window[0]) > _MAX_PERIODS_PER_COLUMN * geometry.columns:
         raise Unphysical(f"{q:.3g} periods in {geometry.columns} columns are too fine; scan less, or take more pixels")
-    if q < LEAST_PERIODS - 0.5:
-        raise Unphysical(
-            f"the line has about {q:.2g} periods; at least {LEAST_PERIODS:g} are needed: scan more of them"
-        )
+    if q < MIN_PERIODS - 0.5:
+        raise Unphysical(f"the line has about {q:.2g} periods; at least {MIN_PERIODS:g} are needed: scan more of them")
     return Spot(q, s - count if s > count / 2 else s, xi)
 
 
@@ -86,12 +84,14 @@ def bend_of(geometry: Geometry, heights: Floats, forward: bool, spot: Spot, arou
     """The shape with which a spot of this s is sharpest in a levelled image; xi near ``around``, or any."""
     weight = np.hanning(geometry.rows + 2)[1:-1]
     profile = (weight * np.exp(-2j * np.pi * spot.s * geometry.y)) @ heights
-    step = min(0.01, _FINE / spot.q)
-    reach = _WIDEST if around is None else 1.5 * _COARSE
+    step = min(0.01, _FINE_STEP_PERIODS / spot.q)
+    reach = _MAX_XI if around is None else 1.5 * _COARSE_STEP
     centre = 0.0 if around is None else around
     count = int(np.ceil(reach / step))
-    skew_count = int(np.ceil(_SKEW / (2.4 * step)))  # xi gamma moves the line by a fifth of what xi does, at two places
-    q = spot.q + np.arange(-8, 9) * _FINE
+    skew_count = int(
+        np.ceil(_MAX_XI_GAMMA / (2.4 * step))
+    )  # xi gamma moves the line by a fifth of what xi does, at two places
+    q = spot.q + np.arange(-8, 9) * _FINE_STEP_PERIODS
     best = Bend(spot.q, 0.0, 0.0, 0.0)
     u = geometry.sweep(forward)
     for xi, skew in product(
@@ -186,9 +186,11 @@ def second_base(
         away = (s - one_s + 0.5 * geometry.rows) % geometry.rows - 0.5 * geometry.rows
         power[np.ix_(np.abs(away) < 2.5, np.abs(q - one_q) < 2.5)] = 0.0
     row, column = divmod(int(np.argmax(power)), power.shape[1])
-    least = max(_CLEAR * float(np.mean(power)), (_SECOND * 0.5 * amplitude * float(np.sum(weight))) ** 2)
+    least = max(
+        _MIN_SPOT_POWER * float(np.mean(power)), (_MIN_SECOND_AMPLITUDE * 0.5 * amplitude * float(np.sum(weight))) ** 2
+    )
     if not power[row, column] > least:
         return None
     spot = Spot(float(q[column]), float(row if row <= geometry.rows / 2 else row - geometry.rows), float(shape[0]))
     bend = Bend(spot.q, float(shape[0]), float(shape[1]), 0.0)
-    return spot, row_polynomial(geometry, left, bend, spot, order, _ASIDE)
+    return spot, row_polynomial(geometry, left, bend, spot, order, _MIN_SIDE_DISTANCE)

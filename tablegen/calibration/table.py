@@ -15,7 +15,7 @@ from tablegen.numerics.arrays import Floats, Ints
 from tablegen.problems import Problem, Rejected
 
 _MAXIMUM_BYTES = 256 << 20
-_MOST_PROBLEMS = 20
+_MAX_PROBLEMS = 20
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Source:
 
 
 @dataclass(frozen=True)
-class Table:
+class MeasuredTable:
     """Columns of numbers in the units of the fits, by name, and the line on which each row stands."""
 
     file: str
@@ -45,7 +45,7 @@ class Table:
         return self.columns[column.name]
 
 
-def read_table(path: Path, needed: Sequence[Column], optional: Sequence[Column] = ()) -> Table:
+def read_table(path: Path, needed: Sequence[Column], optional: Sequence[Column] = ()) -> MeasuredTable:
     """Read the columns that are needed, and the optional ones that are there; others are passed over.
 
     Commas, semicolons or tabs separate, whichever the header has; with the latter two a decimal comma is understood.
@@ -63,8 +63,8 @@ def read_table(path: Path, needed: Sequence[Column], optional: Sequence[Column] 
     reader = _Reader(name, separator, len(_cells(header, separator)), places)
     values = [reader.row(line, text) for line, text in rows[1:]]
     if reader.problems:
-        more = len(reader.problems) - _MOST_PROBLEMS
-        found = reader.problems[:_MOST_PROBLEMS]
+        more = len(reader.problems) - _MAX_PROBLEMS
+        found = reader.problems[:_MAX_PROBLEMS]
         if more > 0:
             found.append(Problem(name, found[-1].line, "", f"and {more} more"))
         raise Rejected(found)
@@ -73,7 +73,7 @@ def read_table(path: Path, needed: Sequence[Column], optional: Sequence[Column] 
     array = np.array(values, dtype=np.float64)
     columns = {column.name: array[:, i] for i, (_, column, _, _) in enumerate(places)}
     source = Source(path.name, hashlib.sha256(content).hexdigest()[:16])
-    return Table(name, source, columns, np.array([line for line, _ in rows[1:]], dtype=np.int64))
+    return MeasuredTable(name, source, columns, np.array([line for line, _ in rows[1:]], dtype=np.int64))
 
 
 _Place = tuple[int, Column, Conversion, str]  # where it stands, what it is, how it converts, how it is spelt

@@ -13,8 +13,8 @@ from tablegen.compensation.hysteresis import BranchShape
 from tablegen.numerics.arrays import Bools, Floats
 from tablegen.problems import Unphysical
 
-_LEAST_SAMPLES = 40  # a period
-_TOO_FAR = 1e3  # the residual of a branch that runs backwards
+_MIN_SAMPLES_PER_PERIOD = 40  # a period
+_REVERSED_BRANCH_RESIDUAL = 1e3  # the residual of a branch that runs backwards
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,16 +51,18 @@ def fit_trace(
     None fits it.
     Raises ``Unphysical``.
     """
-    if len(time_s) < _LEAST_SAMPLES:
-        raise Unphysical(f"{len(time_s)} samples are no trace; at least {_LEAST_SAMPLES} a period are needed")
+    if len(time_s) < _MIN_SAMPLES_PER_PERIOD:
+        raise Unphysical(f"{len(time_s)} samples are no trace; at least {_MIN_SAMPLES_PER_PERIOD} a period are needed")
     if not np.all(np.diff(time_s) > 0.0):
         at = int(np.argmin(np.diff(time_s) > 0.0))
         raise Unphysical(f"time does not ascend after {time_s[at]:g} s; give every trace its own file or trace number")
     triangle = find_triangle(time_s, drive_v)
     periods = float(time_s[-1] - time_s[0]) * (1.0 + 1.0 / (len(time_s) - 1)) / triangle.period_s
     per_period = len(time_s) / periods
-    if per_period < _LEAST_SAMPLES:
-        raise Unphysical(f"{per_period:.3g} samples a period are too few; at least {_LEAST_SAMPLES} are needed")
+    if per_period < _MIN_SAMPLES_PER_PERIOD:
+        raise Unphysical(
+            f"{per_period:.3g} samples a period are too few; at least {_MIN_SAMPLES_PER_PERIOD} are needed"
+        )
     if periods < 0.99:
         raise Unphysical(f"{periods:.3g} of a period are recorded; at least one whole period is needed")
     settle = settle_periods if settle_periods is not None else (1 if periods >= 2.99 else 0)
@@ -71,12 +73,12 @@ def fit_trace(
     )
     periods -= settle
     order = drift_order if drift_order is not None else (1 if periods < 1.99 else 2 if periods < 3.99 else 3)
-    model = _Model(triangle, time_s[used], displacement_nm[used], order, delay_s)
+    model = _TraceModel(triangle, time_s[used], displacement_nm[used], order, delay_s)
     solution = model.solve()
     return _result(model, solution, triangle, periods, int(np.sum(~used)))
 
 
-class _Model:
+class _TraceModel:
     """displacement = low + height tau(t - delay) + drift.
 
     Of the branches xi and xi gamma are fitted, in which (17) is linear, and not their peaks, which have poles.
@@ -125,7 +127,7 @@ class _Model:
     def residuals(self, x: Floats) -> Floats:
         """Model less measurement; far off where a branch would run backwards."""
         if min(BranchShape(float(x[i]), float(x[i + 1])).least_slope() for i in (0, 2)) < 0.02:
-            return np.full(len(self.measured), _TOO_FAR)
+            return np.full(len(self.measured), _REVERSED_BRANCH_RESIDUAL)
         return self.expected(x) - self.measured
 
     def jacobian(self, x: Floats) -> Floats:
@@ -179,7 +181,7 @@ class _Model:
         return solve(self.residuals, start, self.names, scales, jacobian=self.jacobian)
 
 
-def _result(model: _Model, solution: Solution, triangle: Triangle, periods: float, left_out: int) -> TraceFit:
+def _result(model: _TraceModel, solution: Solution, triangle: Triangle, periods: float, left_out: int) -> TraceFit:
     x, left = solution.values, solution.residuals
     correlated = correlation_length(left)
     freedom = max(len(left) / correlated - len(x), 1.0)
@@ -231,7 +233,7 @@ def correlation_length(residuals: Floats) -> float:
     return max(total, 1.0)
 
 
-def _averaged(model: _Model, x: Floats, left: Floats) -> tuple[Floats, tuple[float, float], Curve]:
+def _averaged(model: _TraceModel, x: Floats, left: Floats) -> tuple[Floats, tuple[float, float], Curve]:
     """What is left over, averaged over the periods, and the measured residual to draw."""
     u, tau, rising, _ = model.position(x)
     height = float(x[5])

@@ -4,10 +4,10 @@ import numpy as np
 
 from tablegen.calibration.columns import DISPLACEMENT, DRIVE, TIME, TRACE
 from tablegen.calibration.hysteresis import Trace
-from tablegen.calibration.table import Table
+from tablegen.calibration.table import MeasuredTable
 
 
-def split_traces(table: Table) -> list[Trace]:
+def split_traces(table: MeasuredTable) -> list[Trace]:
     """The traces of a table, in order; named after the file, and by number where there are several."""
     time = table[TIME]
     if TRACE in table:

@@ -10,7 +10,7 @@ from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 
 _NAMES = ("period", "start", "turn", "low", "high")
-_LEAST_SWEEP = 4  # samples in the middle half of a sweep
+_MIN_SWEEP_SAMPLES = 4  # samples in the middle half of a sweep
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ def _sweeps(time_s: Floats, level: Floats) -> list[tuple[float, float]]:
     for end in ends:
         inside = slice(int(far[end]) + 1, int(far[end + 1]))
         t, v = time_s[inside], level[inside]
-        if len(t) < _LEAST_SWEEP:
+        if len(t) < _MIN_SWEEP_SAMPLES:
             continue
         centre = float(np.mean(t))
         slope = float((t - centre) @ (v - np.mean(v)) / ((t - centre) @ (t - centre)))

@@ -1,4 +1,4 @@
-"""The command line. Results go to stdout, messages to stderr; see ``tablegen.cli.status`` for the exit statuses.
+"""The command line. Results go to stdout, messages to stderr; see ``tablegen.cli.exit_status`` for the exit statuses.
 
 Commands import what they need when they run, so that ``--version`` and ``--help`` answer at once.
 """
@@ -15,6 +15,7 @@ from tablegen.cli.check import check
 from tablegen.cli.common import Failure
 from tablegen.cli.control import clear, park, trigger
 from tablegen.cli.device_status import device_status
+from tablegen.cli.exit_status import ExitStatus
 from tablegen.cli.init import init
 from tablegen.cli.paths import paths
 from tablegen.cli.ports import ports
@@ -23,7 +24,6 @@ from tablegen.cli.refine import refine
 from tablegen.cli.schema import schema
 from tablegen.cli.show import show
 from tablegen.cli.simulate import simulate
-from tablegen.cli.status import Status
 from tablegen.cli.upload import upload
 from tablegen.cli.verify import verify
 
@@ -80,7 +80,7 @@ def _run() -> int:
         return error.exit_code
     except (click.Abort, KeyboardInterrupt):
         click.echo("interrupted; the output directory was left as it was", err=True)
-        return Status.INTERRUPTED
+        return ExitStatus.INTERRUPTED
     except BrokenPipeError:
         return _reader_left()
     except SystemExit as end:
@@ -89,10 +89,10 @@ def _run() -> int:
     except OSError as error:
         sys.stdout = None
         click.echo(f"cannot write what is printed: {error.strerror or error}", err=True)
-        return Status.CANNOT_WRITE
+        return ExitStatus.CANNOT_WRITE
 
 
 def _reader_left() -> int:
     """The reader of a pipe went away: nothing is left to say, and Python's own flush at exit must not complain."""
     sys.stdout = None
-    return Status.OK
+    return ExitStatus.OK

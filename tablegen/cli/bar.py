@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 import click
 
-_BAR = 24
+_BAR_WIDTH = 24
 _WIDTH = 76
-_EVERY_S = 0.1
+_REDRAW_S = 0.1
 
 
 class Bar:
@@ -30,7 +30,7 @@ class Bar:
         now = self._clock()
         if self._start is None:
             self._start = now, done  # an upload that goes on has some bytes from the start
-        elif now - self._shown_at < _EVERY_S and done < total:
+        elif now - self._shown_at < _REDRAW_S and done < total:
             return
         self._shown_at = now
         click.echo(f"\r{self._text(now, done, total):<{_WIDTH}}", err=True, nl=False)
@@ -43,8 +43,8 @@ class Bar:
 
     def _text(self, now: float, done: int, total: int) -> str:
         assert self._start is not None
-        full = _BAR * done // total
-        text = f"[{'#' * full}{'.' * (_BAR - full)}] {done}/{total} bytes"
+        full = _BAR_WIDTH * done // total
+        text = f"[{'#' * full}{'.' * (_BAR_WIDTH - full)}] {done}/{total} bytes"
         if done == total:
             return f"{text}  waiting for the start of a line"
         seconds, first = now - self._start[0], self._start[1]

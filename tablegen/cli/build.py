@@ -6,7 +6,7 @@ import click
 
 from tablegen.cli.common import fail, planned, scan_argument, written
 from tablegen.cli.depfile import Depfile
-from tablegen.cli.status import Status
+from tablegen.cli.exit_status import ExitStatus
 
 
 @click.command(short_help="Build C, Verilog, tables and a certificate.")
@@ -54,7 +54,7 @@ def build(
         raise click.UsageError("--check writes nothing; leave out --depfile")
     rule = Depfile(depfile, depfile_target or str(output / "manifest.json"), scan) if depfile is not None else None
     setup, plan, certificates = planned(scan)
-    from tablegen.emit import render
+    from tablegen.emit.render import render
 
     files = render(plan, certificates)
     if only_check:
@@ -62,9 +62,9 @@ def build(
 
         found = differences(output, files)
         if not found:
-            return Status.OK
+            return ExitStatus.OK
         click.echo("\n".join(found))
-        fail([f"{output} is stale; run: tablegen build {scan} -o {output}"], Status.STALE)
+        fail([f"{output} is stale; run: tablegen build {scan} -o {output}"], ExitStatus.STALE)
     if rule is not None:
         rule.note(setup.files)
     changed = written(output, files)
@@ -75,12 +75,12 @@ def build(
 
         click.echo("\n".join(certificate_table(plan, certificates)))
         click.echo(f"\n{output}: {_state(files, changed)}")
-    return Status.OK
+    return ExitStatus.OK
 
 
 def _state(files: dict[str, bytes], changed: list[str]) -> str:
     """What was written; the runtime, which changes with tablegen only, is many files and one thing."""
-    from tablegen.emit import runtime_files
+    from tablegen.emit.render import runtime_files
 
     runtime = runtime_files()
     own, count = sum(name not in runtime for name in changed), len(files) - len(runtime)

@@ -19,7 +19,7 @@ from tablegen.cli.calibration_run import (
     within,
 )
 from tablegen.cli.common import fail, require
-from tablegen.cli.status import Status
+from tablegen.cli.exit_status import ExitStatus
 
 _points = click.option("--points", is_flag=True, help="Write each amplitude as measured, in place of (22).")
 _data = click.argument("data", type=click.Path(path_type=Path), metavar="DATA.CSV")
@@ -103,11 +103,13 @@ def size(
 
     table = read_columns(data, [], [DRIVE, NOMINAL, ACTUAL, APPARENT, TRUE])
     if DRIVE not in table and (NOMINAL not in table or k is None):
-        fail([f"{table.file}: drive_v is missing; or give nominal_nm, and --k NM/V"], Status.WRONG_INPUT)
+        fail([f"{table.file}: drive_v is missing; or give nominal_nm, and --k NM/V"], ExitStatus.WRONG_INPUT)
     if DRIVE in table and k is not None:
         raise click.UsageError("--k is for nominal sizes; the file has drive_v")
     if ACTUAL not in table and any(column not in table for column in (APPARENT, TRUE, NOMINAL)):
-        fail([f"{table.file}: actual_nm is missing; or give nominal_nm, apparent_nm and true_nm"], Status.WRONG_INPUT)
+        fail(
+            [f"{table.file}: actual_nm is missing; or give nominal_nm, apparent_nm and true_nm"], ExitStatus.WRONG_INPUT
+        )
     actual = table[ACTUAL] if ACTUAL in table else table[NOMINAL] * table[TRUE] / table[APPARENT]
     drive = table[DRIVE] if DRIVE in table else table[NOMINAL] / (k or 1.0)
     v_max = full_scale(common)

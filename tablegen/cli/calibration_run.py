@@ -10,19 +10,19 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from tablegen.cli.common import fail, require, written
-from tablegen.cli.status import Status
+from tablegen.cli.exit_status import ExitStatus
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from tablegen.calibration.columns import Column
     from tablegen.calibration.estimate import Fit
-    from tablegen.calibration.image_files import Image
-    from tablegen.calibration.table import Table
+    from tablegen.calibration.image_files import ScanImage
+    from tablegen.calibration.table import MeasuredTable
     from tablegen.compensation.size import SizeLaw
 
 F = TypeVar("F", bound=Callable[..., Any])
-_EXTRAS = ("scipy", "tomlkit")
+_REQUIRED_MODULES = ("scipy", "tomlkit")
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ def shared_options(command: F) -> F:
         if write and scanner is None:
             raise click.UsageError("--write needs --scanner FILE")
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the fits are small, and its threads would only spin
-        require(*_EXTRAS, extra="calibrate")
+        require(*_REQUIRED_MODULES, extra="calibrate")
         if plot is not None:
             if plot.suffix not in (".png", ".svg", ".pdf"):
                 raise click.UsageError(f"--plot {plot}: the name has to end in .png, .svg or .pdf")
@@ -81,7 +81,7 @@ def shared_options(command: F) -> F:
     return run  # type: ignore[return-value]
 
 
-def read_columns(path: Path, needed: "Sequence[Column]", optional: "Sequence[Column]" = ()) -> "Table":
+def read_columns(path: Path, needed: "Sequence[Column]", optional: "Sequence[Column]" = ()) -> "MeasuredTable":
     """A CSV with these columns; what is wrong with it ends the command."""
     from tablegen.calibration.table import read_table
     from tablegen.problems import Rejected
@@ -89,10 +89,10 @@ def read_columns(path: Path, needed: "Sequence[Column]", optional: "Sequence[Col
     try:
         return read_table(path, needed, optional)
     except Rejected as rejected:
-        fail(rejected.problems, Status.WRONG_INPUT)
+        fail(rejected.problems, ExitStatus.WRONG_INPUT)
 
 
-def read_heights(path: Path, channel: str | None) -> "Image":
+def read_heights(path: Path, channel: str | None) -> "ScanImage":
     """An image; what is wrong with it ends the command."""
     from tablegen.calibration.image_files import read_image
     from tablegen.problems import Rejected
@@ -100,10 +100,10 @@ def read_heights(path: Path, channel: str | None) -> "Image":
     try:
         return read_image(path, channel)
     except Rejected as rejected:
-        fail(rejected.problems, Status.WRONG_INPUT)
+        fail(rejected.problems, ExitStatus.WRONG_INPUT)
 
 
-def within(table: "Table", from_hz: float, to_hz: float) -> "Table":
+def within(table: "MeasuredTable", from_hz: float, to_hz: float) -> "MeasuredTable":
     """The rows from one frequency to the other; none ends the command."""
     from dataclasses import replace
 
@@ -111,7 +111,7 @@ def within(table: "Table", from_hz: float, to_hz: float) -> "Table":
 
     kept = (table[FREQUENCY] >= from_hz) & (table[FREQUENCY] <= to_hz)
     if not kept.any():
-        fail([f"{table.file}: no row lies from {from_hz:g} to {to_hz:g} Hz"], Status.WRONG_INPUT)
+        fail([f"{table.file}: no row lies from {from_hz:g} to {to_hz:g} Hz"], ExitStatus.WRONG_INPUT)
     return replace(
         table, columns={name: values[kept] for name, values in table.columns.items()}, lines=table.lines[kept]
     )
@@ -127,7 +127,7 @@ def _scanner_values(common: Common) -> dict[str, Any]:
     try:
         return read_toml(common.scanner, str(common.scanner))[0]
     except Rejected as rejected:
-        fail(rejected.problems, Status.WRONG_INPUT)
+        fail(rejected.problems, ExitStatus.WRONG_INPUT)
 
 
 def full_scale(common: Common) -> float:
@@ -136,10 +136,10 @@ def full_scale(common: Common) -> float:
     found = values.get("v_max")
     if isinstance(found, int | float) and not isinstance(found, bool) and found > 0.0:
         if common.v_max is not None and common.v_max != found:
-            fail([f"{common.scanner}: v_max: {found:g} there, and --v-max {common.v_max:g}"], Status.WRONG_INPUT)
+            fail([f"{common.scanner}: v_max: {found:g} there, and --v-max {common.v_max:g}"], ExitStatus.WRONG_INPUT)
         return float(found)
     if values:
-        fail([f"{common.scanner}: v_max: missing, or no voltage"], Status.WRONG_INPUT)
+        fail([f"{common.scanner}: v_max: missing, or no voltage"], ExitStatus.WRONG_INPUT)
     if common.v_max is None:
         raise click.UsageError("give --scanner FILE, or --v-max V, the driver's maximum output")
     return common.v_max
@@ -163,23 +163,25 @@ def size_law(common: Common, v_max: float, size_v: float) -> "SizeLaw":
 
     path = f"{common.axis}.size"
     if in_file(common, "size", "k_nm_per_v") is None:
-        fail([f"--size-v takes {path} of --scanner FILE; calibrate the size first"], Status.WRONG_INPUT)
+        fail([f"--size-v takes {path} of --scanner FILE; calibrate the size first"], ExitStatus.WRONG_INPUT)
     if not size_v <= v_max:
-        fail([f"--size-v {size_v:g} is above v_max = {v_max:g} V"], Status.WRONG_INPUT)
+        fail([f"--size-v {size_v:g} is above v_max = {v_max:g} V"], ExitStatus.WRONG_INPUT)
     values, document = read_toml(common.scanner, str(common.scanner))  # type: ignore[arg-type]
     tables: dict[str, Any] = {}
     problems = Problems()
     decode(Scanner, values, document, problems, lambda _kind, key, _values, built: tables.update({key: built}))
     size = tables.get(path)
     if size is None:
-        fail([problem for problem in problems.found if problem.key.startswith(path)], Status.WRONG_INPUT)
+        fail([problem for problem in problems.found if problem.key.startswith(path)], ExitStatus.WRONG_INPUT)
     try:
         return SizeLaw.calibrated(size.k_nm_per_v, v_max, size.beta, size.base_nm, size.v_threshold)
     except Unphysical as reason:
-        fail([f"{common.scanner}: {path}: {reason}"], Status.WRONG_INPUT)
+        fail([f"{common.scanner}: {path}: {reason}"], ExitStatus.WRONG_INPUT)
 
 
-def finish(common: Common, tables: "Sequence[Table | Image]", run: "Callable[[], Fit]", points: bool = False) -> int:
+def finish(
+    common: Common, tables: "Sequence[MeasuredTable | ScanImage]", run: "Callable[[], Fit]", points: bool = False
+) -> int:
     """Fit, print, draw and write; with ``points`` hysteresis as measured."""
     from tablegen.calibration.summary import record
     from tablegen.cli.calibration_text import calibration_text
@@ -188,7 +190,7 @@ def finish(common: Common, tables: "Sequence[Table | Image]", run: "Callable[[],
     try:
         fit = run()
     except Unphysical as reason:
-        fail([f"{', '.join(dict.fromkeys(table.file for table in tables))}: {reason}"], Status.WRONG_INPUT)
+        fail([f"{', '.join(dict.fromkeys(table.file for table in tables))}: {reason}"], ExitStatus.WRONG_INPUT)
     sources = list(dict.fromkeys(table.source for table in tables))  # images may stand in one file
     if common.as_json:
         click.echo(json.dumps(record(fit, common.axis, sources), indent=2, allow_nan=False))
@@ -201,10 +203,10 @@ def finish(common: Common, tables: "Sequence[Table | Image]", run: "Callable[[],
         written(common.plot.parent, {common.plot.name: draw(fit.curves, kind)})
     if common.write:
         _write(common, fit, tables, points)
-    return Status.OK
+    return ExitStatus.OK
 
 
-def _write(common: Common, fit: "Fit", tables: "Sequence[Table | Image]", points: bool) -> None:
+def _write(common: Common, fit: "Fit", tables: "Sequence[MeasuredTable | ScanImage]", points: bool) -> None:
     from tablegen.calibration.scanner_file import new_file, updated
     from tablegen.calibration.summary import change
     from tablegen.problems import Rejected, Unphysical
@@ -217,12 +219,12 @@ def _write(common: Common, fit: "Fit", tables: "Sequence[Table | Image]", points
         put = change(fit, list(dict.fromkeys(table.source for table in tables)), points)
         content = updated(text, name, common.axis, put).encode("utf-8")
     except Rejected as rejected:
-        fail(rejected.problems, Status.WRONG_INPUT)
+        fail(rejected.problems, ExitStatus.WRONG_INPUT)
     except Unphysical as reason:
-        fail([f"--points: {reason}"], Status.WRONG_INPUT)
+        fail([f"--points: {reason}"], ExitStatus.WRONG_INPUT)
     except UnicodeDecodeError:
-        fail([f"{name}: is not UTF-8"], Status.WRONG_INPUT)
+        fail([f"{name}: is not UTF-8"], ExitStatus.WRONG_INPUT)
     except OSError as error:
-        fail([f"{name}: {error.strerror or error}"], Status.WRONG_INPUT)
+        fail([f"{name}: {error.strerror or error}"], ExitStatus.WRONG_INPUT)
     changed = written(path.parent, {path.name: content})
     click.echo(f"{name}: {common.axis}.{put.kind} {'written' if changed else 'up to date'}", err=common.as_json)

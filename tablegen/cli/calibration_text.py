@@ -6,10 +6,10 @@ from math import floor, isfinite, log10
 from tablegen.calibration.branch import AmplitudeFit, MeasuredBranch
 from tablegen.calibration.estimate import Estimate, Fit
 from tablegen.calibration.hysteresis import HysteresisFit
-from tablegen.calibration.image_files import Image
+from tablegen.calibration.image_files import ScanImage
 from tablegen.calibration.image_fit import ImageFit
 from tablegen.calibration.summary import change, parameters
-from tablegen.calibration.table import Table
+from tablegen.calibration.table import MeasuredTable
 from tablegen.calibration.trace import TraceFit
 from tablegen.cli.scatter import scatter
 
@@ -17,13 +17,13 @@ _TRACE_HEAD = ("turn", "V_scan", "rate [Hz]", "periods", "noise [%]", "drift [%]
 _IMAGE_HEAD = ("turn", "V_scan", "periods", "noise [%]", "drift [%]", "apart [%]")
 
 
-def calibration_text(fit: Fit, axis: str, tables: Sequence[Table | Image]) -> list[str]:
+def calibration_text(fit: Fit, axis: str, tables: Sequence[MeasuredTable | ScanImage]) -> list[str]:
     """Lines of text; ``tables`` are what was fitted, for the places of outliers."""
     hysteresis = isinstance(fit, HysteresisFit)
     rows = [(name, *figures(estimate), meaning) for name, estimate, meaning in parameters(fit)]
     widths = [max(len(row[i]) for row in rows) for i in range(3)]
     files = ", ".join(table.source.name for table in tables)
-    points = "pixels" if isinstance(tables[0], Image) else "samples" if hysteresis else "points"
+    points = "pixels" if isinstance(tables[0], ScanImage) else "samples" if hysteresis else "points"
     lines = [f"{change(fit, []).kind} of {axis}, {fit.points} {points} of {files}", ""]
     lines += [
         f"{name:<{widths[0]}}  {value:>{widths[1]}} {error:<{widths[2]}}  {meaning}"
@@ -41,7 +41,7 @@ def calibration_text(fit: Fit, axis: str, tables: Sequence[Table | Image]) -> li
     for curve in fit.curves:
         lines += [*scatter(curve), ""]
     for row in fit.outliers:
-        place = f"{tables[0].file}:{tables[0].lines[row]}" if isinstance(tables[0], Table) else tables[0].file
+        place = f"{tables[0].file}:{tables[0].lines[row]}" if isinstance(tables[0], MeasuredTable) else tables[0].file
         lines.append(
             f"outlier: {place}: far from what the other points say; kept. Remove the row if it was measured wrongly"
         )

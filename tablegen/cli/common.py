@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, NoReturn
 
 import click
 
+from tablegen.cli.exit_status import ExitStatus
 from tablegen.cli.progress import Progress
-from tablegen.cli.status import Status
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from tablegen.certificate import Certificate
+    from tablegen.certificate.certificate import Certificate
     from tablegen.config.load import Setup
-    from tablegen.plan import Plan
+    from tablegen.planning.line_plan import Plan
 
 scan_argument = click.argument("scan", type=click.Path(path_type=Path), metavar="SCAN.TOML")
 
@@ -34,7 +34,10 @@ def require(*modules: str, extra: str, otherwise: str = "") -> None:
     missing = [module for module in modules if not _installed(module)]
     if missing:
         needs = " and ".join(missing)
-        fail([f"{needs} is missing; install it with: pip install 'tablegen[{extra}]'{otherwise}"], Status.TOOL_MISSING)
+        fail(
+            [f"{needs} is missing; install it with: pip install 'tablegen[{extra}]'{otherwise}"],
+            ExitStatus.TOOL_MISSING,
+        )
 
 
 def _installed(module: str) -> bool:
@@ -47,7 +50,7 @@ def _installed(module: str) -> bool:
 class Failure(click.ClickException):
     """Lines for stderr and an exit status."""
 
-    def __init__(self, lines: "Sequence[object]", status: Status) -> None:
+    def __init__(self, lines: "Sequence[object]", status: ExitStatus) -> None:
         super().__init__("\n".join(map(str, lines)))
         self.status = status
 
@@ -56,7 +59,7 @@ class Failure(click.ClickException):
         click.echo(self.message, err=True)
 
 
-def fail(lines: "Sequence[object]", status: Status) -> NoReturn:
+def fail(lines: "Sequence[object]", status: ExitStatus) -> NoReturn:
     """End the command."""
     raise Failure(lines, status)
 
@@ -65,9 +68,9 @@ def planned(scan: Path) -> "tuple[Setup, Plan, dict[str, Certificate]]":
     """Load, plan and certify a scan; every failure ends the command with its status."""
     # No linear algebra library is used, and its threads would only spin: a good part of what importing numpy costs.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    from tablegen.certificate import broken_limits, certify
+    from tablegen.certificate.certificate import broken_limits, certify
     from tablegen.config.load import load
-    from tablegen.plan import make_plan
+    from tablegen.planning.line_plan import make_plan
     from tablegen.problems import Rejected
 
     try:
@@ -78,9 +81,9 @@ def planned(scan: Path) -> "tuple[Setup, Plan, dict[str, Certificate]]":
             progress.now("measuring every tick of a line and a frame")
             certificates = certify(plan)
     except Rejected as rejected:
-        fail(rejected.problems, Status.WRONG_INPUT)
+        fail(rejected.problems, ExitStatus.WRONG_INPUT)
     if broken := broken_limits(plan, certificates, setup.scan_file):
-        fail(broken, Status.BROKEN_LIMIT)
+        fail(broken, ExitStatus.BROKEN_LIMIT)
     return setup, plan, certificates
 
 
@@ -96,9 +99,9 @@ def written(folder: Path, files: "Mapping[str, bytes]") -> list[str]:
         with held(signal.SIGINT) as came:
             names = write_files(folder, files)
     except CannotWrite as error:
-        fail([error], Status.CANNOT_WRITE)
+        fail([error], ExitStatus.CANNOT_WRITE)
     except OSError as error:
-        fail([f"{folder}: {error.strerror or error}"], Status.CANNOT_WRITE)
+        fail([f"{folder}: {error.strerror or error}"], ExitStatus.CANNOT_WRITE)
     if came:
-        fail([f"interrupted, after the files of {folder} had been written"], Status.INTERRUPTED)
+        fail([f"interrupted, after the files of {folder} had been written"], ExitStatus.INTERRUPTED)
     return names

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from tablegen.cli.common import fail, planned
-from tablegen.cli.status import Status
+from tablegen.cli.exit_status import ExitStatus
 
 if TYPE_CHECKING:
     from tablegen.link.device import Device
-    from tablegen.link.prepare import Scan
+    from tablegen.link.prepare import PreparedScan
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 INTERRUPTED = "interrupted; the device goes on as it was"
@@ -68,14 +68,14 @@ def connected(
 
     # The first that fits.
     statuses = (
-        (errors.SerialMissing, Status.TOOL_MISSING),
-        (errors.NoPort, Status.NO_PORT),
-        (errors.NoAnswer, Status.NO_ANSWER),
-        (errors.NotUnderstood, Status.NO_ANSWER),
-        (errors.Refused, Status.REFUSED),
-        (errors.Unsuitable, Status.REFUSED),
-        (errors.NotPlaying, Status.MISMATCH),
-        (errors.LinkError, Status.LINK_LOST),
+        (errors.SerialMissing, ExitStatus.TOOL_MISSING),
+        (errors.NoPort, ExitStatus.NO_PORT),
+        (errors.NoAnswer, ExitStatus.NO_ANSWER),
+        (errors.NotUnderstood, ExitStatus.NO_ANSWER),
+        (errors.Refused, ExitStatus.REFUSED),
+        (errors.Unsuitable, ExitStatus.REFUSED),
+        (errors.NotPlaying, ExitStatus.MISMATCH),
+        (errors.LinkError, ExitStatus.LINK_LOST),
     )
     try:
         with Device(port, baud=baud, key=key) as device:
@@ -83,30 +83,30 @@ def connected(
     except errors.LinkError as error:
         fail([error], next(status for kind, status in statuses if isinstance(error, kind)))
     except KeyboardInterrupt:
-        fail([interrupted()], Status.INTERRUPTED)
+        fail([interrupted()], ExitStatus.INTERRUPTED)
 
 
 def _read_key(path: Path) -> bytes:
     try:
         key = binascii.unhexlify("".join(path.read_text("ascii").split()))
     except OSError as error:
-        fail([f"{path}: cannot be read: {error.strerror or error}"], Status.WRONG_INPUT)
+        fail([f"{path}: cannot be read: {error.strerror or error}"], ExitStatus.WRONG_INPUT)
     except ValueError:  # what is no ASCII as well
-        fail([f"{path}: a key is 32 to 64 hexadecimal digits, and nothing else"], Status.WRONG_INPUT)
+        fail([f"{path}: a key is 32 to 64 hexadecimal digits, and nothing else"], ExitStatus.WRONG_INPUT)
     if len(key) not in _KEY_BYTES:
-        fail([f"{path}: a key of {len(key)} bytes; devices have 16 to 32"], Status.WRONG_INPUT)
+        fail([f"{path}: a key of {len(key)} bytes; devices have 16 to 32"], ExitStatus.WRONG_INPUT)
     return key
 
 
-def read_scan(source: Path) -> "Scan":
+def read_scan(source: Path) -> "PreparedScan":
     """The scan of a TOML file, or of a directory that ``tablegen build`` wrote."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    from tablegen.link.prepare import Scan
-    from tablegen.recorded import NotABuild
+    from tablegen.link.prepare import PreparedScan
+    from tablegen.manifest.read import NotABuild
 
     if not source.is_dir():
-        return Scan.of_plan(planned(source)[1])
+        return PreparedScan.of_plan(planned(source)[1])
     try:
-        return Scan.of_build(source)
+        return PreparedScan.of_build(source)
     except NotABuild as error:
-        fail([error], Status.WRONG_INPUT)
+        fail([error], ExitStatus.WRONG_INPUT)

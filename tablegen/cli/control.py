@@ -6,10 +6,10 @@ import click
 
 from tablegen.cli.common import fail
 from tablegen.cli.connection import baud_option, connected, key_option, port_option, timeout_option
-from tablegen.cli.status import Status
+from tablegen.cli.exit_status import ExitStatus
 
-_WAIT_S = 60.0
-_STARTS_S = 1.0
+_PARK_WAIT_S = 60.0
+_START_WAIT_S = 1.0
 
 
 @click.command(short_help="End the scan of a device, and ramp to the park codes.")
@@ -20,14 +20,14 @@ _STARTS_S = 1.0
 @timeout_option("Of --wait.  [default: 60]")
 def park(port: str, baud: int, key_file: Path | None, wait: bool, timeout: float | None) -> int:
     """Park: no more frames, ramp to the park codes within the slew limit, and hold them."""
-    from tablegen.link.messages import State
+    from tablegen.link.messages import DeviceState
 
     with connected(port, baud, key_file) as device:
         device.park()
         if wait:
-            device.wait_for(State.PARKED, _WAIT_S if timeout is None else timeout)
+            device.wait_for(DeviceState.PARKED, _PARK_WAIT_S if timeout is None else timeout)
     click.echo("parked" if wait else "on its way to park")
-    return Status.OK
+    return ExitStatus.OK
 
 
 @click.command(short_help="Start the scan of a device.")
@@ -38,28 +38,28 @@ def park(port: str, baud: int, key_file: Path | None, wait: bool, timeout: float
 def trigger(port: str, baud: int, key_file: Path | None, frames: int) -> int:
     """Arm and trigger: play N frames (without end if not given) of the scan in force, and say whether it plays."""
     from tablegen.link.errors import OutOfTime
-    from tablegen.link.messages import State
+    from tablegen.link.messages import DeviceState
 
     with connected(port, baud, key_file) as device:
         before = device.status()
-        if before.state == State.NO_PROGRAM:
-            fail(["the device has no scan yet; `tablegen upload` brings one"], Status.REFUSED)
-        if before.state == State.PLAYING:
+        if before.state == DeviceState.NO_PROGRAM:
+            fail(["the device has no scan yet; `tablegen upload` brings one"], ExitStatus.REFUSED)
+        if before.state == DeviceState.PLAYING:
             if frames:
-                fail(["it plays already, and would not count frames; `tablegen park --wait` first"], Status.REFUSED)
+                fail(["it plays already, and would not count frames; `tablegen park --wait` first"], ExitStatus.REFUSED)
             click.echo(f"plays already, line {before.line}")
-            return Status.OK
+            return ExitStatus.OK
         device.arm(frames)
         device.trigger()
         try:
-            device.wait_for(State.PLAYING, _STARTS_S)
+            device.wait_for(DeviceState.PLAYING, _START_WAIT_S)
         except OutOfTime:
             if not frames:
-                fail(["triggered, but it does not play; `tablegen status` tells what it does"], Status.REFUSED)
+                fail(["triggered, but it does not play; `tablegen status` tells what it does"], ExitStatus.REFUSED)
             click.echo(f"triggered; {_frames(frames)} over, or it did not start: `tablegen status` tells")
-            return Status.OK
+            return ExitStatus.OK
     click.echo(f"plays {_frames(frames)}" if frames else "plays until it is parked")
-    return Status.OK
+    return ExitStatus.OK
 
 
 def _frames(count: int) -> str:
@@ -75,4 +75,4 @@ def clear(port: str, baud: int, key_file: Path | None) -> int:
     with connected(port, baud, key_file) as device:
         device.clear()
     click.echo("faults forgotten")
-    return Status.OK
+    return ExitStatus.OK

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from tablegen.cli.common import fail, written
-from tablegen.cli.status import Status
+from tablegen.cli.exit_status import ExitStatus
 from tablegen.resources import deciding_files
 
 
@@ -31,7 +31,7 @@ class Depfile:
         for name in (self._target, *map(str, self._prerequisites)):
             if "\n" in name or "\t" in name:
                 why = "no dependency file can name a path with a line end or a tab; rename it"
-                fail([f"{name!r}: {why}"], Status.WRONG_INPUT)
+                fail([f"{name!r}: {why}"], ExitStatus.WRONG_INPUT)
 
     def write(self) -> None:
         """Write the file; the last step of a build."""
@@ -44,7 +44,7 @@ class Depfile:
         if ahead_ns > 0:  # whatever depends on it is out of date when it is built: make would not end
             self._path.unlink()
             why = f"was changed {ahead_ns * 1e-9:.1f} s from now by its time; set the clock right, or touch it"
-            fail([f"{newest}: {why}"], Status.WRONG_INPUT)
+            fail([f"{newest}: {why}"], ExitStatus.WRONG_INPUT)
         os.utime(self._path, ns=(self._started_ns, self._started_ns))
 
 
@@ -59,11 +59,11 @@ def _changed_ns(path: Path) -> int:
 def _remove(path: Path, scan: Path) -> None:
     try:
         if not stat.S_ISREG(path.lstat().st_mode):
-            fail([f"{path}: is no regular file; --depfile needs a file of its own"], Status.WRONG_INPUT)
+            fail([f"{path}: is no regular file; --depfile needs a file of its own"], ExitStatus.WRONG_INPUT)
         if scan.exists() and path.samefile(scan):
-            fail([f"{path}: is the scan; --depfile needs a file of its own"], Status.WRONG_INPUT)
+            fail([f"{path}: is the scan; --depfile needs a file of its own"], ExitStatus.WRONG_INPUT)
         path.unlink()
     except FileNotFoundError:
         pass
     except OSError as error:
-        fail([f"{path}: {error.strerror or error}"], Status.CANNOT_WRITE)
+        fail([f"{path}: {error.strerror or error}"], ExitStatus.CANNOT_WRITE)

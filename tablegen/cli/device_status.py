@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tablegen.cli.connection import baud_option, connected, key_option, port_option
-from tablegen.cli.status import Status
+from tablegen.cli.exit_status import ExitStatus
 
 if TYPE_CHECKING:
     from tablegen.link.messages import AxisLimits, AxisShape, DeviceInfo, DeviceStatus
@@ -33,10 +33,10 @@ def device_status(port: str, baud: int, key_file: Path | None, as_json: bool) ->
         import json
 
         click.echo(json.dumps(_record(info, limits, status), indent=2))
-        return Status.OK
+        return ExitStatus.OK
     for name, text in _rows(info, limits, status):
         click.echo(f"{name:<11} {text}")
-    return Status.OK
+    return ExitStatus.OK
 
 
 def _features(info: "DeviceInfo") -> list[str]:
@@ -89,13 +89,13 @@ def _fields(values: "AxisShape | AxisLimits") -> dict[str, int]:
 
 def _rows(info: "DeviceInfo", limits: "tuple[AxisLimits, AxisLimits]", status: "DeviceStatus") -> list[tuple[str, str]]:
     """What people want to know, the most urgent first."""
-    from tablegen.link.messages import Feature, State, Upload
+    from tablegen.link.messages import DeviceState, Feature, Upload
 
     state = {
-        State.NO_PROGRAM: "no scan yet; `tablegen upload` brings one",
-        State.PARKED: "parked; `tablegen trigger` starts the scan",
-        State.PARKING: "on its way to park",
-        State.PLAYING: f"playing, line {status.line}",
+        DeviceState.NO_PROGRAM: "no scan yet; `tablegen upload` brings one",
+        DeviceState.PARKED: "parked; `tablegen trigger` starts the scan",
+        DeviceState.PARKING: "on its way to park",
+        DeviceState.PLAYING: f"playing, line {status.line}",
     }[status.state]
     scan = status.hash.hex()[:12] if any(status.hash) else "not known by its hash"
     upload = {

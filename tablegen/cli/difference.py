@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from difflib import unified_diff
 from pathlib import Path
 
-_MOST_LINES = 12  # of each file: enough to see what changed, not a table of words
+_MAX_LINES = 12  # of each file: enough to see what changed, not a table of words
 _WIDTH = 120
 
 
@@ -28,7 +28,7 @@ def differences(folder: Path, files: Mapping[str, bytes]) -> list[str]:
         diff = list(unified_diff(before, after, str(path), f"{name} as it would be built", n=0, lineterm=""))
         if not diff:
             out.append(f"{path}: differs in line ends only")
-        out += [line if len(line) <= _WIDTH else line[: _WIDTH - 3] + "..." for line in diff[:_MOST_LINES]]
-        if len(diff) > _MOST_LINES:
-            out.append(f"... {len(diff) - _MOST_LINES} more lines of difference in {name}")
+        out += [line if len(line) <= _WIDTH else line[: _WIDTH - 3] + "..." for line in diff[:_MAX_LINES]]
+        if len(diff) > _MAX_LINES:
+            out.append(f"... {len(diff) - _MAX_LINES} more lines of difference in {name}")
     return out

@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from tablegen.cli.common import fail, written
-from tablegen.cli.status import Status
+from tablegen.cli.exit_status import ExitStatus
 
 _FILES = ("scanner.toml", "annexin_200nm.toml")
 
@@ -20,9 +20,9 @@ def init(folder: Path, force: bool) -> int:
 
     there = [folder / name for name in _FILES if os.path.lexists(folder / name)]
     if there and not force:
-        fail([f"{path} exists; --force overwrites it" for path in there], Status.WRONG_INPUT)
+        fail([f"{path} exists; --force overwrites it" for path in there], ExitStatus.WRONG_INPUT)
     source = resource_folder("examples")
     written(folder, {name: (source / name).read_bytes() for name in _FILES})
     for name in _FILES:
         click.echo(folder / name)
-    return Status.OK
+    return ExitStatus.OK

@@ -4,7 +4,7 @@ import os
 
 import click
 
-from tablegen.cli.status import Status
+from tablegen.cli.exit_status import ExitStatus
 
 
 @click.command(short_help="Print where the files for make, CMake and simulators are.")
@@ -48,4 +48,4 @@ def paths(**asked: bool) -> int:
     for name in chosen or found:
         # As bytes: a path has to come out as it is, whatever the terminal can show.
         click.echo((b"" if chosen else f"{name:<{width}}  ".encode()) + os.fsencode(found[name]))
-    return Status.OK
+    return ExitStatus.OK

@@ -3,7 +3,7 @@
 import click
 
 from tablegen.cli.common import fail
-from tablegen.cli.status import Status
+from tablegen.cli.exit_status import ExitStatus
 
 
 @click.command(short_help="List the serial ports of this machine.")
@@ -13,7 +13,7 @@ def ports(as_json: bool) -> int:
     try:
         from serial.tools.list_ports import comports
     except ImportError:
-        fail(["pyserial is missing; pip install 'tablegen[serial]'"], Status.TOOL_MISSING)
+        fail(["pyserial is missing; pip install 'tablegen[serial]'"], ExitStatus.TOOL_MISSING)
     found = sorted(comports(), key=lambda port: port.device)
     if as_json:
         import json
@@ -28,6 +28,6 @@ def ports(as_json: bool) -> int:
     if not found:
         fail(
             ["this machine has no serial port; is the cable in? URLs like socket://host:port work as well"],
-            Status.NO_PORT,
+            ExitStatus.NO_PORT,
         )
-    return Status.OK
+    return ExitStatus.OK

@@ -8,7 +8,7 @@ from types import TracebackType
 
 import click
 
-_PATIENCE_S = 1.0
+_SHOW_AFTER_S = 1.0
 _WIDTH = 60
 
 
@@ -42,7 +42,7 @@ class Progress:
     def _tell(self) -> None:
         start = time.monotonic()
         shown = False
-        while not self._done.wait(_PATIENCE_S):
+        while not self._done.wait(_SHOW_AFTER_S):
             what = self._what if isinstance(self._what, str) else self._what()
             text = f"{what} ({time.monotonic() - start:.0f} s)"
             click.echo(f"\r{text:<{_WIDTH}}", err=True, nl=False)

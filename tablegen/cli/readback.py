@@ -6,7 +6,7 @@ import click
 
 from tablegen.cli.common import fail, written
 from tablegen.cli.connection import baud_option, connected, key_option, port_option, read_scan, timeout_option
-from tablegen.cli.status import Status
+from tablegen.cli.exit_status import ExitStatus
 
 
 @click.command(short_help="Read back what a device plays; compare, or save it.")
@@ -43,6 +43,6 @@ def readback(
         found = differences(scan, image)
         if found:
             more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
-            fail([f"the device does not play {scan.name}: {found[0]}{more}"], Status.MISMATCH)
+            fail([f"the device does not play {scan.name}: {found[0]}{more}"], ExitStatus.MISMATCH)
         click.echo(f"the device plays {scan.name} {scan.digest[:12]}: {len(image)} bytes, all the same")
-    return Status.OK
+    return ExitStatus.OK

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 from tablegen.cli.common import fail, finite, require, scan_argument, written
-from tablegen.cli.status import Status
+from tablegen.cli.exit_status import ExitStatus
 
 if TYPE_CHECKING:
-    from tablegen.calibration.table import Source, Table
+    from tablegen.calibration.table import MeasuredTable, Source
     from tablegen.refinement.round import Options, Round
 
 _FORMATS = (".png", ".svg", ".pdf")
@@ -105,10 +105,10 @@ def refine(
         written(plot.parent, {plot.name: draw(found.curves, kind)})
     refused = found.worse or _learnt_before(scan, axis, found, source, text)
     if refused and not force:
-        fail([f"{trace}: {refused}"], Status.WRONG_INPUT)
+        fail([f"{trace}: {refused}"], ExitStatus.WRONG_INPUT)
     if write:
         _write(scan, axis, found, source, text, as_json)
-    return Status.OK
+    return ExitStatus.OK
 
 
 def _learn(
@@ -128,11 +128,11 @@ def _learn(
         drive = None if triggered else table[DRIVE]
         found = learn_from(setup, axis, table[TIME], table[DISPLACEMENT], drive, options)
     except Rejected as rejected:
-        fail(rejected.problems, Status.WRONG_INPUT)
+        fail(rejected.problems, ExitStatus.WRONG_INPUT)
     except Unphysical as reason:
-        fail([f"{trace}: {reason}"], Status.WRONG_INPUT)
+        fail([f"{trace}: {reason}"], ExitStatus.WRONG_INPUT)
     except OSError as error:
-        fail([f"{scan}: {error.strerror or error}"], Status.WRONG_INPUT)
+        fail([f"{scan}: {error.strerror or error}"], ExitStatus.WRONG_INPUT)
     return found, table.source, text
 
 
@@ -145,7 +145,7 @@ def _learnt_before(scan: Path, axis: str, found: "Round", source: "Source", text
     return f"[{axis}.refinement] was learnt from this trace already; build, upload and record again"
 
 
-def _read(trace: Path, triggered: bool) -> "Table":
+def _read(trace: Path, triggered: bool) -> "MeasuredTable":
     from tablegen.calibration.columns import DISPLACEMENT, DRIVE, TIME
     from tablegen.calibration.table import read_table
     from tablegen.problems import Problem, Rejected
@@ -172,6 +172,6 @@ def _write(scan: Path, axis: str, found: "Round", source: "Source", text: str, q
         path = scan.resolve()
         content = with_layer(text, str(scan), axis, values, provenance(found, source)).encode("utf-8")
     except Rejected as rejected:
-        fail(rejected.problems, Status.WRONG_INPUT)
+        fail(rejected.problems, ExitStatus.WRONG_INPUT)
     written(path.parent, {path.name: content})
     click.echo(f"{scan}: {axis}.refinement written; build it, play it, and record it again", err=quiet)

@@ -4,10 +4,10 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from tablegen.certificate import Certificate
+from tablegen.certificate.certificate import Certificate
+from tablegen.certificate.summary import rate
 from tablegen.numerics.arrays import Floats
-from tablegen.plan import LinePlan, Plan
-from tablegen.summary import rate
+from tablegen.planning.line_plan import LinePlan, Plan
 
 _WIDTH, _HEIGHT = 64, 8  # characters; a braille character is 2 by 4 dots
 _BRAILLE = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))

@@ -19,12 +19,12 @@ def show(scan: Path, as_json: bool, plot: bool) -> None:
     """
     _, plan, certificates = planned(scan)
     if as_json:
-        from tablegen.emit import render
+        from tablegen.emit.render import render
 
         click.echo(render(plan, certificates)["manifest.json"], nl=False)
         return
+    from tablegen.certificate.summary import notes, summary
     from tablegen.cli.report import plots
-    from tablegen.summary import notes, summary
 
     click.echo(click.style(f"{plan.name} on {plan.scanner!r}", bold=True))
     for text in summary(plan, certificates):

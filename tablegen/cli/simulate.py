@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 import click
 
 from tablegen.cli.common import fail, finite, require, scan_argument, written
+from tablegen.cli.exit_status import ExitStatus
 from tablegen.cli.progress import Progress
-from tablegen.cli.status import Status
 
 if TYPE_CHECKING:
     from tablegen.config.load import Setup
-    from tablegen.virtual.report import Stage
+    from tablegen.virtual.report import SimulationStage
     from tablegen.virtual.scanner import VirtualScanner
     from tablegen.virtual.simulation import Run
 
@@ -76,7 +76,7 @@ def simulate(
     from tablegen.problems import Rejected, Unphysical
     from tablegen.virtual import report
     from tablegen.virtual.parameters import load_truth
-    from tablegen.virtual.report import Stage
+    from tablegen.virtual.report import SimulationStage
     from tablegen.virtual.scanner import VirtualScanner
 
     if plot_file is not None:
@@ -89,12 +89,14 @@ def simulate(
         setup = load(scan)
         truth = load_truth(None if truth_file == "default" else truth_file)
     except Rejected as faults:
-        fail(faults.problems, Status.WRONG_INPUT)
+        fail(faults.problems, ExitStatus.WRONG_INPUT)
     scanner = VirtualScanner.of(truth)
     with Progress() as progress:
         stages = [_play("given", "with the scanner file as it is", setup, scanner, truth_file, progress)]
         if not stages[0].runs:
-            fail(list(dict.fromkeys(why for _, reasons in stages[0].rejected for why in reasons)), Status.WRONG_INPUT)
+            fail(
+                list(dict.fromkeys(why for _, reasons in stages[0].rejected for why in reasons)), ExitStatus.WRONG_INPUT
+            )
         if calibrated:
             from tablegen.virtual.laboratory import calibrate
 
@@ -104,7 +106,7 @@ def simulate(
                 after = calibrate(setup, scanner, 0.01 * noise, seed).setup
                 stages.append(_play("calibrated", heading, after, scanner, truth_file, progress))
             except (Unphysical, ValueError) as reason:
-                stages.append(Stage("calibrated", heading, (), (("calibration", (str(reason),)),)))
+                stages.append(SimulationStage("calibrated", heading, (), (("calibration", (str(reason),)),)))
     if csv_file is not None:
         written(csv_file.parent, {csv_file.name: report.csv(stages).encode()})
     if plot_file is not None:
@@ -120,10 +122,10 @@ def simulate(
 
 def _play(
     name: str, heading: str, setup: "Setup", scanner: "VirtualScanner", truth_file: str, progress: Progress
-) -> "Stage":
+) -> "SimulationStage":
     """Every model that can be played, and why the others cannot."""
     from tablegen.problems import Rejected
-    from tablegen.virtual.report import Stage
+    from tablegen.virtual.report import SimulationStage
     from tablegen.virtual.simulation import models_of, simulate
 
     runs: list[Run] = []
@@ -136,4 +138,4 @@ def _play(
             rejected.append((model, tuple(map(str, faults.problems))))
         except ValueError as reason:
             rejected.append((model, (f"{truth_file}: {reason}",)))
-    return Stage(name, heading, tuple(runs), tuple(rejected))
+    return SimulationStage(name, heading, tuple(runs), tuple(rejected))

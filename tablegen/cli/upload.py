@@ -15,18 +15,18 @@ from tablegen.cli.connection import (
     source_argument,
     timeout_option,
 )
-from tablegen.cli.status import Status
+from tablegen.cli.exit_status import ExitStatus
 
 if TYPE_CHECKING:
     from tablegen.link.device import Device
-    from tablegen.link.image import Image
-    from tablegen.link.prepare import Form, Scan
+    from tablegen.link.image import ProgramImage
+    from tablegen.link.prepare import Form, PreparedScan
     from tablegen.link.upload import UploadResult
 
-_DIGITS = 12  # of a hash, for people
-_OTHERS = 60 + 16  # bytes of BEGIN and COMMIT on the wire
-_FRAME = 16  # what a DATA has beside its bytes
-_BITS = 10
+_HASH_DIGITS = 12  # of a hash, for people
+_BEGIN_AND_COMMIT_BYTES = 60 + 16  # bytes of BEGIN and COMMIT on the wire
+_DATA_OVERHEAD_BYTES = 16  # what a DATA has beside its bytes
+_BITS_PER_BYTE = 10
 
 
 @click.command(short_help="Put a scan into a running instrument, by its serial port.")
@@ -77,7 +77,7 @@ def upload(
     if dry_run:
         click.echo("\n".join(_sizes(scan, baud)))
     if port is None:
-        return Status.OK
+        return ExitStatus.OK
     bar, told = Bar(), [0]
 
     def progress(done: int, total: int) -> None:
@@ -93,7 +93,7 @@ def upload(
             "there (`tablegen status` tells; a complete upload may still come into force)"
         )
 
-    from tablegen.link.messages import State
+    from tablegen.link.messages import DeviceState
     from tablegen.link.prepare import check
 
     with connected(port, baud, key_file, interrupted) as device:
@@ -102,23 +102,23 @@ def upload(
         check(scan, image, device.info, limits, any_rate)
         if dry_run:
             click.echo(_verdict(device, image))
-            return Status.OK
+            return ExitStatus.OK
         try:
             result = device.upload(image, progress, force=force, timeout_s=timeout, limits=limits)
         finally:
             bar.close()
         click.echo(_summary(scan, image, result))
-        if device.hello.state == State.PARKED:
+        if device.hello.state == DeviceState.PARKED:
             click.echo("it is parked; `tablegen trigger` starts it")
-    return Status.OK
+    return ExitStatus.OK
 
 
-def _sizes(scan: "Scan", baud: int) -> list[str]:
+def _sizes(scan: "PreparedScan", baud: int) -> list[str]:
     """Bytes and seconds of both forms."""
     from tablegen.link.errors import Unsuitable
     from tablegen.link.messages import DATA_BYTES
 
-    lines = [f"{scan.name} {scan.digest[:_DIGITS]}", "", f"form       bytes  at {baud} baud"]
+    lines = [f"{scan.name} {scan.digest[:_HASH_DIGITS]}", "", f"form       bytes  at {baud} baud"]
     forms: tuple[Form, ...] = ("table", "fourier")
     for form in forms:
         try:
@@ -126,13 +126,13 @@ def _sizes(scan: "Scan", baud: int) -> list[str]:
         except Unsuitable as error:
             lines.append(f"{form:<8}  none: {error.objections[0]}")
             continue
-        wire = size + _FRAME * -(-size // DATA_BYTES) + _OTHERS
-        seconds = f"{wire * _BITS / baud:.3f} s"
+        wire = size + _DATA_OVERHEAD_BYTES * -(-size // DATA_BYTES) + _BEGIN_AND_COMMIT_BYTES
+        seconds = f"{wire * _BITS_PER_BYTE / baud:.3f} s"
         lines.append(f"{form:<8}  {size:>6}  {seconds:>{len(f'at {baud} baud')}}")
     return lines
 
 
-def _verdict(device: "Device", image: "Image") -> str:
+def _verdict(device: "Device", image: "ProgramImage") -> str:
     status = device.hello
     if status.hash == image.info.hash:
         return "\nthe device has it in force already"
@@ -140,15 +140,15 @@ def _verdict(device: "Device", image: "Image") -> str:
     return text if status.permits else f"{text}, but its interlock is open: no upload comes into force"
 
 
-def _form(image: "Image") -> str:
+def _form(image: "ProgramImage") -> str:
     from tablegen.link.prepare import harmonics_of
 
     rendered = [harmonics > 0 for harmonics in harmonics_of(image.data)]
     return "Fourier words" if all(rendered) else "tables and Fourier words" if any(rendered) else "tables"
 
 
-def _summary(scan: "Scan", image: "Image", result: "UploadResult") -> str:
-    name = f"{scan.name} {scan.digest[:_DIGITS]}"
+def _summary(scan: "PreparedScan", image: "ProgramImage", result: "UploadResult") -> str:
+    name = f"{scan.name} {scan.digest[:_HASH_DIGITS]}"
     if result.already_running:
         return f"{name} is in force already, generation {result.generation}: nothing sent (--force sends it again)"
     text = f"{name} in force, generation {result.generation}"

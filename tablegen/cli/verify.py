@@ -12,16 +12,16 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from tablegen.cli.common import fail
+from tablegen.cli.exit_status import ExitStatus
 from tablegen.cli.progress import Progress
-from tablegen.cli.status import Status
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from tablegen.verify.build import Report, Target
-    from tablegen.verify.checks import Check
+    from tablegen.verification.build import Report, Target
+    from tablegen.verification.checks import Check
 
-_MOST_TICKS = {"icarus": 300_000, "verilator": 3_000_000, "c": 3_000_000, "cortex-m": 1_000_000}
+_DEFAULT_TICKS = {"icarus": 300_000, "verilator": 3_000_000, "c": 3_000_000, "cortex-m": 1_000_000}
 
 
 @click.command(short_help="Play a build's sequencer, and hold every sample against it.")
@@ -108,17 +108,17 @@ def verify(
         if target_name != "verilog" and value is not None:
             raise click.UsageError(f"{option} is for Verilog; --target {target_name} has no choice of it")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    from tablegen.verify.build import NotABuild, verify_build
-    from tablegen.verify.simulate import ToolMissing
+    from tablegen.verification.build import NotABuild, verify_build
+    from tablegen.verification.simulate import ToolMissing
 
     target, most = _target(target_name, simulator or "icarus", axis or "pipelined", fourier)
     try:
         with _terminated_as_interrupted(), _work_folder(keep) as work, Progress() as progress:
             report = verify_build(folder, work, target, most if ticks is None else ticks, seed, progress.now)
     except NotABuild as error:
-        fail([error], Status.WRONG_INPUT)
+        fail([error], ExitStatus.WRONG_INPUT)
     except ToolMissing as error:
-        fail([error], Status.TOOL_MISSING)
+        fail([error], ExitStatus.TOOL_MISSING)
     click.echo("\n".join(_table(report.checks)))
     for note in report.notes:
         click.echo(f"note: {note}")
@@ -130,10 +130,10 @@ def verify(
         count = len(report.failures)
         fail(
             [*lines, "", f"{folder}: {count} of {len(report.checks)} checks failed"],
-            Status.MISMATCH,
+            ExitStatus.MISMATCH,
         )
     click.echo(f"\n{folder}: verified, {len(report.checks)} checks")
-    return Status.OK if written else Status.CANNOT_WRITE
+    return ExitStatus.OK if written else ExitStatus.CANNOT_WRITE
 
 
 def _target(
@@ -144,14 +144,14 @@ def _target(
 ) -> "tuple[Target, int]":
     """What plays, and how many ticks of it are soon over."""
     if name != "verilog":
-        from tablegen.verify.c_target import CTarget
+        from tablegen.verification.c_target import CTarget
 
-        return CTarget(name, fourier), _MOST_TICKS[name]
-    from tablegen.verify.placement import Placement
-    from tablegen.verify.verilog_target import VerilogTarget
+        return CTarget(name, fourier), _DEFAULT_TICKS[name]
+    from tablegen.verification.placement import Placement
+    from tablegen.verification.verilog_target import VerilogTarget
 
     placement = Placement(axis, fourier)
-    return VerilogTarget(simulator, placement), _MOST_TICKS[simulator] // placement.tick_clocks
+    return VerilogTarget(simulator, placement), _DEFAULT_TICKS[simulator] // placement.tick_clocks
 
 
 @contextmanager
@@ -167,7 +167,7 @@ def _work_folder(keep: Path | None) -> Iterator[Path]:
     except OSError as error:
         fail(
             [f"cannot verify: {error.filename or keep or tempfile.gettempdir()}: {error.strerror or error}"],
-            Status.CANNOT_WRITE,
+            ExitStatus.CANNOT_WRITE,
         )
 
 
@@ -190,7 +190,7 @@ def _terminated_as_interrupted() -> Iterator[None]:
 
 
 def _write(path: Path, report: "Report") -> bool:
-    from tablegen.verify.junit import junit
+    from tablegen.verification.junit import junit
 
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -18,7 +18,7 @@ from tablegen.problems import Problems, Unphysical
 # A calibration serves turning points this far beyond the calibrated ones: the paper sees no major difference
 # between 0.5 and 0.7 except at large sizes, and 10 % to 25 % between 0.7 and 0.9.
 TURN_REACH = 0.1
-VOLTAGE_ERROR = 0.02  # by which a measured full scale may differ from v_max
+FULL_SCALE_TOLERANCE = 0.02  # by which a measured full scale may differ from v_max
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,7 +174,7 @@ def _check_amplitudes(setup: Setup, axis: str, hysteresis: Hysteresis, problems:
     for i, entry in enumerate(hysteresis.branches):
         for side, branch in (("forward", entry.forward), ("backward", entry.backward)):
             for j, point in enumerate(branch.points or []):
-                if point.size_v > (1.0 + VOLTAGE_ERROR) * v_max:
+                if point.size_v > (1.0 + FULL_SCALE_TOLERANCE) * v_max:
                     key = f"{axis}.hysteresis.branches[{i}].{side}.points[{j}].size_v"
                     problems.add(setup.scanner_file, key, f"{point.size_v:g} V is above v_max = {v_max:g} V")
 

@@ -4,16 +4,16 @@ from tablegen.config.figures import at_most
 from tablegen.numerics.elementary import log10
 from tablegen.problems import Unphysical
 
-_LEAST_RESPONSE = 0.5
+_MIN_RESPONSE = 0.5
 
 
 def frequency_gain(rate_hz: float, alpha: float, reference_hz: float) -> float:
     """g = 1 / (1 - alpha log10(f / f_DH)): what restores the amplitude of (23), R normalised to its value at f_DH."""
     response = 1.0 - alpha * log10(rate_hz / reference_hz)
-    if response < _LEAST_RESPONSE:
-        highest = reference_hz * 10.0 ** min(_LEAST_RESPONSE / alpha, 300.0)
+    if response < _MIN_RESPONSE:
+        highest = reference_hz * 10.0 ** min(_MIN_RESPONSE / alpha, 300.0)
         raise Unphysical(
             f"at {rate_hz:g} Hz equation (23) leaves {response:.3g} of the amplitude; it was fitted to a few percent "
-            f"a decade and serves down to {_LEAST_RESPONSE}, that is up to {at_most(highest)} Hz"
+            f"a decade and serves down to {_MIN_RESPONSE}, that is up to {at_most(highest)} Hz"
         )
     return 1.0 / response

@@ -9,8 +9,8 @@ from tablegen.numerics.arrays import tree_sum
 from tablegen.numerics.linear import Cholesky
 from tablegen.problems import Unphysical
 
-_LEAST_SPAN = 1e-3  # of p, which runs from -1 to 1; a parabola through points closer than that is noise
-_PANELS = 1024  # of Simpson's rule; the integrand is smooth and the error below 1e-13
+_MIN_SPAN = 1e-3  # of p, which runs from -1 to 1; a parabola through points closer than that is noise
+_SIMPSON_PANELS = 1024  # of Simpson's rule; the integrand is smooth and the error below 1e-13
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,9 +40,9 @@ class OffsetLaw:
         """
         if len(set(p)) < 3:
             raise Unphysical(f"{len(set(p))} different offsets do not determine a parabola; at least 3 are needed")
-        if max(p) - min(p) < _LEAST_SPAN:
+        if max(p) - min(p) < _MIN_SPAN:
             raise Unphysical(
-                f"the offsets span {0.5 * (max(p) - min(p)):.2g} of v_max; at least {0.5 * _LEAST_SPAN:g} of it is "
+                f"the offsets span {0.5 * (max(p) - min(p)):.2g} of v_max; at least {0.5 * _MIN_SPAN:g} of it is "
                 f"needed, better most of it"
             )
         x, y = np.asarray(p), np.asarray(apparent)
@@ -72,12 +72,12 @@ class OffsetLaw:
         """Position in nm above that at 0 V: the integral of the local slope k / m over the offset voltage."""
         if v_offset == 0.0:
             return 0.0
-        p = 2.0 * (v_offset * (np.arange(_PANELS + 1) / _PANELS)) / v_max - 1.0
+        p = 2.0 * (v_offset * (np.arange(_SIMPSON_PANELS + 1) / _SIMPSON_PANELS)) / v_max - 1.0
         slope = 1.0 / (1.0 + self.alpha * p + self.beta * p * p)
-        weights = np.full(_PANELS + 1, 2.0)
+        weights = np.full(_SIMPSON_PANELS + 1, 2.0)
         weights[1::2] = 4.0
         weights[0] = weights[-1] = 1.0
-        return k_nm_per_v * v_offset * float(tree_sum(weights * slope)) / (3.0 * _PANELS)
+        return k_nm_per_v * v_offset * float(tree_sum(weights * slope)) / (3.0 * _SIMPSON_PANELS)
 
     def voltage_at(self, position_nm: float, v_max: float, k_nm_per_v: float) -> float:
         """The offset voltage that gives a position; the inverse of ``position_nm``."""

@@ -16,7 +16,7 @@ T = TypeVar("T", bound=Struct)
 # Called for every table with its type, its key, what was written in it, and what was built of it or None.
 Check: TypeAlias = Callable[[type, str, dict[str, Any], Any], None]
 
-_WRONG = object()  # the value of a key that was reported already
+_ALREADY_REPORTED = object()  # the value of a key that was reported already
 _UNITS = ("_nm", "_v", "_hz", "_s", "_nm_per_v", "_v_per_s", "_db", "_lsb", "_percent")
 
 
@@ -37,7 +37,7 @@ class _Decoder:
 
     def _wrong(self, key: str, why: str) -> object:
         self._problems.add(self._document, key, why)
-        return _WRONG
+        return _ALREADY_REPORTED
 
     def _any(self, kind: types.Type, value: Any, key: str) -> Any:
         match kind:
@@ -79,7 +79,7 @@ class _Decoder:
         for name, field in known.items():
             if name in value:
                 built[name] = self._any(field.type, value[name], join_key(key, name))
-                good = good and built[name] is not _WRONG
+                good = good and built[name] is not _ALREADY_REPORTED
             elif field.required:
                 good = False
                 if not any(name in meant(other, known) for other in unknown):
@@ -87,7 +87,7 @@ class _Decoder:
                     self._wrong(join_key(key, name), f"missing; this {kind_of} is required")
         made = kind.cls(**built) if good else None
         self._check(kind.cls, key, value, made)
-        return made if good else _WRONG
+        return made if good else _ALREADY_REPORTED
 
     def _list(self, kind: types.ListType, value: Any, key: str) -> Any:
         if not isinstance(value, list):
@@ -97,7 +97,7 @@ class _Decoder:
         if kind.max_length is not None and len(value) > kind.max_length:
             return self._wrong(key, f"{len(value)} entries are too many, at most {kind.max_length} are taken")
         built = [self._any(kind.item_type, item, f"{key}[{i}]") for i, item in enumerate(value)]
-        return _WRONG if any(item is _WRONG for item in built) else built
+        return _ALREADY_REPORTED if any(item is _ALREADY_REPORTED for item in built) else built
 
     def _tuple(self, kind: types.TupleType, value: Any, key: str) -> Any:
         count = len(kind.item_types)
@@ -106,7 +106,7 @@ class _Decoder:
         built = [
             self._any(t, item, f"{key}[{i}]") for i, (t, item) in enumerate(zip(kind.item_types, value, strict=True))
         ]
-        return _WRONG if any(item is _WRONG for item in built) else tuple(built)
+        return _ALREADY_REPORTED if any(item is _ALREADY_REPORTED for item in built) else tuple(built)
 
     def _number(self, kind: types.FloatType, value: Any, key: str) -> Any:
         if isinstance(value, bool) or not isinstance(value, int | float):
@@ -114,7 +114,7 @@ class _Decoder:
         if isinstance(value, float) and not math.isfinite(value):
             return self._wrong(key, f"{value} is not a finite number")
         if not self._in_range(kind, value, key):
-            return _WRONG
+            return _ALREADY_REPORTED
         return float(value)
 
     def _integer(self, kind: types.IntType, value: Any, key: str) -> Any:
@@ -123,7 +123,7 @@ class _Decoder:
             return self._wrong(
                 key, f"{value!r} has to be written {value:.0f}" if whole else f"{_shown(value)} is not a whole number"
             )
-        return value if self._in_range(kind, value, key) else _WRONG
+        return value if self._in_range(kind, value, key) else _ALREADY_REPORTED
 
     def _in_range(self, kind: types.FloatType | types.IntType, value: float, key: str) -> bool:
         shown = _shown(value)

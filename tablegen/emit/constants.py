@@ -1,8 +1,8 @@
 """The constants of the emitted headers by name, the same in C and in Verilog."""
 
+from tablegen.device.schedule import Schedule
 from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.synthesis import FRACTION_BITS
-from tablegen.schedule import Schedule
 
 
 def sequence_constants(schedule: Schedule) -> dict[str, int]:

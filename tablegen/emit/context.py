@@ -3,17 +3,17 @@
 from typing import Any
 
 from tablegen import __version__
-from tablegen.certificate import Certificate
+from tablegen.certificate.certificate import Certificate
+from tablegen.certificate.summary import summary
 from tablegen.emit.constants import axis_constants, sequence_constants
 from tablegen.fixedpoint.output import GAIN_BITS
 from tablegen.fixedpoint.phase import PHASE_BITS
 from tablegen.fixedpoint.rounding import signed_limits
 from tablegen.fixedpoint.synthesis import sine_periods
 from tablegen.numerics.arrays import Ints
-from tablegen.plan import LinePlan, Plan
-from tablegen.summary import summary
+from tablegen.planning.line_plan import LinePlan, Plan
 
-_PER_ROW = 10
+_WORDS_PER_ROW = 10
 
 
 def template_context(plan: Plan, certificates: dict[str, Certificate], digest: str) -> dict[str, Any]:
@@ -105,4 +105,4 @@ def _sine(plan: Plan) -> dict[str, Any] | None:
 
 def _rows(words: Ints) -> list[str]:
     values = [str(word) for word in words.tolist()]
-    return [", ".join(values[i : i + _PER_ROW]) for i in range(0, len(values), _PER_ROW)]
+    return [", ".join(values[i : i + _WORDS_PER_ROW]) for i in range(0, len(values), _WORDS_PER_ROW)]

@@ -3,11 +3,11 @@
 from collections.abc import Iterable, Mapping
 from typing import Literal
 
+from tablegen.device.registers import program_words
+from tablegen.device.schedule import Schedule
 from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.synthesis import WORD_BITS, sine_quarter
 from tablegen.numerics.arrays import Ints
-from tablegen.registers import program_words
-from tablegen.schedule import Schedule
 
 
 def memory_file(words: Ints | Iterable[int], bits: int) -> bytes:

@@ -5,12 +5,13 @@ from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from tablegen.certificate import Certificate
+from tablegen.certificate.certificate import Certificate
 from tablegen.emit.context import template_context
-from tablegen.emit.manifest import MANIFEST, manifest_file
 from tablegen.emit.memory import memory_files
-from tablegen.plan import Plan
-from tablegen.record import content_hash, plan_record
+from tablegen.manifest.format import MANIFEST, content_hash
+from tablegen.manifest.record import plan_record
+from tablegen.manifest.write import manifest_file
+from tablegen.planning.line_plan import Plan
 from tablegen.resources import c_link, c_runtime, resource_folder, verilog_runtime
 
 

@@ -9,7 +9,7 @@ from tablegen.fixedpoint.phase import PHASE_BITS
 from tablegen.fixedpoint.program import Program
 from tablegen.numerics.arrays import Ints, merged
 
-_TICKS_AT_LEAST = 4  # a run, on average, for runs to be cheaper than ticks
+_MIN_TICKS_PER_RUN = 4  # a run, on average, for runs to be cheaper than ticks
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +65,7 @@ def _between_words(program: Program) -> Runs | None:
     first_code = program.output.code(between(here, there, np.zeros_like(words), guard))
     last_code = program.output.code(between(here, there, last, guard))
     changes = np.abs(last_code - first_code)
-    if (int(changes.sum()) + len(words)) * _TICKS_AT_LEAST > program.ticks:
+    if (int(changes.sum()) + len(words)) * _MIN_TICKS_PER_RUN > program.ticks:
         return None
 
     segment = np.repeat(np.arange(len(words)), changes + 1)

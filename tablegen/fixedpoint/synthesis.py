@@ -7,7 +7,6 @@ import numpy as np
 from tablegen.fixedpoint.rounding import round_half_up, round_number, saturate, shift_round, signed_limits
 from tablegen.numerics.arrays import Floats, Ints, freeze
 from tablegen.numerics.turns import sine
-from tablegen.waveform.series import FourierSeries
 
 WORD_BITS = 32
 FRACTION_BITS = 30  # Q2.30: |s| <= 1 bounds every coefficient by 4/pi
@@ -37,26 +36,20 @@ class FourierWords:
         return np.concatenate([[self.a0], self.a, self.b])
 
 
-def encode(series: FourierSeries, scale: float) -> FourierWords:
-    """The words of a waveform, (2 w - 1) / scale, rounded to nearest, ties up."""
+def encode(a0: float, a: Floats, b: Floats, scale: float) -> FourierWords:
+    """The words of (2 w - 1) / scale for w = a0 + sum a_n cos + b_n sin, rounded to nearest, ties up."""
     unit = float(1 << FRACTION_BITS)
     high = signed_limits(WORD_BITS)[1]
-    a0 = round_number((2.0 * series.a0 - 1.0) / scale * unit)
-    a, b = (round_half_up(2.0 * c / scale * unit) for c in (series.a, series.b))
-    largest = max(abs(a0), int(np.max(np.abs(a))), int(np.max(np.abs(b))))
+    mean = round_number((2.0 * a0 - 1.0) / scale * unit)
+    cosines, sines = (round_half_up(2.0 * c / scale * unit) for c in (a, b))
+    largest = max(abs(mean), int(np.max(np.abs(cosines))), int(np.max(np.abs(sines))))
     if largest > high:
         raise OverflowError(f"a Fourier word of {largest} does not fit {WORD_BITS} bits")
     # Each product is at most |word| 2^30; their sum and the rounding have to stay inside 64 bits.
-    total = (abs(a0) + int(np.sum(np.abs(a))) + int(np.sum(np.abs(b)))) << SINE_FRACTION_BITS
+    total = (abs(mean) + int(np.sum(np.abs(cosines))) + int(np.sum(np.abs(sines)))) << SINE_FRACTION_BITS
     if total >= 1 << (ACCUMULATOR_BITS - 2):
         raise OverflowError(f"the Fourier words sum to {total / 2.0**60:.3f}, the accumulator holds 4")
-    return FourierWords(a0, a, b)
-
-
-def decode(words: FourierWords, scale: float) -> FourierSeries:
-    """The waveform w that the words stand for."""
-    unit = scale / float(1 << (FRACTION_BITS + 1))
-    return FourierSeries(0.5 + unit * words.a0, unit * words.a.astype(np.float64), unit * words.b.astype(np.float64))
+    return FourierWords(mean, cosines, sines)
 
 
 def sine_table(length: int) -> Ints:

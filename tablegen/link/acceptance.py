@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tablegen.device.schedule import MAXIMUM_LINE_TICKS
 from tablegen.fixedpoint.output import GAIN_BITS
 from tablegen.fixedpoint.phase import MAXIMUM_TICKS, PHASE_BITS
 from tablegen.fixedpoint.program import Program
@@ -15,9 +16,10 @@ from tablegen.fixedpoint.synthesis import FRACTION_BITS
 from tablegen.link.image import Contents
 from tablegen.link.messages import AxisLimits, Reason
 from tablegen.numerics.arrays import Bools, Ints
-from tablegen.schedule import MAXIMUM_LINE_TICKS
 
-_OUTSIDE = 1  # codes: ticks need not visit a word, and rounding may carry it over a limit that no tick crosses
+_CLAMP_ALLOWANCE_CODES = (
+    1  # codes: ticks need not visit a word, and rounding may carry it over a limit that no tick crosses
+)
 _MAXIMUM_STEP = (1 << 24) - 1
 
 
@@ -115,7 +117,11 @@ def _range(contents: Contents, page: int) -> Finding | None:
     program = contents.program(page)
     output = program.output
     codes = output.unclamped(program.words << program.guard)
-    return _first((codes < output.code_min - _OUTSIDE) | (codes > output.code_max + _OUTSIDE), Reason.RANGE, page)
+    return _first(
+        (codes < output.code_min - _CLAMP_ALLOWANCE_CODES) | (codes > output.code_max + _CLAMP_ALLOWANCE_CODES),
+        Reason.RANGE,
+        page,
+    )
 
 
 def _slew(contents: Contents, page: int) -> Finding | None:

@@ -14,26 +14,26 @@ from tablegen.link.exchange import LATENCY_S
 from tablegen.link.messages import (
     AxisLimits,
     DeviceInfo,
+    DeviceState,
     DeviceStatus,
     Reason,
     Request,
-    State,
 )
 from tablegen.link.readback import read_back
 from tablegen.link.reasons import Limits
-from tablegen.link.session import Session
+from tablegen.link.session import LinkSession
 from tablegen.link.transport import Opener, Transport, byte_s, open_port
 from tablegen.link.upload import ProgressCall, Uploader, UploadResult
 
 if TYPE_CHECKING:
-    from tablegen.link.image import Image
+    from tablegen.link.image import ProgramImage
 
 TIMEOUT_S = 5.0  # of a request
-_UPLOAD_S = 15.0  # beside what an upload takes on the line
-_TIMES = 4.0  # what an upload takes on the line
+_UPLOAD_MARGIN_S = 15.0  # beside what an upload takes on the line
+_UPLOAD_TIME_FACTOR = 4.0  # what an upload takes on the line
 _POLL_S = 0.05
-_FRESH_S = 0.25  # a HELLO so young need not be repeated: an upload sees for itself what is not so any more
-_READINGS = 3
+_HELLO_FRESH_S = 0.25  # a HELLO so young need not be repeated: an upload sees for itself what is not so any more
+_MAX_READINGS = 3
 _KEY_BYTES = range(16, 33)
 _NO_HASH = bytes(32)
 
@@ -73,7 +73,7 @@ class Device:
             opener = port
         transport: Transport = opener() if opener is not None else port  # type: ignore[assignment]
         chance = random if random is not None else random_module.SystemRandom()
-        self._session = Session(transport, opener, key, latency_s, chance, sleep)
+        self._session = LinkSession(transport, opener, key, latency_s, chance, sleep)
         self._timeout_s = timeout_s
         try:
             self._session.hello(self._until(None))
@@ -113,7 +113,7 @@ class Device:
 
     def upload(
         self,
-        image: "Image",
+        image: "ProgramImage",
         progress: ProgressCall | None = None,
         *,
         force: bool = False,
@@ -131,7 +131,7 @@ class Device:
         """
         deadline = self._until(self.upload_time_s(image) if timeout_s is None else timeout_s)
         session = self._session
-        if session.now() - session.status_at > _FRESH_S:
+        if session.now() - session.status_at > _HELLO_FRESH_S:
             session.greet(deadline)
         status = session.status
         if status.hash == image.info.hash and not force:
@@ -149,11 +149,15 @@ class Device:
             )
         return result
 
-    def upload_time_s(self, image: "Image") -> float:
+    def upload_time_s(self, image: "ProgramImage") -> float:
         """What is allowed for an upload by default, in seconds: many times what it takes, and two long lines."""
         rate = self.info.update_rate_hz
         line_s = int.from_bytes(image.data[:4], "little") / rate if rate else 0.0  # line_ticks is the first word
-        return _UPLOAD_S + _TIMES * len(image.data) * byte_s(self._session.exchange.transport.baud) + 2.0 * line_s
+        return (
+            _UPLOAD_MARGIN_S
+            + _UPLOAD_TIME_FACTOR * len(image.data) * byte_s(self._session.exchange.transport.baud)
+            + 2.0 * line_s
+        )
 
     def readback(self, *, timeout_s: float | None = None) -> bytes:
         """The image of the scan that plays, as bytes.
@@ -161,9 +165,9 @@ class Device:
         Raises ``Refused`` where the device does not hold it: a scan that came with the firmware, or memory in use.
         """
         size = self.info.image_bytes
-        allowed = _UPLOAD_S + _TIMES * size * byte_s(self._session.exchange.transport.baud)
+        allowed = _UPLOAD_MARGIN_S + _UPLOAD_TIME_FACTOR * size * byte_s(self._session.exchange.transport.baud)
         deadline = self._until(allowed if timeout_s is None else timeout_s)
-        for _ in range(_READINGS):
+        for _ in range(_MAX_READINGS):
             before = self.status()
             image = read_back(self._session, deadline)
             after = self.status()
@@ -212,7 +216,7 @@ class Device:
         """
         return _limits(self._act(Request.LIMITS, x.pack() + y.pack(), 2 * AxisLimits.LAYOUT.size))
 
-    def wait_for(self, state: State, timeout_s: float) -> DeviceStatus:
+    def wait_for(self, state: DeviceState, timeout_s: float) -> DeviceStatus:
         """Wait until the sequencer is in a state. Raises ``OutOfTime``."""
         deadline = self._until(timeout_s)
         while True:

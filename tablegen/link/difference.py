@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS, SCAN_WORDS
 from tablegen.link.image import PROGRAM_BYTES, Contents, take_apart
 from tablegen.link.messages import AxisShape
-from tablegen.link.prepare import Scan
-from tablegen.registers import AXIS_WORDS, PAGE_WORDS, SCAN_WORDS
+from tablegen.link.prepare import PreparedScan
 
 _SIGNED = {"gain", "offset_high"}
 
@@ -27,7 +27,7 @@ class Difference:
         return f"{self.word} (byte {self.address}) is {self.found}, not {self.expected}"
 
 
-def differences(scan: Scan, image: bytes) -> list[Difference]:
+def differences(scan: PreparedScan, image: bytes) -> list[Difference]:
     """All words of an image read out of a device that are not those of the scan, in order; empty if there are none.
 
     Each axis is compared in the form in which the device holds it, words or Fourier words.

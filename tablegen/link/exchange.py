@@ -8,12 +8,12 @@ from tablegen.link.messages import ANSWER, REFUSAL, Refusal, Request
 from tablegen.link.transport import Transport, byte_s
 
 LATENCY_S = 0.016  # of a USB bridge, which passes on what has come 60 times a second
-_DEVICE_S = 0.02  # a device has other things to do
-_HALF_MORE = 1.5
-_END = b"\0"  # in front of a frame it ends what noise has begun
-_FADING = 0.8  # with each answer
-_MOST_LATE_S = 0.25  # more is a stall, which says nothing of the next answer
-_WAIT_FOR_A_LINE = (Request.COMMIT, Request.ABORT)  # and tell nothing of the way
+_DEVICE_DELAY_S = 0.02  # a device has other things to do
+_LATENESS_MARGIN = 1.5
+_FRAME_END = b"\0"  # in front of a frame it ends what noise has begun
+_LATENESS_DECAY = 0.8  # with each answer
+_MAX_LATENESS_S = 0.25  # more is a stall, which says nothing of the next answer
+_ANSWERED_AT_LINE_START = (Request.COMMIT, Request.ABORT)  # and tell nothing of the way
 
 
 @dataclass(slots=True)
@@ -81,15 +81,15 @@ class Exchange:
         """
         wire = Frame(kind, seq, self.session, payload).encode()
         if again:
-            wire = _END + wire
+            wire = _FRAME_END + wire
         self.transport.write(wire)
         now, one = self.now(), byte_s(self.transport.baud)
         self._line_free = max(self._line_free, now) + one * len(wire)
         self.bytes_sent += len(wire)
         way = self._line_free - now + one * (answer_bytes + OVERHEAD) + self._latency_s
-        if kind not in _WAIT_FOR_A_LINE:
+        if kind not in _ANSWERED_AT_LINE_START:
             self._expected[kind, seq] = None if (kind, seq) in self._expected else now + way
-        return now + _HALF_MORE * (way + self._late_s) + _DEVICE_S
+        return now + _LATENESS_MARGIN * (way + self._late_s) + _DEVICE_DELAY_S
 
     def receive(self, until: float) -> list[Answer]:
         """Answers of this session that have come, or come first until then."""
@@ -122,5 +122,5 @@ class Exchange:
     def _learn(self, answer: Answer) -> None:
         expected = self._expected.pop((answer.kind, answer.seq), None)
         if expected is not None:
-            late = min(self.now() - expected, _MOST_LATE_S)
-            self._late_s = max(late, _FADING * self._late_s)
+            late = min(self.now() - expected, _MAX_LATENESS_S)
+            self._late_s = max(late, _LATENESS_DECAY * self._late_s)

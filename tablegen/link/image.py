@@ -6,6 +6,8 @@ from typing import Literal
 
 import numpy as np
 
+from tablegen.device.registers import AXIS_WORDS, OFFSET_LOW_BITS, PAGE_WORDS, SCAN_WORDS, program_words
+from tablegen.device.sequencer import DualProgram
 from tablegen.fixedpoint.interpolation import guard_bits
 from tablegen.fixedpoint.output import UNIT_GAIN_BITS, Output
 from tablegen.fixedpoint.phase import RationalPhase
@@ -13,17 +15,15 @@ from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.synthesis import FourierWords, synthesize
 from tablegen.link.messages import AxisShape, ImageInfo
 from tablegen.numerics.arrays import Ints
-from tablegen.registers import AXIS_WORDS, OFFSET_LOW_BITS, PAGE_WORDS, SCAN_WORDS, program_words
-from tablegen.sequencer import DualProgram
 
 PROGRAM_WORDS = 3 * PAGE_WORDS
 PROGRAM_BYTES = 4 * PROGRAM_WORDS
 FOURIER_BYTES = 4  # a word
-_HARMONICS = AXIS_WORDS.index("harmonics")
+_HARMONICS_WORD = AXIS_WORDS.index("harmonics")
 
 
 @dataclass(frozen=True, slots=True)
-class Image:
+class ProgramImage:
     """What is uploaded, and what BEGIN says of it."""
 
     info: ImageInfo
@@ -32,7 +32,7 @@ class Image:
 
 def make_image(
     program: DualProgram, digest: str, x_fourier: Ints | None = None, y_fourier: Ints | None = None
-) -> Image:
+) -> ProgramImage:
     """The image of a program of the plan with this SHA-256 (64 hexadecimal digits).
 
     Where Fourier words are given, int64 of shape (2 H + 1,) in the order of devices, they go in place of the table.
@@ -43,7 +43,7 @@ def make_image(
     for axis, fourier in ((program.x, x_fourier), (program.y, y_fourier)):
         data += _bytes(axis.words, _shape(axis).word_bytes) if fourier is None else _bytes(fourier, FOURIER_BYTES)
     info = ImageInfo(bytes.fromhex(digest), len(data), zlib.crc32(data), _shape(program.x), _shape(program.y))
-    return Image(info, data)
+    return ProgramImage(info, data)
 
 
 def _shape(axis: Program) -> AxisShape:
@@ -74,7 +74,7 @@ class Contents:
     y: Ints
 
     def scan(self, name: str) -> int:
-        """A word of the page of the scan by its name in ``tablegen.registers.SCAN_WORDS``."""
+        """A word of the page of the scan by its name in ``tablegen.device.registers.SCAN_WORDS``."""
         return self.words[SCAN_WORDS.index(name)]
 
     def axis(self, page: int, name: str) -> int:
@@ -126,7 +126,7 @@ def layout(words: tuple[int, ...], x: AxisShape, y: AxisShape) -> tuple[int, int
     """Bytes that follow the program words for x and for y."""
     sizes = []
     for page, shape in ((1, x), (2, y)):
-        harmonics = words[page * PAGE_WORDS + _HARMONICS]
+        harmonics = words[page * PAGE_WORDS + _HARMONICS_WORD]
         period = words[page * PAGE_WORDS + AXIS_WORDS.index("phase_period")]
         length = 1 << shape.index_bits if shape.index_bits else period
         sizes.append(FOURIER_BYTES * (2 * harmonics + 1) if harmonics else shape.word_bytes * length)
@@ -147,7 +147,7 @@ def take_apart(data: bytes, x: AxisShape, y: AxisShape) -> Contents:
     parts = []
     at = PROGRAM_BYTES
     for page, shape, size in ((1, x, x_bytes), (2, y, y_bytes)):
-        harmonics = words[page * PAGE_WORDS + _HARMONICS]
+        harmonics = words[page * PAGE_WORDS + _HARMONICS_WORD]
         parts.append(_words(data[at : at + size], FOURIER_BYTES if harmonics else shape.word_bytes))
         at += size
     return Contents(words, x, y, *parts)

@@ -76,7 +76,7 @@ class Feature(IntFlag):
     NARROWS = 32
 
 
-class State(IntEnum):
+class DeviceState(IntEnum):
     """What the sequencer of a device does."""
 
     NO_PROGRAM = 0
@@ -211,7 +211,7 @@ class DeviceStatus:
 
     LAYOUT: ClassVar[struct.Struct] = struct.Struct("<4B5I16sI32s")
 
-    state: State
+    state: DeviceState
     upload: Upload
     faults: int
     flags: int
@@ -254,7 +254,7 @@ class DeviceStatus:
         state, upload, *numbers, counts, bad, digest = cls.LAYOUT.unpack_from(payload)
         faults, flags, boot, generation, line, received, crc = numbers
         return cls(
-            State(state),
+            DeviceState(state),
             Upload(upload),
             faults,
             flags,

@@ -18,27 +18,27 @@ from tablegen.link.messages import (
     TAG_BYTES,
     AxisLimits,
     DeviceInfo,
+    DeviceState,
     DeviceStatus,
     Feature,
     ImageInfo,
     Reason,
     Refusal,
     Request,
-    State,
     Upload,
 )
-from tablegen.link.model_bank import Bank, Held, Refused, Taken
+from tablegen.link.model_bank import Bank, Held, RequestRefused, Taken
 from tablegen.link.players import Player
 
 _TAGGED = {Request.COMMIT, Request.PARK, Request.ARM, Request.TRIGGER, Request.CLEAR, Request.LIMITS}
 _ACTING = _TAGGED | {Request.ABORT}
-_PLAIN: dict[int, int] = {  # bytes of a payload without its tag
+_PAYLOAD_BYTES: dict[int, int] = {  # bytes of a payload without its tag
     Request.BEGIN: ImageInfo.LAYOUT.size,
     Request.COMMIT: 4,
     Request.ARM: 4,
     Request.LIMITS: 2 * AxisLimits.LAYOUT.size,
 }
-_MOST_FRAMES = 1 << 31
+_MAX_FRAMES = 1 << 31
 
 
 @dataclass
@@ -89,7 +89,7 @@ class ModelDevice:
         nonces: Callable[[], bytes] | None = None,
         staged: bool = False,
         checking: int = 0,
-        most_frames: int = _MOST_FRAMES,
+        most_frames: int = _MAX_FRAMES,
     ) -> None:
         if bool(key) != (Feature.KEY in info.features):
             raise ValueError("a key and the feature go together")
@@ -171,7 +171,7 @@ class ModelDevice:
     def status(self) -> DeviceStatus:
         """What STATUS answers."""
         player, held, taken = self.player, self._bank.held, self._bank.taken
-        known = bytes(messages.HASH_BYTES) if player.state is State.NO_PROGRAM else self._boot_hash
+        known = bytes(messages.HASH_BYTES) if player.state is DeviceState.NO_PROGRAM else self._boot_hash
         return DeviceStatus(
             state=player.state,
             upload=Upload.NONE if held is None else held.state,
@@ -193,9 +193,9 @@ class ModelDevice:
         memory: _Remembered | None = None
         try:
             if frame.type != Request.HELLO and frame.session != self._session:
-                raise Refused(Reason.SESSION)
+                raise RequestRefused(Reason.SESSION)
             if frame.type not in self._requests:
-                raise Refused(Reason.TYPE)
+                raise RequestRefused(Reason.TYPE)
             self._check_payload(frame)
             if _acts(frame):
                 if self._is_repeated(frame):
@@ -207,11 +207,11 @@ class ModelDevice:
             answer = self._requests[frame.type](frame)
             if answer is not None:
                 self._answer(frame, answer, memory)
-        except Refused as refused:
+        except RequestRefused as refused:
             self._refuse(frame, refused, memory)
 
     def _is_repeated(self, frame: Frame) -> bool:
-        """Whether it was dealt with by the answer of last time. Raises ``Refused`` if it was overtaken."""
+        """Whether it was dealt with by the answer of last time. Raises ``RequestRefused`` if it was overtaken."""
         if self._last is None:
             return False
         behind = (self._last.seq - frame.seq) & 0xFF
@@ -219,7 +219,7 @@ class ModelDevice:
             self._out += self._last.answer or b""
             return True
         if behind < 128:
-            raise Refused(Reason.OLD)
+            raise RequestRefused(Reason.OLD)
         return False
 
     def _check_payload(self, frame: Frame) -> None:
@@ -227,7 +227,7 @@ class ModelDevice:
         kind = Request(frame.type)
         if kind == Request.HELLO:
             if payload and payload[0] != messages.VERSION:
-                raise Refused(Reason.VERSION, messages.VERSION)
+                raise RequestRefused(Reason.VERSION, messages.VERSION)
             good = size == 1
         elif kind == Request.DATA:
             good = 5 <= size <= 4 + self.info.data_bytes
@@ -238,11 +238,11 @@ class ModelDevice:
         if good and kind == Request.ARM:
             good = int(struct.unpack_from("<I", payload)[0]) <= self._most_frames
         if not good:
-            raise Refused(Reason.PAYLOAD)
+            raise RequestRefused(Reason.PAYLOAD)
 
     def _sizes(self, kind: Request) -> set[int]:
         """What the payload of a request may have."""
-        plain = _PLAIN.get(kind, 0)
+        plain = _PAYLOAD_BYTES.get(kind, 0)
         sizes = {plain, plain + TAG_BYTES} if self._key and kind in _TAGGED else {plain}
         if kind == Request.LIMITS:
             return sizes | {0} if Feature.NARROWS in self.info.features else {0}
@@ -255,16 +255,16 @@ class ModelDevice:
     def _check_tag(self, frame: Frame, nonce: bytes | None, image: bytes | None = None) -> None:
         if not self._key:
             return
-        plain = _PLAIN.get(frame.type, 0)
+        plain = _PAYLOAD_BYTES.get(frame.type, 0)
         given = frame.payload[plain:]
         bare = Frame(frame.type, frame.seq, frame.session, frame.payload[:plain])
         if nonce is None or not hmac.compare_digest(tag(self._key, nonce, bare, image), given):
-            raise Refused(Reason.KEY)
+            raise RequestRefused(Reason.KEY)
 
     def _answer(self, frame: Frame, payload: bytes, memory: _Remembered | None) -> None:
         self._send(Frame(frame.type | ANSWER, frame.seq, frame.session, payload), memory)
 
-    def _refuse(self, frame: Frame, refused: Refused, memory: _Remembered | None) -> None:
+    def _refuse(self, frame: Frame, refused: RequestRefused, memory: _Remembered | None) -> None:
         payload = Refusal(frame.type, refused.reason, refused.detail).pack()
         self._send(Frame(messages.REFUSAL, frame.seq, frame.session, payload), memory)
 
@@ -286,7 +286,7 @@ class ModelDevice:
         if isinstance(found, Taken):
             return struct.pack("<II", found.generation, found.line)
         if not self.permits:
-            raise Refused(Reason.INTERLOCK)
+            raise RequestRefused(Reason.INTERLOCK)
         assert self._last is not None
         found.state = Upload.CHECKING
         self._at_work = _AtWork(frame, self._last, self._before, self._use_nonce(), self._checking)
@@ -299,10 +299,10 @@ class ModelDevice:
         try:
             program = self._bank.accept(held, lambda image: self._check_tag(commit.request, commit.nonce, image))
             if not self.permits:
-                raise Refused(Reason.INTERLOCK)
+                raise RequestRefused(Reason.INTERLOCK)
             if not self.player.commit(program):
-                raise Refused(Reason.TICKS)
-        except Refused as refused:
+                raise RequestRefused(Reason.TICKS)
+        except RequestRefused as refused:
             self._at_work = None
             if refused.reason in (Reason.INTERLOCK, Reason.KEY, Reason.TICKS):
                 held.state = Upload.RECEIVING
@@ -326,7 +326,7 @@ class ModelDevice:
             self._answer(commit.request, struct.pack("<II", player.swaps, player.swapped_at), commit.memory)
         elif player.writable:
             self._bank.held = None
-            self._refuse(commit.request, Refused(Reason.WITHDRAWN), commit.memory)
+            self._refuse(commit.request, RequestRefused(Reason.WITHDRAWN), commit.memory)
         else:
             return
         self._at_work = None
@@ -339,12 +339,12 @@ class ModelDevice:
         assert self._last is not None
         if held is not None and held.state is Upload.WAITING:
             if not self.player.withdraw():
-                raise Refused(Reason.TICKS)
+                raise RequestRefused(Reason.TICKS)
             self._aborts.append(_AtWork(frame, self._last))
             return None
         self._at_work = self._bank.held = None
         if commit is not None:
-            self._refuse(commit.request, Refused(Reason.WITHDRAWN), commit.memory)
+            self._refuse(commit.request, RequestRefused(Reason.WITHDRAWN), commit.memory)
         return struct.pack("<I", self.player.swaps)
 
     def _readback(self, frame: Frame) -> bytes:
@@ -353,7 +353,7 @@ class ModelDevice:
 
     def _passed_on(self, done: bool) -> bytes:
         if not done:
-            raise Refused(Reason.TICKS)
+            raise RequestRefused(Reason.TICKS)
         return b""
 
     def _challenge(self, frame: Frame) -> bytes:

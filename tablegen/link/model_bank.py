@@ -6,18 +6,18 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 
+from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS
+from tablegen.device.schedule import Schedule, Window
+from tablegen.device.sequencer import DualProgram
 from tablegen.link.acceptance import Playing, first_objection
 from tablegen.link.image import PROGRAM_BYTES, Contents, layout, make_image, take_apart
-from tablegen.link.messages import AxisLimits, DeviceInfo, ImageInfo, Reason, State, Upload
+from tablegen.link.messages import AxisLimits, DeviceInfo, DeviceState, ImageInfo, Reason, Upload
 from tablegen.link.players import Player
-from tablegen.registers import AXIS_WORDS, PAGE_WORDS
-from tablegen.schedule import Schedule, Window
-from tablegen.sequencer import DualProgram
 
-_SHORTEST_INDEX = 3  # bits, of an interpolated table
+_MIN_INDEX_BITS = 3  # bits, of an interpolated table
 
 
-class Refused(Exception):
+class RequestRefused(Exception):
     """A request is."""
 
     def __init__(self, reason: Reason, detail: int = 0) -> None:
@@ -87,13 +87,13 @@ class Bank:
         info = ImageInfo.unpack(payload)
         held = self.held
         if (held is not None and held.state is not Upload.RECEIVING) or not self._player.writable:
-            raise Refused(Reason.BUSY)
+            raise RequestRefused(Reason.BUSY)
         for axis, (ours, theirs) in enumerate(((self._info.x, info.x), (self._info.y, info.y))):
-            fits = theirs.index_bits == 0 or _SHORTEST_INDEX <= theirs.index_bits <= ours.index_bits
+            fits = theirs.index_bits == 0 or _MIN_INDEX_BITS <= theirs.index_bits <= ours.index_bits
             if not fits or (theirs.word_bits, theirs.dac_bits) != (ours.word_bits, ours.dac_bits):
-                raise Refused(Reason.SHAPE, axis)
+                raise RequestRefused(Reason.SHAPE, axis)
         if not PROGRAM_BYTES <= info.image_bytes <= self._info.image_bytes:
-            raise Refused(Reason.LENGTH, self._info.image_bytes)
+            raise RequestRefused(Reason.LENGTH, self._info.image_bytes)
         if held is None or held.announced != payload:
             self._stage_is_whole = False
             held = self.held = Held(info, payload, bytearray())
@@ -103,7 +103,7 @@ class Bank:
         """The answer to DATA."""
         held = self.held
         if held is None:
-            raise Refused(Reason.UPLOAD)
+            raise RequestRefused(Reason.UPLOAD)
         (offset,) = struct.unpack_from("<I", payload)
         before = len(held.data)
         if offset == before and before + len(payload) - 4 <= held.info.image_bytes:
@@ -111,7 +111,7 @@ class Bank:
             if before < PROGRAM_BYTES <= len(held.data):
                 try:
                     self._look_at_words(held)
-                except Refused:
+                except RequestRefused:
                     self.held = None
                     raise
         return struct.pack("<I", len(held.data))
@@ -124,41 +124,41 @@ class Bank:
             harmonics = words[page * PAGE_WORDS + AXIS_WORDS.index("harmonics")]
             most = self._info.harmonics if shape.index_bits else 0
             if harmonics > most:
-                raise Refused(Reason.HARMONICS, most)
+                raise RequestRefused(Reason.HARMONICS, most)
         for page, (shape, ours) in enumerate(shapes, 1):
             period = words[page * PAGE_WORDS + AXIS_WORDS.index("phase_period")]
             if not shape.index_bits and period > 1 << ours.index_bits:
-                raise Refused(Reason.SHAPE, page - 1)
+                raise RequestRefused(Reason.SHAPE, page - 1)
         size = PROGRAM_BYTES + sum(layout(words, held.info.x, held.info.y))
         if size != held.info.image_bytes:
-            raise Refused(Reason.LENGTH, size)
+            raise RequestRefused(Reason.LENGTH, size)
 
     def find(self, image_crc: int) -> Taken | Held:
         """What a COMMIT means: the program that plays already, or a complete upload."""
         held, taken = self.held, self.taken
         if held is None:
             if taken is None or taken.info.image_crc != image_crc:
-                raise Refused(Reason.UPLOAD)
+                raise RequestRefused(Reason.UPLOAD)
             return taken
         if held.info.image_crc != image_crc:
-            raise Refused(Reason.UPLOAD)
+            raise RequestRefused(Reason.UPLOAD)
         if held.state is not Upload.RECEIVING:
-            raise Refused(Reason.BUSY)
+            raise RequestRefused(Reason.BUSY)
         if len(held.data) < held.info.image_bytes:
-            raise Refused(Reason.INCOMPLETE, len(held.data))
+            raise RequestRefused(Reason.INCOMPLETE, len(held.data))
         return held
 
     def accept(self, held: Held, authentic: Callable[[bytes], None]) -> DualProgram:
         """The program of an upload that passes every check. ``authentic`` raises if the tag is not the image's."""
         image = bytes(held.data)
         if zlib.crc32(image) != held.info.image_crc:
-            raise Refused(Reason.IMAGE)
+            raise RequestRefused(Reason.IMAGE)
         authentic(image)
         contents = take_apart(image, held.info.x, held.info.y)
         old = self._player.playing
-        playing = None if old is None else Playing(old.x, old.y, self._player.state is State.PLAYING)
+        playing = None if old is None else Playing(old.x, old.y, self._player.state is DeviceState.PLAYING)
         if found := first_objection(contents, *self.limits, playing):
-            raise Refused(*found)
+            raise RequestRefused(*found)
         return program_of(contents, self._info.update_rate_hz)
 
     def take(self, held: Held) -> None:
@@ -171,7 +171,7 @@ class Bank:
         """Bytes of the image that plays."""
         taken = self.taken
         if taken is None or (self._staged and not self._stage_is_whole):
-            raise Refused(Reason.READBACK)
+            raise RequestRefused(Reason.READBACK)
         image = taken.image if self._staged else _of_tables(taken)
         return image[offset : offset + count]
 

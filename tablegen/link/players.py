@@ -5,10 +5,10 @@ from typing import Protocol
 
 import numpy as np
 
-from tablegen.link.messages import State
-from tablegen.sequencer import DualProgram, Fault, Sequencer, Tick
+from tablegen.device.sequencer import DualProgram, Fault, Sequencer, Tick
+from tablegen.link.messages import DeviceState
 
-REQUESTS = 8  # that a sequencer in C keeps until its next tick
+MAX_REQUESTS = 8  # that a sequencer in C keeps until its next tick
 
 
 class Player(Protocol):
@@ -27,7 +27,7 @@ class Player(Protocol):
         """The line that the old program had come to when the last one was taken."""
 
     @property
-    def state(self) -> State:
+    def state(self) -> DeviceState:
         """Of the last tick."""
 
     @property
@@ -107,7 +107,7 @@ class _Queue:
         return done
 
     def _ask(self, act: Callable[[], None]) -> bool:
-        if len(self._requests) == REQUESTS:
+        if len(self._requests) == MAX_REQUESTS:
             return False
         self._requests.append(act)
         return True
@@ -118,7 +118,7 @@ class _Queue:
 
 
 class SequencerPlayer(_Queue):
-    """Every tick of ``tablegen.sequencer``; ``seen`` is called with the generation and line of each, and the tick."""
+    """Every tick of ``tablegen.device.sequencer``; ``seen`` is called with generation, line and tick of each."""
 
     def __init__(
         self,
@@ -143,12 +143,18 @@ class SequencerPlayer(_Queue):
         return self.sequencer.line
 
     @property
-    def state(self) -> State:
+    def state(self) -> DeviceState:
         """Of the last tick."""
         if self.swaps == 0:
-            return State.NO_PROGRAM
+            return DeviceState.NO_PROGRAM
         assert self._last is not None
-        return State.PLAYING if self._last.playing else State.PARKED if self._last.parked else State.PARKING
+        return (
+            DeviceState.PLAYING
+            if self._last.playing
+            else DeviceState.PARKED
+            if self._last.parked
+            else DeviceState.PARKING
+        )
 
     @property
     def playing(self) -> DualProgram | None:
@@ -235,11 +241,11 @@ class LinePlayer(_Queue):
         self._waits = program
 
     @property
-    def state(self) -> State:
+    def state(self) -> DeviceState:
         """Of the last tick."""
         if self.swaps == 0:
-            return State.NO_PROGRAM
-        return State.PLAYING if self._played else State.PARKING if self._parks_for else State.PARKED
+            return DeviceState.NO_PROGRAM
+        return DeviceState.PLAYING if self._played else DeviceState.PARKING if self._parks_for else DeviceState.PARKED
 
     @property
     def writable(self) -> bool:

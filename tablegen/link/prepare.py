@@ -6,27 +6,28 @@ from typing import Literal
 
 import numpy as np
 
+from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS
+from tablegen.device.sequencer import DualProgram
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.program import Program
 from tablegen.link.acceptance import first_objection
 from tablegen.link.errors import Unsuitable
-from tablegen.link.image import FOURIER_BYTES, PROGRAM_BYTES, Image, make_image, take_apart
+from tablegen.link.image import FOURIER_BYTES, PROGRAM_BYTES, ProgramImage, make_image, take_apart
 from tablegen.link.messages import AxisShape, DeviceInfo, Feature
 from tablegen.link.reasons import Limits, explain
+from tablegen.manifest.format import content_hash
+from tablegen.manifest.read import NotABuild, read_manifest
+from tablegen.manifest.record import plan_record
 from tablegen.numerics.arrays import Ints
-from tablegen.plan import Plan
-from tablegen.record import content_hash, plan_record
-from tablegen.recorded import NotABuild, read_manifest
-from tablegen.registers import AXIS_WORDS, PAGE_WORDS
-from tablegen.sequencer import DualProgram
+from tablegen.planning.line_plan import Plan
 
 Form = Literal["auto", "table", "fourier"]
 TWOS_COMPLEMENT, LEFT_ALIGNED = 64, 128  # of AxisShape.converter
-_RATE_HZ = 1.0  # a device tells its rate to the nearest whole one
+_RATE_TOLERANCE_HZ = 1.0  # a device tells its rate to the nearest whole one
 
 
 @dataclass(frozen=True, eq=False)
-class Scan:
+class PreparedScan:
     """What can be uploaded: a program, the hash of its plan, and the Fourier words of both axes.
 
     These are int64 of shape (2 H + 1,), in the order of devices.
@@ -39,27 +40,27 @@ class Scan:
     y_fourier: Ints
 
     @classmethod
-    def of_plan(cls, plan: Plan) -> "Scan":
+    def of_plan(cls, plan: Plan) -> "PreparedScan":
         """The scan of a plan."""
         digest = content_hash(plan_record(plan))
-        return cls(plan.name, digest, DualProgram.of(plan), plan.x.fourier.in_order, plan.y.fourier.in_order)
+        return cls(plan.name, digest, plan.program, plan.x.fourier.in_order, plan.y.fourier.in_order)
 
     @classmethod
-    def of_build(cls, folder: Path) -> "Scan":
+    def of_build(cls, folder: Path) -> "PreparedScan":
         """The scan that ``tablegen build`` wrote into a folder. Raises ``NotABuild``."""
-        recorded = read_manifest(folder)
-        manifest = recorded.manifest
-        if recorded.own_hash != manifest.hash:
+        stored = read_manifest(folder)
+        manifest = stored.manifest
+        if stored.own_hash != manifest.hash:
             raise NotABuild(f"{folder}: its manifest was changed after the build; build it again")
         axes = manifest.axes
-        return cls(manifest.name, manifest.hash, recorded.program, axes.x.fourier_words, axes.y.fourier_words)
+        return cls(manifest.name, manifest.hash, stored.program, axes.x.fourier_words, axes.y.fourier_words)
 
     @property
     def axes(self) -> tuple[tuple[str, Program, Ints], tuple[str, Program, Ints]]:
         """Name, program and Fourier words of both."""
         return ("x", self.program.x, self.x_fourier), ("y", self.program.y, self.y_fourier)
 
-    def image(self, form: Form = "auto", info: DeviceInfo | None = None) -> Image:
+    def image(self, form: Form = "auto", info: DeviceInfo | None = None) -> ProgramImage:
         """The image to upload: as tables, as Fourier words, or for each axis what is smaller and the device takes.
 
         Raises ``Unsuitable`` where an axis has no Fourier words that would render its table.
@@ -74,7 +75,7 @@ class Scan:
         ]
         return make_image(self.program, self.digest, chosen[0], chosen[1])
 
-    def like(self, image: bytes) -> Image:
+    def like(self, image: bytes) -> ProgramImage:
         """The image that a device which plays this scan should hold, each axis in the form that this one has."""
         x, y = harmonics_of(image)
         return make_image(self.program, self.digest, self.x_fourier if x else None, self.y_fourier if y else None)
@@ -100,7 +101,7 @@ def _rendered(axis: Program, words: Ints, info: DeviceInfo | None) -> bool:
     return FOURIER_BYTES * len(words) < table.word_bytes * len(axis.words)
 
 
-def check(scan: Scan, image: Image, info: DeviceInfo, limits: Limits, any_rate: bool = False) -> None:
+def check(scan: PreparedScan, image: ProgramImage, info: DeviceInfo, limits: Limits, any_rate: bool = False) -> None:
     """Whether a device with these limits in force would take the image, as far as can be known without it.
 
     Raises ``Unsuitable`` with everything that is found.
@@ -115,7 +116,7 @@ def check(scan: Scan, image: Image, info: DeviceInfo, limits: Limits, any_rate: 
         raise Unsuitable(found)
 
 
-def _device(image: Image, info: DeviceInfo, scan: Scan) -> list[str]:
+def _device(image: ProgramImage, info: DeviceInfo, scan: PreparedScan) -> list[str]:
     found = []
     harmonics = harmonics_of(image.data)
     if any(harmonics) and not info.features & Feature.FOURIER:
@@ -135,9 +136,9 @@ def _device(image: Image, info: DeviceInfo, scan: Scan) -> list[str]:
     return found
 
 
-def _rate(scan: Scan, info: DeviceInfo) -> list[str]:
+def _rate(scan: PreparedScan, info: DeviceInfo) -> list[str]:
     wanted = float(scan.program.schedule.update_rate_hz)
-    if not info.update_rate_hz or abs(wanted - info.update_rate_hz) <= _RATE_HZ:
+    if not info.update_rate_hz or abs(wanted - info.update_rate_hz) <= _RATE_TOLERANCE_HZ:
         return []
     return [
         f"built for {wanted:g} ticks a second; the device makes {info.update_rate_hz}: every line would take "

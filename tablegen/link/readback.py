@@ -6,7 +6,7 @@ from tablegen.link.errors import LinkLost, NotUnderstood, OutOfTime, Silent
 from tablegen.link.frames import MAXIMUM_FRAME
 from tablegen.link.messages import DATA_BYTES, DeviceInfo, Reason, Request
 from tablegen.link.reasons import refused
-from tablegen.link.session import Session
+from tablegen.link.session import LinkSession
 
 _REQUEST = struct.Struct("<IB")
 _OFFSET = struct.Struct("<I")
@@ -14,7 +14,7 @@ _PROGRAM_BYTES = 192  # as tablegen.link.image has it, without numpy
 _WORD_BYTES = 4  # at most
 
 
-def read_back(session: Session, deadline: float) -> bytes:
+def read_back(session: LinkSession, deadline: float) -> bytes:
     """The whole image.
 
     Raises ``Refused`` where the device does not hold it, ``OutOfTime``, and what lines raise.
@@ -38,7 +38,7 @@ def _most(info: DeviceInfo) -> int:
     return max(info.image_bytes, _PROGRAM_BYTES + tables)
 
 
-def _some(session: Session, wanted: range, deadline: float) -> dict[int, bytes]:
+def _some(session: LinkSession, wanted: range, deadline: float) -> dict[int, bytes]:
     """So many pieces at once, and what was lost of them one by one."""
     try:
         found = _at_once(session, wanted, deadline)
@@ -57,7 +57,7 @@ def _some(session: Session, wanted: range, deadline: float) -> dict[int, bytes]:
     return found
 
 
-def _at_once(session: Session, wanted: range, deadline: float) -> dict[int, bytes]:
+def _at_once(session: LinkSession, wanted: range, deadline: float) -> dict[int, bytes]:
     """As far as they come."""
     exchange, found = session.exchange, dict[int, bytes]()
     waiting: dict[int, int] = {}

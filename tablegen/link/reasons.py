@@ -14,13 +14,13 @@ _AXES = "xy"
 Limits = tuple[AxisLimits, AxisLimits]
 
 # Of these `detail` is an axis, and where there is one 2 times the index of a word.
-_OF_AN_AXIS = {
+_AXIS_REASONS = {
     Reason.SHAPE: "its table is longer than the device's, or of other widths; build for this device",
     Reason.PERIOD: "its period, phase step and remainder do not belong together; build it again",
     Reason.OUTPUT: "gain, offset, code limits or max_step are out of order or range; build it again",
     Reason.FOURIER: "its Fourier words sum to 4.0 or more, beyond what a device adds up; upload --as table",
 }
-_PLAIN = {
+_MESSAGES = {
     Reason.TYPE: "the device does not know this request; its firmware is older, or made without it",
     Reason.PAYLOAD: "the device finds its length or a value in it wrong; do versions of tablegen and firmware fit?",
     Reason.SESSION: "the device has been reset, or another program talks to it; try again",
@@ -68,11 +68,11 @@ def explain(
     if reason not in list(Reason):
         return f"reason {reason}, detail {detail}: this version of tablegen does not know it; update it"
     known = Reason(reason)
-    if known in _PLAIN:
-        return _PLAIN[known]
+    if known in _MESSAGES:
+        return _MESSAGES[known]
     axis, index = _AXES[detail & 1], detail >> 1
-    if known in _OF_AN_AXIS:
-        return f"{axis}: {_OF_AN_AXIS[known]}"
+    if known in _AXIS_REASONS:
+        return f"{axis}: {_AXIS_REASONS[known]}"
     if known in _SENTENCES:
         return _SENTENCES[known](detail, info)
     page = 1 + (detail & 1)

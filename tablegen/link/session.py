@@ -20,13 +20,13 @@ from tablegen.link.reasons import refused
 from tablegen.link.transport import Opener, Transport
 
 HELLO_BYTES = DeviceInfo.LAYOUT.size + DeviceStatus.LAYOUT.size
-_TRIES = 12  # of a request, the wait doubling up to 8 times the first: seconds, at usual rates
-_LONGEST = 3
-_ANEW = 4  # sessions or challenges that are begun anew for one request
-_REOPEN_S = 0.25
+_MAX_TRIES = 12  # of a request, the wait doubling up to 8 times the first: seconds, at usual rates
+_MAX_DOUBLINGS = 3
+_MAX_RESTARTS = 4  # sessions or challenges that are begun anew for one request
+_REOPEN_INTERVAL_S = 0.25
 
 
-class Session:
+class LinkSession:
     """One host at one device. Requests end in an answer or an error before their deadline, a time of ``now``."""
 
     def __init__(
@@ -85,9 +85,9 @@ class Session:
             raise why
         while True:
             self.close()
-            if self.now() + _REOPEN_S >= deadline:
+            if self.now() + _REOPEN_INTERVAL_S >= deadline:
                 raise why
-            self._sleep(_REOPEN_S)
+            self._sleep(_REOPEN_INTERVAL_S)
             try:
                 self.exchange.use(self._opener())
                 self._hello_patiently(deadline)
@@ -106,7 +106,7 @@ class Session:
 
     def ask(self, kind: Request, payload: bytes, answer_bytes: int, deadline: float) -> bytes:
         """A request that does not act: the payload of its answer."""
-        for _ in range(_ANEW):
+        for _ in range(_MAX_RESTARTS):
             try:
                 return self._repeat(kind, None, payload, answer_bytes, deadline)
             except Silent:
@@ -123,7 +123,7 @@ class Session:
         """A request that acts, with a tag where the device wants one; it is carried out once."""
         number, body = self.exchange.number(), None
         last: LinkError = self.contested()
-        for _ in range(_ANEW):
+        for _ in range(_MAX_RESTARTS):
             try:
                 if body is None:
                     body = payload + (self.tag(kind, number, payload, deadline) if tagged else b"")
@@ -186,13 +186,13 @@ class Session:
         What acts has its ``number``; the rest has another one each time, so that answers tell how long the way is.
         """
         sent = set()
-        for count in range(_TRIES):
+        for count in range(_MAX_TRIES):
             again = count > 0 or kind == Request.HELLO
             seq = self.exchange.seq() if number is None else number
             sent.add(seq)
             due = self.exchange.send(kind, seq, payload, answer_bytes, again)
             now = self.now()
-            until = min(now + (due - now) * (1 << min(count, _LONGEST)), deadline)
+            until = min(now + (due - now) * (1 << min(count, _MAX_DOUBLINGS)), deadline)
             while self.now() < until:
                 for answer in self.exchange.receive(until):
                     if answer.kind == kind and answer.seq in sent:

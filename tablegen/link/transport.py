@@ -9,9 +9,9 @@ from typing import Any, Protocol
 from tablegen.link.errors import LinkLost, NoPort, SerialMissing
 
 _POLL_S = 0.01  # pyserial's own wait; changing it for every read would configure the port again each time
-_WRITE_S = 5.0  # a port that takes nothing for so long has a cable without an end
-_MOST = 4096  # bytes of a read, so that a babbling line cannot hold it
-_BITS = 10  # of a byte on the wire: start, 8, stop
+_WRITE_TIMEOUT_S = 5.0  # a port that takes nothing for so long has a cable without an end
+_MAX_READ_BYTES = 4096  # bytes of a read, so that a babbling line cannot hold it
+_BITS_PER_BYTE = 10  # of a byte on the wire: start, 8, stop
 
 
 class Transport(Protocol):
@@ -37,7 +37,7 @@ Opener = Callable[[], Transport]
 
 def byte_s(baud: int | None) -> float:
     """Seconds that a byte takes on the wire."""
-    return _BITS / baud if baud else 0.0
+    return _BITS_PER_BYTE / baud if baud else 0.0
 
 
 def open_port(url: str, baud: int = 115200) -> Transport:
@@ -50,7 +50,7 @@ def open_port(url: str, baud: int = 115200) -> Transport:
     except ImportError:
         raise SerialMissing from None
     # pyserial's RFC 2217 takes no time-out for writing, and has one of its own.
-    write_s = None if url.lower().startswith("rfc2217:") else _WRITE_S
+    write_s = None if url.lower().startswith("rfc2217:") else _WRITE_TIMEOUT_S
     try:
         # Two programs on one port would take each other's answers.
         port = serial.serial_for_url(url, baud, timeout=_POLL_S, write_timeout=write_s, exclusive=True)
@@ -95,8 +95,8 @@ class SerialTransport:
         try:
             while True:
                 # socket:// says 0 or 1 whatever waits, and a read of more than there is waits for the rest.
-                while len(received) < _MOST and (waiting := self._port.in_waiting):
-                    received += self._port.read(min(waiting, _MOST))
+                while len(received) < _MAX_READ_BYTES and (waiting := self._port.in_waiting):
+                    received += self._port.read(min(waiting, _MAX_READ_BYTES))
                 if received or self.now() >= end:
                     return bytes(received)
                 received += self._port.read(1)

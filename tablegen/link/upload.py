@@ -11,19 +11,19 @@ from tablegen.link.errors import LinkError, LinkLost, NotUnderstood, OutOfTime, 
 from tablegen.link.exchange import Answer
 from tablegen.link.messages import DATA_BYTES, NONCE_BYTES, DeviceStatus, Reason, Request, Upload
 from tablegen.link.reasons import Limits, refused
-from tablegen.link.session import Session
+from tablegen.link.session import LinkSession
 
 if TYPE_CHECKING:
-    from tablegen.link.image import Image
+    from tablegen.link.image import ProgramImage
 
-_SILENCE_S = 3.0  # at least, and so many waits for one answer
+_MIN_SILENCE_S = 3.0  # at least, and so many waits for one answer
 _SILENCE_WAITS = 16
-_LONGEST = 3  # doublings of a wait in vain
+_MAX_DOUBLINGS = 3  # doublings of a wait in vain
 _POLL_S = (0.03, 0.25)  # between two STATUS while a COMMIT is at work: at first, and at most
 _BUSY_S = 0.05
-_ANEW = 4  # times that an upload is begun anew for the same reason
-_ANEW_KEY = 2
-_OF_THE_WORDS = (Reason.SHAPE, Reason.LENGTH, Reason.HARMONICS)  # when the program words are complete
+_MAX_RESTARTS = 4  # times that an upload is begun anew for the same reason
+_MAX_KEY_RESTARTS = 2
+_LAYOUT_REASONS = (Reason.SHAPE, Reason.LENGTH, Reason.HARMONICS)  # when the program words are complete
 _CRC = struct.Struct("<I")
 _COMMITTED = struct.Struct("<2I")
 
@@ -68,7 +68,12 @@ class Uploader:
     """One upload in a session, until it is in force or cannot be."""
 
     def __init__(
-        self, session: Session, image: "Image", deadline: float, progress: ProgressCall | None, limits: Limits | None
+        self,
+        session: LinkSession,
+        image: "ProgramImage",
+        deadline: float,
+        progress: ProgressCall | None,
+        limits: Limits | None,
     ) -> None:
         self._session, self._image, self._deadline = session, image, deadline
         self._exchange = session.exchange
@@ -139,7 +144,7 @@ class Uploader:
     def _count(self, reason: int, error: LinkError) -> None:
         """Some things may happen by chance, but not for ever."""
         self._anew[reason] = self._anew.get(reason, 0) + 1
-        if self._anew[reason] > (_ANEW_KEY if reason == Reason.KEY else _ANEW):
+        if self._anew[reason] > (_MAX_KEY_RESTARTS if reason == Reason.KEY else _MAX_RESTARTS):
             raise error
 
     # The loop
@@ -220,7 +225,7 @@ class Uploader:
     def _note(self, sent: _Sent) -> None:
         """It is on its way; each wait in vain doubles the next."""
         self._longest_wait = max(self._longest_wait, sent.due - sent.at)
-        sent.due = sent.at + (sent.due - sent.at) * (1 << min(self._in_vain, _LONGEST))
+        sent.due = sent.at + (sent.due - sent.at) * (1 << min(self._in_vain, _MAX_DOUBLINGS))
         self._flight[sent.kind, sent.seq] = sent
 
     def _wake(self) -> float:
@@ -233,7 +238,7 @@ class Uploader:
         """What is not answered in time was lost; where nothing was heard since, so was all that is on its way."""
         late = [sent for sent in self._flight.values() if sent.due <= now]
         if any(sent.at >= self._heard_at for sent in late):
-            if now - self._heard_at > max(_SILENCE_S, _SILENCE_WAITS * self._longest_wait):
+            if now - self._heard_at > max(_MIN_SILENCE_S, _SILENCE_WAITS * self._longest_wait):
                 raise self._session.silent()
             self._in_vain += 1
             late = list(self._flight.values())
@@ -343,7 +348,7 @@ class Uploader:
             if sent.round == self._round:
                 self._count(answer.reason, error)
                 self._begin_anew()
-        elif sent.kind == Request.DATA and answer.reason in _OF_THE_WORDS and not self._begun:
+        elif sent.kind == Request.DATA and answer.reason in _LAYOUT_REASONS and not self._begun:
             pass  # of what was in hand before
         else:
             raise error

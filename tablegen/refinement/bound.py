@@ -13,14 +13,14 @@ import numpy.typing as npt
 
 from tablegen.compensation.dynamics import Measured, Response, SecondOrder, capped_inverse
 from tablegen.numerics.arrays import Floats
-from tablegen.plan import LinePlan
+from tablegen.planning.line_plan import LinePlan
 
 # How wrong the dynamics of a scanner file are taken to be: frequencies, quality, and for responses gain and phase.
 FREQUENCIES = (0.8, 1.0, 1.25)
 QUALITIES = (0.5, 1.0, 2.0)
 GAINS = (0.8, 1.0, 1.25)
 PHASES = (-1.0 / 18.0, 0.0, 1.0 / 18.0)  # periods: 20 degrees
-LEAST_SHRINKING = 0.9  # of the error, that a round may leave of a harmonic that is learnt
+MAX_ERROR_LEFT = 0.9  # of the error, that a round may leave of a harmonic that is learnt
 
 Complex = npt.NDArray[np.complex128]
 
@@ -53,7 +53,7 @@ def bound(line: LinePlan, gain: float, used: int) -> Bound:
     """The bound of one axis at a learning gain, for ``used`` harmonics, or as many of them as it allows."""
     n = np.arange(1.0, line.target.harmonics + 1.0)
     worst = np.max(left_of_error(gain, plausible_ratios(line, n * float(line.rate))), axis=0)
-    beyond = np.flatnonzero(worst > LEAST_SHRINKING)
+    beyond = np.flatnonzero(worst > MAX_ERROR_LEFT)
     most = int(beyond[0]) if len(beyond) else line.target.harmonics
     used = min(used, most)
     phase = acos(min(0.5 * gain, 1.0))

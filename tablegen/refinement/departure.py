@@ -8,14 +8,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tablegen.measurement import CHORD
+from tablegen.certificate.line_errors import CHORD
 from tablegen.numerics.arrays import Floats
-from tablegen.plan import LinePlan
+from tablegen.planning.line_plan import LinePlan
 from tablegen.problems import Unphysical
 from tablegen.refinement.displacement import Displacement
 
-_POINTS = 801  # over the window of a direction
-_LOST = 0.1  # of the line: no error of a model, but another scan or another phase
+_WINDOW_POINTS = 801  # over the window of a direction
+_MAX_DEPARTURE = 0.1  # of the line: no error of a model, but another scan or another phase
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,9 +96,9 @@ def departure(line: LinePlan, measured: Displacement, share: Floats | None = Non
 
     Raises ``Unphysical`` where the two have nothing to do with each other.
     """
-    points = imaged(line, np.linspace(0.0, 1.0, _POINTS) if share is None else share)
+    points = imaged(line, np.linspace(0.0, 1.0, _WINDOW_POINTS) if share is None else share)
     found = _straightened(points, measured.series.value(points.times), 1.0)
-    if not abs(found.size_nm) > 0.0 or found.rms_percent > 100.0 * _LOST:
+    if not abs(found.size_nm) > 0.0 or found.rms_percent > 100.0 * _MAX_DEPARTURE:
         raise Unphysical(
             f"the displacement is {found.rms_percent:.3g} % of the line off what this scan asks; is it another axis, "
             f"or is time 0 no line start?"

@@ -10,8 +10,8 @@ from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 from tablegen.waveform.series import FourierSeries
 
-_CHUNK = 1 << 14  # samples that are worked out at a time
-_STRAY = 7.0  # standard deviations
+_CHUNK_SAMPLES = 1 << 14  # samples that are worked out at a time
+_OUTLIER_SIGMAS = 7.0  # standard deviations
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +68,7 @@ def fit_displacement(
 
     normal: Floats = np.zeros((1 + 2 * count + order,) * 2)
     right = np.zeros(len(normal))
-    parts = [slice(first, first + _CHUNK) for first in range(0, len(t), _CHUNK)]
+    parts = [slice(first, first + _CHUNK_SAMPLES) for first in range(0, len(t), _CHUNK_SAMPLES)]
     for rows in parts:
         b = basis(rows)
         normal += b.T @ b
@@ -95,7 +95,7 @@ def fit_displacement(
     noise = height * float(np.sqrt(left @ left / max(len(t) - len(c), 1)))
     left_out = int(np.sum(~used))
     farthest = int(np.argmax(np.abs(left)))  # it pulls the fit, and the others seem off too
-    stands_out = abs(float(left[farthest])) > max(_STRAY * 1.4826 * float(np.median(np.abs(left))), 1e-6)
+    stands_out = abs(float(left[farthest])) > max(_OUTLIER_SIGMAS * 1.4826 * float(np.median(np.abs(left))), 1e-6)
     stray = left_out + farthest if stands_out else None
     moved = height * float(np.ptp(drift))
     return Displacement(series, covariance, noise, moved, correlated, periods, len(t), left_out, stray)

@@ -5,9 +5,9 @@ from math import pi
 
 import numpy as np
 
-from tablegen.measurement import CHORD
+from tablegen.certificate.line_errors import CHORD
 from tablegen.numerics.arrays import Floats
-from tablegen.plan import LinePlan
+from tablegen.planning.line_plan import LinePlan
 from tablegen.refinement.departure import Departure, departure, straight_line
 from tablegen.refinement.displacement import Displacement
 from tablegen.waveform.series import FourierSeries
@@ -18,7 +18,9 @@ DEFAULT_HARMONICS = 16
 DIGITS = 8  # of a coefficient in the scan file: a 24-bit converter has 7
 # Of the mean square acceleration: settles what the windows leave open, and costs nothing inside them.
 _SMOOTHNESS = 1e-9
-_COST = 4.0  # of the two figures of a harmonic, after Akaike: what a learnt one adds in noise, and in doubt of it
+_AKAIKE_COST = (
+    4.0  # of the two figures of a harmonic, after Akaike: what a learnt one adds in noise, and in doubt of it
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +93,7 @@ def _worth_learning(coefficients: list[Floats], covariances: list[Floats]) -> in
     for count, (c, covariance) in enumerate(zip(coefficients, covariances, strict=True), 1):
         top = [count, 2 * count]
         explained.append(float(c[top] @ np.linalg.solve(covariance[np.ix_(top, top)], c[top])))
-    cost = np.cumsum([0.0, *(_COST - chi for chi in explained)])
+    cost = np.cumsum([0.0, *(_AKAIKE_COST - chi for chi in explained)])
     return int(np.argmin(cost))
 
 

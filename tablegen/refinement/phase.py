@@ -7,17 +7,19 @@ import numpy as np
 
 from tablegen.calibration.least_squares import solve
 from tablegen.numerics.arrays import Floats
-from tablegen.plan import LinePlan
+from tablegen.planning.line_plan import LinePlan
 from tablegen.problems import Unphysical
 from tablegen.waveform.series import FourierSeries
 
-LEAST_SAMPLES = 40  # a period
-_GRID = 1 << 16  # points a period, between which the known waveform is linear
-_CLOCKS = 0.01  # by which the clocks of generator and recorder may differ
-_REACH = 0.05  # by which the recorded drive may differ from the plan's, of its amplitude
-_CROOKED = 0.005  # rms departure of the drive from the plan's waveform, of its amplitude, averaged over periods
-_BINS = 64  # a period, for that
-_LACKS = 0.5  # of the layer
+MIN_SAMPLES_PER_PERIOD = 40  # a period
+_GRID_POINTS = 1 << 16  # points a period, between which the known waveform is linear
+_MAX_CLOCK_DIFFERENCE = 0.01  # by which the clocks of generator and recorder may differ
+_MAX_DRIVE_DIFFERENCE = 0.05  # by which the recorded drive may differ from the plan's, of its amplitude
+_MAX_DRIVE_DEPARTURE = (
+    0.005  # rms departure of the drive from the plan's waveform, of its amplitude, averaged over periods
+)
+_BINS_PER_PERIOD = 64  # a period, for that
+_MAX_LAYER_MISSING = 0.5  # of the layer
 
 
 @dataclass(frozen=True)
@@ -69,16 +71,16 @@ def phase_by_drive(line: LinePlan, time_s: Floats, drive_v: Floats, delay_s: flo
     x = found.values
     relative = float(x[3]) / amplitude
     departure = _averaged(turns(x), found.residuals) / max(abs(relative), 1e-9)
-    if abs(float(x[0]) / nominal - 1.0) > _CLOCKS:
+    if abs(float(x[0]) / nominal - 1.0) > _MAX_CLOCK_DIFFERENCE:
         raise Unphysical(
             f"the recorded drive has a period of {x[0]:.6g} s, this scan {nominal:.6g} s; is time_s in seconds?"
         )
-    if abs(relative - 1.0) > _REACH or abs(float(x[2]) - middle) > _REACH * amplitude:
+    if abs(relative - 1.0) > _MAX_DRIVE_DIFFERENCE or abs(float(x[2]) - middle) > _MAX_DRIVE_DIFFERENCE * amplitude:
         raise Unphysical(
             f"the recorded drive is {x[3]:.4g} V about {x[2]:.4g} V, this scan {amplitude:.4g} V about {middle:.4g} V; "
             f"drive_v is the voltage at the piezo, behind the amplifier, of the axis that is named"
         )
-    if departure > _CROOKED:
+    if departure > _MAX_DRIVE_DEPARTURE:
         raise Unphysical(
             f"the recorded drive departs from this scan's by {100.0 * departure:.2g} % rms; record the scan as it is "
             f"built from this file"
@@ -89,16 +91,18 @@ def phase_by_drive(line: LinePlan, time_s: Floats, drive_v: Floats, delay_s: flo
 
 
 def _check_times(time_s: Floats, period_s: float) -> None:
-    if len(time_s) < LEAST_SAMPLES:
-        raise Unphysical(f"{len(time_s)} samples are no trace; at least {LEAST_SAMPLES} a period are needed")
+    if len(time_s) < MIN_SAMPLES_PER_PERIOD:
+        raise Unphysical(f"{len(time_s)} samples are no trace; at least {MIN_SAMPLES_PER_PERIOD} a period are needed")
     if not np.all(np.diff(time_s) > 0.0):
         at = int(np.argmin(np.diff(time_s) > 0.0))
         raise Unphysical(f"time does not ascend after {time_s[at]:g} s; a file holds one trace")
     periods = float(time_s[-1] - time_s[0]) * (1.0 + 1.0 / (len(time_s) - 1)) / period_s
     if periods < 0.99:
         raise Unphysical(f"{periods:.3g} of a period of {period_s:.6g} s are recorded; record one or more, best five")
-    if len(time_s) < LEAST_SAMPLES * periods:
-        raise Unphysical(f"{len(time_s) / periods:.3g} samples a period are too few; {LEAST_SAMPLES} are needed")
+    if len(time_s) < MIN_SAMPLES_PER_PERIOD * periods:
+        raise Unphysical(
+            f"{len(time_s) / periods:.3g} samples a period are too few; {MIN_SAMPLES_PER_PERIOD} are needed"
+        )
 
 
 def _first_guess(series: FourierSeries, time_s: Floats, drive_v: Floats, nominal_s: float) -> tuple[float, float]:
@@ -124,7 +128,7 @@ def _first_guess(series: FourierSeries, time_s: Floats, drive_v: Floats, nominal
 
 
 def _tabled(series: FourierSeries, derivative: int) -> Floats:
-    count = _GRID
+    count = _GRID_POINTS
     spectrum = 0.5 * (series.a - 1j * series.b) * (2j * pi * np.arange(1, series.harmonics + 1)) ** derivative
     whole = np.concatenate([[series.a0 if derivative == 0 else 0.0], spectrum])
     values = np.fft.irfft(whole, count) * count
@@ -132,17 +136,17 @@ def _tabled(series: FourierSeries, derivative: int) -> Floats:
 
 
 def _at(table: Floats, turns: Floats) -> Floats:
-    place = (turns - np.floor(turns)) * _GRID
-    k = np.minimum(place.astype(np.int64), _GRID - 1)
+    place = (turns - np.floor(turns)) * _GRID_POINTS
+    k = np.minimum(place.astype(np.int64), _GRID_POINTS - 1)
     value: Floats = table[k] + (place - k) * (table[k + 1] - table[k])
     return value
 
 
 def _averaged(turns: Floats, left: Floats) -> float:
     """Rms of what is left, averaged over the periods in pieces of one: without the noise of a reading."""
-    place = np.minimum(((turns - np.floor(turns)) * _BINS).astype(np.int64), _BINS - 1)
-    count = np.bincount(place, minlength=_BINS)
-    mean = np.bincount(place, left, minlength=_BINS)[count > 0] / count[count > 0]
+    place = np.minimum(((turns - np.floor(turns)) * _BINS_PER_PERIOD).astype(np.int64), _BINS_PER_PERIOD - 1)
+    count = np.bincount(place, minlength=_BINS_PER_PERIOD)
+    mean = np.bincount(place, left, minlength=_BINS_PER_PERIOD)[count > 0] / count[count > 0]
     return float(np.sqrt(np.mean(mean**2)))
 
 
@@ -163,7 +167,7 @@ def _check_layer(line: LinePlan, turns: Floats, left: Floats) -> None:
         return
     inverse = np.linalg.inv(columns.T @ columns)
     error = float(np.sqrt(inverse[0, 0] * left_over[0] / max(len(columns) - 4, 1)))
-    if float(found[0]) < -_LACKS and error < 0.2 * _LACKS:
+    if float(found[0]) < -_MAX_LAYER_MISSING and error < 0.2 * _MAX_LAYER_MISSING:
         share = min(-float(found[0]), 1.0)
         raise Unphysical(
             f"the recorded drive lacks {ceil(100.0 * share - 0.5)} % of the layer that the scan file has; "

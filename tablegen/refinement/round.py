@@ -9,17 +9,17 @@ import numpy as np
 from tablegen.calibration.estimate import Curve
 from tablegen.config.load import Setup
 from tablegen.config.schema import Refinement
-from tablegen.layer import model_digest
 from tablegen.numerics.arrays import Floats
-from tablegen.plan import LinePlan, make_plan
+from tablegen.planning.line_plan import LinePlan, make_plan
+from tablegen.planning.refinement_layer import model_digest
 from tablegen.problems import Unphysical
 from tablegen.refinement.bound import Bound, bound
 from tablegen.refinement.displacement import Displacement, fit_displacement
 from tablegen.refinement.learning import DEFAULT_GAIN, DEFAULT_HARMONICS, Lesson, learn
 from tablegen.refinement.phase import Phase, phase_by_drive, phase_by_trigger
 
-_FINISHED = 0.9  # of the residual: what is left is noise where a round would take less than the rest
-_SIZE = 0.01  # of the line, beyond which the size is worth a remark
+_FINISHED_RATIO = 0.9  # of the residual: what is left is noise where a round would take less than the rest
+_SIZE_NOTE_LIMIT = 0.01  # of the line, beyond which the size is worth a remark
 
 
 @dataclass(frozen=True)
@@ -148,7 +148,7 @@ def _remarks(line: LinePlan, measured: Displacement, lesson: Lesson, phase: Phas
     found = []
     size = abs(lesson.before.size_nm)
     by = size / line.drive.size_nm - 1.0
-    if abs(by) > _SIZE:
+    if abs(by) > _SIZE_NOTE_LIMIT:
         found.append(
             f"the line is {size:.5g} nm where the scan file asks for {line.drive.size_nm:.5g} nm "
             f"({100.0 * by:+.2f} %); sizes are not learnt: calibrate {line.axis}.size, best before refining"
@@ -162,7 +162,7 @@ def _remarks(line: LinePlan, measured: Displacement, lesson: Lesson, phase: Phas
         found.append(f"the reading at {at:.9g} s is far off the others; without such there is less noise")
     if lesson.harmonics == 0:
         found.append("nothing stands out of the sensor's noise: there is nothing more to learn from such a trace")
-    elif lesson.after.rms_percent > _FINISHED * lesson.before.rms_percent:
+    elif lesson.after.rms_percent > _FINISHED_RATIO * lesson.before.rms_percent:
         found.append("most of what is left is noise: record more periods, or leave it at that")
     if measured.correlated > 3.0:
         found.append(

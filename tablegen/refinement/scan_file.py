@@ -12,8 +12,8 @@ from tablegen.config.toml import parse_toml
 from tablegen.problems import Problem, Rejected
 
 KEY = "refinement"
-_PER_ROW = 6
-_MARK = re.compile(r"# refine (\d+): ")
+_COEFFICIENTS_PER_ROW = 6
+_ROUND_MARK = re.compile(r"# refine (\d+): ")
 
 
 def with_layer(text: str, name: str, axis: str, values: Mapping[str, Any], provenance: str) -> str:
@@ -44,9 +44,9 @@ def rounds_of(text: str, name: str, axis: str) -> list[str]:
     """The provenance of each round of ``[AXIS.refinement]``, which the text has, oldest first."""
     rows = text.split("\n")
     at = first = parse_toml(text, name)[1].line_of(f"{axis}.{KEY}") - 1
-    while first > 0 and _MARK.match(rows[first - 1]):
+    while first > 0 and _ROUND_MARK.match(rows[first - 1]):
         first -= 1
-    return [_MARK.sub("", row).rstrip("\r") for row in rows[first:at]]
+    return [_ROUND_MARK.sub("", row).rstrip("\r") for row in rows[first:at]]
 
 
 def _put(text: str, name: str, axis: str, values: Mapping[str, Any]) -> str:
@@ -82,8 +82,8 @@ def _update(table: Any, values: Mapping[str, Any]) -> None:
 
 def _rows(values: Sequence[float]) -> Array:
     array = tomlkit.array()
-    for first in range(0, len(values), _PER_ROW):
-        array.add_line(*values[first : first + _PER_ROW], indent="    ")
+    for first in range(0, len(values), _COEFFICIENTS_PER_ROW):
+        array.add_line(*values[first : first + _COEFFICIENTS_PER_ROW], indent="    ")
     array.add_line(indent="")
     return array
 
@@ -91,6 +91,6 @@ def _rows(values: Sequence[float]) -> Array:
 def _commented(text: str, at: int, provenance: str) -> str:
     """The text with a line more in the comment above row ``at``, that of the table."""
     rows = text.split("\n")
-    last = _MARK.match(rows[at - 1]) if at > 0 else None
+    last = _ROUND_MARK.match(rows[at - 1]) if at > 0 else None
     rows.insert(at, f"# refine {int(last[1]) + 1 if last else 1}: {provenance}")
     return "\n".join(rows)

@@ -9,7 +9,7 @@ import numpy as np
 from tablegen.config.load import Setup
 from tablegen.config.schema import BandLimit, ScannerAxis
 from tablegen.numerics.arrays import Floats
-from tablegen.plan import make_plan
+from tablegen.planning.line_plan import make_plan
 from tablegen.virtual.laboratory import OFFSETS
 from tablegen.virtual.scanner import VirtualScanner
 from tablegen.virtual.simulation import AxisRun, run_line

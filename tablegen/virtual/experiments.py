@@ -9,14 +9,14 @@ from math import ceil, exp, pi
 import numpy as np
 
 from tablegen.numerics.arrays import Floats, FloatsLike
-from tablegen.virtual.measurement import ideal_triangle
+from tablegen.virtual.line_error import ideal_triangle
 from tablegen.virtual.scanner import VirtualAxis
 from tablegen.virtual.sensor import Sensor
 
 TICKS = 2000  # of a triangle whose size alone counts
 STEPS_PER_RING = 8  # of the generator, in a period of the resonance
 RUNG_OUT = 1e-2  # what is left of a step's ringing that is small beside the sensor's noise
-MOST_TICKS = 1 << 21  # beyond it steps are so small that they ring nothing
+MAX_TICKS = 1 << 21  # beyond it steps are so small that they ring nothing
 
 
 def triangle_size(axis: VirtualAxis, size_v: float, offset_v: float, rate_hz: float, turn: float = 0.5) -> float:
@@ -104,7 +104,7 @@ def _finer(axis: VirtualAxis, tick_hz: float, ticks: int) -> int:
     ringing = max(axis.resonance.poles, key=lambda pole: abs(pole.imag))
     if exp(ringing.real / tick_hz) < RUNG_OUT:
         return 1
-    return max(1, min(ceil(STEPS_PER_RING * abs(ringing.imag) / (2.0 * pi * tick_hz)), MOST_TICKS // ticks))
+    return max(1, min(ceil(STEPS_PER_RING * abs(ringing.imag) / (2.0 * pi * tick_hz)), MAX_TICKS // ticks))
 
 
 def _triangle(size_v: float, offset_v: float, samples: int, turn: float) -> Floats:

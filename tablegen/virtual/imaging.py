@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from tablegen.numerics.arrays import Floats
-from tablegen.virtual.measurement import ideal_triangle
+from tablegen.virtual.line_error import ideal_triangle
 from tablegen.virtual.scanner import VirtualAxis
 
 _TICKS = 16384  # of a line

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from tablegen.numerics.arrays import Floats, FloatsLike
 
-_BLOCK = 64  # ticks that are computed as one product of matrices
+_BLOCK_TICKS = 64  # ticks that are computed as one product of matrices
 
 
 @dataclass(frozen=True)
@@ -55,8 +55,8 @@ class Modes:
         decay = 1.0 + change
         doubled = np.where(np.array(self.poles).imag != 0.0, 2.0, 1.0)  # a pole and its conjugate
         ticks = len(drive)
-        blocks = np.pad(drive, (0, -ticks % _BLOCK)).reshape(-1, _BLOCK)
-        k = np.arange(_BLOCK)
+        blocks = np.pad(drive, (0, -ticks % _BLOCK_TICKS)).reshape(-1, _BLOCK_TICKS)
+        k = np.arange(_BLOCK_TICKS)
         powers = decay[:, None] ** k
         impulse = np.sum((doubled * weight)[:, None] * powers, axis=0).real
         impulse[0] += self.direct
@@ -64,7 +64,7 @@ class Modes:
         fed = blocks @ powers[:, ::-1].T
         state = (drive[0] if at_rest is None else at_rest) / -change
         states = np.empty((len(blocks), len(decay)), dtype=np.complex128)
-        over = decay**_BLOCK
+        over = decay**_BLOCK_TICKS
         for i, feed in enumerate(fed):
             states[i] = state
             state = over * state + feed

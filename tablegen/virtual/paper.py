@@ -11,7 +11,7 @@ from tablegen.compensation.hysteresis import BranchShape, LineShape, beta_at
 from tablegen.numerics.arrays import Floats
 from tablegen.virtual.experiments import apparent_sizes, triangle_size
 from tablegen.virtual.identify import OFFSETS_V, X_TARGETS
-from tablegen.virtual.measurement import Branch, LineError, ideal_triangle, line_error
+from tablegen.virtual.line_error import BranchError, LineError, ideal_triangle, line_error
 from tablegen.virtual.parameters import load_truth
 from tablegen.virtual.scanner import VirtualAxis, VirtualScanner
 
@@ -54,7 +54,7 @@ def comparison(axis: VirtualAxis) -> Iterator[tuple[str, str, str]]:
     ):
         line = played_line(axis, shape.value(t), 100.0)
         for (residual, scaling), name in zip(papers, ("forward", "backward"), strict=True):
-            one: Branch = getattr(line, name)
+            one: BranchError = getattr(line, name)
             low, high = one.residual_range
             found = f"{low:+.2f} .. {high:+.2f} %, {one.scaling_peak_to_peak:.1f} %"
             yield f"residual and scaling error, {model} model, {name}", f"±{residual} %, {scaling} %", found

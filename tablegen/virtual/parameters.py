@@ -16,7 +16,7 @@ from tablegen.problems import Document, Problems
 Coefficient = Annotated[float, Meta(ge=0.0, le=1e9)]
 
 
-class Hysteresis(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class HysteresisTruth(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The Preisach operator; see ``tablegen.virtual.preisach``."""
 
     reversible_nm: Annotated[
@@ -37,26 +37,26 @@ class Creep(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     terms_per_decade: Annotated[int, Meta(ge=1, le=8, description="time constants a decade")] = 2
 
 
-class Resonance(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class ResonanceTruth(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The first resonance."""
 
     frequency_hz: Annotated[Hertz, Meta(description="undamped")]
     quality: Annotated[float, Meta(ge=0.6, le=1e4, description="quality factor")]
 
 
-class Axis(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class AxisTruth(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One axis of the scanner."""
 
-    hysteresis: Hysteresis
+    hysteresis: HysteresisTruth
     sensitivity: Annotated[
         list[Annotated[float, Meta(ge=-2.0, le=2.0)]],
         Meta(max_length=8, description="s = 1 + c1 p + c2 p^2 + ..., p = 2 V / v_max - 1 of the mean drive"),
     ] = []
     creep: Creep | None = None
-    resonance: Resonance | None = None
+    resonance: ResonanceTruth | None = None
 
 
-class Amplifier(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class AmplifierTruth(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What the amplifier does beyond its gain."""
 
     bandwidth_hz: Annotated[Hertz, Meta(description="half the power")] | None = None
@@ -67,9 +67,9 @@ class Truth(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     name: Annotated[Name, Meta(description="for reports")]
     v_max: Annotated[PositiveVolts, Meta(description="drive 1 of the hysteresis")]
-    amplifier: Amplifier = Amplifier()
-    x: Axis
-    y: Axis
+    amplifier: AmplifierTruth = AmplifierTruth()
+    x: AxisTruth
+    y: AxisTruth
 
 
 def load_truth(path: str | Path | None = None) -> Truth:
@@ -87,7 +87,7 @@ def load_truth(path: str | Path | None = None) -> Truth:
 
 
 def _check(file: Document, problems: Problems, kind: type, key: str, _: Mapping[str, Any], built: Any) -> None:
-    if kind is Hysteresis and built is not None:
+    if kind is HysteresisTruth and built is not None:
         rows = [len(row) for row in built.density_nm]
         if rows != list(range(len(rows), 0, -1)):
             problems.add(file, f"{key}.density_nm", f"{len(rows)} rows need {len(rows)}, ..., 2, 1 coefficients")
@@ -95,7 +95,7 @@ def _check(file: Document, problems: Problems, kind: type, key: str, _: Mapping[
             problems.add(file, f"{key}.reversible_nm", "all 0; a drive that turns would not move at all")
     elif kind is Creep and built is not None and built.slowest_s <= built.fastest_s:
         problems.add(file, f"{key}.slowest_s", f"{built.slowest_s:g} s is not above fastest_s = {built.fastest_s:g} s")
-    elif kind is Axis and built is not None:
+    elif kind is AxisTruth and built is not None:
         factors = [sensitivity(built.sensitivity, 0.1 * k - 1.0) for k in range(21)]
         if min(factors) <= 0.05:
             problems.add(file, f"{key}.sensitivity", f"falls to {min(factors):.3g} between 0 and v_max")

@@ -5,15 +5,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from tablegen.numerics.arrays import Floats, Ints
-from tablegen.plan import LinePlan
+from tablegen.planning.line_plan import LinePlan
 from tablegen.waveform.sampler import Sampler
 
 # A slow axis can have more ticks a frame than fit in memory; its codes are then looked at this often.
-MOST_TICKS = 1 << 20
+MAX_TICKS = 1 << 20
 
 
 @dataclass(frozen=True, eq=False)
-class Drive:
+class PlayedDrive:
     """One period of an axis: codes, and volts at the piezo, at ``tick`` numbers that are ``tick_s`` apart."""
 
     tick: Ints
@@ -28,7 +28,7 @@ class Drive:
         return self.period_s * np.arange(len(self.codes)) / len(self.codes)
 
 
-def played(line: LinePlan, most_ticks: int = MOST_TICKS) -> Drive:
+def played(line: LinePlan, most_ticks: int = MAX_TICKS) -> PlayedDrive:
     """What an undisturbed period of one axis puts out: a line of x, a frame of y."""
     period = line.program.ticks
     count = min(period, most_ticks)
@@ -36,10 +36,10 @@ def played(line: LinePlan, most_ticks: int = MOST_TICKS) -> Drive:
     codes = line.program.codes(tick)
     period_s = 1.0 / float(line.rate)
     volts = line.converter.v_zero + line.converter.v_per_code * codes.astype(np.float64)
-    return Drive(tick, period_s / count, codes, volts, period_s)
+    return PlayedDrive(tick, period_s / count, codes, volts, period_s)
 
 
-def intended(line: LinePlan, drive: Drive) -> Floats:
+def intended(line: LinePlan, drive: PlayedDrive) -> Floats:
     """The position, 0..1, that the scan file's model asks for at each of these ticks: rounded where the line turns."""
     shape = line.drive.shape
     k = np.arange(len(drive.codes), dtype=np.int64)

@@ -15,7 +15,7 @@ import numpy as np
 from tablegen.numerics.arrays import Floats, FloatsLike
 
 # Drives this far outside 0..1 are the last bits of a voltage, not a voltage.
-_TOLERANCE = 1e-9
+_SATURATION_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +71,7 @@ class Preisach:
     def play(self, drive: Floats, memory: Memory | None = None) -> tuple[Floats, Memory]:
         """Displacement in nm at each drive of a sequence, and what is remembered after it."""
         drive = np.asarray(drive, dtype=np.float64)
-        if drive.size and max(-float(drive.min()), float(drive.max()) - 1.0) > _TOLERANCE:
+        if drive.size and max(-float(drive.min()), float(drive.max()) - 1.0) > _SATURATION_TOLERANCE:
             raise ValueError(f"a drive of {drive.min():g}..{drive.max():g} leaves 0..1, for which the operator is made")
         drive = np.clip(drive, 0.0, 1.0)
         memory = memory or Memory()

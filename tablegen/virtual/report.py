@@ -7,16 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from tablegen.virtual.measurement import Branch, LineError, ideal_triangle
+from tablegen.virtual.line_error import BranchError, LineError, ideal_triangle
 from tablegen.virtual.simulation import AxisRun, Run
 
 LABEL = "simulation on a virtual scanner"
-_MOST_ROWS = 10_000
+_MAX_CSV_ROWS = 10_000
 _COLOURS = {"triangle": "#c23b22", "sinusoidal": "#d98e04", "harmonic": "#1f5fa8"}
 
 
 @dataclass(frozen=True)
-class Stage:
+class SimulationStage:
     """Runs with one scanner file: as ``given``, or as ``calibrated`` on the virtual scanner; and what could not run."""
 
     name: str
@@ -25,7 +25,7 @@ class Stage:
     rejected: tuple[tuple[str, tuple[str, ...]], ...] = ()
 
 
-def text(name: str, truth: str, stages: Sequence[Stage]) -> list[str]:
+def text(name: str, truth: str, stages: Sequence[SimulationStage]) -> list[str]:
     """A table for the terminal."""
     first = next(run for stage in stages for run in stage.runs)
     lines = [
@@ -56,8 +56,8 @@ def _rows(axis: str, run: Run) -> list[str]:
     start = f"{axis:<4}  {run.model + mark:<12}{one.size_error_percent:+6.2f}"
     rows: list[str] = []
     for side in one.directions:
-        branch: Branch = getattr(one.error, side)
-        imaged: Branch = getattr(one.imaged, side)
+        branch: BranchError = getattr(one.error, side)
+        imaged: BranchError = getattr(one.imaged, side)
         peak, at = branch.peak
         rows.append(
             f"{start if not rows else ' ' * len(start)}  {side:<9}  {peak:+6.3f}   {at:5.3f}   {_range(branch)}       "
@@ -66,15 +66,15 @@ def _rows(axis: str, run: Run) -> list[str]:
     return rows
 
 
-def _range(branch: Branch) -> str:
+def _range(branch: BranchError) -> str:
     low, high = branch.residual_range
     return f"{low:+6.3f} .. {high:+6.3f}"
 
 
-def data(name: str, truth: str, stages: Sequence[Stage]) -> dict[str, Any]:
+def data(name: str, truth: str, stages: Sequence[SimulationStage]) -> dict[str, Any]:
     """The same as plain data, for JSON, by stage and model."""
 
-    def branch(one: Branch, imaged: Branch) -> dict[str, Any]:
+    def branch(one: BranchError, imaged: BranchError) -> dict[str, Any]:
         peak, at = one.peak
         return {
             "residual_peak_percent": peak,
@@ -112,7 +112,7 @@ def data(name: str, truth: str, stages: Sequence[Stage]) -> dict[str, Any]:
     }
 
 
-def csv(stages: Sequence[Stage]) -> str:
+def csv(stages: Sequence[SimulationStage]) -> str:
     """One settled period of each axis, at most some ten thousand of its ticks; ``position`` is that of the triangle."""
     out = io.StringIO()
     out.write("# simulation\n")
@@ -126,7 +126,7 @@ def csv(stages: Sequence[Stage]) -> str:
 
 def _write_ticks(out: io.StringIO, start: str, one: AxisRun) -> None:
     ticks = len(one.displacement_nm)
-    thin = slice(None, None, -(-ticks // _MOST_ROWS))
+    thin = slice(None, None, -(-ticks // _MAX_CSV_ROWS))
     position = ideal_triangle(ticks, one.turn)[thin]
     rising = (np.arange(ticks) / ticks <= one.turn)[thin]
     forward, backward = one.error.forward, one.error.backward
@@ -141,7 +141,7 @@ def _write_ticks(out: io.StringIO, start: str, one: AxisRun) -> None:
         out.write(f"{start},{k},{t:.9g},{code},{v:.9g},{d:.9g},{p:.6f},{r:.6f}\n")
 
 
-def figure(title: str, stages: Sequence[Stage]) -> bytes:
+def figure(title: str, stages: Sequence[SimulationStage]) -> bytes:
     """A PNG: displacement, residual and scaling error, a row for each axis and stage. Needs matplotlib."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -172,7 +172,7 @@ def _draw(axes: Sequence[Any], one: AxisRun, model: str) -> None:
     axes[0].plot(one.drive.time_s[thin], one.displacement_nm[thin], color=colour, lw=1.4, label=model)
     error: LineError = one.error
     for side in one.directions:
-        branch: Branch = getattr(error, side)
+        branch: BranchError = getattr(error, side)
         style = "-" if side == "forward" else "--"
         low, high = branch.window
         inside = (branch.position >= low) & (branch.position <= high)

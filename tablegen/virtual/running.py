@@ -3,7 +3,7 @@
 import numpy as np
 
 from tablegen.numerics.arrays import Floats
-from tablegen.plan import LinePlan
+from tablegen.planning.line_plan import LinePlan
 from tablegen.virtual.played import played
 from tablegen.virtual.scanner import VirtualAxis
 from tablegen.virtual.sensor import Sensor

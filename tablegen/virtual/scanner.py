@@ -16,7 +16,7 @@ from tablegen.virtual.parameters import Truth, sensitivity
 from tablegen.virtual.preisach import Preisach
 
 _STRAIGHT = Modes(1.0)
-_LEVELS = 2.0**36  # of the drive
+_DRIVE_LEVELS = 2.0**36  # of the drive
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class VirtualAxis:
     resonance: Modes
 
     @classmethod
-    def of(cls, axis: parameters.Axis, v_max: float, amplifier: parameters.Amplifier) -> "VirtualAxis":
+    def of(cls, axis: parameters.AxisTruth, v_max: float, amplifier: parameters.AmplifierTruth) -> "VirtualAxis":
         """From the parameters of a file."""
         h, c, r = axis.hysteresis, axis.creep, axis.resonance
         creep = _STRAIGHT
@@ -80,7 +80,7 @@ class VirtualAxis:
         low, high = float(np.min(volts)), float(np.max(volts))
         if low < -1e-6 * self.v_max or high > (1.0 + 1e-6) * self.v_max:
             raise ValueError(f"{low:g}..{high:g} V leaves the 0..{self.v_max:g} V of the virtual scanner")
-        return np.clip(np.rint(volts * (_LEVELS / self.v_max)) / _LEVELS, 0.0, 1.0)
+        return np.clip(np.rint(volts * (_DRIVE_LEVELS / self.v_max)) / _DRIVE_LEVELS, 0.0, 1.0)
 
 
 @dataclass(frozen=True)

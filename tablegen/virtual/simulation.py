@@ -8,9 +8,9 @@ import msgspec
 from tablegen.config.load import Setup
 from tablegen.config.schema import Branch, Hysteresis, ScannerAxis
 from tablegen.numerics.arrays import Floats
-from tablegen.plan import LinePlan, make_plan
-from tablegen.virtual.measurement import LineError, about_window_line, line_error
-from tablegen.virtual.played import Drive, intended, played
+from tablegen.planning.line_plan import LinePlan, make_plan
+from tablegen.virtual.line_error import LineError, about_window_line, line_error
+from tablegen.virtual.played import PlayedDrive, intended, played
 from tablegen.virtual.scanner import VirtualAxis, VirtualScanner
 
 Model = Literal["triangle", "sinusoidal", "harmonic"]
@@ -27,7 +27,7 @@ class AxisRun:
 
     axis: Literal["x", "y"]
     turn: float
-    drive: Drive
+    drive: PlayedDrive
     displacement_nm: Floats
     error: LineError
     imaged: LineError

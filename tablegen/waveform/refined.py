@@ -8,7 +8,7 @@ from tablegen.numerics.arrays import Floats, FloatsLike
 from tablegen.waveform.series import FourierSeries
 
 
-class Shape(Protocol):
+class WaveformShape(Protocol):
     """A periodic normalised waveform; see ``LineShape``."""
 
     @property

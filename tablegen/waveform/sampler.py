@@ -10,7 +10,7 @@ import numpy as np
 from tablegen.numerics.arrays import Floats, Ints
 from tablegen.waveform.series import FourierSeries
 
-_ORDER = 6
+_TAYLOR_ORDER = 6
 # Half a block of the highest harmonic is then pi/64 of angle, and its seventh power over 7! is 1e-13.
 _BLOCKS_PER_HARMONIC = 64
 
@@ -32,7 +32,9 @@ class Sampler:
             return
         self._blocks = blocks
         rate = 1j * tau * np.arange(series.harmonics + 1)
-        self._terms = [np.fft.irfft(spectrum * rate**m, blocks) * (blocks / factorial(m)) for m in range(_ORDER + 1)]
+        self._terms = [
+            np.fft.irfft(spectrum * rate**m, blocks) * (blocks / factorial(m)) for m in range(_TAYLOR_ORDER + 1)
+        ]
 
     def at(self, k: Ints) -> Floats:
         """w(k / count) for any k in [0, count)."""

@@ -19,7 +19,7 @@ from tablegen.numerics.arrays import Floats, tree_sum
 from tablegen.numerics.linear import Cholesky
 from tablegen.numerics.turns import cosine, sine_and_cosine
 from tablegen.problems import Unphysical
-from tablegen.waveform.refined import Shape
+from tablegen.waveform.refined import WaveformShape
 from tablegen.waveform.series import FourierSeries
 
 # Keeps the fit on the line, not only parallel to it, where the harmonics are too few for both.
@@ -27,11 +27,11 @@ VALUE_WEIGHT = 100.0
 # Small enough to cost nothing inside the window (0.005 % at H = 32), large enough to keep the system regular.
 SMOOTHNESS = 1e-12
 # Where the fit would leave [0, 1] its extremes are held this far inside.
-_MARGIN = 1e-3
-_ROUNDS = 40
+_RANGE_MARGIN = 1e-3
+_MAX_RANGE_ROUNDS = 40
 
 
-def fit_window(shape: Shape, harmonics: int, window: tuple[float, float], both: bool) -> FourierSeries:
+def fit_window(shape: WaveformShape, harmonics: int, window: tuple[float, float], both: bool) -> FourierSeries:
     """Fit harmonics 1..``harmonics`` to the line inside ``window`` (normalised position) of the imaging branches.
 
     Raises ``Unphysical`` where the range [0, 1] and the harmonics do not go together.
@@ -129,7 +129,7 @@ def _within_range(free: Floats, factor: Cholesky, harmonics: int) -> FourierSeri
     columns: dict[int, Floats] = {}
     c = free
     swing = (0.0, 1.0)  # of the free fit, for the message
-    for attempt in range(_ROUNDS):
+    for attempt in range(_MAX_RANGE_ROUNDS):
         w = _series(c, harmonics).on_grid(points)
         swing = swing if attempt else (float(np.min(w)), float(np.max(w)))
         if float(np.min(w)) >= 0.0 and float(np.max(w)) <= 1.0:
@@ -137,7 +137,7 @@ def _within_range(free: Floats, factor: Cholesky, harmonics: int) -> FourierSeri
         held = {point for point, _ in active}
         for point in _excursions(w):
             if point not in held:
-                active.append((point, 1.0 - _MARGIN if w[point] > 0.5 else _MARGIN))
+                active.append((point, 1.0 - _RANGE_MARGIN if w[point] > 0.5 else _RANGE_MARGIN))
         if len(active) > harmonics:
             break
         for point, _ in active:

@@ -1,0 +1,124 @@
+"""What a build promises, measured on every emitted integer of one whole period of each axis, and the limits on it."""
+
+from dataclasses import dataclass
+from math import log10, sqrt
+
+import numpy as np
+
+from tablegen.certificate.line_errors import (
+    EmittedPeriod,
+    Refined,
+    ScalingError,
+    power_at_resonance_db,
+    refined,
+    scaling_error,
+)
+from tablegen.planning.line_plan import LinePlan, Plan
+from tablegen.problems import Document, Problem
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """The error budget of one axis. Codes and LSB are the converter's; dB are of power, relative to the scan's.
+
+    ``refinement`` is what the layer of ``tablegen refine`` moves, where there is one; it is not counted as an error.
+    """
+
+    ticks: int
+    max_error_lsb: float
+    rms_error_lsb: float
+    scaling: dict[str, ScalingError]
+    lowest_code: int
+    highest_code: int
+    headroom_low: int
+    headroom_high: int
+    largest_step: int
+    max_step: int
+    peak_slew_v_per_s: float
+    beyond_cutoff_db: float
+    at_resonance_db: float | None
+    refinement: dict[str, Refined] | None = None
+
+    @property
+    def scaling_error_percent(self) -> float:
+        """The worst of both directions; ripple shorter than a chord counts in full."""
+        return max(max(error.total, error.band_limit) for error in self.scaling.values())
+
+    @property
+    def size_error_percent(self) -> float:
+        """The worst of both directions, with its sign."""
+        return max((error.size for error in self.scaling.values()), key=abs)
+
+
+def certify(plan: Plan) -> dict[str, Certificate]:
+    """Certificates of both axes."""
+    return {line.axis: _certify(line) for line in plan.lines}
+
+
+def broken_limits(plan: Plan, certificates: dict[str, Certificate], file: Document) -> list[Problem]:
+    """The limits of the configuration that a certificate exceeds, each with a remedy."""
+    problems = []
+    for axis, certificate in certificates.items():
+        if certificate.largest_step > certificate.max_step:
+            why = (
+                f"the {axis} axis steps by {certificate.largest_step} codes, above its guard of {certificate.max_step}"
+            )
+            problems.append(file.problem("amplifier.max_slew_v_per_s", why))
+        limit = plan.limits.max_error_lsb
+        if limit is not None and certificate.max_error_lsb > limit:
+            why = f"the {axis} axis errs by up to {certificate.max_error_lsb:.4g} LSB, above {limit:g}; "
+            remedy = f"lengthen or widen {axis}.table" if limit > 0.5 else "a code alone is rounded by up to 0.5"
+            problems.append(file.problem("limits.max_error_lsb", why + remedy))
+        limit = plan.limits.max_scaling_error_percent
+        if limit is None:
+            continue
+        worst, size = certificate.scaling_error_percent, certificate.size_error_percent
+        if worst > limit or abs(size) > limit:
+            what = f"scaling error of {worst:.4g} %" if worst > limit else f"size error of {size:+.4g} %"
+            parts = max(certificate.scaling.values(), key=lambda error: max(error.total, error.band_limit))
+            remedy = _remedy(plan.x if axis == "x" else plan.y, parts)
+            why = f"the {axis} axis has a {what}, above {limit:g} %; {remedy}"
+            problems.append(file.problem("limits.max_scaling_error_percent", why))
+    return problems
+
+
+def _remedy(line: LinePlan, parts: ScalingError) -> str:
+    axis = line.axis
+    largest = max(parts.band_limit, parts.quantisation, parts.model)
+    if largest == parts.band_limit:
+        return f"most of it is the band limit: more {axis}.band_limit.harmonics, a narrower window or method = 'window'"
+    if largest == parts.model:
+        return "most of it is dynamics that max_boost_db leaves: fewer harmonics or a lower line rate"
+    if abs(line.codes_per_unit) * line.scale > 2.0**line.program.bits:  # a word of the table is more than a code
+        return f"most of it is quantisation: more {axis}.table.bits"
+    return f"most of it is quantisation: more dac.bits, or an amplifier whose range fits the {axis} scan"
+
+
+def _certify(line: LinePlan) -> Certificate:
+    played, output = EmittedPeriod(line), line.program.output
+    codes, lengths, ticks = played.runs.codes, played.runs.lengths, line.program.ticks
+    mean, square = played.error_moments()
+    offset = float(output.offset_code)
+    code_mean = float(np.sum(lengths * (codes - offset))) / ticks
+    power = max(float(np.sum(lengths * (codes - offset - code_mean) ** 2)) / ticks, 1e-30)
+    directions = {"forward": line.drive.shape.forward}
+    if line.band_limit.directions == "both":
+        directions["backward"] = line.drive.shape.backward
+    return Certificate(
+        ticks=ticks,
+        max_error_lsb=played.largest_error(),
+        rms_error_lsb=sqrt(square),
+        scaling={side: scaling_error(line, played, side, branch) for side, branch in directions.items()},
+        lowest_code=int(codes.min()),
+        highest_code=int(codes.max()),
+        headroom_low=int(codes.min()) - output.code_min,
+        headroom_high=output.code_max - int(codes.max()),
+        largest_step=int(np.max(np.abs(codes - np.roll(codes, 1)))),
+        max_step=output.max_step,
+        peak_slew_v_per_s=line.drive.v_amplitude * line.series.peak_slope() * float(line.rate),
+        beyond_cutoff_db=10.0 * log10(max(square - mean * mean, 1e-30) / power),
+        at_resonance_db=power_at_resonance_db(line, played.runs, power),
+        refinement=None
+        if line.layer is None
+        else {side: refined(line, side, branch) for side, branch in directions.items()},
+    )

@@ -1,0 +1,146 @@
+"""Plan and certificate in words: the block that stands in every emitted file and on the terminal. Plain ASCII."""
+
+from fractions import Fraction
+
+import numpy as np
+
+from tablegen.certificate.certificate import Certificate
+from tablegen.planning.line_plan import LinePlan, Plan
+
+_GRID = 32  # points a period of the highest harmonic
+
+
+def drive_lines(line: LinePlan) -> list[tuple[str, str]]:
+    """What is applied to an axis, factor by factor: label and value."""
+    drive, output = line.drive, line.program.output
+    rows = [
+        (
+            "scan",
+            f"{drive.size_nm:.6g} nm line, {drive.window_nm:.6g} nm window, at {drive.position_nm:.6g} nm",
+        ),
+        ("V_offset", f"{drive.v_offset:.6g} V   p = {drive.p_offset:+.4f}"),
+        ("V_scan", f"{drive.v_scan:.6g} V   {drive.v_scan_normalised:.6g} of v_max, (9) (12)"),
+        ("m", f"{drive.m:.6f}   offset, (1)"),
+        ("g", f"{drive.g:.6f}   frequency, (23)"),
+        ("m g V_scan", f"{drive.v_amplitude:.6g} V peak to peak"),
+        ("branches", _branches(line)),
+        ("line", f"{line.program.ticks} ticks, {rate(line.rate)}{_asked(line)}, turn {drive.turn:g}"),
+        (
+            "harmonics",
+            f"{line.series.harmonics}, up to {_hz(line.series.harmonics * float(line.rate))}, {_method(line)}",
+        ),
+        ("table", f"{len(line.program.words)} words of {line.program.bits} bits, {line.program.mode}"),
+        ("gain, offset", f"{output.gain_word} / 2^{output.gain_q}, code {output.offset_code}"),
+    ]
+    if line.layer is not None:
+        layer = 100.0 * float(np.max(np.abs(line.layer.on_grid(_GRID * line.layer.harmonics))))
+        rows.append(("refinement", f"{line.layer.harmonics} harmonics learnt, up to {layer:.3g} % of the line"))
+    if line.held_harmonics:
+        first, last = line.held_harmonics[0], line.held_harmonics[-1]
+        rows.append(("boost limit", f"holds back {len(line.held_harmonics)} harmonics, {first} to {last}"))
+    return rows
+
+
+def _branches(line: LinePlan) -> str:
+    drive = line.drive
+    if drive.model == "triangle":
+        return "triangle, hysteresis not compensated"
+    sides = (("forward", drive.forward), ("backward", drive.backward))
+    return f"{drive.model}; " + ", ".join(f"{side} beta {b.beta:.5f} u_peak {b.u_peak:.4g}" for side, b in sides)
+
+
+def _method(line: LinePlan) -> str:
+    low, high = line.band_limit.window
+    return f"{line.band_limit.method} {low:g}..{high:g} {line.band_limit.directions}"
+
+
+def _asked(line: LinePlan) -> str:
+    same = abs(float(line.rate) - line.requested_hz) <= 1e-12 * line.requested_hz
+    return " as asked" if same else f" (asked {_hz(line.requested_hz)})"
+
+
+def _hz(value: float) -> str:
+    return f"{value:.6g} Hz"
+
+
+def rate(value: Fraction) -> str:
+    """A rate as a number, and as the exact fraction where the number is not exact."""
+    shown = _hz(float(value))
+    if Fraction(f"{float(value):.6g}") == value:
+        return shown
+    return f"{shown} = {value.numerator}/{value.denominator} Hz"
+
+
+def certificate_lines(certificate: Certificate) -> list[tuple[str, str]]:
+    """A certificate: label and value."""
+    c = certificate
+    rows = [
+        ("error", f"max {c.max_error_lsb:.3f} LSB, rms {c.rms_error_lsb:.3f} LSB, over all {c.ticks} ticks"),
+    ]
+    for side, e in c.scaling.items():
+        parts = (
+            f"band limit {_percent(e.band_limit)}, quantisation {_percent(e.quantisation)}, model {_percent(e.model)}"
+        )
+        rows.append(("scaling " + side, f"{_percent(e.total)} % peak to peak ({parts})"))
+        rows.append(("", f"uncompensated {_percent(e.uncompensated)} %; window's size off by {e.size:+.4f} %"))
+    for side, r in (c.refinement or {}).items():
+        moves = f"moves up to {_percent(r.position)} % of the line, takes away {_percent(r.scaling)} % peak to peak"
+        rows.append(("refined " + side, moves))
+    rows += [
+        (
+            "codes",
+            f"{c.lowest_code}..{c.highest_code}, headroom {c.headroom_low} below, {c.headroom_high} above",
+        ),
+        (
+            "step",
+            f"at most {c.largest_step} of {c.max_step} codes a tick; {c.peak_slew_v_per_s:.4g} V/s at the piezo",
+        ),
+        ("beyond cutoff", f"{c.beyond_cutoff_db:.1f} dB" + _resonance(c)),
+    ]
+    return rows
+
+
+def _resonance(certificate: Certificate) -> str:
+    at = certificate.at_resonance_db
+    return "" if at is None else f"; at the resonance {at:.1f} dB"
+
+
+def _percent(value: float) -> str:
+    return f"{value:.3g}" if abs(value) >= 0.0005 else "0.000"
+
+
+def notes(plan: Plan) -> list[str]:
+    """What a user should know before trusting the image, in sentences."""
+    schedule, found = plan.schedule, []
+    per_pixel = schedule.pixel_ticks
+    if per_pixel.denominator != 1:
+        whole = [n for n in (int(per_pixel), int(per_pixel) + 1) if n > 0]
+        rates = [f"{float(schedule.line_rate) * float(per_pixel) / n:.6g} Hz" for n in whole]
+        found.append(
+            f"a pixel is {float(per_pixel):.4g} ticks, so its start is rounded to the tick; "
+            f"line rates near {' or '.join(rates)} make it {' or '.join(map(str, whole))} whole ticks"
+        )
+    found.append(
+        f"a frame images {schedule.pixels} x {schedule.up.count}"
+        + (f" + {schedule.down.count}" if schedule.down.count else "")
+        + f" pixels: the lines inside the window of y, of {schedule.lines} a frame"
+    )
+    for line in plan.lines:
+        if line.drive.model == "triangle":
+            found.append(f"hysteresis of {line.axis} is not compensated: the scanner file has no model for it")
+    return found
+
+
+def summary(plan: Plan, certificates: dict[str, Certificate]) -> list[str]:
+    """The whole block, a list of lines of text."""
+    schedule = plan.schedule
+    lines = [
+        f"{schedule.ticks} ticks a line, {schedule.lines} lines a frame, "
+        f"{rate(schedule.line_rate)} lines, {rate(schedule.frame_rate)} frames, {schedule.pixels} pixels"
+    ]
+    for line in plan.lines:
+        lines += ["", f"{line.axis} drive"]
+        lines += [f"  {label:<18}{value}" for label, value in drive_lines(line)]
+        lines += [f"{line.axis} certificate"]
+        lines += [f"  {label:<18}{value}" for label, value in certificate_lines(certificates[line.axis])]
+    return lines

@@ -1,0 +1,70 @@
+"""Which tick belongs to which line, pixel and direction; one counter for both axes. Integers alone."""
+
+from dataclasses import dataclass
+from fractions import Fraction
+from math import floor
+
+MAXIMUM_LINE_TICKS = 1 << 24
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """A stretch [first, first + count) of ticks of a line, or of lines of a frame; empty where nothing is imaged."""
+
+    first: int
+    count: int
+
+    @property
+    def stop(self) -> int:
+        """The first tick (or line) after it."""
+        return self.first + self.count
+
+    def __contains__(self, k: int) -> bool:
+        return self.first <= k < self.stop
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """Ticks of a line, lines of a frame, and where they image.
+
+    ``forward`` and ``backward`` are in ticks of the line, ``up`` and ``down`` in lines of the frame (y forward and
+    backward). ``turn_tick`` is the first tick of the backward sweep, ``turn_line`` the first line that starts in it.
+    """
+
+    ticks: int
+    lines: int
+    update_rate_hz: Fraction
+    requested_hz: float
+    pixels: int
+    settle_lines: int
+    turn_tick: int
+    forward: Window
+    backward: Window
+    turn_line: int
+    up: Window
+    down: Window
+
+    @property
+    def update_rate_millihz(self) -> int:
+        """Ticks in a thousand seconds, to the nearest, ties up: what an integer can say of the update rate."""
+        return floor(self.update_rate_hz * 1000 + Fraction(1, 2))
+
+    @property
+    def frame_ticks(self) -> int:
+        """Ticks of a frame."""
+        return self.ticks * self.lines
+
+    @property
+    def line_rate(self) -> Fraction:
+        """Lines per second, exactly."""
+        return self.update_rate_hz / self.ticks
+
+    @property
+    def frame_rate(self) -> Fraction:
+        """Frames per second, exactly."""
+        return self.line_rate / self.lines
+
+    @property
+    def pixel_ticks(self) -> Fraction:
+        """Ticks per pixel of the forward sweep; pixel p starts at the tick floor(p pixel_ticks) of the window."""
+        return Fraction(self.forward.count, self.pixels)

@@ -1,0 +1,277 @@
+"""The integer model of the sequencer: the specification that C and Verilog equal on every tick.
+
+``Sequencer`` is a device: two banks, a state, and a tick. ``play_line`` is the undisturbed line of a program.
+What happens on which tick is stated in ``docs/sequencer.md``; the arithmetic stands in ``tablegen.fixedpoint``.
+"""
+
+from dataclasses import dataclass, field
+from enum import Enum, IntFlag
+
+import numpy as np
+
+from tablegen.device.schedule import Schedule, Window
+from tablegen.fixedpoint.program import Program
+from tablegen.numerics.arrays import Bools, Ints
+
+
+class SequencerState(Enum):
+    """What the sequencer is doing."""
+
+    PARKED = "parked"
+    RUNNING = "running"
+    PARKING = "parking"
+
+
+class Fault(IntFlag):
+    """Sticky faults; cleared only on request."""
+
+    NONE = 0
+    SLEW = 1  # the slew guard held a code back although the output had caught up with its program
+    CLAMP = 2  # a code had to be held inside [code_min, code_max]
+
+
+@dataclass(frozen=True, eq=False)
+class DualProgram:
+    """What a bank holds: both axes and the schedule they share."""
+
+    x: Program
+    y: Program
+    schedule: Schedule
+
+
+@dataclass(frozen=True, slots=True)
+class Tick:
+    """What leaves the sequencer on one tick: two codes, markers, what it did, and the faults so far."""
+
+    x: int
+    y: int
+    line: bool = False
+    frame: bool = False
+    pixel: bool = False
+    backward: bool = False
+    valid: bool = False
+    swapped: bool = False
+    playing: bool = False
+    parked: bool = False
+    faults: Fault = Fault.NONE
+
+
+@dataclass(frozen=True, eq=False)
+class LineTicks:
+    """One line as arrays of shape (ticks,): codes of both axes and the markers of every tick."""
+
+    x: Ints
+    y: Ints
+    line: Bools
+    frame: Bools
+    pixel: Bools
+    backward: Bools
+    valid: Bools
+
+
+def pixel_starts(window: Window, pixels: int) -> Ints:
+    """Ticks at which pixels start: i-th tick of the window where floor(i pixels / count) exceeds the one before.
+
+    A device adds ``pixels`` to an accumulator and takes off ``count`` when it can: no multiplier.
+    """
+    i = np.arange(window.count, dtype=np.int64)
+    pixel = i * pixels // max(window.count, 1)
+    return window.first + i[np.diff(pixel, prepend=-1) > 0]
+
+
+def play_line(program: DualProgram, line: int, settled: bool = True) -> LineTicks:
+    """Line ``line`` of a frame in steady state: the slew guard untouched, ``valid`` as after settling."""
+    schedule = program.schedule
+    k = np.arange(schedule.ticks, dtype=np.int64)
+    pixel = np.zeros(schedule.ticks, dtype=np.bool_)
+    inside = np.zeros(schedule.ticks, dtype=np.bool_)
+    for window in (schedule.forward, schedule.backward):
+        if window.count:
+            pixel[pixel_starts(window, schedule.pixels)] = True
+            inside[window.first : window.stop] = True
+    images = line in schedule.up or line in schedule.down
+    return LineTicks(
+        x=program.x.codes(k),
+        y=program.y.codes(line * schedule.ticks + k),
+        line=k == 0,
+        frame=(k == 0) & (line == 0),
+        pixel=pixel,
+        backward=k >= schedule.turn_tick,
+        valid=inside & images & settled,
+    )
+
+
+@dataclass
+class Sequencer:
+    """A device, tick by tick.
+
+    ``commit`` fills the idle bank; it is taken at the next line start, or on the next tick while no line plays.
+    ``arm`` and ``trigger`` start ``frames`` frames (0: without end) from line 0; ``park`` ends them at once. Parked
+    and parking outputs follow the park code under the slew guard of the bank that plays. A device without a program
+    (``playing`` is None) holds its ``codes`` and ignores triggers.
+    """
+
+    playing: DualProgram | None
+    codes: tuple[int, int] = (0, 0)  # at the converters now; with a program, its park codes
+    idle: DualProgram | None = None
+    running: bool = False
+    parked: bool = False
+    armed: bool = False
+    faults: Fault = Fault.NONE
+    fault_counts: dict[Fault, int] = field(default_factory=lambda: {Fault.SLEW: 0, Fault.CLAMP: 0})
+    tick: int = 0
+    line: int = 0
+    frames_left: int = 0
+    settle_left: int = 0
+    catching_up: bool = False
+
+    def __post_init__(self) -> None:
+        self._endless = True
+        self._armed_frames = 0
+        if self.playing is not None:
+            self.codes = self.playing.x.output.park_code, self.playing.y.output.park_code
+            self.parked = True
+        self._line_ticks: LineTicks | None = None
+        self._clamped: Bools = np.zeros(0, dtype=np.bool_)
+
+    @property
+    def state(self) -> SequencerState:
+        """What the last tick and the requests since have made of it."""
+        return (
+            SequencerState.RUNNING if self.running else SequencerState.PARKED if self.parked else SequencerState.PARKING
+        )
+
+    def commit(self, program: DualProgram) -> None:
+        """Put a program into the idle bank, complete and checked, to be taken at the next line start."""
+        self.idle = program
+
+    def withdraw(self) -> None:
+        """A committed program that was not taken yet is not to be played."""
+        self.idle = None
+
+    def arm(self, frames: int = 0) -> None:
+        """Let the next trigger start so many frames; 0 is without end."""
+        self.armed = True
+        self._armed_frames = frames  # a scan that plays keeps its own count
+
+    def trigger(self) -> bool:
+        """Start at line 0 on the next tick; ignored unless armed, not running, and with a program to play.
+
+        The codes need not have parked: in a pipeline nobody knows yet, and the slew guard holds anyway.
+        """
+        if not self.armed or self.running or self.playing is None:
+            return False
+        self.armed = self.parked = False
+        self._endless = self._armed_frames == 0
+        self.frames_left = self._armed_frames
+        self.running = True
+        self._begin(self.playing)
+        return True
+
+    def park(self) -> None:
+        """Ramp to the park codes from the next tick on, and hold them."""
+        self.armed = self.running = False
+
+    def reset(self) -> None:
+        """As at power-up, but for program and codes: they ramp to the park codes, since a reset must not jump."""
+        self.park()
+        self.parked = False
+        self.withdraw()
+        self.clear_faults()
+
+    def clear_faults(self) -> None:
+        """Forget sticky faults and their counts."""
+        self.faults = Fault.NONE
+        self.fault_counts = dict.fromkeys(self.fault_counts, 0)
+
+    def step(self) -> Tick:
+        """Play one tick and return what leaves."""
+        swapped = False
+        if self.idle is not None and (not self.running or self.tick == 0):
+            self.playing, self.idle = self.idle, None
+            swapped = True
+            if self.running:
+                self._begin(self.playing)
+        if not self.running or self.playing is None:
+            return self._rest(swapped)
+
+        if self.tick == 0:
+            self._line_ticks = play_line(self.playing, self.line)
+            self._clamped = self._outside(self.playing, self.line)
+        line = self._line_ticks
+        assert line is not None
+        k = self.tick
+        reached = self._approach(self.playing, int(line.x[k]), int(line.y[k]))
+        if self._clamped[k]:
+            self._fault(Fault.CLAMP)
+        if reached:
+            self.catching_up = False
+        elif not self.catching_up:
+            self._fault(Fault.SLEW)
+        out = Tick(
+            *self.codes,
+            line=bool(line.line[k]),
+            frame=bool(line.frame[k]),
+            pixel=bool(line.pixel[k]),
+            backward=bool(line.backward[k]),
+            valid=bool(line.valid[k]) and reached and self.settle_left == 0 and not self.faults,
+            swapped=swapped,
+            playing=True,
+            faults=self.faults,
+        )
+        self._advance(self.playing.schedule)
+        return out
+
+    def _begin(self, program: DualProgram) -> None:
+        """A program starts at its own line 0, unsettled, and away from where the output is."""
+        self.tick = self.line = 0
+        self.settle_left = program.schedule.settle_lines
+        self.catching_up = True
+
+    def _advance(self, schedule: Schedule) -> None:
+        self.tick += 1
+        if self.tick < schedule.ticks:
+            return
+        self.tick = 0
+        self.settle_left = max(self.settle_left - 1, 0)
+        self.line += 1
+        if self.line < schedule.lines:
+            return
+        self.line = 0
+        if not self._endless:
+            self.frames_left -= 1
+            if self.frames_left == 0:
+                self.running = False
+
+    def _rest(self, swapped: bool) -> Tick:
+        program = self.playing
+        if program is not None:
+            self.parked = self._approach(program, program.x.output.park_code, program.y.output.park_code)
+        else:
+            self.parked = True
+        return Tick(*self.codes, swapped=swapped, parked=self.parked, faults=self.faults)
+
+    def _approach(self, program: DualProgram, x: int, y: int) -> bool:
+        """Move both codes towards their targets, by at most max_step each; whether both arrived."""
+        x_step, y_step = program.x.output.max_step, program.y.output.max_step
+        x_now, y_now = self.codes
+        self.codes = (
+            x_now + min(max(x - x_now, -x_step), x_step),
+            y_now + min(max(y - y_now, -y_step), y_step),
+        )
+        return self.codes == (x, y)
+
+    @staticmethod
+    def _outside(playing: DualProgram, line: int) -> Bools:
+        """Ticks of a line on which the clamp changes a code of either axis."""
+        schedule = playing.schedule
+        out = np.zeros(schedule.ticks, dtype=np.bool_)
+        k = np.arange(schedule.ticks, dtype=np.int64)
+        for program, at in ((playing.x, k), (playing.y, line * schedule.ticks + k)):
+            code = program.output.unclamped(program.samples(at))
+            out |= (code < program.output.code_min) | (code > program.output.code_max)
+        return out
+
+    def _fault(self, fault: Fault) -> None:
+        self.faults |= fault
+        self.fault_counts[fault] += 1

@@ -1,0 +1,144 @@
+"""The plan and its certificate as plain data: what the manifest says of them."""
+
+from collections.abc import Mapping
+from decimal import ROUND_CEILING, Context, Decimal
+from typing import Any
+
+from tablegen.certificate.certificate import Certificate
+from tablegen.certificate.line_errors import Refined, ScalingError
+from tablegen.device.schedule import Schedule, Window
+from tablegen.planning.line_plan import LinePlan, Plan
+
+
+def plan_record(plan: Plan) -> dict[str, Any]:
+    """Everything that decides what a device plays, as JSON-ready data: axes and schedule."""
+    return {
+        "name": plan.name,
+        "scanner": plan.scanner,
+        "sequence": _sequence(plan.schedule),
+        "axes": {line.axis: _axis(line) for line in plan.lines},
+    }
+
+
+def certificate_record(certificate: Certificate) -> dict[str, Any]:
+    """A certificate as JSON-ready data, its figures to six significant digits."""
+    record: dict[str, Any] = {
+        name: _figure(getattr(certificate, name))
+        for name in certificate.__dataclass_fields__
+        if name not in ("scaling", "refinement")
+    }
+    record["max_error_lsb"] = _bound(certificate.max_error_lsb)
+    record["scaling_error_percent"] = _sides(certificate.scaling)
+    if certificate.refinement is not None:
+        record["refinement_percent"] = _sides(certificate.refinement)
+    return record
+
+
+def _sides(figures: Mapping[str, ScalingError] | Mapping[str, Refined]) -> dict[str, dict[str, Any]]:
+    return {
+        side: {part: _figure(getattr(one, part)) for part in one.__dataclass_fields__} for side, one in figures.items()
+    }
+
+
+def _bound(value: float) -> float:
+    """Six significant digits, rounded up: what is printed as a maximum has to be one."""
+    return float(Context(prec=6, rounding=ROUND_CEILING).create_decimal(Decimal(value)))
+
+
+def _figure(value: float | int | None) -> float | int | None:
+    return float(f"{value:.6g}") if isinstance(value, float) else value
+
+
+def _window(window: Window) -> list[int]:
+    return [window.first, window.count]
+
+
+def _sequence(schedule: Schedule) -> dict[str, Any]:
+    return {
+        "update_rate_hz": [schedule.update_rate_hz.numerator, schedule.update_rate_hz.denominator],
+        "line_ticks": schedule.ticks,
+        "frame_lines": schedule.lines,
+        "pixels": schedule.pixels,
+        "settle_lines": schedule.settle_lines,
+        "turn_tick": schedule.turn_tick,
+        "forward_ticks": _window(schedule.forward),
+        "backward_ticks": _window(schedule.backward),
+        "turn_line": schedule.turn_line,
+        "up_lines": _window(schedule.up),
+        "down_lines": _window(schedule.down),
+    }
+
+
+def _layer(line: LinePlan) -> dict[str, Any]:
+    """What `tablegen refine` learnt; nothing without a layer, so that such a build keeps its hash."""
+    if line.layer is None:
+        return {}
+    return {"refinement": {"harmonics": line.layer.harmonics, "a": line.layer.a.tolist(), "b": line.layer.b.tolist()}}
+
+
+def _axis(line: LinePlan) -> dict[str, Any]:
+    drive, program, output = line.drive, line.program, line.program.output
+    return {
+        "drive": {
+            "v_offset": drive.v_offset,
+            "v_scan": drive.v_scan,
+            "v_scan_normalised": drive.v_scan_normalised,
+            "v_amplitude": drive.v_amplitude,
+            "m": drive.m,
+            "g": drive.g,
+            "size_nm": drive.size_nm,
+            "window_nm": drive.window_nm,
+            "position_nm": drive.position_nm,
+            "forward": {"beta": drive.forward.beta, "u_peak": drive.forward.u_peak},
+            "backward": {"beta": drive.backward.beta, "u_peak": drive.backward.u_peak},
+            "turn": drive.turn,
+            "model": drive.model,
+        },
+        "line": {
+            "ticks": program.ticks,
+            "hold_ticks": program.hold,
+            "rate_hz": float(line.rate),
+            "rate_exact": [line.rate.numerator, line.rate.denominator],
+            "requested_hz": line.requested_hz,
+            "phase_step": program.phase.step,
+            "phase_remainder": program.phase.remainder,
+        },
+        "fourier": {
+            "band_limit": line.band_limit.method,
+            "window": list(line.band_limit.window),
+            "directions": line.band_limit.directions,
+            "harmonics": line.series.harmonics,
+            "a0": line.series.a0,
+            "a": line.series.a.tolist(),
+            "b": line.series.b.tolist(),
+            "held_harmonics": list(line.held_harmonics),
+            "q_format": "Q2.30",
+            "a0_word": line.fourier.a0,
+            "a_words": line.fourier.a.tolist(),
+            "b_words": line.fourier.b.tolist(),
+            **_layer(line),
+        },
+        "table": {
+            "mode": program.mode,
+            "bits": program.bits,
+            "scale": line.scale,
+            "guard_bits": program.guard,
+            "words": program.words.tolist(),
+        },
+        "output": {
+            "gain_word": output.gain_word,
+            "gain_q": output.gain_q,
+            "offset_word": output.offset_word,
+            "offset_code": output.offset_code,
+            "code_min": output.code_min,
+            "code_max": output.code_max,
+            "max_step": output.max_step,
+            "park_code": output.park_code,
+            "v_zero": line.converter.v_zero,
+            "v_per_code": line.converter.v_per_code,
+            "dac_bits": output.dac_bits,
+            "coding": output.coding,
+            "align": output.align,
+            "word_bits": output.word_bits,
+        },
+    }

@@ -1,0 +1,37 @@
+"""``manifest.json``: the machine-readable record of a build."""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from tablegen import __version__
+from tablegen.certificate.certificate import Certificate
+from tablegen.manifest.record import certificate_record
+
+
+def manifest_file(
+    record: dict[str, Any], digest: str, certificates: dict[str, Certificate], files: Mapping[str, bytes]
+) -> bytes:
+    """The plan's record with its hash, the certificates, and the SHA-256 of every other file of the build."""
+    axes = {
+        axis: {**content, "certificate": certificate_record(certificates[axis])}
+        for axis, content in record["axes"].items()
+    }
+    manifest = {
+        "tablegen": __version__,
+        "hash": digest,
+        **{key: value for key, value in record.items() if key != "axes"},
+        "files": {name: hashlib.sha256(content).hexdigest() for name, content in sorted(files.items())},
+        "axes": axes,
+    }
+    return (_readable(manifest) + "\n").encode("ascii")
+
+
+def _readable(value: Any, indent: str = "") -> str:
+    """JSON with a key a line, and arrays of numbers on one line."""
+    if isinstance(value, dict) and value:
+        inner = indent + "  "
+        items = (f"{inner}{json.dumps(key)}: {_readable(item, inner)}" for key, item in value.items())
+        return "{\n" + ",\n".join(items) + f"\n{indent}}}"
+    return json.dumps(value, ensure_ascii=True, allow_nan=False)

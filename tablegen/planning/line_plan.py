@@ -1,0 +1,198 @@
+"""From a checked configuration to integers: the immutable plan that everything downstream reads."""
+
+from dataclasses import dataclass
+from fractions import Fraction
+from math import ceil
+from typing import Literal
+
+import numpy as np
+
+from tablegen.compensation.drive import Drive, compensate
+from tablegen.compensation.dynamics import capped_inverse
+from tablegen.config.load import Setup
+from tablegen.config.schema import BandLimit, FastAxis, Limits, SlowAxis
+from tablegen.device.schedule import Schedule
+from tablegen.device.sequencer import DualProgram
+from tablegen.fixedpoint.converter import Converter, fit_gain, make_output
+from tablegen.fixedpoint.phase import RationalPhase
+from tablegen.fixedpoint.program import Program
+from tablegen.fixedpoint.synthesis import FourierWords, encode, synthesize
+from tablegen.numerics.arrays import Floats, Ints
+from tablegen.planning.feasibility import Feasibility
+from tablegen.planning.refinement_layer import learnt_layer
+from tablegen.planning.timing import make_schedule
+from tablegen.problems import Problems
+from tablegen.waveform.band_limit import band_limited
+from tablegen.waveform.series import FourierSeries
+
+# Peaks are rounded up to this grid before they enter the scale: it then does not depend on the last bit of a maximum.
+_PEAK_GRID = 1024
+
+
+@dataclass(frozen=True, eq=False)
+class LinePlan:
+    """One axis: what was asked for in volts, the waveform, and the integers that play it.
+
+    ``target`` is the band-limited w that the piezo is to follow, ``series`` the w that is played: the same with
+    each harmonic divided by the dynamics. ``held_harmonics`` are those at which the boost limit held that back.
+    ``layer`` is what of the target was learnt from a measurement, and lies over the model's shape.
+    """
+
+    axis: Literal["x", "y"]
+    rate: Fraction
+    requested_hz: float
+    drive: Drive
+    converter: Converter
+    band_limit: BandLimit
+    target: FourierSeries
+    series: FourierSeries
+    held_harmonics: tuple[int, ...]
+    scale: float
+    fourier: FourierWords
+    program: Program
+    layer: FourierSeries | None = None
+
+    @property
+    def described(self) -> FourierSeries:
+        """The target without the layer: what the scanner's model describes."""
+        return self.target if self.layer is None else self.target.less(self.layer)
+
+    def float_codes(self, w: Floats) -> Floats:
+        """The codes, unrounded, that values of w ask for: V(t) = V_offset + m g V_scan (w - 1/2)."""
+        return self.converter.code(self.drive.v_offset) + self.codes_per_unit * (w - 0.5)
+
+    @property
+    def codes_per_unit(self) -> float:
+        """Codes that w = 0 and w = 1 are apart; negative where the amplifier inverts."""
+        return self.drive.v_amplitude / self.converter.v_per_code
+
+    def codes(self, start: int, stop: int) -> Ints:
+        """The emitted codes at ticks [start, stop)."""
+        return self.program.codes(np.arange(start, stop, dtype=np.int64))
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A whole build: both axes and the one schedule they share."""
+
+    name: str
+    scanner: str
+    schedule: Schedule
+    x: LinePlan
+    y: LinePlan
+    limits: Limits
+    header_only: bool
+
+    @property
+    def lines(self) -> tuple[LinePlan, LinePlan]:
+        """Both axes, fast first."""
+        return self.x, self.y
+
+    @property
+    def program(self) -> DualProgram:
+        """What a bank of the device holds of it: the programs of both axes and their schedule."""
+        return DualProgram(self.x.program, self.y.program, self.schedule)
+
+
+def make_plan(setup: Setup) -> Plan:
+    """Compensate, shape and quantise a scan.
+
+    Raises ``Rejected`` with every contradiction that was found on both axes.
+    """
+    problems = Problems()
+    schedule = make_schedule(setup, problems)
+    if schedule is None:
+        # The rest is examined at the rates asked for, so that its problems are reported in the same run.
+        line_rate = setup.scan.timing.line_rate_hz
+        compensate(setup, "x", line_rate, problems)
+        compensate(setup, "y", line_rate / setup.scan.timing.lines, problems)
+        problems.stop_if_any()
+        raise AssertionError("a schedule fails with a problem")  # pragma: no cover
+    x = _line_plan(setup, "x", schedule, problems)
+    y = _line_plan(setup, "y", schedule, problems)
+    problems.stop_if_any()
+    assert x is not None
+    assert y is not None
+    scan = setup.scan
+    return Plan(
+        scan.name,
+        setup.scanner.name,
+        schedule,
+        x,
+        y,
+        scan.limits,
+        scan.emit.header_only,
+    )
+
+
+def _line_plan(setup: Setup, axis: Literal["x", "y"], schedule: Schedule, problems: Problems) -> LinePlan | None:
+    scan: FastAxis = getattr(setup.scan, axis)
+    file = setup.scan_file
+    rate = schedule.line_rate if axis == "x" else schedule.frame_rate
+    requested = schedule.requested_hz if axis == "x" else schedule.requested_hz / schedule.lines
+    hold = schedule.ticks if isinstance(scan, SlowAxis) and scan.motion == "step" else 1
+    period = (schedule.ticks if axis == "x" else schedule.frame_ticks) // hold
+
+    drive = compensate(setup, axis, float(rate), problems)
+    before = len(problems.found)
+    feasible = Feasibility(setup, axis, problems)
+    harmonics = feasible.harmonics(rate, period)
+    length = feasible.table_length(period)
+    if drive is None or len(problems.found) > before:
+        return None
+
+    layer = learnt_layer(setup, axis, drive, float(rate), harmonics, problems)
+    if len(problems.found) > before:
+        return None
+    target = None
+    with problems.at(file, f"{axis}.band_limit.harmonics"):
+        target = band_limited(drive.shape, scan.band_limit, harmonics, layer)
+    if target is None:
+        return None
+    series: FourierSeries = target
+    held: tuple[int, ...] = ()
+    if drive.response is not None:
+        with problems.at(setup.scanner_file, f"{axis}.resonance.response"):
+            series, held = _through_inverse(target, drive, float(rate))
+
+    converter = Converter.of(setup.scan.dac, setup.scan.amplifier)
+    w = series.on_grid(32 * harmonics)
+    low, high = float(np.min(w)), float(np.max(w))
+    largest = max(1.0, abs(2.0 * low - 1.0), abs(2.0 * high - 1.0))
+    feasible.check_words(series, largest)
+    feasible.check_range(drive, converter, low, high)
+    max_step = feasible.max_step(drive, converter, series, largest, float(rate), period)
+    if len(problems.found) > before:
+        return None
+
+    bits = scan.table.bits
+    peak = ceil(largest * _PEAK_GRID) / _PEAK_GRID
+    amplitude = 0.5 * drive.v_amplitude / converter.v_per_code  # codes for 2 w - 1 = 1
+    gain_word, scale = fit_gain(amplitude, peak, bits, converter.bits)
+    park_v = drive.v_offset if scan.park_v is None else scan.park_v
+    output = make_output(setup.scan.dac, converter, drive.v_max, drive.v_offset, park_v, bits, gain_word, max_step)
+    fourier = encode(series.a0, series.a, series.b, scale)
+    program = Program(RationalPhase(period), hold, scan.table.mode, bits, synthesize(fourier, length, bits), output)
+    return LinePlan(
+        axis=axis,
+        rate=rate,
+        requested_hz=requested,
+        drive=drive,
+        converter=converter,
+        band_limit=scan.band_limit,
+        target=target,
+        series=series,
+        held_harmonics=held,
+        scale=scale,
+        fourier=fourier,
+        program=program,
+        layer=layer,
+    )
+
+
+def _through_inverse(target: FourierSeries, drive: Drive, rate_hz: float) -> tuple[FourierSeries, tuple[int, ...]]:
+    """Each harmonic divided by the response at its frequency, with the boost limited."""
+    assert drive.response is not None
+    n = np.arange(1.0, target.harmonics + 1.0)
+    real, imaginary, held = capped_inverse(drive.response, n * rate_hz, drive.max_boost_db)
+    return target.times(real, imaginary), tuple(int(h) for h in n[held])

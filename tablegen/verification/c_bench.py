@@ -1,0 +1,123 @@
+"""The C sequencer under the scripts of the Verilog one: compiled with a compiler of this machine, run as a process."""
+
+import shlex
+import shutil
+import subprocess
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tablegen.fixedpoint.synthesis import sine_periods
+from tablegen.numerics.arrays import Ints
+from tablegen.resources import c_runtime
+from tablegen.verification.bench import SequencerShape
+from tablegen.verification.simulate import SimulationFailed, ToolMissing
+from tablegen.verification.stream import Script, Words
+
+_HERE = Path(__file__).parent
+BENCH = (_HERE / "stream_bench.c", _HERE / "stream_bench.h")
+HOST = _HERE / "stream_bench_host.c"
+_SHAPE, _SINE = 5 << 60, 2 << 60 | 5 << 48
+OPTIONS = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wsign-conversion", "-Werror")
+
+
+@dataclass(frozen=True)
+class CPlayed:
+    """What a script made: the ticks, and how often each fault was seen."""
+
+    capture: Words
+    counts: list[int]
+
+
+def storage_bits(bits: int) -> int:
+    """Bits in which the C runtime holds table or converter words of so many bits."""
+    return 16 if bits <= 16 else 32
+
+
+def defines(shape: SequencerShape, fill: int = 0) -> dict[str, int]:
+    """The choices of a firmware for programs of a shape; with ``fill`` ticks are played that many at once at most."""
+    chosen = {
+        "DAC_REQUESTS": 128,
+        "DAC_TABLE_STORAGE_BITS": storage_bits(max(shape.x_word_bits, shape.y_word_bits)),
+        "DAC_OUTPUT_STORAGE_BITS": storage_bits(shape.dac_bits),
+    }
+    return chosen | ({"BENCH_FILL": fill} if fill else {})
+
+
+def script_words(script: Script, shape: SequencerShape, sine: Ints | None = None) -> str:
+    """A script as the C bench reads it: shape, codes at power-up, the sine table if it is needed, commands."""
+    x_index, y_index = (
+        getattr(shape, f"{axis}_index_bits") if getattr(shape, f"{axis}_interpolated") else 0 for axis in "xy"
+    )
+    word = shape.dac_bits | shape.x_word_bits << 5 | x_index << 10 | shape.y_word_bits << 15 | y_index << 20
+    first = [_SHAPE | word, script.power_up[0] | script.power_up[1] << 24]
+    if sine is not None:
+        first += [_SINE | at << 32 | int(value) & 0xFFFFFFFF for at, value in enumerate(sine)]
+    return "".join(f"{value:016x}\n" for value in first) + script.text()
+
+
+def sine_of(shape: SequencerShape) -> Ints:
+    """The sine table from which the runtime renders tables of a shape."""
+    return sine_periods(max(shape.x_index_bits, shape.y_index_bits))
+
+
+def require_compiler(compiler: str) -> list[str]:
+    """The words of a compiler's command; ``ToolMissing`` where there is none of that name."""
+    try:
+        command = shlex.split(compiler)
+    except ValueError:
+        command = []
+    if not command or shutil.which(command[0]) is None:
+        raise ToolMissing(f"{command[0] if command else compiler} is not installed: apt-get install gcc, or set CC")
+    return command
+
+
+class CBench:
+    """The bench, compiled once for programs of one shape."""
+
+    def __init__(
+        self,
+        shape: SequencerShape,
+        folder: Path,
+        compiler: str = "cc",
+        options: Sequence[str] = OPTIONS,
+        sources: Sequence[Path] | None = None,
+        fill: int = 0,
+        chosen: Mapping[str, int] | None = None,
+    ) -> None:
+        """``sources`` in place of the shipped runtime; what is ``chosen`` in place of what suits the shape."""
+        command = require_compiler(compiler)
+        runtime = list(c_runtime() if sources is None else sources)
+        folder.mkdir(parents=True, exist_ok=True)
+        self.shape, self.program = shape, folder / "stream_bench"
+        line = [
+            *command,
+            *options,
+            *(f"-D{name}={value}" for name, value in (defines(shape, fill) if chosen is None else chosen).items()),
+            *(f"-I{place}" for place in sorted({str(path.parent) for path in (*runtime, *BENCH)})),
+            *(str(path) for path in (*runtime, BENCH[0], HOST) if path.suffix == ".c"),
+            "-o",
+            str(self.program),
+        ]
+        done = subprocess.run(line, capture_output=True, text=True, check=False)
+        if done.returncode or done.stderr:
+            raise SimulationFailed(f"{' '.join(line)}\n{done.stdout}{done.stderr}".strip())
+
+    def play(self, script: Script, fourier: bool = False) -> CPlayed:
+        """Run a script; raises ``SimulationFailed`` where the bench ends before its script."""
+        return self.run(script_words(script, self.shape, sine_of(self.shape) if fourier else None))
+
+    def run(self, words: str, timeout: float | None = None) -> CPlayed:
+        """The same for a script as ``script_words`` makes it; a bench fails that takes longer, in seconds."""
+        try:
+            done = subprocess.run(
+                [str(self.program)], input=words, capture_output=True, text=True, check=False, timeout=timeout
+            )
+        except subprocess.TimeoutExpired:
+            raise SimulationFailed(f"the bench did not end in {timeout:.0f} s") from None
+        if done.returncode:
+            raise SimulationFailed(done.stderr.strip() or f"the bench ended with status {done.returncode}")
+        capture = np.frombuffer(bytes.fromhex(done.stdout), dtype=">u8").astype(np.uint64)
+        return CPlayed(capture[:-4], [int(count) for count in capture[-4:]])

@@ -1,0 +1,228 @@
+"""The C sequencer of a build: what a user would compile plays, on this machine or on an emulated Cortex-M.
+
+The bench is compiled with the emitted header and arrays and with the ``dac_*.c`` of the directory. A session is played
+twice, a tick a call (``dac_sequencer_step``) and many ticks a call (``dac_sequencer_fill``).
+"""
+
+import os
+import shlex
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from tablegen.fixedpoint.output import Output
+from tablegen.manifest.read import NotABuild, StoredBuild
+from tablegen.verification import worker
+from tablegen.verification.bench import CAPTURE, SCRIPT, SequencerShape
+from tablegen.verification.build import Outcome, Progress, differing_check
+from tablegen.verification.c_bench import CBench, CPlayed, require_compiler, script_words, storage_bits
+from tablegen.verification.c_files import arrays_file, wrong_arrays, wrong_constants
+from tablegen.verification.checks import (
+    Check,
+    check_codes,
+    check_faults,
+    check_filled,
+    check_no_faults,
+    first_difference,
+    make_capture,
+)
+from tablegen.verification.directory import copies, some
+from tablegen.verification.placement import Placement
+from tablegen.verification.session import make_session
+from tablegen.verification.simulate import SimulationFailed
+from tablegen.verification.stream import Words, read_capture
+
+_MAX_TABLE_WORDS = 1 << 17  # of a direct table, as dac_sequencer_load() takes them
+_MAX_FILL_TICKS = 600  # ticks a call
+_MIN_TICKS_PER_SECOND = 5000  # a program that plays fewer does not end
+
+
+@dataclass(frozen=True)
+class CTarget:
+    """Where the C sequencer plays, and whether it renders its tables from Fourier words."""
+
+    machine: Literal["c", "cortex-m"]
+    fourier: bool = False
+
+    def require(self) -> None:
+        """A compiler, and what runs its output."""
+        if self.machine == "cortex-m":
+            from tablegen.verification.emulate import require_emulator
+
+            require_emulator()
+        else:
+            require_compiler(_compiler())
+
+    def refuse(self, folder: Path, stored: StoredBuild) -> None:
+        """``direct`` tables may be longer than the runtime takes, and are not rendered."""
+        for name, axis in stored.axes:
+            if axis.table.mode == "direct" and len(axis.table.words) > _MAX_TABLE_WORDS:
+                raise NotABuild(
+                    f"{folder}: the table of {name} has {len(axis.table.words)} words, the C sequencer plays at most "
+                    f"{_MAX_TABLE_WORDS}; mode = 'interpolated' needs fewer"
+                )
+        if self.fourier and not any(axis.table.mode == "interpolated" for _, axis in stored.axes):
+            raise NotABuild(
+                f"{folder}: both tables are direct, and no device renders those; verify it without --fourier"
+            )
+
+    def check_files(self, folder: Path, stored: StoredBuild) -> list[Check]:
+        """The C header and the arrays."""
+        constants, differing = wrong_constants(folder, stored)
+        words, flipped = wrong_arrays(folder, stored)
+        return [
+            differing_check("header", "manifest", f"{constants} constants", differing),
+            differing_check("arrays", "manifest", f"{words} words", flipped),
+        ]
+
+    def play(
+        self, folder: Path, work: Path, stored: StoredBuild, most_ticks: int, seed: int, progress: Progress
+    ) -> Outcome:
+        """One session by steps, and the same by fills."""
+        player = _compiler() if self.machine == "c" else "arm-none-eabi-gcc, Cortex-M4"
+        sources, absent = _sources(folder, work, stored, self.fourier)
+        if absent:
+            return Outcome([Check("program", player, "nothing", failure="program: " + some(absent))])
+
+        progress("playing the integer model")
+        session = make_session(stored.program, None, most_ticks, seed, Placement())
+        shape = SequencerShape.of((stored.program.x, stored.program.y))
+        (work / SCRIPT).write_text(script_words(session.script, shape), "ascii")  # which ends the script
+        expected, ticks = session.script.expected, len(session.script.expected)
+        counts = [*session.script.counts, 0, 0]  # nothing here has overruns
+        job = {
+            "machine": self.machine,
+            "shape": asdict(shape),
+            "sources": [str(path) for path in sources],
+            "defines": self._defines(stored),
+            "ticks": ticks,
+        }
+        try:
+            progress(f"compiling and playing {ticks} ticks, one a call")
+            words, counted = _played(work, {**job, "fill": 0})
+        except (SimulationFailed, OSError, ValueError) as error:
+            return Outcome([Check("program", player, f"{ticks} ticks", failure=f"program: {error}")])
+        capture = make_capture(stored, expected, _packed(words, stored), session.own)
+        sent = {"x": words[::2] & np.uint64(0xFFFFFFFF), "y": words[::2] >> np.uint64(32)}
+        checks = check_codes(capture, stored, {axis: part.astype(np.int64) for axis, part in sent.items()})
+        checks += [check_no_faults(capture, stored), check_faults(capture, stored, counted, counts)]
+        try:
+            progress(f"compiling and playing {ticks} ticks, many a call")
+            words, counted = _played(work, {**job, "fill": _MAX_FILL_TICKS})
+            filled = make_capture(stored, expected, _packed(words, stored), session.own)
+            checks.append(check_filled(filled, stored, counted, counts))
+        except (SimulationFailed, OSError, ValueError) as error:
+            checks.append(Check("fill", "integer model", f"{ticks} ticks", failure=f"fill: {error}"))
+        return Outcome(checks, session, first_difference(capture, stored))
+
+    def _defines(self, stored: StoredBuild) -> dict[str, int]:
+        """What a firmware for this build is compiled with, and what the bench is."""
+        axes = [axis for _, axis in stored.axes]
+        rendered = [len(axis.table.words) for axis in axes if self.fourier and axis.table.mode == "interpolated"]
+        return {
+            "DAC_TABLE_STORAGE_BITS": storage_bits(max(axis.table.bits for axis in axes)),
+            "DAC_OUTPUT_STORAGE_BITS": storage_bits(max(axis.output.word_bits for axis in axes)),
+            "BENCH_EMITTED": 1,
+            "BENCH_TABLE_WORDS": max(rendered, default=1),
+        }
+
+
+def play_job(folder: Path, job: dict[str, Any]) -> dict[str, Any]:
+    """Compile and play the script that stands in ``folder``; in a process that can be ended. Counts of faults."""
+    fill = job["fill"]
+    defines = {**job["defines"], **({"BENCH_FILL": fill} if fill else {})}
+    sources = [Path(source) for source in job["sources"]]
+    shape, place = SequencerShape(**job["shape"]), folder / ("fill" if fill else "step")
+    text = (folder / SCRIPT).read_text("ascii")
+    played: CPlayed
+    if job["machine"] == "cortex-m":
+        from tablegen.verification.emulate import CortexMBench
+
+        played = CortexMBench(shape, place, None, _options(), sources, fill, defines).run(text)
+    else:
+        bench = CBench(shape, place, _compiler(), _options(os.environ.get("CFLAGS", "")), sources, fill, defines)
+        played = bench.run(text, timeout=60.0 + job["ticks"] / _MIN_TICKS_PER_SECOND)
+    (folder / _record_of(fill)).write_text(played.capture.astype(">u8").tobytes().hex("\n", 8) + "\n", "ascii")
+    return {"counts": played.counts}
+
+
+def _played(work: Path, job: dict[str, Any]) -> tuple[Words, list[int]]:
+    """What the bench stored, two words a tick, and the counts of faults."""
+    status = worker.run(work, __name__, job)
+    return read_capture(work / _record_of(job["fill"])), [int(count) for count in status["counts"]]
+
+
+def _sources(folder: Path, work: Path, stored: StoredBuild, fourier: bool) -> tuple[list[Path], list[str]]:
+    """Copies of what a user of the build would compile, and the file that hands it to the bench; what is missing."""
+    runtime = stored.runtime(".c", ".h")
+    own = sorted({f"{stored.manifest.name}.h", arrays_file(stored)})
+    sources, absent = copies(folder, own + runtime, work / "c")
+    if not runtime:
+        absent.append("the build holds no dac_*.c")
+    (work / "bench").mkdir(exist_ok=True)
+    handed = work / "bench" / "bench_program.c"
+    handed.write_text(_bench_program(stored, fourier), "ascii")
+    return [*sources, handed], absent
+
+
+def _compiler() -> str:
+    return os.environ.get("CC") or "cc"
+
+
+def _options(flags: str = "") -> list[str]:
+    """Warnings are for whoever compiles the firmware: what counts here is what it does."""
+    try:
+        return ["-std=c99", "-O2", *shlex.split(flags), "-w"]
+    except ValueError as error:
+        raise SimulationFailed(f"CFLAGS cannot be read: {error}") from None
+
+
+def _record_of(fill: int) -> str:
+    return f"fill_{CAPTURE}" if fill else f"step_{CAPTURE}"
+
+
+def _bench_program(stored: StoredBuild, fourier: bool) -> str:
+    """The C file that hands what the build emitted to the bench, by the names that its header has."""
+    name = stored.manifest.name
+    capital = name.upper()
+    lines = [
+        "/* Hands what a build emitted to the bench of tablegen verify. */",
+        f'#include "{name}.h"',
+        '#include "stream_bench.h"',
+        "",
+        f"const dac_program bench_program = DAC_PROGRAM({capital}, {name});",
+    ]
+    rendered = []
+    for axis, content in stored.axes:
+        rendered.append(fourier and content.table.mode == "interpolated")
+        of = f"{capital}_{axis.upper()}"
+        words = f"{name}_{axis}_fourier, {of}_HARMONICS" if rendered[-1] else "NULL, 0"
+        lines += [
+            f"const dac_converter bench_{axis}_converter = DAC_CONVERTER({of}, 0);",
+            f"const bench_axis bench_{axis} = {{{words}, {of}_OFFSET_CODE}};",
+        ]
+    lines += [
+        f"const int32_t *const bench_sine = {f'{name}_sine' if any(rendered) else 'NULL'};",
+        f"const unsigned bench_sine_index_bits = {f'{capital}_SINE_INDEX_BITS' if any(rendered) else '0'};",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _packed(words: Words, stored: StoredBuild) -> Words:
+    """Pairs of captures as one word a tick, as models are stored: converter words turned back into codes."""
+    sent, told = words[::2], words[1::2]
+    x = _codes(sent & np.uint64(0xFFFFFFFF), stored.program.x.output)
+    y = _codes(sent >> np.uint64(32), stored.program.y.output)
+    markers, faults = told & np.uint64(0xFF), told >> np.uint64(8) & np.uint64(0xFF)
+    packed: Words = faults << np.uint64(56) | markers << np.uint64(48) | y << np.uint64(24) | x
+    return packed
+
+
+def _codes(words: Words, output: Output) -> Words:
+    """The codes in converter words, by the coding that the manifest has."""
+    shift = output.word_bits - output.dac_bits if output.align == "left" else 0
+    flip = 1 << (output.dac_bits - 1) if output.coding == "twos-complement" else 0
+    codes: Words = (words >> np.uint64(shift) ^ np.uint64(flip)) & np.uint64(0xFFFFFF)
+    return codes

@@ -1,0 +1,33 @@
+"""The checks as JUnit XML, as continuous integration reads it."""
+
+import re
+from collections.abc import Sequence
+from xml.sax.saxutils import escape, quoteattr
+
+from tablegen.verification.checks import Check
+
+_NOT_XML = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+def junit(name: str, checks: Sequence[Check]) -> str:
+    """One test case a check; the message of a failure is its first line, the text all of it."""
+    failures = sum(check.failure is not None for check in checks)
+    suite = f'name={quoteattr(f"tablegen verify {name}")} tests="{len(checks)}" failures="{failures}" errors="0"'
+    lines = ['<?xml version="1.0" encoding="UTF-8"?>', "<testsuites>", f"  <testsuite {suite}>"]
+    for check in checks:
+        case = f"classname={quoteattr(f'{name}.{check.subject}')} name={quoteattr(_plain(check.against))}"
+        if check.failure is None:
+            lines.append(f"    <testcase {case}/>")
+            continue
+        text = _plain(check.failure)
+        lines += [
+            f"    <testcase {case}>",
+            f"      <failure message={quoteattr(text.splitlines()[0])}>{escape(text)}</failure>",
+            "    </testcase>",
+        ]
+    return "\n".join([*lines, "  </testsuite>", "</testsuites>", ""])
+
+
+def _plain(text: str) -> str:
+    """What XML can hold."""
+    return _NOT_XML.sub("?", text)

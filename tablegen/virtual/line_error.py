@@ -1,0 +1,116 @@
+"""What is wrong with a line, in the paper's own measures: residual, and scaling error.
+
+Residual: displacement less the ideal line, in percent of the line. Scaling error: relative deviation of the local
+slope from that at x = 0.5, in percent, above 0 where the image is stretched, taken of chords of 1/20 of the line that
+lie inside the window.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tablegen.certificate.line_errors import CHORD
+from tablegen.numerics.arrays import Floats
+
+POINTS = 1001  # over the whole line
+
+
+@dataclass(frozen=True, eq=False)
+class BranchError:
+    """One direction of a line; arrays run with the position x, 0 on the left for both directions.
+
+    ``residual`` stands at ``position``, ``scaling`` at ``scaling_position``; both in percent.
+    """
+
+    position: Floats
+    residual: Floats
+    scaling_position: Floats
+    scaling: Floats
+    window: tuple[float, float]
+
+    @property
+    def peak(self) -> tuple[float, float]:
+        """The residual of the largest size inside the window, with its sign, and where it is."""
+        inside = self._inside()
+        i = int(np.argmax(np.abs(self.residual[inside])))
+        return float(self.residual[inside][i]), float(self.position[inside][i])
+
+    @property
+    def residual_range(self) -> tuple[float, float]:
+        """Lowest and highest residual inside the window."""
+        inside = self.residual[self._inside()]
+        return float(np.min(inside)), float(np.max(inside))
+
+    @property
+    def scaling_peak_to_peak(self) -> float:
+        """Of the scaling error inside the window."""
+        return float(np.max(self.scaling) - np.min(self.scaling))
+
+    def _inside(self) -> np.typing.NDArray[np.bool_]:
+        low, high = self.window
+        return (self.position >= low - 1e-9) & (self.position <= high + 1e-9)
+
+
+@dataclass(frozen=True, eq=False)
+class LineError:
+    """Both directions, and the size in nm that the ideal line would have."""
+
+    size_nm: float
+    forward: BranchError
+    backward: BranchError
+
+
+def about_window_line(error: LineError, directions: Sequence[str] = ("forward", "backward")) -> LineError:
+    """The same about the straight line that fits the imaged windows best, one line for all ``directions``.
+
+    Where turnarounds are rounded, the ends of the line are not imaged and need not be where the ends of a straight line
+    would be. What an image shows is the departure from this line, and its slope is the size of the image.
+    """
+    imaged: list[BranchError] = [getattr(error, side) for side in directions]
+    inside = [branch._inside() for branch in imaged]
+    x = np.concatenate([branch.position[part] for branch, part in zip(imaged, inside, strict=True)])
+    y = np.concatenate([branch.residual[part] for branch, part in zip(imaged, inside, strict=True)])
+    slope, offset = np.polyfit(x, y, 1)
+    grown = 1.0 + 0.01 * slope
+
+    def branch(one: BranchError) -> BranchError:
+        return replace(one, residual=(one.residual - offset - slope * one.position) / grown)
+
+    return LineError(error.size_nm * grown, branch(error.forward), branch(error.backward))
+
+
+def ideal_triangle(ticks: int, turn: float) -> Floats:
+    """The ideal position at every tick of a period, equation (14)."""
+    t = np.arange(ticks) / ticks
+    return np.where(t <= turn, t / turn, (1.0 - t) / (1.0 - turn))
+
+
+def line_error(
+    displacement_nm: Floats, turn: float, window: tuple[float, float] = (0.1, 0.9), ideal: Floats | None = None
+) -> LineError:
+    """Compare one period of a settled displacement, shape (ticks,), with the ideal line.
+
+    ``ideal`` is the position that was asked for at every tick, 0..1, rounded where the line turns; by default the
+    triangle. The displacement's extremes are taken for those of ``ideal``: those of a triangle are the line's ends.
+    """
+    ticks = len(displacement_nm)
+    asked = ideal_triangle(ticks, turn) if ideal is None else ideal
+    low, high = float(np.min(displacement_nm)), float(np.max(displacement_nm))
+    size = (high - low) / (float(np.max(asked)) - float(np.min(asked)))
+    if not size > 0.0:
+        raise ValueError("the displacement does not move")
+    reached = (displacement_nm - low) / size + float(np.min(asked))
+    x = np.linspace(0.0, 1.0, POINTS)
+    times = np.arange(ticks) / ticks
+
+    def branch(at: Floats) -> BranchError:
+        y = np.interp(at, times, reached, period=1.0)
+        first, last = (int(np.searchsorted(x, edge + way)) for edge, way in zip(window, (-1e-9, 1e-9), strict=True))
+        baseline = min(round(CHORD * (POINTS - 1)), last - first - 1)
+        slope = (y[first + baseline : last] - y[first : last - baseline]) / (baseline / (POINTS - 1))
+        middle = 0.5 * (x[first + baseline : last] + x[first : last - baseline])
+        scaling = 100.0 * (1.0 - slope / float(np.interp(0.5, middle, slope)))
+        return BranchError(x, 100.0 * (y - x), middle, scaling, window)
+
+    return LineError(size, branch(turn * x), branch(turn + (1.0 - turn) * (1.0 - x)))
