@@ -29,6 +29,7 @@ LAYERS = (
     "calibration",
     "refinement",
     "virtual",
+    "api",
     "cli",
     "__main__",
 )

@@ -30,7 +30,7 @@ from verifying import (
 
 from tablegen.emit.memory import memory_file
 from tablegen.fixedpoint.program import Program
-from tablegen.manifest.read import read_manifest
+from tablegen.manifest.read import read_build
 
 TICKS = 2000
 CHECKS = 15
@@ -139,7 +139,7 @@ def test_what_was_not_played_is_said(short: Build) -> None:
 @pytest.mark.parametrize(("axis", "at", "bit"), [("x", 70, 6), ("x", 250, 15), ("y", 100, 8)])
 def test_a_flipped_bit_of_a_table_is_found_at_its_first_tick(folder: Path, axis: str, at: int, bit: int) -> None:
     """A bit of the word of that tick."""
-    program: Program = getattr(read_manifest(folder).program, axis)
+    program: Program = getattr(read_build(folder).program, axis)
     word = at * len(program.words) // program.ticks
     flip(folder / f"{NAME}_{axis}.mem", word, bit)
     raw = int((folder / f"{NAME}_{axis}.mem").read_text("ascii").split()[word], 16)
@@ -206,7 +206,7 @@ def test_the_header_of_other_builds_is_read_right(variant: str, tmp_path: Path) 
     from tablegen.verification.directory import wrong_constants
 
     built = build(tmp_path, VARIANTS[variant])
-    assert wrong_constants(built.folder, read_manifest(built.folder))[1] == []
+    assert wrong_constants(built.folder, read_build(built.folder))[1] == []
 
 
 def test_an_edited_runtime_is_played_and_found(folder: Path) -> None:

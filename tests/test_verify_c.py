@@ -16,6 +16,7 @@ from building import NAME, VARIANTS, Build, Variant, build
 from editing import Outcome, run
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tablegen.verification.c_files import arrays_file, wrong_arrays, wrong_constants
 from verifying import (
     check_first_difference,
     check_interruption,
@@ -33,10 +34,9 @@ from verifying import (
 
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.program import Program
-from tablegen.manifest.read import StoredBuild, read_manifest
+from tablegen.manifest.read import StoredBuild, read_build
 from tablegen.verification.bench import SequencerShape
 from tablegen.verification.c_bench import CBench, script_words
-from tablegen.verification.c_files import arrays_file, wrong_arrays, wrong_constants
 from tablegen.verification.c_target import CTarget, _codes, _packed, _sources
 from tablegen.verification.placement import Placement
 from tablegen.verification.session import make_session, varied
@@ -148,7 +148,7 @@ class Benches:
 @pytest.fixture(scope="module")
 def benches(short: Build, tmp_path_factory: pytest.TempPathFactory) -> Benches:
     """Those of the short build."""
-    folder, stored = tmp_path_factory.mktemp("benches"), read_manifest(short.folder)
+    folder, stored = tmp_path_factory.mktemp("benches"), read_build(short.folder)
     sources, absent = _sources(short.folder, folder, stored, fourier=False)
     assert not absent
     chosen = CTarget("c")._defines(stored)
@@ -224,7 +224,7 @@ def test_codes_come_back_from_converter_words(bits: tuple[int, int], coding: str
 
 def test_the_variation_differs_from_the_program_and_clamps(short: Build) -> None:
     """Otherwise a mixture of the two, or a missing limit, would go unseen; the park code has to stay inside."""
-    program = read_manifest(short.folder).program
+    program = read_build(short.folder).program
     for own, other in ((program.x, varied(program).x), (program.y, varied(program).y)):
         k = np.arange(own.ticks)
         clamped = other.output.unclamped(other.samples(k)) != other.codes(k)
@@ -244,7 +244,7 @@ def defined(folder: Path) -> list[str]:
 
 def test_every_constant_is_held_against_the_manifest(short: Build, tmp_path: Path) -> None:
     """One by one, with what it is and what it is in the manifest; nothing is compiled."""
-    stored = read_manifest(short.folder)
+    stored = read_build(short.folder)
     count, wrong = wrong_constants(short.folder, stored)
     names = defined(short.folder)
     assert (count, wrong) == (len(names), [])
@@ -260,7 +260,7 @@ def test_every_constant_is_held_against_the_manifest(short: Build, tmp_path: Pat
 def test_headers_and_arrays_of_other_builds_are_read_right(variant: str, tmp_path: Path) -> None:
     """Also where no table is interpolated, where numbers have 64 bits, and where arrays stand in the header."""
     built = build(tmp_path, VARIANTS[variant])
-    stored = read_manifest(built.folder)
+    stored = read_build(built.folder)
     assert wrong_constants(built.folder, stored) == (len(defined(built.folder)), [])
     assert wrong_arrays(built.folder, stored)[1] == []
     assert arrays_file(stored).endswith(".h") == ("header_only" in str(VARIANTS[variant].scan))
@@ -327,7 +327,7 @@ def test_the_hash_in_the_header_is_held_against_the_manifest(folder: Path, short
 
 @pytest.mark.parametrize(("axis", "at", "bit"), [("x", 70, 6), ("x", 250, 14), ("y", 100, 8)])
 def test_a_damaged_table_is_found_at_its_first_tick(folder: Path, axis: str, at: int, bit: int) -> None:
-    program: Program = getattr(read_manifest(folder).program, axis)
+    program: Program = getattr(read_build(folder).program, axis)
     word = at * len(program.words) // program.ticks
     old, new = put_word(folder, f"{axis}_table", word, lambda value: value ^ 1 << bit)
     heard = first_heard(program, word, new)

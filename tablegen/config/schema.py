@@ -158,10 +158,24 @@ class Limits(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     ) = None
 
 
+DEFAULT_FORMATS = ("c", "verilog")
+
+
 class Emit(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What the build writes."""
 
-    header_only: Annotated[bool, Meta(description="tables inside the header instead of a .c file beside it")] = False
+    formats: (
+        Annotated[
+            list[Annotated[str, Meta(min_length=1, max_length=64)]],
+            Meta(
+                min_length=1,
+                max_length=64,
+                description="what to write, by `tablegen formats`; c and verilog if not given",
+            ),
+        ]
+        | None
+    ) = None
+    header_only: Annotated[bool, Meta(description="C: tables inside the header, without a .c file beside it")] = False
 
 
 class Scan(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
