@@ -3,13 +3,13 @@
 import subprocess
 from pathlib import Path
 
-from building import REPOSITORY, VARIANTS, build, run_clean
+from building import BENCHES, REPOSITORY, VARIANTS, build, run_clean
 from link_talk import Talk
 
 from tablegen.link.messages import DeviceInfo, DeviceStatus, Feature, Request
 
 EXAMPLE = REPOSITORY / "examples" / "verilog" / "linked_scanner.v"
-BENCH = REPOSITORY / "hdl_tests" / "linked_scanner_bench.v"
+BENCH = BENCHES / "linked_scanner_bench.v"
 RUN_S = 120
 
 

@@ -12,9 +12,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
+from building import REPOSITORY
 
-FORMAL = Path(__file__).parent / "formal"
-MODULES = Path(__file__).parent.parent / "firmware_templates" / "verilog"
+FORMAL = REPOSITORY / "hdl_tests" / "formal"
+MODULES = REPOSITORY / "firmware_templates" / "verilog"
 PASSED, FAILED = "Status: PASSED", "Status: FAILED"
 
 

@@ -15,16 +15,18 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from building import BENCHES, REPOSITORY
+
 from tablegen.resources import verilog_runtime
 from tablegen.verification.simulate import Compiled, Design, compile_design
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "firmware_templates" / "loader"))
+sys.path.insert(0, str(REPOSITORY / "firmware_templates" / "loader"))
 _before, sys.dont_write_bytecode = sys.dont_write_bytecode, True  # nothing but sources in a folder that ships
 import assembler  # noqa: E402
 
 sys.dont_write_bytecode = _before
 
-BENCH = Path(__file__).parent / "loader_bench.v"
+BENCH = BENCHES / "loader_bench.v"
 LINES = "lines.log"
 START_S, ANSWER_S, END_S = 60.0, 300.0, 20.0
 NO_STOP_BIT, BREAK, PULSE = 1 << 8, 1 << 9, 1 << 10  # of an entry of ``talk``

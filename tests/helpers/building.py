@@ -24,7 +24,9 @@ from tablegen.fixedpoint.output import UNIT_GAIN_BITS
 from tablegen.fixedpoint.rounding import signed_limits
 from tablegen.planning.line_plan import LinePlan, Plan, make_plan
 
-REPOSITORY = Path(__file__).resolve().parents[1]
+REPOSITORY = Path(__file__).resolve().parents[2]
+HELPERS = REPOSITORY / "tests" / "helpers"
+BENCHES = REPOSITORY / "hdl_tests" / "benches"
 EXAMPLE = REPOSITORY / "examples" / "annexin_200nm.toml"
 NAME = "annexin_200nm"
 REMOVED = object()  # as a value: the key is taken out

@@ -1,7 +1,7 @@
 """Faults put into the C sequencer, each of which the tests have to find; run as a program it lists them.
 
 A mutant is tried where it shows: by scripts that are played by fills or by steps, with words of 16 bits or of 32, by
-the checks of the functions, or between two threads. As a program it needs ``PYTHONPATH=hdl_tests``.
+the checks of the functions, or between two threads. As a program it needs ``PYTHONPATH=hdl_tests/helpers``.
 """
 
 import os

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from building import REPOSITORY
 from variants import plan_of, setup_of
 
 from tablegen.compensation.hysteresis import BranchShape, LineShape, beta_at
@@ -239,7 +240,7 @@ def test_a_trace_begins_at_rest_and_creeps() -> None:
 
 
 def test_the_page_has_the_table_of_the_paper() -> None:
-    page = Path(__file__).parents[1] / "docs" / "virtual.md"
+    page = REPOSITORY / "docs" / "virtual.md"
     assert table() in page.read_text(encoding="utf-8")
 
 

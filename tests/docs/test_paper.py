@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from building import REPOSITORY
 from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.image import imread
@@ -17,15 +18,14 @@ from tablegen.compensation.hysteresis import BranchShape
 from tablegen.compensation.size import SizeLaw
 from tablegen.numerics.arrays import Floats
 
-ROOT = Path(__file__).parent.parent
-sys.path.append(str(ROOT / "docs"))
+sys.path.append(str(REPOSITORY / "docs"))
 
-import make_paper  # noqa: E402
-from paper import figure_3, figure_5_growth, figure_5_laws, figure_6, laws, measured, page  # noqa: E402
-from paper.rows import Printed, Row, Source, about, between, exact, exactly, faults, limits  # noqa: E402
+import make_paper
+from paper import figure_3, figure_5_growth, figure_5_laws, figure_6, laws, measured, page
+from paper.rows import Printed, Row, Source, about, between, exact, exactly, faults, limits
 
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
-PAGE = ROOT / "docs" / "paper" / "README.md"
+PAGE = REPOSITORY / "docs" / "paper" / "README.md"
 
 # What text and captions print of a result, by section of the page; read from the paper, not from the rows.
 PRINTED = {

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from building import REPOSITORY
 from editing import SCANNER, Outcome, edited, run, write_pair
 from refining import SCANS, Scan, calibrated, play, rounds, scan_text, scanner, sensed
 
@@ -43,7 +44,7 @@ def folder(tmp_path: Path) -> Path:
 
 def page_rows(scan: Scan) -> list[list[str]]:
     """Residuals and scaling errors of docs/refine.md for a scan before the first and after the third round."""
-    page = (Path(__file__).parents[1] / "docs" / "refine.md").read_text("utf-8")
+    page = (REPOSITORY / "docs" / "refine.md").read_text("utf-8")
     table = page.split(f"| {scan.name} |")[1].split("\n")
     rows = [[cell.strip() for cell in row.split("|")][-7:-3] for row in table[:4]]
     return [rows[0], rows[3]]

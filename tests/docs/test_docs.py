@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from building import REPOSITORY
 from click.testing import CliRunner
 from editing import SCAN, edited, write_pair
-from test_band_limit import SECTION_8, worst
+from scaling import SECTION_8, worst
 
 from tablegen.certificate.certificate import certify
 from tablegen.cli import cli
@@ -18,8 +19,7 @@ from tablegen.planning.line_plan import make_plan
 from tablegen.problems import Rejected
 from tablegen.waveform.band_limit import band_limited
 
-ROOT = Path(__file__).parent.parent
-README = (ROOT / "README.md").read_text(encoding="utf-8")
+README = (REPOSITORY / "README.md").read_text(encoding="utf-8")
 
 
 def block(command: str) -> str:
@@ -30,7 +30,7 @@ def block(command: str) -> str:
 
 
 def test_the_build_prints_what_the_readme_shows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    (tmp_path / "examples").symlink_to(REPOSITORY / "examples")
     monkeypatch.chdir(tmp_path)
     result = CliRunner().invoke(cli, ["build", "examples/annexin_200nm.toml", "-o", "build/demo"])
     assert result.stdout == block("tablegen build examples/annexin_200nm.toml -o build/demo")
@@ -77,7 +77,7 @@ def same(shown: str, measured: float) -> bool:
 
 
 def test_the_band_limit_tables_are_measured() -> None:
-    page = (ROOT / "docs" / "waveform.md").read_text(encoding="utf-8")
+    page = (REPOSITORY / "docs" / "waveform.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| (\d+) \| ([\d.]+) \| ([\d.]+) \| ([\d.]+) \| (\d+) \| (\d+) \|$", page, re.M)
     short = re.findall(r"^\| (\d+) \| ([\d.]+) \| ([\d.]+) \| ([\d.]+) \|$", README, re.M)
     assert [row[0] for row in rows] == ["8", "16", "21", "32", "64"]
@@ -107,15 +107,17 @@ def test_uncompensated_errors_are_measured(tmp_path: Path) -> None:
 
 
 def test_the_configuration_page_is_the_schema() -> None:
-    sys.path.insert(0, str(ROOT / "docs"))
+    sys.path.insert(0, str(REPOSITORY / "docs"))
     try:
         from make_configuration import page
     finally:
         sys.path.pop(0)
-    assert (ROOT / "docs" / "configuration.md").read_text(encoding="utf-8") == page()
+    assert (REPOSITORY / "docs" / "configuration.md").read_text(encoding="utf-8") == page()
 
 
-@pytest.mark.parametrize("page", sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")]), ids=lambda p: p.name)
+@pytest.mark.parametrize(
+    "page", sorted([REPOSITORY / "README.md", *(REPOSITORY / "docs").glob("*.md")]), ids=lambda p: p.name
+)
 def test_links_lead_somewhere(page: Path) -> None:
     for target in re.findall(r"\[[^\]\n]+\]\(([^)#\s]+\.[a-z]+)\)", page.read_text(encoding="utf-8")):
         assert (page.parent / target).exists(), target

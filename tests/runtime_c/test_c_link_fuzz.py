@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 from building import run_clean
-from link_device import HERE
 from link_mutants import MUTANTS, Mutant
 
 from tablegen.resources import c_link, c_runtime
 
-CORPUS = HERE / "fuzz" / "corpus"
+FUZZ = Path(__file__).parent / "fuzz"
+CORPUS = FUZZ / "corpus"
 LONGEST = 120.0  # seconds
 OPTIONS = ("-std=c99", "-O1", "-g", "-fsanitize=fuzzer,address,undefined", "-fno-sanitize-recover=all")
 # What leads to codes or memory that must not be, whatever is answered.
@@ -34,7 +34,7 @@ def replay(folder: Path, mutant: Mutant | None = None) -> subprocess.CompletedPr
         (folder / path.name).write_text(text, "utf-8")
     copies = [folder / path.name for path in sources if path.suffix == ".c"]
     program = folder / "link"
-    run_clean(["clang", *OPTIONS, f"-I{folder}", *copies, HERE / "fuzz" / "link_fuzz.c", "-o", program])
+    run_clean(["clang", *OPTIONS, f"-I{folder}", *copies, FUZZ / "link_fuzz.c", "-o", program])
     command = [str(program), "-runs=0", f"-artifact_prefix={folder}/", str(CORPUS)]
     return subprocess.run(command, capture_output=True, text=True, check=False, timeout=LONGEST, cwd=folder)
 

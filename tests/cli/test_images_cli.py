@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from calibrating import AMPLITUDES, Scanner, grating
 from editing import Outcome, run, write_pair
+from image_writers import ascii_of, gwy, npy, png
 from PIL import Image as Pillow
-from test_images_files import ascii_of, gwy, npy, png
 
 from tablegen.numerics.arrays import Floats
 

@@ -9,7 +9,7 @@ from unittest.mock import patch
 
 from tablegen.cli import _run
 
-EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 SCAN = (EXAMPLES / "annexin_200nm.toml").read_text(encoding="utf-8")
 SCANNER = (EXAMPLES / "scanner.toml").read_text(encoding="utf-8")
 

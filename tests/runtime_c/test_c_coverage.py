@@ -4,9 +4,9 @@ import os
 import subprocess
 import sys
 from dataclasses import dataclass
-from pathlib import Path
 
 import pytest
+from building import HELPERS
 from c_benches import FILL, Benches
 from c_coverage import COVERAGE, Coverage, coverage
 from c_library import compile_both
@@ -15,7 +15,6 @@ from c_scripts import IN_C, LONG, LONG_PERIODS, everything, long_periods, long_p
 from tablegen.resources import c_runtime
 from tablegen.verification.bench import SequencerShape
 
-HERE = Path(__file__).parent
 AXIS = next(path for path in c_runtime() if path.name == "dac_axis.c")
 SEQUENCER = next(path for path in c_runtime() if path.name == "dac_sequencer.c")
 RUN = 16  # ticks with one check
@@ -46,7 +45,7 @@ def measured(tmp_path_factory: pytest.TempPathFactory) -> Measured:
         benches.play(IN_C[name].script(name), IN_C[name].shape, fill=FILL)
     paths = compile_both(folder / "libraries", options=COVERAGE)
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-    for command in ([sys.executable, str(HERE / "c_checks.py"), *map(str, paths)],):
+    for command in ([sys.executable, str(HELPERS / "c_checks.py"), *map(str, paths)],):
         done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stdout + done.stderr
     return Measured(coverage([folder], [path.name for path in c_runtime()]), ticks)

@@ -55,7 +55,7 @@ class Landings:
                 text = text.replace(old, new)
             (folder / path.name).write_text(text, "utf-8")
         bench = folder / "link_landings.c"
-        bench.write_text((REPOSITORY / "tests" / "link_landings.c").read_text("utf-8"), "utf-8")
+        bench.write_text((REPOSITORY / "tests" / "helpers" / "link_landings.c").read_text("utf-8"), "utf-8")
         self.processor = Processor(
             compile_bare(folder / "landings.elf", [*sources, bench, MEMORY], chosen={"DAC_LINK_RING": RING})
         )

@@ -10,14 +10,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
+from building import BENCHES, REPOSITORY
 from spi_monitor import Converter, Wires, quiet, receive, two_channels, updates
 
 from tablegen.fixedpoint.output import Output
 from tablegen.numerics.arrays import Ints
 from tablegen.verification.simulate import Design, compile_design
 
-HERE = Path(__file__).parent
-MODULES = HERE.parent / "firmware_templates" / "verilog"
+MODULES = REPOSITORY / "firmware_templates" / "verilog"
 CODING, SPI, STREAM = (MODULES / f"{name}.v" for name in ("dac_coding", "dac_spi", "dac_axi_stream"))
 STROBE, RESET, END = 1, 2, 8
 PARALLEL, TWO_CHANNELS, TWO_SELECTS, CHAIN = range(4)
@@ -190,7 +190,7 @@ def play(
 ) -> dict[str, Played]:
     """Plays every setup in one simulation. Those with a mutation get a module of their own."""
     folder.mkdir(parents=True, exist_ok=True)
-    sources, instances, stimuli = [CODING, SPI, HERE / "outputs_bench.v"], [], {}
+    sources, instances, stimuli = [CODING, SPI, BENCHES / "outputs_bench.v"], [], {}
     for index, (name, setup) in enumerate(setups.items()):
         stimuli[name] = stimulus(setup, samples, index)
         (folder / f"{name}.hex").write_text(stimuli[name].text(), "ascii")

@@ -2,10 +2,10 @@
 
 import json
 from collections import Counter
-from pathlib import Path
 from typing import Any
 
 import pytest
+from building import HELPERS
 from dialogues import GOLDEN, boot_program, dialogues, hold
 from link_device import HostDevice
 from link_programs import make_scan
@@ -15,7 +15,7 @@ from link_talk import Talk
 from tablegen.link.messages import DeviceInfo, DeviceStatus, Feature, Reason, Request
 from tablegen.verification.bench import SequencerShape
 
-FRAMES: dict[str, Any] = json.loads(Path(__file__).with_name("golden_frames.json").read_text("utf-8"))
+FRAMES: dict[str, Any] = json.loads((HELPERS / "golden_frames.json").read_text("utf-8"))
 SHAPES = {
     "16 bits": SequencerShape(16, 1, 5, 16, 1, 4, 16),
     "12 bits": SequencerShape(12, 1, 4, 10, 1, 3, 14),

@@ -61,7 +61,7 @@ class Landings:
         folder.mkdir(exist_ok=True)
         (folder / "programs.h").write_text(c_programs(programs, rounds))
         source = folder / "landings.c"
-        source.write_text((REPOSITORY / "tests" / "landings.c").read_text("utf-8"), "utf-8")
+        source.write_text((REPOSITORY / "tests" / "helpers" / "landings.c").read_text("utf-8"), "utf-8")
         support = folder / "support.c"  # the processor has no C library
         memory = (REPOSITORY / "tablegen" / "verification" / "stream_bench_memory.c").read_text("utf-8")
         start = memory.index("/* The barriers")

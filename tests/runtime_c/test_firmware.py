@@ -264,7 +264,7 @@ ARDUINOS = {
 
 @pytest.mark.parametrize("board", ARDUINOS)
 def test_the_arduino_sketch_compiles(sketch: Build, board: str, tmp_path: Path) -> None:
-    headers = REPOSITORY / "tests" / "arduino"
+    headers = REPOSITORY / "tests" / "helpers" / "arduino"
     run_clean(
         [*ARDUINOS[board], *WARNINGS, "-O2", f"-I{headers}", "-x", "c++", "-c", sketch.folder / "scan_player.ino",
          "-o", tmp_path / "sketch.o"]
@@ -274,7 +274,7 @@ def test_the_arduino_sketch_compiles(sketch: Build, board: str, tmp_path: Path) 
 def test_avr_plays_the_scan_in_time(sketch: Build, tmp_path: Path) -> None:
     """Every tick is the model's, and takes fewer cycles than there are between two interrupts."""
     ticks, executable = 2600, tmp_path / "avr.elf"
-    source, sources = REPOSITORY / "tests" / "avr_step.c", sorted((sketch.folder / "src").glob("*.c"))
+    source, sources = REPOSITORY / "tests" / "helpers" / "avr_step.c", sorted((sketch.folder / "src").glob("*.c"))
     run_clean(
         ["avr-gcc", "-std=c99", "-mmcu=atmega2560", "-O2", *WARNINGS, f"-DTICKS={ticks}",
          f"-I{sketch.folder / 'src'}", source, *sources, "-o", executable]

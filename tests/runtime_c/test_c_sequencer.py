@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from building import NAME, VARIANTS, build, run_clean
+from building import HELPERS, NAME, VARIANTS, build, run_clean
 from c_benches import COMPILERS, FILL, Benches
 from c_checks import CHECKS
 from c_devices import Check, Libraries
@@ -38,7 +38,6 @@ from stream_scripts import FAULTS, flag, in_any_order, occurrences
 from tablegen.verification.bench import SequencerShape
 from tablegen.verification.stream import FLAGS, Script
 
-HERE = Path(__file__).parent
 HARMONICS = 6
 
 
@@ -169,7 +168,7 @@ def test_functions_with_sanitizers(compiler: str, tmp_path: Path) -> None:
         **os.environ, "LD_PRELOAD": runtime, "ASAN_OPTIONS": "detect_leaks=0", "PYTHONMALLOC": "malloc",
         "PYTHONPATH": os.pathsep.join(sys.path),
     }  # fmt: skip
-    command = [sys.executable, str(HERE / "c_checks.py"), *map(str, paths)]
+    command = [sys.executable, str(HELPERS / "c_checks.py"), *map(str, paths)]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
 
