@@ -12,9 +12,9 @@ from typing import Any
 
 import cocotb
 from cocotb.triggers import Timer
+from limits import PATIENCE_S
 
 MOST = 1024  # bytes of a command
-WAIT_S = 120.0  # for a command; then whoever should send it is gone
 POLL_CLOCKS = 2000
 AT_ONCE = 10  # bytes onto the line between two polls
 
@@ -23,8 +23,8 @@ AT_ONCE = 10  # bytes onto the line between two polls
 async def serve(dut: Any) -> None:
     """Until the other end closes."""
     await Timer(1, "ns")
-    with socket.create_connection(("127.0.0.1", int(os.environ["LOADER_PORT"])), WAIT_S) as control:
-        control.settimeout(WAIT_S)
+    with socket.create_connection(("127.0.0.1", int(os.environ["LOADER_PORT"])), PATIENCE_S) as control:
+        control.settimeout(PATIENCE_S)
         with control.makefile("rw", encoding="ascii") as lines:
             for line in lines:
                 command = json.loads(line)

@@ -16,6 +16,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from building import BENCHES, REPOSITORY
+from limits import PATIENCE_S
 
 from tablegen.resources import verilog_runtime
 from tablegen.verification.simulate import Compiled, Design, compile_design
@@ -28,7 +29,6 @@ sys.dont_write_bytecode = _before
 
 BENCH = BENCHES / "loader_bench.v"
 LINES = "lines.log"
-START_S, ANSWER_S, END_S = 60.0, 300.0, 20.0
 NO_STOP_BIT, BREAK, PULSE = 1 << 8, 1 << 9, 1 << 10  # of an entry of ``talk``
 BOOT_HASH = bytes(range(0xE0, 0x100))
 MOST = 512  # entries of a command
@@ -64,7 +64,7 @@ class Simulation:
         self.folder = self._compiled.folder
         (self.folder / LINES).unlink(missing_ok=True)
         with socket.create_server(("127.0.0.1", 0)) as server:
-            server.settimeout(START_S)
+            server.settimeout(PATIENCE_S)
             settings = {"LOADER_PORT": str(server.getsockname()[1])}
             # A process, since the runner waits for the simulator, with an environment of its own.
             self._process = multiprocessing.get_context("fork").Process(
@@ -72,7 +72,7 @@ class Simulation:
             )
             self._process.start()
             self._control, _ = server.accept()
-        self._control.settimeout(ANSWER_S)
+        self._control.settimeout(PATIENCE_S)
         self._lines = self._control.makefile("rw", encoding="ascii")
         self._ask({"program": list(self._words), "memory": list(self._memory)})
         return self
@@ -82,7 +82,7 @@ class Simulation:
     ) -> None:
         self._lines.close()
         self._control.close()
-        self._process.join(END_S)
+        self._process.join(PATIENCE_S)
         if self._process.is_alive():
             self._process.kill()
 

@@ -18,6 +18,7 @@ import pytest
 from building import REPOSITORY
 from editing import SCAN, SCANNER, edited, run, write_pair
 from jsonschema import Draft202012Validator
+from limits import PATIENCE_S
 
 from tablegen import __version__
 
@@ -56,7 +57,7 @@ def tablegen(
         env={**os.environ, **environment},
         preexec_fn=before,
         check=False,
-        timeout=120,
+        timeout=PATIENCE_S,
     )
 
 
@@ -533,7 +534,7 @@ main()
 def interrupted(event: str, count: int, *arguments: str | Path) -> subprocess.CompletedProcess[str]:
     """The command line, interrupted as an audit event or a call happens for the so-manieth time."""
     command = [sys.executable, "-c", INTERRUPTED, event, str(count), *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
+    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=PATIENCE_S)
 
 
 LONG = edited(SCAN, "timing.lines = 20000", "x.size_nm = 201.0", "- [limits]")
@@ -600,7 +601,7 @@ def test_a_signal_from_outside_interrupts_a_build(scan: Path) -> None:
         pipe.open("wb"),
     ):
         process.send_signal(signal.SIGINT)
-        printed, told = process.communicate(timeout=60)
+        printed, told = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 130
     assert (printed, told.strip()) == ("", "interrupted; the output directory was left as it was")
     assert not out.exists()

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 from c_library import storage
+from limits import PATIENCE_S
 from stream_laws import steps_are_limited
 
 from tablegen.verification.bench import SequencerShape
@@ -39,7 +40,7 @@ class Benches:
         self, script: Script, shape: SequencerShape, compiler: str = "gcc", fill: int = 0, fourier: bool = False
     ) -> CPlayed:
         """Play a script and hold it against the model: every tick, and the counts of faults."""
-        played = self.compiled(shape, compiler, fill).run(words_of(script, shape, fourier), timeout=120.0)
+        played = self.compiled(shape, compiler, fill).run(words_of(script, shape, fourier), timeout=PATIENCE_S)
         expected = np.array(script.expected, dtype=np.uint64)
         if fill:
             expected &= _WITHOUT_FAULTS  # a fill tells them at its end

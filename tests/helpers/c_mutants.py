@@ -19,6 +19,7 @@ from c_scripts import IN_C, LONG, everything, long_periods, long_play
 from c_scripts import LONG_PERIODS as PERIODS
 from c_threads import compile_threads
 from c_threads import play as play_threads
+from limits import ENDED, program_within, within
 from mutants import Verdict
 
 from tablegen.resources import c_runtime
@@ -30,7 +31,7 @@ from tablegen.verification.stream import Script, compare
 HERE = Path(__file__).parent
 OPTIONS = ("-std=c99", "-O1", "-DDAC_WAIT=0")  # as many runs as can be
 CHECKS = {"checks": (), "checks small": ("-DDAC_SMALL=1",), "checks split": ("-DDAC_LONG_MULTIPLY=0",)}
-HANGS = 60.0  # seconds
+PLAY_S, CHECK_S, THREADS_S = 20, 120, 120  # of CPU time: what does not hang takes a second of it, two, and three
 _PROGRAMS = 3000  # between two threads
 
 
@@ -93,10 +94,9 @@ def judge(mutant: Mutant | None, folder: Path, where: str = "") -> Verdict:
 
 def _check(paths: tuple[Path, ...]) -> Verdict:
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-    command = [sys.executable, str(HERE / "c_checks.py"), *map(str, paths)]
-    try:
-        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False, timeout=HANGS)
-    except subprocess.TimeoutExpired:
+    command = within(CHECK_S, [sys.executable, HERE / "c_checks.py", *paths])
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    if done.returncode == ENDED:
         return Verdict(True, "hangs")
     if done.returncode == 1 and done.stdout:
         return Verdict(True, done.stdout.partition(":")[0])
@@ -110,10 +110,11 @@ def _play(where: str, folder: Path, runtime: list[Path]) -> Verdict:
     # A shift by a negative count shows nowhere else.
     options = (*OPTIONS, "-fsanitize=undefined", "-fno-sanitize-recover=all") if where == "split wide" else OPTIONS
     bench = CBench(playing[0][1], folder, "gcc", options, runtime, chosen=chosen)
+    bench.program = program_within(PLAY_S, bench.program)
     for script, shape in playing:
         words = words_of(script, shape)
         try:
-            played = bench.run(words, timeout=HANGS)
+            played = bench.run(words)
         except SimulationFailed as error:
             return Verdict(True, str(error))
         expected = script.expected if not fill else [word & (1 << 56) - 1 for word in script.expected]

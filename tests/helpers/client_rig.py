@@ -15,6 +15,7 @@ from unittest.mock import patch
 
 from client_line import VirtualLine
 from editing import Outcome, run
+from limits import PATIENCE_S
 from link_programs import INFO, SmallScan, make_scan
 
 from tablegen.link.device import Device
@@ -152,7 +153,7 @@ class Served:
 
     def __exit__(self, *_: object) -> None:
         self._stop.set()
-        self._thread.join(30)
+        self._thread.join(PATIENCE_S)
         for descriptor in {self._master, self._slave} - {-1}:
             os.close(descriptor)
         if self._listener is not None:

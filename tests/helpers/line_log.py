@@ -177,7 +177,7 @@ class LineCheck:
                 yield self.taken[self._generation], self._play
             elif played.generation == self._generation + 1:
                 for name, program in self._offered.items():
-                    yield name, self._swapped(self._play.program, program)
+                    yield name, self._swapped(self._play.program, program, self._codes)
         if played.line != 0 or played.generation < self._generation:
             return
         if same:
@@ -190,15 +190,18 @@ class LineCheck:
         for name, program in self._offered.items():
             for codes in self._ramp(program, parked):
                 yield name, self._started(program, codes)
+        for codes in self._ramp(before, self._codes):  # committed after the trigger, before its first tick
+            for name, program in self._offered.items():
+                yield name, self._swapped(before, program, codes)
 
     def _program(self, name: str) -> DualProgram:
         if self._play is not None and self.taken[self._generation] == name:
             return self._play.program
         return self._offered[name]
 
-    def _swapped(self, old: DualProgram, new: DualProgram) -> _Play:
+    def _swapped(self, old: DualProgram, new: DualProgram, codes: tuple[int, int]) -> _Play:
         """Taken at the start of a line."""
-        sequencer = self._running(old, self._codes)
+        sequencer = self._running(old, codes)
         sequencer.commit(new)
         return _Play(self, sequencer, new, after_park=False)
 

@@ -15,11 +15,12 @@ from pathlib import Path
 import link_trials
 from building import run_clean
 from c_library import PROBE
+from limits import ENDED, limit
 from link_device import HERE, LINES
 
 from tablegen.resources import c_link, c_runtime
 
-HANGS = 90.0  # seconds
+TRY_S = 120  # of CPU time; what does not hang takes ten
 _FORK = get_context("fork")  # nothing is imported again
 _OPTIONS = [
     "-std=c99", "-O0", "-fPIC", "-DDAC_TABLE_STORAGE_BITS=16", "-DDAC_OUTPUT_STORAGE_BITS=16", "-DDAC_STRIDE=2",
@@ -86,10 +87,8 @@ class Workshop:
         process = _FORK.Process(target=_try, args=(self.library(mutant), tell))
         process.start()
         tell.close()
-        process.join(HANGS)
-        if process.is_alive():
-            process.kill()
-            process.join()
+        process.join()
+        if process.exitcode == ENDED:
             return "hangs"
         if told.poll():
             try:
@@ -101,6 +100,7 @@ class Workshop:
 
 def _try(library: Path, tell) -> None:  # type: ignore[no-untyped-def]
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    limit(TRY_S)
     faulthandler.disable()  # some mutants crash, and that is all there is to know
     tell.send(link_trials.failure(library))
 

@@ -7,6 +7,7 @@ from collections import Counter
 from random import Random
 from types import TracebackType
 
+from limits import PATIENCE_S
 from link_faults import Chances, Spoiler, split
 
 _BYTE_BITS = 10
@@ -39,7 +40,7 @@ class FaultProxy:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._ended.set()
-        self._thread.join(10.0)
+        self._thread.join(PATIENCE_S)
         self._listening.close()
 
     @property
@@ -65,7 +66,7 @@ class FaultProxy:
         back.start()
         vanished = self._pass_on(client, device, self._out, gone)
         gone.set()
-        back.join(10.0)
+        back.join(PATIENCE_S)
         if vanished:
             client.close()
             self._ended.wait(self._chances.away_s)

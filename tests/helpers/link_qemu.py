@@ -10,9 +10,9 @@ from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
 
+from limits import PATIENCE_S
 from line_log import PlayedLine
 
-_LONGEST_WAIT = 60.0  # s, for what comes within seconds unless something is broken
 _RECORD = 41  # characters; a reset may cut one off, and the next one follows it at once
 _PTY = re.compile(rb"redirected to (/dev/pts/\d+)")
 
@@ -75,7 +75,7 @@ class LinkMachine:
     ) -> None:
         self._process.kill()
         self._process.communicate()
-        self._reader.join(_LONGEST_WAIT)
+        self._reader.join(PATIENCE_S)
         self._log.close()
         self._monitor.close()
 
@@ -85,7 +85,7 @@ class LinkMachine:
 
     def reset_while_receiving(self, data: bytes, status: int, raised: int, when: Callable[[int, int], bool]) -> None:
         """The same in the middle of bytes: when the registers at two addresses are so, as the monitor reads them."""
-        until = time.monotonic() + _LONGEST_WAIT
+        until = time.monotonic() + PATIENCE_S
         with socket.create_connection(("127.0.0.1", self.port)) as link:
             while True:
                 link.sendall(data)
@@ -111,7 +111,7 @@ class LinkMachine:
 
     def wait_for(self, good: Callable[[PlayedLine], bool], followed: Callable[[list[PlayedLine]], None]) -> None:
         """Until a line is good; all lines are followed."""
-        until = time.monotonic() + _LONGEST_WAIT
+        until = time.monotonic() + PATIENCE_S
         while True:
             lines = self.lines()
             followed(lines)

@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 from types import TracebackType
 
-_LONGEST_WAIT = 60.0  # s, for what comes within milliseconds unless something is broken
+from limits import PATIENCE_S
 
 
 class Machine:
@@ -67,7 +67,7 @@ class Machine:
 
     def _line(self, number: int) -> str:
         """The next line of one; the other is received meanwhile, since a full log stops the samples."""
-        until = time.monotonic() + _LONGEST_WAIT
+        until = time.monotonic() + PATIENCE_S
         while b"\n" not in self._received[number]:
             ready, _, _ = select.select(self._sockets, [], [], max(until - time.monotonic(), 0))
             assert ready, "QEMU has nothing to say"

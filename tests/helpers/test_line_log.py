@@ -5,7 +5,7 @@ import zlib
 from dataclasses import replace
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from line_log import LineCheck, PlayedLine, WrongLine
 from link_programs import make_scan
@@ -78,6 +78,7 @@ def _check() -> LineCheck:
 
 
 @given(_STEPS)
+@example([("trigger", 0), ("commit", 1)])
 @settings(max_examples=60)
 def test_what_the_model_plays_is_right(steps: list[Step]) -> None:
     lines = _played(steps)

@@ -6,6 +6,7 @@ import time
 from random import Random
 
 import pytest
+from limits import PATIENCE_S
 from link_faults import KINDS, Chances, Spoiler, split
 from link_line import Line
 from link_proxy import FaultProxy
@@ -142,7 +143,7 @@ def _serve_echo(listening: socket.socket) -> None:
 
 
 def _received(client: socket.socket, count: int) -> bytes:
-    client.settimeout(20.0)
+    client.settimeout(PATIENCE_S)
     data = b""
     while len(data) < count and (part := client.recv(4096)):
         data += part
@@ -162,7 +163,7 @@ def test_the_proxy_passes_on_and_lets_clients_come_again() -> None:
                     client.sendall(sent[33:])
                     assert _received(client, len(sent)) == sent
             assert proxy.connections == 2
-        device.join(10.0)
+        device.join(PATIENCE_S)
         assert not device.is_alive()
 
 
@@ -174,7 +175,7 @@ def test_the_proxy_vanishes() -> None:
             with socket.create_connection(("127.0.0.1", port)) as client:
                 client.sendall(b"\1\0")
                 assert _received(client, 2) == b""
-            until = time.monotonic() + 20.0
+            until = time.monotonic() + PATIENCE_S
             with socket.create_connection(("127.0.0.1", port)):
                 while proxy.connections < 2:
                     assert time.monotonic() < until

@@ -16,6 +16,7 @@ from xml.etree import ElementTree
 import numpy as np
 from building import NAME, Variant, build
 from editing import Outcome
+from limits import PATIENCE_S
 
 from tablegen.fixedpoint.program import Program
 
@@ -134,7 +135,7 @@ def _command(
 ) -> subprocess.CompletedProcess[str]:
     line = [sys.executable, *start, "verify", *map(str, arguments)]
     return subprocess.run(
-        line, env={**os.environ, **environment}, capture_output=True, text=True, check=False, timeout=120
+        line, env={**os.environ, **environment}, capture_output=True, text=True, check=False, timeout=PATIENCE_S
     )
 
 
@@ -192,7 +193,7 @@ def check_interruption(
                 time.sleep(0.01)
             process.send_signal(number)
         try:
-            printed, told = process.communicate(timeout=60)
+            printed, told = process.communicate(timeout=PATIENCE_S)
         except subprocess.TimeoutExpired:
             process.terminate()  # otherwise one would wait for ever
             raise

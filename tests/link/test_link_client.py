@@ -368,14 +368,14 @@ def test_frames_that_cannot_be() -> None:
                 device.arm(frames)
 
 
-def test_it_waits_by_the_clock_of_the_line_only() -> None:
+def test_it_waits_by_the_clock_of_the_line_only(monkeypatch: pytest.MonkeyPatch) -> None:
     """Minutes of a dead line take no time here."""
-    start = time.monotonic()
+    for name in ("sleep", "monotonic"):
+        monkeypatch.delattr(time, name)
     line = VirtualLine(model(), baud=300, tick_hz=0)
     with client(line, timeout_s=180.0) as device, pytest.raises(LinkError):
         device.upload(TABLE, timeout_s=180.0)
     assert line.now() > 180.0
-    assert time.monotonic() - start < 120.0
 
 
 def test_sessions_are_chosen_by_chance() -> None:

@@ -13,6 +13,7 @@ import pytest
 import serial
 from building import Variant, build
 from client_rig import BOOT, Served, info_for, model
+from limits import PATIENCE_S
 from link_programs import make_scan
 from serial.rfc2217 import PortManager
 
@@ -22,8 +23,8 @@ from tablegen.link.messages import DeviceState
 from tablegen.link.prepare import PreparedScan
 from tablegen.link.transport import open_port
 
-WAIT_S = 120
 RATE_HZ = 500_000
+PATIENT = ("--timeout", str(PATIENCE_S))
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +45,7 @@ def tablegen(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
         capture_output=True,
         text=True,
         check=False,
-        timeout=WAIT_S,
+        timeout=PATIENCE_S,
     )
 
 
@@ -52,11 +53,11 @@ def tablegen(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
 def test_the_command_line_on_a_real_port(kind: str, folder: Path, scan: PreparedScan) -> None:
     with Served(model(info_for(scan)), kind, RATE_HZ) as served:
         port = ("--port", served.url)
-        done = tablegen("upload", folder, "--as", "table", *port)
+        done = tablegen("upload", folder, "--as", "table", *port, *PATIENT)
         assert (done.returncode, done.stderr) == (0, "")
         assert done.stdout.startswith(f"annexin_200nm {scan.digest[:12]} in force, generation 2")
         assert served.device.status().hash.hex() == scan.digest
-        done = tablegen("readback", folder, *port)
+        done = tablegen("readback", folder, *port, *PATIENT)
         assert (done.returncode, done.stderr) == (0, "")
         assert done.stdout.endswith("all the same\n")
         done = tablegen("trigger", *port)
@@ -66,7 +67,7 @@ def test_the_command_line_on_a_real_port(kind: str, folder: Path, scan: Prepared
 
 def test_a_connection_that_breaks_is_made_again_and_the_upload_goes_on(folder: Path, scan: PreparedScan) -> None:
     with Served(model(info_for(scan)), "tcp", RATE_HZ, dies_after=4000) as served:
-        done = tablegen("upload", folder, "--as", "table", "--port", served.url)
+        done = tablegen("upload", folder, "--as", "table", "--port", served.url, *PATIENT)
         assert (done.returncode, done.stderr) == (0, "")
         assert served.calls == 2
         assert served.device.status().hash.hex() == scan.digest
@@ -92,9 +93,9 @@ def test_an_interruption_leaves_what_was_received_for_the_next_time(folder: Path
 
     device.receive = slow  # type: ignore[method-assign]
     with Served(device, "tcp", RATE_HZ) as served:
-        command = [sys.executable, "-m", "tablegen", "upload", str(folder), "--as", "table", "--port", served.url]
+        command = [sys.executable, "-m", "tablegen", "upload", str(folder), "--as", "table"]
         started = subprocess.Popen(
-            command,
+            [*command, "--port", served.url, *PATIENT],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
@@ -102,19 +103,19 @@ def test_an_interruption_leaves_what_was_received_for_the_next_time(folder: Path
             preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
         )
         try:
-            end = time.monotonic() + WAIT_S
+            end = time.monotonic() + PATIENCE_S
             while device.status().received < 480 and time.monotonic() < end:
                 time.sleep(0.005)
             started.send_signal(signal.SIGINT)
-            out, err = started.communicate(timeout=WAIT_S)
+            out, err = started.communicate(timeout=PATIENCE_S)
         finally:
             started.kill()
-            started.wait(WAIT_S)
+            started.wait(PATIENCE_S)
         assert (started.returncode, out) == (130, "")
         assert err.startswith("interrupted; the device plays its old scan and keeps ")
         assert err.count("\n") == 1
         device.receive = receive  # type: ignore[method-assign]
-        done = tablegen("upload", folder, "--as", "table", "--port", served.url)
+        done = tablegen("upload", folder, "--as", "table", "--port", served.url, *PATIENT)
         assert done.returncode == 0
         assert ", of which the device had " in done.stdout
 
@@ -130,10 +131,10 @@ def test_two_programs_do_not_share_a_port() -> None:
 def test_the_class_on_a_real_port(kind: str) -> None:
     new = make_scan(2)
     with Served(model(), kind) as served, Device(served.url) as device:
-        assert device.upload(new.image(False)).generation == 2
-        assert device.readback() == new.image(False).data
+        assert device.upload(new.image(False), timeout_s=PATIENCE_S).generation == 2
+        assert device.readback(timeout_s=PATIENCE_S) == new.image(False).data
         device.park()
-        device.wait_for(DeviceState.PARKED, 30.0)
+        device.wait_for(DeviceState.PARKED, PATIENCE_S)
 
 
 def test_reading_waits_no_longer_than_it_may_and_takes_all_that_has_come() -> None:
@@ -143,7 +144,7 @@ def test_reading_waits_no_longer_than_it_may_and_takes_all_that_has_come() -> No
         start = port.now()
         assert port.read(0.0) == b""
         assert port.read(0.05) == b""
-        assert 0.05 <= port.now() - start < WAIT_S
+        assert 0.05 <= port.now() - start < PATIENCE_S
         os.write(master, b"\0abc\0")
         found = b""
         while len(found) < 5:
@@ -200,13 +201,13 @@ class Rfc2217Server:
     def __init__(self, port: serial.Serial) -> None:
         self.port = port
         self._listener = socket.create_server(("127.0.0.1", 0))
-        self._listener.settimeout(WAIT_S)
+        self._listener.settimeout(PATIENCE_S)
         self.url = f"rfc2217://127.0.0.1:{self._listener.getsockname()[1]}"
         self._thread = threading.Thread(target=self._serve, daemon=True)
         self._thread.start()
 
     def close(self) -> None:
-        self._thread.join(WAIT_S)
+        self._thread.join(PATIENCE_S)
         self._listener.close()
 
     def write(self, data: bytes) -> None:
@@ -238,8 +239,8 @@ def test_a_port_of_another_machine_by_rfc2217() -> None:
     with Served(model(), "pty") as served, PtyPort(served.url, timeout=0.01) as port:
         server = Rfc2217Server(port)
         with Device(server.url, baud=460800) as device:
-            assert device.upload(new.image(False)).generation == 2
-            assert device.readback() == new.image(False).data
+            assert device.upload(new.image(False), timeout_s=PATIENCE_S).generation == 2
+            assert device.readback(timeout_s=PATIENCE_S) == new.image(False).data
             assert port.baudrate == 460800, "the rate is that of the far end"
         server.close()
 

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from building import REMOVED, REPOSITORY, VARIANTS, Variant, run_clean, write_variant
 from emulation import CmsdkBoard, Firmware, Pl011Board
+from limits import PATIENCE_S
 from line_log import LineCheck, PlayedLine
 from link_faults import MIXED, Chances
 from link_line import Line
@@ -36,8 +37,8 @@ SCAN = {
     "y.table.length": 128,
 }
 SIZES_NM = (40.0, 30.0)  # of the scans that are uploaded into one of 50 nm
-_LONGEST_S = 100.0  # of a command; it is over in a second or two
 _INSTRUCTIONS = 700  # between two samples, beside interrupts
+_PATIENT = ("--timeout", str(PATIENCE_S))
 Board = type[Pl011Board | CmsdkBoard]
 
 
@@ -91,7 +92,7 @@ def _tablegen(*arguments: str | Path) -> tuple[int, str]:
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
-        timeout=_LONGEST_S,
+        timeout=PATIENCE_S,
     )
     return done.returncode, done.stdout
 
@@ -124,10 +125,10 @@ def test_the_command_line_and_firmware_in_qemu(build_for: Callable[[Board], Buil
         assert built.boot.digest[:8] in _works("status", *port)
         _works("trigger", *port)
         for form, file, scan in zip(("table", "fourier"), built.files, built.scans, strict=True):
-            assert "in force" in _works("upload", file, *port, "--as", form)
+            assert "in force" in _works("upload", file, *port, "--as", form, *_PATIENT)
             _play(machine, check, scan.digest)
-        _works("readback", built.files[1], *port)
-        _works("park", *port, "--wait")
+        _works("readback", built.files[1], *port, *_PATIENT)
+        _works("park", *port, "--wait", *_PATIENT)
         check.follow(machine.lines())
     assert sorted(check.taken.values()) == sorted([LineCheck.BOOT, *(scan.digest for scan in built.scans)])
 
@@ -152,7 +153,7 @@ def test_the_command_line_and_qemu_with_faults_in_between(build_for: Callable[[B
             assert proxy.done.total()
         port = ("--port", machine.url)
         _works("trigger", *port)
-        _works("upload", built.files[0], *port, "--force")
+        _works("upload", built.files[0], *port, "--force", *_PATIENT)
         _play(machine, check, built.scans[0].digest)
 
 
@@ -162,7 +163,7 @@ def test_a_reset_of_qemu_in_mid_upload(build_for: Callable[[Board], Built]) -> N
     built = build_for(board)
     check = built.check()
     image = built.scans[0].image("table")
-    with LinkMachine(board.machine, built.executable) as machine, Device(machine.url, timeout_s=20.0) as client:
+    with LinkMachine(board.machine, built.executable) as machine, Device(machine.url, timeout_s=PATIENCE_S) as client:
         boot = client.hello.boot
         client.arm()
         client.trigger()
@@ -174,9 +175,9 @@ def test_a_reset_of_qemu_in_mid_upload(build_for: Callable[[Board], Built]) -> N
                 machine.reset()
 
         with suppress(NotPlaying):  # the reset may come when all was in force
-            client.upload(image, progress, timeout_s=60.0)
+            client.upload(image, progress, timeout_s=PATIENCE_S)
         assert resets
-        assert client.upload(image, timeout_s=60.0).generation == 2
+        assert client.upload(image, timeout_s=PATIENCE_S).generation == 2
         check.follow(machine.lines())  # nothing plays after a reset
         check.reboot()
         assert client.status().boot == boot + 1
@@ -193,13 +194,13 @@ def test_what_was_received_before_a_reset_does_not_deafen_it(build_for: Callable
     board = Pl011Board
     built = build_for(board)
     with LinkMachine(board.machine, built.executable) as machine:
-        with Device(machine.url, timeout_s=20.0) as client:
+        with Device(machine.url, timeout_s=PATIENCE_S) as client:
             boot = client.hello.boot
         # UARTFR without RXFE, and neither receive interrupt in UARTRIS.
         machine.reset_while_receiving(
             bytes(range(1, 256)), 0x4000C018, 0x4000C03C, lambda flags, raised: not flags & 0x10 and not raised & 0x50
         )
-        with Device(machine.url, timeout_s=20.0) as client:
+        with Device(machine.url, timeout_s=PATIENCE_S) as client:
             assert client.status().boot == boot + 1
 
 
