@@ -111,7 +111,7 @@ def _npy(content: bytes, _: str) -> list[_Channel]:
 
 
 def _png(content: bytes, _: str) -> list[_Channel]:
-    from PIL import ScanImage as Pillow
+    from PIL import Image as Pillow
 
     try:
         with warnings.catch_warnings():
