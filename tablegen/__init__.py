@@ -6,4 +6,4 @@ The data flow is one way::
                                                                                     |-> sequencer, certificate
 """
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"

@@ -4,6 +4,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Literal
 
+from tablegen.installation import records
+
 
 def resource_folder(name: Literal["examples", "firmware_templates"]) -> Path:
     """Where the example files, or the templates and the runtime, are installed."""
@@ -37,4 +39,4 @@ def deciding_files() -> list[Path]:
     modules = {path for path in package.rglob("*.py") if not others.intersection((path, *path.parents))}
     templates = resource_folder("firmware_templates")
     emitted = {path for language in ("c", "verilog") for path in (templates / language).iterdir() if path.is_file()}
-    return sorted({*modules, *emitted, *package.parent.glob("tablegen-*.dist-info/RECORD")})
+    return sorted({*modules, *emitted, *records(package.parent)})
