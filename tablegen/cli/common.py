@@ -11,6 +11,7 @@ import click
 
 from tablegen.cli.exit_status import ExitStatus
 from tablegen.cli.progress import Progress
+from tablegen.installation import install_advice
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -42,10 +43,7 @@ def require(*modules: str, extra: str, otherwise: str = "") -> None:
     missing = [module for module in modules if not _installed(module)]
     if missing:
         needs = " and ".join(missing)
-        fail(
-            [f"{needs} is missing; install it with: pip install 'tablegen[{extra}]'{otherwise}"],
-            ExitStatus.TOOL_MISSING,
-        )
+        fail([f"{needs} is missing; install it with: {install_advice(extra)}{otherwise}"], ExitStatus.TOOL_MISSING)
 
 
 def _installed(module: str) -> bool:

