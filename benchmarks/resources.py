@@ -1,8 +1,9 @@
 """What the Verilog modules take: cells, memories, multipliers and clock rates, as a table for docs/resources.md.
 
 ``python benchmarks/resources.py`` prints the table, ``--write`` puts it into the page. It needs yosys and
-nextpnr-ice40; other versions of them give other numbers. iCE40 (HX8K) is placed and routed once for each of ``SEEDS``, and
-the table has the slowest result. It is not a lower bound: another seed may be slower. The others are synthesised only.
+nextpnr-ice40; other versions of them give other numbers. iCE40 (HX8K) is placed and routed once for each of ``SEEDS``,
+and the table has the slowest result. It is not a lower bound: another seed may be slower. The others are synthesised
+only.
 """
 
 import json
