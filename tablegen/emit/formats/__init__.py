@@ -41,7 +41,7 @@ def get(name: str) -> Format:
         except Exception as error:
             raise UnknownFormat(f"{name!r} of {_package(entry)} cannot be loaded: {error}") from error
     else:
-        raise UnknownFormat(f"{name!r} is no format; there are {', '.join(names())}")
+        raise UnknownFormat(f"{name!r} is not a format; formats are {', '.join(names())}")
     if not isinstance(found, Format) or found.name != name:
         raise UnknownFormat(f"{name!r} of {_package(_others()[name])} is no tablegen.emit.format.Format of that name")
     return found
