@@ -123,7 +123,7 @@ def _context(content: Content) -> dict[str, Any]:
         "phase_bits": PHASE_BITS,
         "least_gain": signed_limits(GAIN_BITS)[0],
         "greatest_gain": signed_limits(GAIN_BITS)[1],
-        "word_type": "int16_t" if bits <= 16 else "int32_t",  # of both tables: the runtime is compiled for one
+        "word_type": "int16_t" if bits <= 16 else "int32_t",  # the type of both tables: the runtime is compiled for one
         "sine": {"constants": _sine_constants(content), "rows": rows(sine_periods(index_bits))} if index_bits else None,
         "axes": [_axis(content, axis) for axis in content.axes],
     }
@@ -144,7 +144,7 @@ def _axis(content: Content, axis: AxisContent) -> dict[str, Any]:
 
 
 def _sine_constants(content: Content) -> dict[str, int]:
-    """Of the sine from which tables are rendered; none where no table is."""
+    """Constants of the sine from which tables are computed; none where no table is."""
     bits = content.sine_index_bits
     return {"SINE_INDEX_BITS": bits, "SINE_LENGTH": len(sine_periods(bits))} if bits else {}
 
