@@ -243,9 +243,9 @@ class StoredBuild:
         return sorted(name for name in self.manifest.files if name.startswith("dac_") and name.endswith(suffixes))
 
 
-def read_build(folder: Path) -> StoredBuild:
-    """The build in a directory."""
-    path = folder / MANIFEST
+def read_build(folder: str | Path) -> StoredBuild:
+    """The build in a directory. Raises ``NotABuild`` for a manifest that is missing, damaged or cannot be played."""
+    path = Path(folder) / MANIFEST
     try:
         content = path.read_bytes()
     except OSError as error:

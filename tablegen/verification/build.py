@@ -44,14 +44,18 @@ class Target(Protocol):
         """Play the build in ``folder``, in the directory ``work``, and check what comes."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Report:
-    """What came of a verification."""
+    """What came of a verification: ``failures`` are empty if all is well."""
 
     name: str
     checks: list[Check]
     difference: str | None
     notes: list[str]
+
+    def __repr__(self) -> str:
+        failed = len(self.failures)
+        return f"<tablegen report {self.name!r}: {len(self.checks)} checks, {failed or 'none'} failed>"
 
     @property
     def failures(self) -> list[str]:
