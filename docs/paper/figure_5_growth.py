@@ -57,7 +57,7 @@ def rows() -> list[Row]:
             about("10", "%"),
             max(growth(1.0, FORWARD_GROWTH), growth(1.0, BACKWARD_GROWTH)),
             law,
-            "the sentence means the forward scan, which ends at 3.7 %; 5k and section 8 end at 8.0 % and 8.5 % backward",
+            "the sentence means the forward scan, which ends at 3.7 %; 5k and section 8 reach 8.0 % and 8.5 % backward",
         ),
         *_turn_rows(),
         *_z_rows(),
