@@ -65,7 +65,7 @@ def rows() -> list[Row]:
 
 
 def _increase(turn: float) -> float:
-    """How much more forward residual a sawtooth of 100 V has than a triangle, in percent of it."""
+    """The increase of the forward residual from a triangle to a sawtooth, at 100 V, in percent."""
     return 100.0 * (triangle(100.0, turn).forward.peak[0] / triangle(100.0).forward.peak[0] - 1.0)
 
 

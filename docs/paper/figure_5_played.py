@@ -50,7 +50,7 @@ def _optimised_for_the_law() -> tuple[float, float]:
 
 
 def rows() -> list[Row]:
-    """By section and figure."""
+    """All rows, by section and figure."""
     return [*_triangle_rows(), *_scaling_rows(), *_sinusoidal_rows(), *_harmonic_rows()]
 
 
