@@ -1,4 +1,4 @@
-"""Results of the virtual scanner, computed once: emitted integers at full scale, triangles of many sizes, calibrations."""
+"""Results of the virtual scanner, computed once: emitted integers at full scale, triangles, calibrations."""
 
 from dataclasses import dataclass, replace
 from functools import cache
