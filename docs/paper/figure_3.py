@@ -15,9 +15,9 @@ from tablegen.numerics.arrays import Floats
 from tablegen.virtual.experiments import triangle_size
 
 TITLE = "Figure 3: scan size"
-TEXT = """The laws are (6) and (10) with beta = 0.53 and a threshold of 0.5, calibrated at 200 nm = 13 V as in section
-5. Only the 436 and 467 nm need a calibration at 200 nm = 20 V. The virtual scanner was identified on these laws. It is
-calibrated by `tablegen calibrate size` on its own sizes, without noise."""
+TEXT = """The laws are (6) and (10) with beta = 0.53 and a threshold of 0.5, calibrated at 200 nm = 13 V, the value of
+section 5. Only the 436 and 467 nm need a calibration at 200 nm = 20 V. The virtual scanner was identified on these
+laws. It is calibrated by `tablegen calibrate size` on its own sizes, without noise."""
 
 SIZES_V = np.array([3.0, 5, 7, 10, 13, 20, 30, 39, 50, 60, 70, 80, 90, 100])
 SMALLEST_NM, LARGEST_NM = 1.0, 200.0 / laws.BASE_V  # nominal; the latter takes all of v_max
