@@ -61,7 +61,7 @@ link: $(VENV)/installed-test
 
 # What is found goes into build/fuzz; what reaches something new may go into the corpus: build/fuzz/link -merge=1.
 FUZZ_RUNS ?= 1000000
-FUZZED := $(wildcard firmware_templates/c/dac_*.[ch]) tests/fuzz/link_fuzz.c
+FUZZED := $(wildcard firmware_templates/c/dac_*.[ch]) tests/runtime_c/fuzz/link_fuzz.c
 build/fuzz/link: $(FUZZED)
 	@.ci/system-packages clang libclang-rt-dev
 	@mkdir -p $(@D)/found
@@ -70,7 +70,7 @@ build/fuzz/link: $(FUZZED)
 
 fuzz: build/fuzz/link
 	build/fuzz/link -runs=$(FUZZ_RUNS) -seed=1 -max_len=400 -timeout=10 -artifact_prefix=build/fuzz/ \
-	    build/fuzz/found tests/fuzz/corpus
+	    build/fuzz/found tests/runtime_c/fuzz/corpus
 
 bench: $(VENV)/installed
 	$(BIN)/python benchmarks/build_cost.py

@@ -13,7 +13,7 @@ import numpy as np
 
 ROOT = Path(__file__).parent.parent
 PAGE = ROOT / "docs" / "calibration.md"
-sys.path.insert(0, str(ROOT / "tests"))
+sys.path.insert(0, str(ROOT / "tests" / "helpers"))
 
 from calibrating import CASES, trials  # noqa: E402
 

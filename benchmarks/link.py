@@ -15,7 +15,7 @@ from pathlib import Path
 from random import Random
 
 HERE = Path(__file__).parent
-sys.path.insert(0, str(HERE.parent / "tests"))  # the line and the device are those of the tests
+sys.path.insert(0, str(HERE.parent / "tests" / "helpers"))  # the line and the device are those of the tests
 
 from link_line import Line  # noqa: E402
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from building import BENCHES
 from spi_bench import (
     AD5541A,
     END,
-    HERE,
     RESET,
     STREAM,
     STROBE,
@@ -55,7 +55,7 @@ def stream(folder: Path, word_bits: int, pauses: float, gaps: Sequence[int], mod
         lines.append(f"{do << 60 | generator.choice(gaps) << 53 | markers << 48 | x << 24 | y:016x}\n")
         samples.append((y << lane | x, markers))
     lines.append(f"{END << 60 | 100 << 53:016x}\n")
-    design = Design([HERE / "outputs_axi_bench.v", module], "outputs_axi_bench", {"WORD_BITS": word_bits})
+    design = Design([BENCHES / "outputs_axi_bench.v", module], "outputs_axi_bench", {"WORD_BITS": word_bits})
     compiled = compile_design("icarus", design, folder)
     (folder / "stimulus.hex").write_text("".join(lines), "ascii")
     assert compiled.run("cocotb_outputs_axi", {"PAUSES": str(pauses)}) == (1, 0)

@@ -13,7 +13,7 @@ from pathlib import Path
 import mutants
 import numpy as np
 import pytest
-from building import REPOSITORY
+from building import BENCHES, REPOSITORY
 from programs import random_dual, random_fourier
 
 from tablegen.device.registers import program_words
@@ -22,7 +22,7 @@ from tablegen.resources import verilog_runtime
 from tablegen.verification.bench import SequencerShape
 from tablegen.verification.simulate import Design, compile_design
 
-BENCH = Path(__file__).parent / "boot_bench.v"
+BENCH = BENCHES / "boot_bench.v"
 BOOT = next(path for path in verilog_runtime() if path.name == "dac_boot.v")
 X_TABLE, X_FOURIER = 1, 3  # regions; those of y are one more
 AT_BOTH_ENDS = 2  # clocks on which a boot that is not held up writes nothing: it reads the first word, it has ended

@@ -4,7 +4,8 @@ import random
 from pathlib import Path
 
 import pytest
-from spi_bench import AD5541A, CODING, HERE, Mutant, Spi
+from building import BENCHES
+from spi_bench import AD5541A, CODING, Mutant, Spi
 
 from tablegen.verification.simulate import Design, compile_design
 
@@ -47,7 +48,7 @@ def coded(folder: Path, module: Path) -> list[tuple[Spi, list[int]]]:
         "ascii",
     )
     compiled = compile_design(
-        "icarus", Design([top, HERE / "outputs_coding_bench.v", module], "outputs_top"), folder / "build"
+        "icarus", Design([top, BENCHES / "outputs_coding_bench.v", module], "outputs_top"), folder / "build"
     )
     for bits in {setup.bits for setup in codings()}:
         (compiled.folder / f"{bits}.hex").write_text("".join(f"{code:x}\n" for code in codes_of(bits)), "ascii")

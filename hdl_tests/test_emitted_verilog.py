@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from building import (
+    BENCHES,
     NAME,
     REPOSITORY,
     VARIANTS,
@@ -25,7 +26,6 @@ from tablegen.device.sequencer import play_line
 from tablegen.numerics.arrays import Ints
 
 PLAYER = REPOSITORY / "examples" / "verilog" / "play.v"
-BENCHES = REPOSITORY / "hdl_tests"
 LINES = 2  # of configurations whose frame is too long to be played whole
 
 

@@ -3,14 +3,14 @@
 import subprocess
 from pathlib import Path
 
-from building import REPOSITORY, VARIANTS, build, run_clean
+from building import BENCHES, REPOSITORY, VARIANTS, build, run_clean
+from limits import PATIENCE_S
 from link_talk import Talk
 
 from tablegen.link.messages import DeviceInfo, DeviceStatus, Feature, Request
 
 EXAMPLE = REPOSITORY / "examples" / "verilog" / "linked_scanner.v"
-BENCH = REPOSITORY / "hdl_tests" / "linked_scanner_bench.v"
-RUN_S = 120
+BENCH = BENCHES / "linked_scanner_bench.v"
 
 
 def test_it_says_what_it_is(tmp_path: Path) -> None:
@@ -28,7 +28,7 @@ def test_it_says_what_it_is(tmp_path: Path) -> None:
         cwd=built.folder,
         capture_output=True,
         text=True,
-        timeout=RUN_S,
+        timeout=PATIENCE_S,
         check=True,
     )
     wire = bytes.fromhex("".join(line for line in done.stdout.split() if len(line) == 2))

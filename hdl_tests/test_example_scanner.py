@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from building import REPOSITORY, VARIANTS, build, run_clean
+from building import BENCHES, REPOSITORY, VARIANTS, build, run_clean
 from spi_monitor import Converter, ProtocolFault, Wires, quiet, receive
 
 from tablegen.device.sequencer import DualProgram, Sequencer
@@ -15,7 +15,7 @@ from tablegen.resources import verilog_runtime
 from tablegen.verification.simulate import Design, compile_design
 
 SCANNER = REPOSITORY / "examples" / "verilog" / "scanner.v"
-BENCH = REPOSITORY / "hdl_tests" / "scanner_bench.v"
+BENCH = BENCHES / "scanner_bench.v"
 CLOCKS_PER_TICK = 100
 TICKS = 1300  # more than a line
 AD5541A = Converter(frame_bits=16, cpol=0, cpha=0)

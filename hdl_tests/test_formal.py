@@ -12,9 +12,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
+from building import REPOSITORY
+from limits import PATIENCE_S
 
-FORMAL = Path(__file__).parent / "formal"
-MODULES = Path(__file__).parent.parent / "firmware_templates" / "verilog"
+FORMAL = REPOSITORY / "hdl_tests" / "formal"
+MODULES = REPOSITORY / "firmware_templates" / "verilog"
 PASSED, FAILED = "Status: PASSED", "Status: FAILED"
 
 
@@ -72,7 +74,7 @@ def _translate(proof: Proof, folder: Path, modules: Mapping[str, str] | None = N
 
 def _solve(smt2: Path, *options: str | int) -> str:
     command = ["yosys-smtbmc", "--noprogress", "-s", "z3", *map(str, options), str(smt2)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=300).stdout
+    return subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S).stdout
 
 
 QUICK = [
@@ -103,7 +105,7 @@ def _proven_by_sat(proof: Proof, folder: Path, modules: Mapping[str, str] | None
     script = folder / "prove.ys"
     induction = "memory_map; opt -full; sat -tempinduct -prove-asserts -set-assumes -verify -maxsteps 4\n"
     script.write_text(_read(proof, modules or {}, folder) + induction, "utf-8")
-    done = subprocess.run(["yosys", "-s", script], capture_output=True, text=True, timeout=300)
+    done = subprocess.run(["yosys", "-s", script], capture_output=True, text=True, timeout=PATIENCE_S)
     proven = "Induction step proven: SUCCESS!" in done.stdout
     assert proven or "proof did fail" in done.stderr, done.stderr  # and not something else
     assert proven == (done.returncode == 0)

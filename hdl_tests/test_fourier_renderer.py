@@ -15,6 +15,7 @@ from pathlib import Path
 import mpmath as mp
 import numpy as np
 import pytest
+from building import BENCHES, REPOSITORY
 from variants import plan_of
 
 from tablegen.fixedpoint.rounding import signed_limits
@@ -22,8 +23,7 @@ from tablegen.fixedpoint.synthesis import FourierWords, sine_quarter, sine_table
 from tablegen.numerics.arrays import Ints
 from tablegen.verification.simulate import Design, compile_design
 
-HERE = Path(__file__).parent
-MODULES = HERE.parent / "firmware_templates" / "verilog"
+MODULES = REPOSITORY / "firmware_templates" / "verilog"
 RENDERER = [MODULES / f"dac_fourier{part}.v" for part in ("", "_product", "_sum")]
 START_AGAIN, RESET, WRITE_AGAIN, AND_ONCE_MORE = 1, 2, 4, 8  # flags of the bench
 HIGHEST = (1 << 31) - 1
@@ -94,7 +94,7 @@ def failures(
         (folder / name).write_text("".join(f"{word:08x}\n" for word in words), "ascii")
     (folder / "expected.json").write_text(json.dumps(expected), "ascii")
     design = Design(
-        sources=[HERE / "fourier_bench.v", *sources],
+        sources=[BENCHES / "fourier_bench.v", *sources],
         top="fourier_bench",
         parameters={
             "X_INDEX_BITS": parameters.index_bits[0],

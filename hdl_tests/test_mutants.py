@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from building import REPOSITORY
 from mutants import Verdict, judge_all
 from stream_mutants import BENCHES, MUTANTS, Mutant, bench_of, judge, script_of
 
@@ -19,7 +20,7 @@ def test_the_verilog_as_it_is_passes(name: str, tmp_path: Path) -> None:
 
 
 def test_the_documentation_counts_them() -> None:
-    page = Path(__file__).parents[1] / "docs" / "verilog.md"
+    page = REPOSITORY / "docs" / "verilog.md"
     assert f"{len(MUTANTS)} faults put into the Verilog" in page.read_text("utf-8")
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from building import Variant, write_variant
+from building import BENCHES, Variant, write_variant
 from programs import random_dual
 from spi_monitor import Converter, Wires, receive, updates
 from stream_configurations import (
@@ -48,7 +48,6 @@ from tablegen.resources import verilog_runtime
 from tablegen.verification.bench import BenchRun, SequencerBench, SequencerShape
 from tablegen.verification.stream import FLAGS, Script, Words
 
-HERE = Path(__file__).parent
 SAMPLES_ON_ICARUS = 100_000
 SAMPLES_ON_VERILATOR = 1_000_000
 
@@ -537,7 +536,7 @@ def test_volts_at_the_piezo(name: str, tmp_path: Path) -> None:
         "FRAME_BITS": chip.frame_bits,
         "PREFIX": chip.prefix,
     }
-    sources = [*verilog_runtime(), HERE / "stream_spi_bench.v"]
+    sources = [*verilog_runtime(), BENCHES / "stream_spi_bench.v"]
     shape = SequencerShape.of((program.x, program.y))
     bench = SequencerBench("icarus", shape, tmp_path / "bench", parameters, sources, top="stream_spi_bench")
     script = Script()

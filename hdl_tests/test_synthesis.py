@@ -11,10 +11,10 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
+from building import REPOSITORY
 
-ROOT = Path(__file__).parent.parent
-sys.path.insert(0, str(ROOT / "benchmarks"))
-import resources  # noqa: E402
+sys.path.insert(0, str(REPOSITORY / "benchmarks"))
+import resources
 
 MODULES = resources.MODULES
 CHECKED: dict[str, tuple[str, Mapping[str, int]]] = {

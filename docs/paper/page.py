@@ -23,8 +23,8 @@ _HEAD = """# The paper's numbers, and ours
 This page compares every result that the text, Table 1 and the captions of *Feedforward Compensation of Piezo
 Nonlinearity for High-Precision High-Speed Atomic Force Microscopy* (Umeda and Kodera) print with our number. It is for
 readers of the paper who want to check tablegen. The page on the [virtual scanner](../virtual.md) describes the
-simulation behind many of our numbers. `make paper` writes this page and its pictures; `tests/test_paper.py` compares
-the page with the program.
+simulation behind many of our numbers. `make paper` writes this page and its pictures; `tests/docs/test_paper.py`
+compares the page with the program.
 
 The paper measured a piezo; we did not. A number of ours that is neither an equation nor arithmetic comes from the
 virtual scanner. It is **a simulation, and was identified on some of these numbers**. The column "from" says where our

@@ -1,6 +1,6 @@
 """Images of heights from files: .npy, .tif, .png, Gwyddion's .gwy, and matrices of numbers as text.
 
-Needs ``tablegen[images]`` for .tif and .png.
+Needs the extra ``images`` for .tif and .png.
 """
 
 import hashlib
@@ -111,7 +111,7 @@ def _npy(content: bytes, _: str) -> list[_Channel]:
 
 
 def _png(content: bytes, _: str) -> list[_Channel]:
-    from PIL import ScanImage as Pillow
+    from PIL import Image as Pillow
 
     try:
         with warnings.catch_warnings():

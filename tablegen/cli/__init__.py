@@ -16,6 +16,7 @@ from tablegen.cli.common import Failure
 from tablegen.cli.control import clear, park, trigger
 from tablegen.cli.device_status import device_status
 from tablegen.cli.exit_status import ExitStatus
+from tablegen.cli.formats import formats
 from tablegen.cli.init import init
 from tablegen.cli.paths import paths
 from tablegen.cli.ports import ports
@@ -54,7 +55,7 @@ def cli() -> None:
 
 
 instrument = (upload, device_status, readback, park, trigger, clear, ports)
-for command in (build, check, show, calibrate, simulate, refine, verify, *instrument, init, paths, schema):
+for command in (build, check, show, calibrate, simulate, refine, verify, *instrument, init, formats, paths, schema):
     cli.add_command(command)
 
 

@@ -105,7 +105,7 @@ def read_scan(source: Path) -> "PreparedScan":
     from tablegen.manifest.read import NotABuild
 
     if not source.is_dir():
-        return PreparedScan.of_plan(planned(source)[1])
+        return planned(source).prepared
     try:
         return PreparedScan.of_build(source)
     except NotABuild as error:

@@ -4,6 +4,7 @@ import click
 
 from tablegen.cli.common import fail
 from tablegen.cli.exit_status import ExitStatus
+from tablegen.installation import install_advice
 
 
 @click.command(short_help="List the serial ports of this machine.")
@@ -13,7 +14,7 @@ def ports(as_json: bool) -> int:
     try:
         from serial.tools.list_ports import comports
     except ImportError:
-        fail(["pyserial is missing; pip install 'tablegen[serial]'"], ExitStatus.TOOL_MISSING)
+        fail([f"pyserial is missing; {install_advice('serial')}"], ExitStatus.TOOL_MISSING)
     found = sorted(comports(), key=lambda port: port.device)
     if as_json:
         import json

@@ -18,10 +18,8 @@ from tablegen.cli.progress import Progress
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from tablegen.verification.build import Report, Target
+    from tablegen.verification.build import Report
     from tablegen.verification.checks import Check
-
-_DEFAULT_TICKS = {"icarus": 300_000, "verilator": 3_000_000, "c": 3_000_000, "cortex-m": 1_000_000}
 
 
 @click.command(short_help="Play a build's sequencer, and hold every sample against it.")
@@ -29,11 +27,9 @@ _DEFAULT_TICKS = {"icarus": 300_000, "verilator": 3_000_000, "c": 3_000_000, "co
 @click.option(
     "--target",
     "target_name",
-    type=click.Choice(("verilog", "c", "cortex-m")),
-    default="verilog",
-    show_default=True,
-    help="Which sequencer: the dac_*.v in a simulator, the dac_*.c compiled for this machine, or the same for a "
-    "Cortex-M4 and emulated.",
+    type=click.Choice(("verilog", "c", "cortex-m", "files")),
+    help="Which sequencer to play: the dac_*.v in a simulator, the dac_*.c compiled for this machine, the same for a "
+    "Cortex-M4 in an emulator, or none and only the files.  [default: verilog, or c in a build without Verilog]",
 )
 @click.option(
     "--sim",
@@ -72,7 +68,7 @@ _DEFAULT_TICKS = {"icarus": 300_000, "verilator": 3_000_000, "c": 3_000_000, "co
 )
 def verify(
     folder: Path,
-    target_name: Literal["verilog", "c", "cortex-m"],
+    target_name: Literal["verilog", "c", "cortex-m", "files"] | None,
     simulator: Literal["icarus", "verilator"] | None,
     ticks: int | None,
     axis: Literal["pipelined", "blocks", "serial"] | None,
@@ -89,11 +85,11 @@ def verify(
     waveform as the certificate promises, every step and code inside its limits.
 
     \b
-    verilog   the dac_*.v with the .mem files, under cocotb. Needs tablegen[hdl] and
-              Icarus Verilog, or tablegen[verilator] and a C++ compiler.
+    verilog   the dac_*.v with the .mem files, under cocotb. Needs Icarus Verilog and the
+              extra hdl, or a C++ compiler and the extra verilator.
     c         the dac_*.c with NAME.h and NAME.c, a tick a call and many ticks a call,
               converter words too. Needs a C compiler: $CC $CFLAGS, or cc.
-    cortex-m  the same for a Cortex-M4. Needs tablegen[cortex-m] and arm-none-eabi-gcc.
+    cortex-m  the same for a Cortex-M4. Needs arm-none-eabi-gcc and the extra cortex-m.
 
     In C what is swapped in has half the amplitude and clamps, so that neither a mixture of two programs nor a missing
     limit goes unseen. A frame that has more ticks than are played is played in part; a note says so.
@@ -105,20 +101,33 @@ def verify(
     Exit status: 0 verified, 5 a check failed, 2 DIR holds no build, 6 a tool is missing.
     """
     for option, value in (("--sim", simulator), ("--axis", axis)):
-        if target_name != "verilog" and value is not None:
+        if target_name not in (None, "verilog") and value is not None:
             raise click.UsageError(f"{option} is for Verilog; --target {target_name} has no choice of it")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    from tablegen.verification.build import NotABuild, verify_build
+    from tablegen.manifest.read import NotABuild
+    from tablegen.verification.run import verify as verify_build
     from tablegen.verification.simulate import ToolMissing
 
-    target, most = _target(target_name, simulator or "icarus", axis or "pipelined", fourier)
     try:
-        with _terminated_as_interrupted(), _work_folder(keep) as work, Progress() as progress:
-            report = verify_build(folder, work, target, most if ticks is None else ticks, seed, progress.now)
+        with _terminated_as_interrupted(), Progress() as progress:
+            report = verify_build(
+                folder,
+                target_name,
+                simulator=simulator or "icarus",
+                axis=axis or "pipelined",
+                fourier=fourier,
+                ticks=ticks,
+                seed=seed,
+                keep=keep,
+                progress=progress.now,
+            )
     except NotABuild as error:
         fail([error], ExitStatus.WRONG_INPUT)
     except ToolMissing as error:
         fail([error], ExitStatus.TOOL_MISSING)
+    except OSError as error:
+        place = error.filename or keep or tempfile.gettempdir()
+        fail([f"cannot verify: {place}: {error.strerror or error}"], ExitStatus.CANNOT_WRITE)
     click.echo("\n".join(_table(report.checks)))
     for note in report.notes:
         click.echo(f"note: {note}")
@@ -134,41 +143,6 @@ def verify(
         )
     click.echo(f"\n{folder}: verified, {len(report.checks)} checks")
     return ExitStatus.OK if written else ExitStatus.CANNOT_WRITE
-
-
-def _target(
-    name: Literal["verilog", "c", "cortex-m"],
-    simulator: Literal["icarus", "verilator"],
-    axis: Literal["pipelined", "blocks", "serial"],
-    fourier: bool,
-) -> "tuple[Target, int]":
-    """What plays, and how many ticks of it are soon over."""
-    if name != "verilog":
-        from tablegen.verification.c_target import CTarget
-
-        return CTarget(name, fourier), _DEFAULT_TICKS[name]
-    from tablegen.verification.placement import Placement
-    from tablegen.verification.verilog_target import VerilogTarget
-
-    placement = Placement(axis, fourier)
-    return VerilogTarget(simulator, placement), _DEFAULT_TICKS[simulator] // placement.tick_clocks
-
-
-@contextmanager
-def _work_folder(keep: Path | None) -> Iterator[Path]:
-    """Where things are played: taken away again, whatever happens, unless it is to be kept."""
-    try:
-        if keep is not None:
-            keep.mkdir(parents=True, exist_ok=True)
-            yield keep.resolve()
-            return
-        with tempfile.TemporaryDirectory(prefix="tablegen-", ignore_cleanup_errors=True) as folder:
-            yield Path(folder).resolve()
-    except OSError as error:
-        fail(
-            [f"cannot verify: {error.filename or keep or tempfile.gettempdir()}: {error.strerror or error}"],
-            ExitStatus.CANNOT_WRITE,
-        )
 
 
 @contextmanager

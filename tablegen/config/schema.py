@@ -188,10 +188,24 @@ class Limits(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     ) = None
 
 
+DEFAULT_FORMATS = ("c", "verilog")
+
+
 class Emit(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What the build writes."""
 
-    header_only: Annotated[bool, Meta(description="put the tables into the header instead of a .c file")] = False
+    formats: (
+        Annotated[
+            list[Annotated[str, Meta(min_length=1, max_length=64)]],
+            Meta(
+                min_length=1,
+                max_length=64,
+                description="formats to write, by `tablegen formats`; default: c and verilog",
+            ),
+        ]
+        | None
+    ) = None
+    header_only: Annotated[bool, Meta(description="C: put the tables into the header instead of a .c file")] = False
 
 
 class Scan(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

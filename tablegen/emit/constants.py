@@ -1,8 +1,18 @@
-"""The constants of the emitted headers by name, the same in C and in Verilog."""
+"""The constants of a build by name, the same in every language."""
 
 from tablegen.device.schedule import Schedule
+from tablegen.emit.content import Content
 from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.synthesis import FRACTION_BITS
+
+
+def scan_constants(content: Content) -> dict[str, int]:
+    """All numbers of a build by their names without the scan's: those of the schedule, then X_... and Y_..."""
+    constants = sequence_constants(content.schedule)
+    for axis in content.axes:
+        own = axis_constants(axis.program, axis.harmonics)
+        constants |= {f"{axis.axis.upper()}_{key}": value for key, value in own.items()}
+    return constants
 
 
 def sequence_constants(schedule: Schedule) -> dict[str, int]:

@@ -1,0 +1,229 @@
+"""``tablegen simulate``: what it prints and writes, labelled as a simulation, and what it refuses."""
+
+import csv
+import json
+import sys
+from importlib.resources import files
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pytest
+from editing import SCAN, SCANNER, edited, run, write_pair
+
+from tablegen.cli.exit_status import ExitStatus
+from tablegen.problems import Rejected
+from tablegen.virtual.parameters import load_truth
+
+TRUTH = (files("tablegen.virtual") / "default.toml").read_text(encoding="utf-8")
+SHORT = edited(SCAN, "timing.lines = 20", "y.band_limit.harmonics = 16")
+
+
+def truth(folder: Path, *edits: str) -> Path:
+    """The default virtual scanner with edits."""
+    path = folder / "truth.toml"
+    path.write_text(edited(TRUTH, *edits), encoding="utf-8")
+    return path
+
+
+def test_text_and_data_say_the_same(tmp_path: Path) -> None:
+    scan = write_pair(tmp_path, SHORT)
+    shown, plain = run("simulate", scan), run("simulate", scan, "--json")
+    assert (shown.status, shown.err, plain.status, plain.err) == (0, "", 0, "")
+    assert "simulation" in shown.out.splitlines()[0]
+    assert shown.out.splitlines()[-1].startswith("A simulation, not a measurement")
+    data = json.loads(plain.out)
+    assert data["simulation"] is True
+    rows = [line for line in shown.out.splitlines() if line.startswith(("x  ", "y  "))]
+    for stage in ("given", "calibrated"):
+        models = data[stage]["models"]
+        assert list(models) == ["triangle", "sinusoidal", "harmonic"]
+        for axis in "xy":
+            for model in models:
+                row, found = rows.pop(0), models[model][axis]
+                assert row.startswith(f"{axis}     {model}")
+                assert ("*" in row) == (model == "harmonic") == (axis in models[model]["in_scanner_file"])
+                assert f"{found['size_error_percent']:+6.2f}  forward" in row
+                assert f"   {found['forward']['residual_peak_percent']:+6.3f}   " in row
+                for name in ("residual_range_percent", "residual_about_image_line_percent"):
+                    low, high = found["forward"][name]
+                    assert f"{low:+6.3f} .. {high:+6.3f}" in row
+                assert row.endswith(f"{found['forward']['scaling_error_peak_to_peak_percent']:6.3f}")
+        # y images forward only.
+        assert ["backward" in models["triangle"][axis] for axis in "xy"] == [True, False]
+    assert not rows
+
+
+def test_a_calibration_makes_the_scan_straighter(tmp_path: Path) -> None:
+    """x at the example's 200 nm: the example's file is another scanner's, of the same kind."""
+    data = json.loads(run("simulate", write_pair(tmp_path, SHORT), "--json").out)
+    given, calibrated = (data[stage]["models"]["harmonic"]["x"] for stage in ("given", "calibrated"))
+    for side in ("forward", "backward"):
+        before, after = (one[side]["scaling_error_peak_to_peak_percent"] for one in (given, calibrated))
+        assert after < 0.5 * before
+    assert abs(calibrated["size_error_percent"]) < 1.0 < abs(given["size_error_percent"])
+
+
+def test_noise_and_seed_are_those_of_the_calibration(tmp_path: Path) -> None:
+    scan = write_pair(tmp_path, SHORT)
+    first, again, other, loud = (
+        json.loads(run("simulate", scan, "--json", *extra).out)
+        for extra in ((), ("--seed", "0"), ("--seed", "1"), ("--noise", "1"))
+    )
+    assert first == again
+    for changed in (other, loud):
+        assert changed["given"] == first["given"]
+        assert changed["calibrated"] != first["calibrated"]
+
+
+def test_without_a_calibration(tmp_path: Path) -> None:
+    data = json.loads(run("simulate", write_pair(tmp_path, SHORT), "--json", "--no-calibration").out)
+    assert "given" in data
+    assert "calibrated" not in data
+
+
+def test_a_calibration_needs_scipy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "scipy", None)
+    scan = write_pair(tmp_path, SHORT)
+    outcome = run("simulate", scan)
+    assert outcome.status == ExitStatus.TOOL_MISSING
+    assert "piezo-tablegen[calibrate]" in outcome.err
+    assert "--no-calibration" in outcome.err
+    assert run("simulate", scan, "--no-calibration").status == 0
+
+
+def test_a_line_and_a_frame_as_csv(tmp_path: Path) -> None:
+    scan = write_pair(tmp_path, SHORT)
+    assert run("simulate", scan, "--csv", tmp_path / "out" / "ticks.csv").status == 0
+    lines = (tmp_path / "out" / "ticks.csv").read_text(encoding="utf-8").splitlines()
+    assert lines[0] == "# simulation"
+    rows = list(csv.DictReader(lines[1:]))
+    stages, models = ("given", "calibrated"), ("triangle", "sinusoidal", "harmonic")
+    for stage, model in product(stages, models):
+        mine = [row for row in rows if (row["scanner"], row["model"]) == (stage, model)]
+        x, y = ([row for row in mine if row["axis"] == axis] for axis in "xy")
+        assert len(x) == 1250
+        assert len(y) == 25_000 / 3 + 2 / 3  # every third tick of the frame
+        volts = np.array([float(row["drive_v"]) for row in x])
+        codes = np.array([float(row["code"]) for row in x])
+        assert volts == pytest.approx(10.0 * (-5.0 + codes * 10.0 / 65536) + 50.0)
+        moved = np.array([float(row["displacement_nm"]) for row in x])
+        assert np.ptp(moved) == pytest.approx(190.0, rel=0.05)  # its turns are rounded
+
+
+def test_a_figure(tmp_path: Path) -> None:
+    scan = write_pair(tmp_path, SHORT)
+    assert run("simulate", scan, "--plot", tmp_path / "figure.png").status == 0
+    assert (tmp_path / "figure.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+
+
+def test_wrong_use(tmp_path: Path) -> None:
+    scan = write_pair(tmp_path, SHORT)
+    for arguments, why in (
+        (("--plot", tmp_path / "figure.pdf"), "the name has to end in .png"),
+        (("--noise", "nan"), "nan is not a finite number"),
+    ):
+        outcome = run("simulate", scan, *arguments)
+        assert outcome.status == ExitStatus.WRONG_INPUT
+        assert why in outcome.err
+    assert not (tmp_path / "figure.pdf").exists()
+
+
+def test_a_figure_needs_matplotlib(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    outcome = run("simulate", write_pair(tmp_path, SHORT), "--plot", tmp_path / "figure.png")
+    assert outcome.status == ExitStatus.TOOL_MISSING
+    assert "piezo-tablegen[plot]" in outcome.err
+    assert not (tmp_path / "figure.png").exists()
+
+
+def test_an_uncalibrated_scanner_is_a_triangle(tmp_path: Path) -> None:
+    scanner = edited(SCANNER, "- [x.hysteresis]", "- [[x.hysteresis.branches]]", "- [y.hysteresis]")
+    scanner = edited(scanner, "- [[y.hysteresis.branches]]")
+    outcome = run("simulate", write_pair(tmp_path, SHORT, scanner), "--json")
+    assert outcome.status == 0
+    data = json.loads(outcome.out)
+    assert list(data["given"]["models"]) == ["triangle"]
+    assert list(data["calibrated"]["models"]) == ["triangle", "sinusoidal", "harmonic"]
+
+
+def test_a_calibrated_scan_that_cannot_be_played_leaves_the_given_one(tmp_path: Path) -> None:
+    """98 V for k as given; the virtual scanner goes less far a volt than this file says, and takes more than 100 V."""
+    scanner = edited(SCANNER, "x.size.k_nm_per_v = 15.0", "x.size.beta = 0.0")
+    outcome = run("simulate", write_pair(tmp_path, edited(SHORT, "x.size_nm = 1450.0"), scanner), "--json")
+    assert outcome.status == 0
+    data = json.loads(outcome.out)
+    assert data["given"]["models"]
+    assert data["calibrated"]["models"] == {}
+    assert "x.size_nm" in data["calibrated"]["rejected"]["harmonic"]
+
+
+def test_another_truth(tmp_path: Path) -> None:
+    """Without hysteresis, creep or resonance the triangle is straight, and compensation makes it worse."""
+    scan = write_pair(tmp_path, SHORT)
+    zero = ", ".join("[" + ", ".join(["0"] * (9 - i)) + "]" for i in range(9))
+    straight = "\n".join(f"[{axis}.hysteresis]\nreversible_nm = [1000]\ndensity_nm = [{zero}]" for axis in "xy")
+    (tmp_path / "straight.toml").write_text(f'name = "straight"\nv_max = 100\n{straight}\n', encoding="utf-8")
+    outcome = run("simulate", scan, "--scanner-truth", tmp_path / "straight.toml", "--json")
+    data = json.loads(outcome.out)
+    assert data["virtual_scanner"] == "straight"
+    # There is nothing to calibrate, which is said.
+    assert data["calibrated"]["models"] == {}
+    assert "no hysteresis" in data["calibrated"]["rejected"]["calibration"]
+    plain, shaped = (data["given"]["models"][model]["x"]["forward"] for model in ("triangle", "harmonic"))
+    assert abs(plain["residual_peak_percent"]) < 0.05
+    assert shaped["residual_peak_percent"] == pytest.approx(2.08, abs=0.1)  # (22) at 0.2 of full scale
+
+
+@pytest.mark.parametrize(
+    ("edit", "key", "why"),
+    [
+        ("v_max = -1", "v_max", "is below"),
+        ("x.creep.loss_per_decade = 0.5", "x.creep.loss_per_decade", "is above"),
+        ("x.creep.slowest_s = 1e-6", "x.creep.slowest_s", "is not above fastest_s"),
+        ("x.sensitivity = [-1.5]", "x.sensitivity", "falls to"),
+        ("y.resonance.quality = 0.1", "y.resonance.quality", "is below"),
+        ("y.resonance.q = 3", "y.resonance.q", "unknown key"),
+        ("x.hysteresis.reversible_nm = [0, 0]", "x.hysteresis.reversible_nm", "all 0"),
+        ("x.hysteresis.reversible_nm = [-3]", "x.hysteresis.reversible_nm[0]", "is below 0"),
+    ],
+)
+def test_faults_of_a_truth_file(tmp_path: Path, edit: str, key: str, why: str) -> None:
+    path = truth(tmp_path, edit)
+    with pytest.raises(Rejected) as caught:
+        load_truth(path)
+    assert [(problem.key, why in problem.why) for problem in caught.value.problems] == [(key, True)]
+    outcome = run("simulate", write_pair(tmp_path, SHORT), "--scanner-truth", path)
+    assert outcome.status == ExitStatus.WRONG_INPUT
+    assert outcome.err.startswith(f"{path}:")
+
+
+def test_density_is_a_triangle_of_numbers(tmp_path: Path) -> None:
+    text = 'name = "a"\nv_max = 1\n' + "".join(
+        f"[{axis}.hysteresis]\nreversible_nm = [1]\ndensity_nm = [[1, 2], [3, 4]]\n" for axis in "xy"
+    )
+    (tmp_path / "truth.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(Rejected, match="2 rows need 2"):
+        load_truth(tmp_path / "truth.toml")
+
+
+def test_what_cannot_be_played_is_said(tmp_path: Path) -> None:
+    missing = run("simulate", write_pair(tmp_path, SHORT), "--scanner-truth", tmp_path / "none.toml")
+    assert missing.status == ExitStatus.WRONG_INPUT
+    small = run("simulate", write_pair(tmp_path, SHORT), "--scanner-truth", truth(tmp_path, "v_max = 55"))
+    assert small.status == ExitStatus.WRONG_INPUT
+    assert "leaves the 0..55 V" in small.err
+    wrong = run("simulate", write_pair(tmp_path, edited(SHORT, "x.size_nm = 1e6")))
+    assert wrong.status == ExitStatus.WRONG_INPUT
+    assert "x.size_nm" in wrong.err
+
+
+def test_a_model_that_is_rejected_leaves_the_others(tmp_path: Path) -> None:
+    """A u_peak outside the poles of (20) rejects the harmonic model alone."""
+    branch = "forward = { beta_max = 0.037, rho = 4.0, u_peak = 0.1 }"
+    scanner = SCANNER.replace("forward = { beta_max = 0.037, rho = 4.0, u_peak = 0.37 }", branch, 1)
+    outcome = run("simulate", write_pair(tmp_path, SHORT, scanner), "--json")
+    assert outcome.status == 0
+    data = json.loads(outcome.out)
+    assert list(data["given"]["models"]) == ["triangle", "sinusoidal"]
+    assert "u_peak" in data["given"]["rejected"]["harmonic"]

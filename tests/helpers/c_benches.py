@@ -1,0 +1,62 @@
+"""Benches of the C sequencer, compiled once for all shapes of the same storage; scripts are held against the model."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from c_library import storage
+from limits import PATIENCE_S
+from stream_laws import steps_are_limited
+
+from tablegen.verification.bench import SequencerShape
+from tablegen.verification.c_bench import CBench, CPlayed, script_words, sine_of
+from tablegen.verification.stream import Script, compare
+
+SANITIZED = ("-std=c99", "-O1", "-g", "-fsanitize=undefined,address", "-fno-sanitize-recover=all")
+COMPILERS = ("gcc", "clang")
+FILL = 200  # ticks in one call, at most
+_WITHOUT_FAULTS = np.uint64((1 << 56) - 1)
+
+
+@dataclass(frozen=True)
+class Benches:
+    """By compiler, storage and way of playing; ``sources`` as those of ``CBench``."""
+
+    folder: Path
+    options: tuple[str, ...] = SANITIZED
+    sources: tuple[Path, ...] | None = None
+    _compiled: dict[tuple[str, int, int, int], CBench] = field(default_factory=dict)
+
+    def compiled(self, shape: SequencerShape, compiler: str = "gcc", fill: int = 0) -> CBench:
+        """The bench for a shape, whatever shape it was compiled for."""
+        table, output = storage(max(shape.x_word_bits, shape.y_word_bits)), storage(shape.dac_bits)
+        key = compiler, table, output, fill
+        if key not in self._compiled:
+            folder = self.folder / f"{compiler}_{table}_{output}_{fill}"
+            self._compiled[key] = CBench(shape, folder, compiler, self.options, self.sources, fill)
+        return self._compiled[key]
+
+    def play(
+        self, script: Script, shape: SequencerShape, compiler: str = "gcc", fill: int = 0, fourier: bool = False
+    ) -> CPlayed:
+        """Play a script and hold it against the model: every tick, and the counts of faults."""
+        played = self.compiled(shape, compiler, fill).run(words_of(script, shape, fourier), timeout=PATIENCE_S)
+        expected = np.array(script.expected, dtype=np.uint64)
+        if fill:
+            expected &= _WITHOUT_FAULTS  # a fill tells them at its end
+        mismatch = compare(expected.tolist(), played.capture)
+        assert mismatch is None, mismatch
+        assert played.counts == [*script.counts, 0, 0], (played.counts, script.counts)
+        steps_are_limited(played.capture, script.taken)
+        return played
+
+
+_texts: dict[int, tuple[Script, str]] = {}
+
+
+def words_of(script: Script, shape: SequencerShape, fourier: bool = False) -> str:
+    """The script as the bench reads it. It is written once: writing it lets its last ticks come."""
+    if id(script) not in _texts:
+        sine = sine_of(shape) if fourier else None
+        _texts[id(script)] = script, script_words(script, shape, sine)
+    return _texts[id(script)][1]

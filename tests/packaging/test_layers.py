@@ -1,0 +1,156 @@
+"""The one direction of imports, and what the independent side may not load."""
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import tablegen
+
+PACKAGE = Path(tablegen.__file__).parent
+# From the lowest to the highest; a module imports from its own layer and from those before it.
+LAYERS = (
+    "problems interruption resources installation",
+    "numerics",
+    "config",
+    "compensation",
+    "waveform",
+    "fixedpoint",
+    "device",
+    "planning",
+    "certificate",
+    "manifest",
+    "emit",
+    "link",
+    "verification",
+    "calibration",
+    "refinement",
+    "virtual",
+    "api",
+    "cli",
+    "__main__",
+)
+LEVELS = {name: level for level, names in enumerate(LAYERS) for name in names.split()}
+
+
+def modules() -> dict[str, Path]:
+    """Every module of the package by its name without ``tablegen.``; packages by their folder."""
+    found = {}
+    for path in PACKAGE.rglob("*.py"):
+        parts = path.relative_to(PACKAGE).with_suffix("").parts
+        found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return {name: path for name, path in found.items() if name}
+
+
+def imported(source: str, known: dict[str, Path]) -> Iterator[tuple[str, bool]]:
+    """Modules of the package that a source imports, and whether it does as soon as it is loaded itself."""
+    tree = ast.parse(source)
+    at_once = {id(node) for node in tree.body}
+    for node in ast.walk(tree):
+        names: list[str] = []
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            whole = [f"{node.module}.{alias.name}" for alias in node.names]
+            names = [name if name.removeprefix("tablegen.") in known else str(node.module) for name in whole]
+        for name in names:
+            if name.startswith("tablegen."):
+                yield name.removeprefix("tablegen."), id(node) in at_once
+
+
+def upward(sources: dict[str, str], known: dict[str, Path]) -> list[str]:
+    """Imports from a lower layer to a higher one."""
+    return [
+        f"{name} imports {other}"
+        for name, source in sources.items()
+        for other, _ in imported(source, known)
+        if LEVELS[other.split(".")[0]] > LEVELS[name.split(".")[0]]
+    ]
+
+
+def circles(graph: dict[str, set[str]]) -> list[list[str]]:
+    """Names that reach themselves, each with its way back; empty without a circle."""
+    found, done = [], set()
+
+    def visit(name: str, way: list[str]) -> None:
+        if name in way:
+            found.append([*way[way.index(name) :], name])
+        elif name not in done:
+            for other in sorted(graph.get(name, ())):
+                visit(other, [*way, name])
+            done.add(name)
+
+    for name in sorted(graph):
+        visit(name, [])
+    return found
+
+
+def test_every_package_has_a_layer() -> None:
+    assert {name.split(".")[0] for name in modules()} == set(LEVELS)
+
+
+def test_imports_go_one_way() -> None:
+    known = modules()
+    assert upward({name: path.read_text("utf-8") for name, path in known.items()}, known) == []
+
+
+def test_an_import_that_goes_back_is_found() -> None:
+    known = modules()
+    assert upward({"config.load": "def late():\n    from tablegen.planning import line_plan\n"}, known) == [
+        "config.load imports planning.line_plan"
+    ]
+    assert upward({"device.sequencer": "import tablegen.emit.render"}, known) == [
+        "device.sequencer imports emit.render"
+    ]
+
+
+def test_no_modules_import_each_other_in_a_circle() -> None:
+    known = modules()
+    graph = {name: {other for other, _ in imported(path.read_text("utf-8"), known)} for name, path in known.items()}
+    assert circles(graph) == []
+    assert circles({"a": {"b"}, "b": {"c"}, "c": {"a"}}) == [["a", "b", "c", "a"]]
+
+
+def loaded_by(code: str) -> set[str]:
+    """The modules that are loaded once a new interpreter has run this."""
+    script = f"import sys\n{code}\nprint(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    return set(done.stdout.split())
+
+
+CALCULATION = {"tablegen.compensation", "tablegen.waveform", "tablegen.planning", "jinja2"}
+
+
+@pytest.mark.parametrize(
+    "module",
+    [
+        "tablegen.manifest.read",
+        "tablegen.device.sequencer",
+        "tablegen.device.registers",
+        "tablegen.verification.checks",
+        "tablegen.verification.directory",
+        "tablegen.verification.build",
+        "tablegen.verification.verilog_target",
+        "tablegen.verification.c_target",
+        "tablegen.link.players",
+        "tablegen.link.model",
+    ],
+)
+def test_the_independent_side_loads_no_calculation(module: str) -> None:
+    """What reads, plays or checks a build shares the integers with what made it, and nothing before them."""
+    loaded = loaded_by(f"import {module}")
+    assert module in loaded
+    assert loaded & CALCULATION == set()
+
+
+def test_the_calculation_would_be_seen() -> None:
+    assert loaded_by("import tablegen.planning.line_plan") >= CALCULATION - {"jinja2"}
+    assert "jinja2" in loaded_by("import tablegen.emit.render")
+
+
+@pytest.mark.parametrize("module", ["tablegen", "tablegen.cli", "tablegen.cli.device_status", "tablegen.link.device"])
+def test_what_answers_at_once_loads_no_numpy(module: str) -> None:
+    assert "numpy" not in loaded_by(f"import {module}")

@@ -1,0 +1,64 @@
+"""The kept corpus of ``make fuzz`` with sanitizers; and that it finds a device that is broken."""
+
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+from building import run_clean
+from limits import within
+from link_mutants import MUTANTS, Mutant
+
+from tablegen.resources import c_link, c_runtime
+
+FUZZ = Path(__file__).parent / "fuzz"
+CORPUS = FUZZ / "corpus"
+CORPUS_S = 300  # of CPU time; it takes ten
+OPTIONS = ("-std=c99", "-O1", "-g", "-fsanitize=fuzzer,address,undefined", "-fno-sanitize-recover=all")
+# What leads to codes or memory that must not be, whatever is answered.
+FOUND = {
+    "code limits of the device are not checked",
+    "the step is not checked",
+    "every upload goes into the same tables",
+    "a frame may be too long",
+    "schedules are not checked",
+    "a swap in mid-line",
+    "the CRC of an answer is wrong",
+}
+
+
+def replay(folder: Path, mutant: Mutant | None = None) -> subprocess.CompletedProcess[str]:
+    """Compile the target, with a mutant in it or with none, and give it every file of the corpus."""
+    sources: Sequence[Path] = [*c_runtime(), *c_link()]
+    for path in sources:
+        text = mutant.source if mutant is not None and mutant.file == path.name else path.read_text("utf-8")
+        (folder / path.name).write_text(text, "utf-8")
+    copies = [folder / path.name for path in sources if path.suffix == ".c"]
+    program = folder / "link"
+    run_clean(["clang", *OPTIONS, f"-I{folder}", *copies, FUZZ / "link_fuzz.c", "-o", program])
+    command = [str(program), "-runs=0", f"-artifact_prefix={folder}/", str(CORPUS)]
+    return subprocess.run(within(CORPUS_S, command), capture_output=True, text=True, check=False, cwd=folder)
+
+
+def test_the_corpus_is_small() -> None:
+    sizes = [path.stat().st_size for path in CORPUS.iterdir()]
+    assert 50 < len(sizes) < 200
+    assert sum(sizes) < 300_000
+
+
+def test_the_corpus_finds_nothing(tmp_path: Path) -> None:
+    done = replay(tmp_path)
+    assert done.returncode == 0, done.stderr[-3000:]
+    assert "DONE" in done.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted(FOUND))
+def test_the_corpus_finds_what_is_broken(name: str, tmp_path: Path) -> None:
+    (mutant,) = (each for each in MUTANTS if each.breaks == name)
+    assert replay(tmp_path, mutant).returncode != 0
+
+
+def test_the_corpus_finds_an_upload_into_tables_that_play(tmp_path: Path) -> None:
+    (mutant,) = (each for each in MUTANTS if each.breaks == "every upload goes into the same tables")
+    assert replay(tmp_path, mutant).returncode != 0

@@ -1,0 +1,484 @@
+"""``tablegen verify``: what is right is found right, and every way of being wrong is found, told, and where it is.
+
+The builds are small and few ticks are played: that a whole frame equals the model is for one of them, and for
+the tests of the sequencer in ``hdl_tests/``.
+"""
+
+import json
+import re
+import shutil
+import signal
+from pathlib import Path
+
+import pytest
+from building import NAME, VARIANTS, Build, Variant, build
+from editing import Outcome, run
+from verifying import (
+    check_first_difference,
+    check_interruption,
+    command,
+    command_without,
+    differing,
+    edit,
+    edit_manifest,
+    failed,
+    first_heard,
+    read_report,
+    verdicts,
+    with_a_long_table,
+)
+
+from tablegen.emit.memory import memory_file
+from tablegen.fixedpoint.program import Program
+from tablegen.manifest.read import read_build
+
+TICKS = 2000
+CHECKS = 15
+FILES = {("files", "SHA-256 in the manifest"), ("memories", "manifest")}
+MODES = (
+    "example",
+    "bits_8",
+    "bits_12",
+    "bits_18",
+    "bits_20",
+    "bits_24",
+    "narrow_table_wide_dac",
+    "wide_table_narrow_dac",
+    "direct",
+    "direct_steps",
+    "steps",
+    "turn_0.7",
+    "turn_0.95",
+    "left_aligned",
+    "prime_line",
+    "inverting",
+)
+
+
+@pytest.fixture(scope="module")
+def short(tmp_path_factory: pytest.TempPathFactory) -> Build:
+    """A build of 8 lines of 331 ticks."""
+    return build(tmp_path_factory.mktemp("short"), VARIANTS["short_frame"])
+
+
+@pytest.fixture
+def folder(short: Build, tmp_path: Path) -> Path:
+    """A copy of it, to be damaged."""
+    shutil.copytree(short.folder, tmp_path / "out")
+    return tmp_path / "out"
+
+
+def verify(folder: Path, *arguments: str | Path | int, ticks: int = TICKS) -> Outcome:
+    return run("verify", folder, "--ticks", str(ticks), *map(str, arguments))
+
+
+def flip(path: Path, line: int, bit: int) -> None:
+    """Flip one bit of one word of a memory file."""
+    words = path.read_text("ascii").split()
+    words[line] = f"{int(words[line], 16) ^ (1 << bit):0{len(words[line])}x}"
+    path.write_text("\n".join(words) + "\n", "ascii")
+
+
+# What is right
+
+
+@pytest.mark.parametrize("name", MODES)
+def test_a_build_verifies(name: str, tmp_path: Path) -> None:
+    """Both modes of tables, steps, all widths of words and codes, turns."""
+    built = build(tmp_path, VARIANTS[name])
+    outcome = verify(built.folder)
+    assert (outcome.status, outcome.err) == (0, "")
+    assert set(verdicts(outcome).values()) == {"ok"}
+    assert len(verdicts(outcome)) == CHECKS
+    assert outcome.out.splitlines()[-1] == f"{built.folder}: verified, {CHECKS} checks"
+    assert not list(built.folder.glob("*.vvp")), "nothing is written into the build"
+
+
+def test_a_whole_frame_verifies(short: Build) -> None:
+    """Codes of all of a line and of a frame, frames that follow, a swap in mid-frame; by any seed."""
+    for seed in (1, 2):
+        outcome = verify(short.folder, "--seed", seed, ticks=300000)
+        assert (outcome.status, outcome.err) == (0, "")
+        assert "note:" not in outcome.out
+        table = " ".join(outcome.out.split())
+        for axis, period in (("x", "line"), ("y", "frame")):
+            promised = short.manifest["axes"][axis]["certificate"]["max_error_lsb"]
+            found = re.search(
+                rf"{axis} float waveform \d+ codes, 100 % of the {period} ([\d.]+) LSB ([\d.]+) LSB", table
+            )
+            assert found
+            # The certificate is the worst of the period, and the whole period was played.
+            assert float(found[1]) == pytest.approx(promised, abs=0.001)
+            assert float(found[2]) == pytest.approx(promised, abs=0.001)
+
+
+def test_verilator_finds_the_same(folder: Path) -> None:
+    """A wrong rounding, at the same first tick, and nothing else."""
+    edit(folder / "dac_interpolator.v", "1'b1} + step", "1'b0} + step")
+    outcome = verify(folder, "--sim", "verilator")
+    assert outcome.status == 5
+    on_icarus = verify(folder)
+    assert differing(outcome) == differing(on_icarus)
+    assert verdicts(outcome) == verdicts(on_icarus)
+
+
+def test_what_was_not_played_is_said(short: Build) -> None:
+    outcome = verify(short.folder)
+    assert outcome.status == 0
+    notes = [line for line in outcome.out.splitlines() if line.startswith("note: ")]
+    assert len(notes) == 1
+    needed = re.fullmatch(r"note: not a whole frame of 2648 ticks was played; --ticks (\d+) plays one", notes[0])
+    assert needed
+    assert "note:" not in verify(short.folder, ticks=int(needed[1])).out
+    assert "note: no line ended in time for a swap in mid-frame; --ticks" in verify(short.folder, ticks=1000).out
+
+
+# What is wrong in the directory
+
+
+@pytest.mark.parametrize(("axis", "at", "bit"), [("x", 70, 6), ("x", 250, 15), ("y", 100, 8)])
+def test_a_flipped_bit_of_a_table_is_found_at_its_first_tick(folder: Path, axis: str, at: int, bit: int) -> None:
+    """A bit of the word of that tick."""
+    program: Program = getattr(read_build(folder).program, axis)
+    word = at * len(program.words) // program.ticks
+    flip(folder / f"{NAME}_{axis}.mem", word, bit)
+    raw = int((folder / f"{NAME}_{axis}.mem").read_text("ascii").split()[word], 16)
+    heard = first_heard(program, word, raw - (raw >> (program.bits - 1) << program.bits))
+
+    outcome = verify(folder)
+    assert outcome.status == 5
+    assert {*FILES, (axis, "integer model")} <= failed(outcome)
+    assert ("x" if axis == "y" else "y", "integer model") not in failed(outcome)
+    assert f"files: {NAME}_{axis}.mem: stale or edited" in outcome.err
+    check_first_difference(outcome, axis, heard, 331)
+    assert f"expected {heard.wanted}, got {heard.got}" in outcome.err
+
+
+@pytest.mark.parametrize(
+    ("register", "bit", "fails"),
+    [
+        (0, 0, ("markers", "integer model")),  # line_ticks
+        (16 + 3, 2, ("x", "integer model")),  # gain of x
+        (32 + 9, 0, ("y", "integer model")),  # park code of y
+    ],
+)
+def test_a_flipped_bit_of_the_program_is_found(folder: Path, register: int, bit: int, fails: tuple[str, str]) -> None:
+    flip(folder / f"{NAME}_program.mem", register, bit)
+    outcome = verify(folder)
+    assert outcome.status == 5
+    assert {fails, *FILES} <= failed(outcome)
+    assert f"files: {NAME}_program.mem: stale or edited" in outcome.err
+    assert "first difference: tick " in outcome.err
+
+
+@pytest.mark.parametrize("suffix", ["sine.mem", "x_fourier.mem", "y_fourier.mem"])
+def test_a_flipped_bit_of_what_is_not_played_is_found_by_its_hash(folder: Path, suffix: str) -> None:
+    flip(folder / f"{NAME}_{suffix}", 3, 0)
+    outcome = verify(folder)
+    assert outcome.status == 5
+    assert failed(outcome) == FILES
+    assert re.search(
+        rf"memories: {NAME}_{suffix}: word 3 is [0-9a-f]{{8}}, it is [0-9a-f]{{8}} in the manifest", outcome.err
+    )
+    assert "first difference" not in outcome.err
+
+
+def test_an_edited_constant_is_found(folder: Path) -> None:
+    edit(folder / f"{NAME}.vh", f"{NAME.upper()}_PIXELS = 32'sd50;", f"{NAME.upper()}_PIXELS = 32'sd51;")
+    edit(folder / f"{NAME}.vh", f'{NAME.upper()}_X_TABLE_FILE = "{NAME}_x.mem";', f'{NAME.upper()}_X_TABLE_FILE = "";')
+    outcome = verify(folder)
+    assert outcome.status == 5
+    assert failed(outcome) == {("files", "SHA-256 in the manifest"), ("header", "manifest")}
+    assert f"{NAME}.vh: {NAME.upper()}_PIXELS is 51, it is 50 in the manifest" in outcome.err
+    assert f"{NAME}.vh: {NAME.upper()}_X_TABLE_FILE is '', it is '{NAME}_x.mem' in the manifest" in outcome.err
+
+
+def test_a_constant_that_is_missing_or_new_is_found(folder: Path) -> None:
+    edit(folder / f"{NAME}.vh", f"localparam signed [31:0] {NAME.upper()}_SETTLE_LINES", "localparam OTHER")
+    outcome = verify(folder)
+    assert f"{NAME}.vh: {NAME.upper()}_SETTLE_LINES is missing, it is 2 in the manifest" in outcome.err
+    assert f"{NAME}.vh: OTHER is not in the manifest" in outcome.err
+
+
+@pytest.mark.parametrize("variant", ["direct", "direct_steps", "bits_24", "left_aligned", "inverting"])
+def test_the_header_of_other_builds_is_read_right(variant: str, tmp_path: Path) -> None:
+    """Also where no table is interpolated, and where numbers are negative or have 64 bits; nothing is simulated."""
+    from tablegen.verification.directory import wrong_constants
+
+    built = build(tmp_path, VARIANTS[variant])
+    assert wrong_constants(built.folder, read_build(built.folder))[1] == []
+
+
+def test_an_edited_runtime_is_played_and_found(folder: Path) -> None:
+    """Rounding down in place of to the nearest: one code too low here and there, told with tick, expected and got."""
+    edit(folder / "dac_interpolator.v", "1'b1} + step", "1'b0} + step")
+    outcome = verify(folder)
+    assert outcome.status == 5
+    assert {("files", "SHA-256 in the manifest"), ("y", "integer model")} <= failed(outcome)
+    assert "files: dac_interpolator.v: stale or edited" in outcome.err
+    *_, expected, got = differing(outcome)
+    codes = [re.findall(r"[xy] (\d+)", text) for text in (expected, got)]
+    assert 0 < max(abs(int(a) - int(b)) for a, b in zip(*codes, strict=True)) <= 1
+
+
+def test_a_runtime_that_does_not_compile_is_told_by_its_log(folder: Path) -> None:
+    edit(folder / "dac_slew.v", "endmodule", "endmodul")
+    outcome = verify(folder)
+    assert outcome.status == 5
+    assert ("simulation", "icarus") in failed(outcome)
+    assert "dac_slew.v" in outcome.err
+    assert "syntax error" in outcome.err
+
+
+def test_samples_that_never_come_are_found(folder: Path) -> None:
+    edit(folder / "dac_verdict.v", "strobe <= tick;", "strobe <= 1'b0;")
+    outcome = verify(folder)
+    assert outcome.status == 5
+    models = {(subject, "integer model") for subject in ("x", "y", "markers")}
+    assert {*models, ("timing", "constant delay")} <= failed(outcome)
+    assert "ticks are lost or too many" in outcome.err
+
+
+def test_unknown_codes_are_found(folder: Path) -> None:
+    """A register without a power-up value, in a simulator that knows what that means."""
+    text = (folder / "dac_interpolator.v").read_text("ascii")
+    (folder / "dac_interpolator.v").write_text(text.replace("1'b1} + step", "1'bx} + step"), "ascii")
+    outcome = verify(folder)
+    assert outcome.status == 5
+    assert "got       undefined" in outcome.err
+
+
+@pytest.mark.parametrize(
+    ("name", "also"),
+    [(f"{NAME}.h", None), ("dac_spi.v", "dac_spi.v is missing"), (f"{NAME}_x.mem", f"{NAME}_x.mem is missing")],
+)
+def test_a_missing_file_is_named(folder: Path, name: str, also: str | None) -> None:
+    (folder / name).unlink()
+    outcome = verify(folder)
+    assert outcome.status == 5
+    assert f"files: {name}: missing" in outcome.err
+    simulated = ("x", "integer model") in verdicts(outcome)
+    assert simulated == (also is None)
+    assert also is None or f"simulation: {also}" in outcome.err
+
+
+@pytest.mark.parametrize(
+    ("content", "why"),
+    [
+        (b"0000\n" * 7, "has 7 words in place of 2048"),
+        (b"a table\n", "does not hold one hexadecimal word a line"),
+        (b"\xff\xfe", "does not hold one hexadecimal word a line"),
+    ],
+)
+def test_a_memory_that_cannot_be_read_is_named(folder: Path, content: bytes, why: str) -> None:
+    (folder / f"{NAME}_y.mem").write_bytes(content)
+    outcome = verify(folder)
+    assert outcome.status == 5
+    assert f"simulation: {NAME}_y.mem {why}" in outcome.err
+
+
+def test_all_that_is_wrong_is_told_at_once(folder: Path) -> None:
+    (folder / f"{NAME}.h").unlink()
+    edit(folder / f"{NAME}.vh", f"{NAME.upper()}_PIXELS = 32'sd50;", f"{NAME.upper()}_PIXELS = 32'sd51;")
+    flip(folder / f"{NAME}_x.mem", 70 * 2048 // 331, 7)
+    outcome = verify(folder)
+    for text in (f"{NAME}.h: missing", f"{NAME}.vh: stale", f"{NAME}_x.mem: stale", "PIXELS is 51", "first difference"):
+        assert text in outcome.err
+    assert outcome.err.splitlines()[-1] == f"{folder}: {len(failed(outcome))} of {CHECKS} checks failed"
+
+
+# What is wrong in the manifest
+
+
+def test_codes_beyond_the_certificate_are_found(folder: Path) -> None:
+    """Negative control of the float reference: a promise that is a little too good, and a waveform that is shifted."""
+    promised = json.loads((folder / "manifest.json").read_bytes())["axes"]["x"]["certificate"]["max_error_lsb"]
+    edit_manifest(folder, "axes", "x", "certificate", "max_error_lsb", value=promised - 0.001)
+    outcome = verify(folder)
+    assert failed(outcome) == {("x", "float waveform")}
+    assert re.search(
+        r"x: 0\.\d+ LSB from the float waveform, the certificate promises 0\.\d+; at tick \d+", outcome.err
+    )
+
+
+def test_a_manifest_that_was_edited_is_found(folder: Path) -> None:
+    axis = json.loads((folder / "manifest.json").read_bytes())["axes"]["y"]
+    edit_manifest(folder, "axes", "y", "fourier", "a0", value=axis["fourier"]["a0"] + 1e-4)
+    edit_manifest(folder, "axes", "x", "output", "max_step", value=1)
+    outcome = verify(folder)
+    assert outcome.status == 5
+    found = failed(outcome)
+    assert {("manifest", "its own hash"), ("y", "float waveform"), ("x", "slew guard"), ("header", "manifest")} <= found
+
+
+@pytest.mark.parametrize(
+    ("content", "why"),
+    [
+        (None, "cannot be read: No such file or directory; the directory is the one of `tablegen build -o DIR`"),
+        (b'{"tablegen": "0.1', "is damaged: "),
+        (b'{"name": "npm", "version": "1.0"}', "is not a manifest of tablegen"),
+        (b"[1, 2]", "is not a manifest of tablegen"),
+        (b"\xff\x00", "is damaged: "),
+    ],
+)
+def test_a_directory_without_a_manifest_is_wrong_input(folder: Path, content: bytes | None, why: str) -> None:
+    (folder / "manifest.json").unlink()
+    if content is not None:
+        (folder / "manifest.json").write_bytes(content)
+    outcome = verify(folder)
+    assert (outcome.status, outcome.out) == (2, "")
+    assert outcome.err.startswith(f"{folder}/manifest.json: {why}")
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "why"),
+    [
+        (("axes", "x", "table", "bits"), 30, "Expected `int` <= 24 - at `$.axes.x.table.bits`"),
+        (("axes", "y", "table", "words", 3), "7", "Expected `int`, got `str` - at `$.axes.y.table.words[3]`"),
+        (("axes", "y", "table", "words"), [1, 2, 3], "axes.y.table.words are 3"),
+        (("axes", "x", "table", "words", 3), 1 << 20, "axes.x.table.words do not fit 16 bits"),
+        (("axes", "x", "output", "gain_word"), 1 << 17, "axes.x.output.gain_word is 131072"),
+        (("axes", "x", "output", "dac_bits"), 12, "axes.x and axes.y differ in output.dac_bits"),
+        (("axes", "x", "line", "ticks"), 332, "axes.x.line.ticks is 332, the schedule has 331"),
+        (("axes", "y", "line", "hold_ticks"), 0, "Expected `int` >= 1 - at `$.axes.y.line.hold_ticks`"),
+        (("axes", "y", "fourier", "a"), [], "axes.y.fourier has not 16 harmonics"),
+        (("sequence", "forward_ticks"), [300, 100], "sequence.forward_ticks ends at 400, beyond 331"),
+        (("files", "../../etc/passwd"), "0" * 64, "Expected `str` matching regex"),
+        (("name",), "../x", "Expected `str` matching regex"),
+        (("hash",), 5, "Expected `str`, got `int` - at `$.hash`"),
+    ],
+)
+def test_a_damaged_manifest_is_wrong_input(folder: Path, path: tuple[str | int, ...], value: object, why: str) -> None:
+    edit_manifest(folder, *path, value=value)
+    outcome = verify(folder)
+    assert (outcome.status, outcome.out) == (2, "")
+    assert "manifest.json: is damaged: " in outcome.err
+    assert why in outcome.err
+
+
+def test_a_build_of_another_version_is_noted(folder: Path) -> None:
+    edit_manifest(folder, "tablegen", value="0.0.7")
+    outcome = verify(folder)
+    assert outcome.status == 0
+    assert "note: built by tablegen 0.0.7, verified by " in outcome.out
+
+
+def test_a_table_that_no_sequencer_can_address_is_wrong_input(tmp_path: Path) -> None:
+    outcome = verify(with_a_long_table(tmp_path, 40))
+    assert outcome.status == 2
+    assert "the table of y has 80000 words, dac_sequencer.v plays at most 65536" in outcome.err
+
+
+# Reports
+
+
+def test_junit_has_a_case_a_check(short: Build, tmp_path: Path) -> None:
+    report = tmp_path / "reports" / "verify.xml"
+    outcome = verify(short.folder, "--junit", report)
+    assert outcome.status == 0
+    told = read_report(report)
+    assert told.counts == (str(CHECKS), "0", "0")
+    assert list(told.cases) == list(verdicts(outcome))
+    assert told.failed == set()
+
+
+def test_junit_tells_failures(folder: Path, tmp_path: Path) -> None:
+    edit(folder / "dac_interpolator.v", "1'b1} + step", "1'b0} + step  /* <&]]> */")
+    report = tmp_path / "verify.xml"
+    outcome = verify(folder, "--junit", report)
+    told = read_report(report)
+    assert told.failed == failed(outcome)
+    assert told.counts == (str(CHECKS), str(len(told.failed)), "0")
+    (model,) = told.cases["y", "integer model"]
+    assert model.text == model.get("message")
+    assert re.search(r"the first at tick \d+ \(line \d+, tick \d+ of it\): expected \d+, got \d+$", str(model.text))
+
+
+def test_junit_that_cannot_be_written_is_status_4(short: Build, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    outcome = verify(short.folder, "--junit", tmp_path / "file" / "x.xml")
+    assert outcome.status == 4
+    assert "verified" in outcome.out
+    assert outcome.messages == [f"{tmp_path}/file/x.xml: File exists"]
+
+
+def test_what_is_simulated_is_kept_on_request(short: Build, tmp_path: Path) -> None:
+    assert verify(short.folder, "--keep", tmp_path / "kept").status == 0
+    assert {"script.hex", "capture.hex", "rtl", "icarus"} <= {path.name for path in (tmp_path / "kept").iterdir()}
+
+
+def test_memories_are_what_a_build_writes(short: Build) -> None:
+    """The reader of memory files against their writer, signed words included."""
+    from tablegen.verification.directory import memory_words
+
+    words = short.plan.x.program.words
+    read = memory_words(short.folder / f"{NAME}_x.mem", len(words))
+    assert memory_file(read, 16) == short.files[f"{NAME}_x.mem"]
+    assert [word - (word >> 15 << 16) for word in read] == words.tolist()
+
+
+# Tools, interruptions
+
+
+@pytest.mark.parametrize("simulator", ["icarus", "verilator"])
+def test_a_missing_simulator_is_status_6_with_its_remedy(short: Build, tmp_path: Path, simulator: str) -> None:
+    done = command(short.folder, "--sim", simulator, PATH=str(tmp_path))
+    assert (done.returncode, done.stdout) == (6, "")
+    assert "apt-get install" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_missing_cocotb_is_status_6_with_its_remedy(short: Build) -> None:
+    done = command_without(["cocotb_tools"], short.folder)
+    assert (done.returncode, done.stdout) == (6, "")
+    assert done.stderr == "cocotb is not installed: pip install 'piezo-tablegen[hdl]'\n"
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("begun", ["job.json", "capture.hex"])
+def test_an_interruption_leaves_nothing_behind(tmp_path: Path, number: signal.Signals, begun: str) -> None:
+    """Before or while the simulator plays."""
+    built = build(tmp_path / "built", VARIANTS["header_only"])
+    check_interruption(built.folder, tmp_path / "temporary", number, begun, "--ticks", "40000")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interruption_waits_until_there_is_a_process_to_end(tmp_path: Path, number: signal.Signals) -> None:
+    """One that comes while the worker is being started, and would have left it to play for nobody."""
+    built = build(tmp_path / "built", VARIANTS["header_only"])
+    check_interruption(built.folder, tmp_path / "temporary", number, "icarus", "--ticks", "40000", within_popen=True)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "late"),
+    [
+        (["--axis", "blocks"], 24),
+        (["--axis", "serial"], 41),
+        (["--axis", "blocks", "--fourier"], 24),
+        (["--axis", "serial", "--fourier"], 41),
+        (["--fourier"], 36),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_every_way_of_placing_the_sequencer(tmp_path: Path, arguments: list[str], late: int) -> None:
+    tables = {"x.table": {"length": 128, "bits": 20}, "y.table": {"length": 64, "bits": 18}}
+    small = Variant({**VARIANTS["short_frame"].scan, **tables})
+    built = build(tmp_path / "out", small)
+    outcome = verify(built.folder, *arguments)
+    assert outcome.status == 0, outcome.out + outcome.err
+    assert f" samples, {late} clocks late" in outcome.out
+
+    # What a device renders comes from the Fourier words, what it plays otherwise from the table.
+    flip(built.folder / f"{NAME}_x_fourier.mem", 1, 27)
+    outcome = verify(built.folder, *arguments)
+    assert outcome.status == 5
+    assert (("markers", "integer model") in failed(outcome) or ("x", "integer model") in failed(outcome)) == (
+        "--fourier" in arguments
+    )
+
+
+def test_direct_tables_are_not_rendered(tmp_path: Path) -> None:
+    built = build(tmp_path / "out", VARIANTS["direct_steps"])
+    outcome = verify(built.folder, "--fourier")
+    assert outcome.status == 2
+    assert "both tables are direct" in outcome.err
