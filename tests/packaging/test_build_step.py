@@ -20,6 +20,8 @@ from installing import write_command
 
 from tablegen.resources import c_link, c_runtime
 
+pytestmark = pytest.mark.common
+
 TOOLS = ("make", "Unix Makefiles", "Ninja")
 BUILT = {"main", NAME, *(path.stem for path in (*c_runtime(), *c_link()) if path.suffix == ".c")}
 LINKED = {"example"}
