@@ -14,6 +14,8 @@ from tablegen.device.sequencer import DualProgram, Sequencer
 from tablegen.resources import verilog_runtime
 from tablegen.verification.simulate import Design, compile_design
 
+pytestmark = pytest.mark.common
+
 SCANNER = REPOSITORY / "examples" / "verilog" / "scanner.v"
 BENCH = BENCHES / "scanner_bench.v"
 CLOCKS_PER_TICK = 100
@@ -54,6 +56,7 @@ def test_it_elaborates_as_its_header_says(tmp_path: Path) -> None:
     assert program.exists()
 
 
+@pytest.mark.rest
 def test_the_converters_receive_the_codes_of_the_model(captured: tuple[DualProgram, np.ndarray]) -> None:
     program, levels = captured
     sclk, x_data, y_data, select_n, load_n = (levels >> i & 1 for i in range(5))
@@ -77,6 +80,7 @@ def test_the_converters_receive_the_codes_of_the_model(captured: tuple[DualProgr
         assert set(np.diff(frames.start).tolist()) == {CLOCKS_PER_TICK}, "every sample is as long as every other"
 
 
+@pytest.mark.rest
 def test_a_capture_with_a_wrong_bit_is_not_taken(captured: tuple[DualProgram, np.ndarray]) -> None:
     """Negative control: the select of one frame rises a clock early."""
     _, levels = captured

@@ -15,6 +15,8 @@ import pytest
 from building import REPOSITORY
 from limits import PATIENCE_S
 
+pytestmark = pytest.mark.rest
+
 FORMAL = REPOSITORY / "hdl_tests" / "formal"
 MODULES = REPOSITORY / "firmware_templates" / "verilog"
 PASSED, FAILED = "Status: PASSED", "Status: FAILED"
@@ -77,12 +79,7 @@ def _solve(smt2: Path, *options: str | int) -> str:
     return subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S).stdout
 
 
-QUICK = [
-    name if name != "sequencer_of_look_up_tables" else pytest.param(name, marks=pytest.mark.slow) for name in PROOFS
-]
-
-
-@pytest.mark.parametrize("name", QUICK)
+@pytest.mark.parametrize("name", PROOFS)
 def test_holds_for_ever(name: str, tmp_path: Path) -> None:
     proof = PROOFS[name]
     smt2 = _translate(proof, tmp_path)
@@ -112,7 +109,7 @@ def _proven_by_sat(proof: Proof, folder: Path, modules: Mapping[str, str] | None
     return proven
 
 
-@pytest.mark.parametrize("name", ["slew_8_bits", pytest.param("slew_16_bits", marks=pytest.mark.slow), "serial"])
+@pytest.mark.parametrize("name", WIDER)
 def test_holds_for_ever_by_sat(name: str, tmp_path: Path) -> None:
     assert _proven_by_sat(WIDER[name], tmp_path)
 

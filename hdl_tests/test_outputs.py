@@ -7,6 +7,8 @@ import pytest
 import verilator
 from spi_bench import CODING, SPI, STREAM
 
+pytestmark = pytest.mark.rest
+
 
 def tool(*command: object, folder: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run([*map(str, command)], cwd=folder, capture_output=True, text=True, check=False)

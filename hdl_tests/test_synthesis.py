@@ -16,6 +16,8 @@ from building import REPOSITORY
 sys.path.insert(0, str(REPOSITORY / "benchmarks"))
 import resources
 
+pytestmark = pytest.mark.rest
+
 MODULES = resources.MODULES
 CHECKED: dict[str, tuple[str, Mapping[str, int]]] = {
     "as_it_comes": ("dac_sequencer", {}),
@@ -130,7 +132,7 @@ def test_meets_the_requirements(name: str) -> None:
         assert result.mhz >= int(row[9]) - 0.5
 
 
-@pytest.mark.slow
+@pytest.mark.rest
 @pytest.mark.parametrize("name", resources.CASES)
 def test_page_is_what_is_measured(name: str) -> None:
     case = resources.CASES[name]

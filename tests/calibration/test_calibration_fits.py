@@ -39,7 +39,7 @@ def test_standard_errors_are_neither_too_small_nor_too_large(kind: str) -> None:
     assert np.mean(found) == pytest.approx(0.0, abs=0.3), "biased"
 
 
-@pytest.mark.slow
+@pytest.mark.rest
 @pytest.mark.parametrize("kind", CASES)
 def test_the_truth_lies_within_two_errors_in_95_of_100(kind: str) -> None:
     """Of 1,000 trials a share of 95.45 % is measured to 0.66 %: three times of that are allowed. Images take longer."""

@@ -572,6 +572,7 @@ def test_an_interruption_before_writing_leaves_the_build_that_was_there(scan: Pa
     assert stamps(out) == when
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(
     ("event", "count"), [("tempfile.mkstemp", 1), ("tempfile.mkstemp", 5), ("os.rename", 1), ("os.rename", 4)]
 )

@@ -94,6 +94,7 @@ def test_make_reads_every_name_as_it_is(tmp_path: Path, name: str) -> None:
         assert makes(tmp_path, target, prerequisite)
 
 
+@pytest.mark.common
 def test_ninja_reads_every_name_as_it_is(tmp_path: Path) -> None:
     (tmp_path / "d").mkdir()
     for name in NAMES:
@@ -143,6 +144,7 @@ def test_the_target_is_what_is_asked_for(scan: Path) -> None:
     assert names(file)[0] == "stamp"
 
 
+@pytest.mark.common
 def test_nothing_else_is_read(measured: Path, installed: Path) -> None:
     """Held against the interpreter, which tells what it opens: of the user's folder, of the templates, and modules."""
     folder = measured.parent
@@ -163,6 +165,7 @@ def test_nothing_else_is_read(measured: Path, installed: Path) -> None:
     assert set(deciding) <= set(listed)
 
 
+@pytest.mark.common
 def test_of_an_installation_the_record_is_named_which_has_the_version(installed: Path) -> None:
     code = "from tablegen.emit.depfile import deciding_files; print(*deciding_files(['c']), sep='\\n')"
     listed = python(installed.parent, "-c", code, path=installed).splitlines()

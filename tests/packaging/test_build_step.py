@@ -21,6 +21,8 @@ from installing import write_command
 from tablegen import __version__
 from tablegen.resources import c_link, c_runtime
 
+pytestmark = pytest.mark.common
+
 TOOLS = ("make", "Unix Makefiles", "Ninja")
 BUILT = {"main", NAME, *(path.stem for path in (*c_runtime(), *c_link()) if path.suffix == ".c")}
 LINKED = {"example"}

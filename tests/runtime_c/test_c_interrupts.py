@@ -17,6 +17,8 @@ from tablegen.verification.bench import SequencerShape
 from tablegen.verification.emulate import TRAP, Processor, compile_bare
 from tablegen.verification.stream import pack
 
+pytestmark = pytest.mark.rest
+
 SHAPE = SequencerShape(16, 1, 5, 16, 1, 4, 16)
 PRODUCER = ("dac_sequencer_load", "dac_sequencer_commit", "dac_sequencer_withdraw", "dac_sequencer_trigger")
 

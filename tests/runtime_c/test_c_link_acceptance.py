@@ -21,6 +21,8 @@ from tablegen.link.messages import REFUSAL, AxisLimits, Reason, Refusal, Request
 from tablegen.numerics.arrays import Ints
 from tablegen.verification.bench import SequencerShape
 
+pytestmark = pytest.mark.common
+
 SHAPES = {
     "16 bits": SequencerShape(16, 1, 5, 16, 1, 4, 16),
     "24 bits": SequencerShape(24, 1, 4, 21, 1, 3, 24),

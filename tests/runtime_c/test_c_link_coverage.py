@@ -14,6 +14,8 @@ from test_c_link import SHAPES, test_golden_dialogues
 
 from tablegen.resources import c_link
 
+pytestmark = pytest.mark.common
+
 # A program that passes every check and is not loaded all the same; a source of random numbers, which no notes have.
 UNREACHABLE = ("DAC_LINK_REFUSED, (uint32_t)loaded", "l->config->random(l->nonce)")
 

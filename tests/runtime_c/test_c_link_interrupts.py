@@ -18,6 +18,8 @@ from tablegen.resources import c_link, c_runtime
 from tablegen.verification.bench import SequencerShape
 from tablegen.verification.emulate import TRAP, Processor, compile_bare
 
+pytestmark = pytest.mark.rest
+
 SHAPE = SequencerShape(16, 1, 5, 16, 1, 4, 16)
 RING = 512
 MEMORY = REPOSITORY / "examples" / "firmware" / "memory.c"

@@ -1,0 +1,26 @@
+"""Which parameters of a test are in which set of tests; ``tests/README.md`` tells what the sets are."""
+
+from collections.abc import Collection, Iterable
+from typing import Any
+
+import pytest
+
+_COMMON = ("clang", "g++", "gcc-c++")  # beginnings of names of tools
+_REST = ("cppcheck", "ghdl", "zig")
+
+
+def by_tool(names: Iterable[str]) -> list[Any]:
+    """Parameters that name a tool: ``gcc`` and Icarus are quick, others common or of the rest."""
+    marked = []
+    for name in names:
+        marks = [pytest.mark.common] if name.startswith(_COMMON) else []
+        marks += [pytest.mark.rest] if name.startswith(_REST) else []
+        marked.append(pytest.param(name, marks=marks))
+    return marked
+
+
+def quick(few: Collection[Any], parameters: Iterable[Any]) -> list[Any]:
+    """Parameters of which a few are quick; with the others the test is common."""
+    every = list(parameters)
+    assert set(few) <= set(every)
+    return [each if each in few else pytest.param(each, marks=pytest.mark.common) for each in every]
