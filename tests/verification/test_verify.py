@@ -33,8 +33,8 @@ from tablegen.fixedpoint.program import Program
 from tablegen.manifest.read import read_build
 
 TICKS = 2000
-CHECKS = 15
-FILES = {("files", "SHA-256 in the manifest"), ("memories", "manifest")}
+CHECKS = 17
+FILES = {("files", "SHA-256 in the manifest"), ("verilog memories", "manifest")}
 MODES = (
     "example",
     "bits_8",
@@ -178,7 +178,7 @@ def test_a_flipped_bit_of_what_is_not_played_is_found_by_its_hash(folder: Path, 
     assert outcome.status == 5
     assert failed(outcome) == FILES
     assert re.search(
-        rf"memories: {NAME}_{suffix}: word 3 is [0-9a-f]{{8}}, it is [0-9a-f]{{8}} in the manifest", outcome.err
+        rf"verilog memories: {NAME}_{suffix}: word 3 is [0-9a-f]{{8}}, it is [0-9a-f]{{8}} in the manifest", outcome.err
     )
     assert "first difference" not in outcome.err
 
@@ -188,7 +188,7 @@ def test_an_edited_constant_is_found(folder: Path) -> None:
     edit(folder / f"{NAME}.vh", f'{NAME.upper()}_X_TABLE_FILE = "{NAME}_x.mem";', f'{NAME.upper()}_X_TABLE_FILE = "";')
     outcome = verify(folder)
     assert outcome.status == 5
-    assert failed(outcome) == {("files", "SHA-256 in the manifest"), ("header", "manifest")}
+    assert failed(outcome) == {("files", "SHA-256 in the manifest"), ("verilog header", "manifest")}
     assert f"{NAME}.vh: {NAME.upper()}_PIXELS is 51, it is 50 in the manifest" in outcome.err
     assert f"{NAME}.vh: {NAME.upper()}_X_TABLE_FILE is '', it is '{NAME}_x.mem' in the manifest" in outcome.err
 
@@ -203,10 +203,11 @@ def test_a_constant_that_is_missing_or_new_is_found(folder: Path) -> None:
 @pytest.mark.parametrize("variant", ["direct", "direct_steps", "bits_24", "left_aligned", "inverting"])
 def test_the_header_of_other_builds_is_read_right(variant: str, tmp_path: Path) -> None:
     """Also where no table is interpolated, and where numbers are negative or have 64 bits; nothing is simulated."""
-    from tablegen.verification.directory import wrong_constants
+    from tablegen.emit.content import stored_content
+    from tablegen.emit.formats.verilog import wrong_constants
 
     built = build(tmp_path, VARIANTS[variant])
-    assert wrong_constants(built.folder, read_build(built.folder))[1] == []
+    assert wrong_constants(built.folder, stored_content(read_build(built.folder)))[1] == []
 
 
 def test_an_edited_runtime_is_played_and_found(folder: Path) -> None:
@@ -308,7 +309,12 @@ def test_a_manifest_that_was_edited_is_found(folder: Path) -> None:
     outcome = verify(folder)
     assert outcome.status == 5
     found = failed(outcome)
-    assert {("manifest", "its own hash"), ("y", "float waveform"), ("x", "slew guard"), ("header", "manifest")} <= found
+    assert {
+        ("manifest", "its own hash"),
+        ("y", "float waveform"),
+        ("x", "slew guard"),
+        ("verilog header", "manifest"),
+    } <= found
 
 
 @pytest.mark.parametrize(

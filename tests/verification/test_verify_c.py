@@ -16,7 +16,6 @@ from building import NAME, VARIANTS, Build, Variant, build
 from editing import Outcome, run
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tablegen.verification.c_files import arrays_file, wrong_arrays, wrong_constants
 from verifying import (
     check_first_difference,
     check_interruption,
@@ -32,6 +31,8 @@ from verifying import (
     with_a_long_table,
 )
 
+from tablegen.emit.content import stored_content
+from tablegen.emit.formats.c import arrays_file, wrong_arrays, wrong_constants
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.program import Program
 from tablegen.manifest.read import StoredBuild, read_build
@@ -44,9 +45,9 @@ from tablegen.verification.simulate import SimulationFailed
 from tablegen.verification.stream import Script
 
 CAPITAL = NAME.upper()
-CHECKS = 18
+CHECKS = 20
 FILES = ("files", "SHA-256 in the manifest")
-HEADER, ARRAYS, FILL = ("header", "manifest"), ("arrays", "manifest"), ("fill", "integer model")
+HEADER, ARRAYS, FILL = ("c header", "manifest"), ("c arrays", "manifest"), ("fill", "integer model")
 PROGRAM = ("program", "cc")
 # Words that are wider than their codes, of the widest that converters have.
 WIDE = Variant({**VARIANTS["short_frame"].scan, "dac.bits": 12, "dac.word_bits": 32, "dac.align": "left"})
@@ -244,14 +245,14 @@ def defined(folder: Path) -> list[str]:
 
 def test_every_constant_is_held_against_the_manifest(short: Build, tmp_path: Path) -> None:
     """One by one, with what it is and what it is in the manifest; nothing is compiled."""
-    stored = read_build(short.folder)
-    count, wrong = wrong_constants(short.folder, stored)
+    content = stored_content(read_build(short.folder))
+    count, wrong = wrong_constants(short.folder, content)
     names = defined(short.folder)
     assert (count, wrong) == (len(names), [])
     for name in set(names) - {"HASH"}:
         shutil.copy(short.folder / f"{NAME}.h", tmp_path)
         old, new = define(tmp_path, name, lambda value: value + 1)
-        assert wrong_constants(tmp_path, stored)[1] == [
+        assert wrong_constants(tmp_path, content)[1] == [
             f"{NAME}.h: {CAPITAL}_{name} is {new}, it is {old} in the manifest"
         ]
 
@@ -260,10 +261,10 @@ def test_every_constant_is_held_against_the_manifest(short: Build, tmp_path: Pat
 def test_headers_and_arrays_of_other_builds_are_read_right(variant: str, tmp_path: Path) -> None:
     """Also where no table is interpolated, where numbers have 64 bits, and where arrays stand in the header."""
     built = build(tmp_path, VARIANTS[variant])
-    stored = read_build(built.folder)
-    assert wrong_constants(built.folder, stored) == (len(defined(built.folder)), [])
-    assert wrong_arrays(built.folder, stored)[1] == []
-    assert arrays_file(stored).endswith(".h") == ("header_only" in str(VARIANTS[variant].scan))
+    content = stored_content(read_build(built.folder))
+    assert wrong_constants(built.folder, content) == (len(defined(built.folder)), [])
+    assert wrong_arrays(built.folder, content)[1] == []
+    assert arrays_file(content).endswith(".h") == ("header_only" in str(VARIANTS[variant].scan))
 
 
 # What each constant of a program does when it is wrong: which check beside header and files fails first.
