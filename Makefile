@@ -9,6 +9,7 @@
 # make bench     what a build costs, against importing numpy
 # make figures   the pictures of the README and the docs
 # make paper     the paper's numbers beside ours, into docs/paper
+# make check-python PYTHON=python3.13  `make check` under another Python, in an environment of its own
 # make clean     remove what these made
 
 PYTHON ?= python3
@@ -21,17 +22,19 @@ HDL_TOOLS := make g++ iverilog yosys nextpnr-ice40 z3
 FIRMWARE_TOOLS := gcc-arm-none-eabi qemu-system-arm gcc-avr avr-libc simavr gcc-riscv64-unknown-elf gcc-mips-linux-gnu \
     libc6-dev-mips-cross qemu-user
 TOOLS := $(FIRMWARE_TOOLS) gcc clang libclang-rt-dev cppcheck cmake ninja-build ghdl $(HDL_TOOLS)
+# The Pythons that the package supports. The tests also run the wheel under each of them that this machine has.
+PYTHONS := 3.11 3.12 3.13
 # A file of tests goes to one process: what its tests share is made once.
 # OpenBLAS threads only spin beside the other processes.
 PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist loadfile
 
-.PHONY: demo test test-hdl test-slow resources instructions link fuzz bench figures paper clean
+.PHONY: demo test test-hdl test-slow pythons check-python resources instructions link fuzz bench figures paper clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/installed
 	$(BIN)/tablegen build examples/annexin_200nm.toml -o build/demo
 
-test: $(VENV)/installed-test
+test: $(VENV)/installed-test pythons
 	@.ci/system-packages $(TOOLS)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -45,6 +48,12 @@ test-hdl: $(VENV)/installed-test
 test-slow: $(VENV)/installed-test
 	@.ci/system-packages $(TOOLS)
 	$(BIN)/python -m pytest -m slow
+
+pythons: $(VENV)/installed
+	@.ci/further-pythons $(VENV) $(PYTHONS)
+
+check-python:
+	$(MAKE) check VENV=.venv-$$($(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2])')
 
 resources: $(VENV)/installed-test
 	@.ci/system-packages $(HDL_TOOLS)
@@ -97,4 +106,4 @@ $(VENV)/installed-plot: $(VENV)/installed
 	@touch $@
 
 clean:
-	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) .venv-* build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
