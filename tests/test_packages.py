@@ -7,6 +7,7 @@ import tarfile
 import zipfile
 from pathlib import Path
 
+import building
 import pytest
 from building import EXAMPLE, REPOSITORY
 from installing import (
@@ -96,9 +97,10 @@ def test_tests_of_the_sdist_are_collected(sdist: Path, installed: Path, tmp_path
     files = {path.relative_to(source).as_posix() for path in source.glob("*tests/**/test_*.py")}
     assert collected(source, path=installed) == files
     # Negative control: a helper that is missing is an error of the collection.
-    (source / "tests" / "building.py").unlink()
+    this, helper = (Path(file).resolve().relative_to(REPOSITORY) for file in (__file__, str(building.__file__)))
+    (source / helper).unlink()
     with pytest.raises(AssertionError, match="ModuleNotFoundError"):
-        collected(source, "tests/test_packages.py", path=installed)
+        collected(source, str(this), path=installed)
 
 
 def collected(tree: Path, *names: str, path: Path) -> set[str]:
