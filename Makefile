@@ -22,19 +22,17 @@ HDL_TOOLS := make g++ iverilog yosys nextpnr-ice40 z3
 FIRMWARE_TOOLS := gcc-arm-none-eabi qemu-system-arm gcc-avr avr-libc simavr gcc-riscv64-unknown-elf gcc-mips-linux-gnu \
     libc6-dev-mips-cross qemu-user
 TOOLS := $(FIRMWARE_TOOLS) gcc clang libclang-rt-dev cppcheck cmake ninja-build ghdl $(HDL_TOOLS)
-# The Pythons that the package supports. The tests also run the wheel under each of them that this machine has.
-PYTHONS := 3.11 3.12 3.13
 # A file of tests goes to one process: what its tests share is made once.
 # OpenBLAS threads only spin beside the other processes.
 PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist loadfile
 
-.PHONY: demo test test-hdl test-slow pythons check-python resources instructions link fuzz bench figures paper clean
+.PHONY: demo test test-hdl test-slow resources instructions link fuzz bench figures paper clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/installed
 	$(BIN)/tablegen build examples/annexin_200nm.toml -o build/demo
 
-test: $(VENV)/installed-test pythons
+test: $(VENV)/installed-test
 	@.ci/system-packages $(TOOLS)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -48,12 +46,6 @@ test-hdl: $(VENV)/installed-test
 test-slow: $(VENV)/installed-test
 	@.ci/system-packages $(TOOLS)
 	$(BIN)/python -m pytest -m slow
-
-pythons: $(VENV)/installed
-	@.ci/further-pythons $(VENV) $(PYTHONS)
-
-check-python:
-	$(MAKE) check VENV=.venv-$$($(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2])')
 
 resources: $(VENV)/installed-test
 	@.ci/system-packages $(HDL_TOOLS)
@@ -104,6 +96,16 @@ $(VENV)/installed-test: $(VENV)/installed
 $(VENV)/installed-plot: $(VENV)/installed
 	$(PIP) install --editable '.[calibrate,plot]'
 	@touch $@
+
+# The Pythons that the package supports. `make test` runs the wheel under each further one that this machine has.
+PYTHONS := 3.11 3.12 3.13
+.PHONY: pythons check-python
+test: pythons
+pythons: $(VENV)/installed
+	@.ci/further-pythons $(VENV) $(PYTHONS)
+
+check-python:
+	$(MAKE) check VENV=.venv-$$($(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2])')
 
 clean:
 	rm -rf $(VENV) .venv-* build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
