@@ -8,7 +8,6 @@ from io import TextIOWrapper
 
 import click
 
-from tablegen import __version__
 from tablegen.cli.build import build
 from tablegen.cli.calibrate import calibrate
 from tablegen.cli.check import check
@@ -27,6 +26,7 @@ from tablegen.cli.show import show
 from tablegen.cli.simulate import simulate
 from tablegen.cli.upload import upload
 from tablegen.cli.verify import verify
+from tablegen.version import __version__
 
 
 @click.group(

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from functools import cache
 
-from tablegen import __version__
 from tablegen.certificate.certificate import Certificate
 from tablegen.certificate.summary import summary
 from tablegen.emit.content import AxisContent, Content
@@ -13,6 +12,7 @@ from tablegen.manifest.format import MANIFEST, content_hash
 from tablegen.manifest.record import plan_record
 from tablegen.manifest.write import manifest_file
 from tablegen.planning.line_plan import LinePlan, Plan
+from tablegen.version import __version__
 
 
 def render(plan: Plan, certificates: dict[str, Certificate], formats: Sequence[str] | None = None) -> dict[str, bytes]:

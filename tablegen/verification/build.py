@@ -5,13 +5,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from tablegen import __version__
 from tablegen.emit.content import stored_content
 from tablegen.emit.formats import UnknownFormat, get
 from tablegen.manifest.read import NotABuild, StoredBuild, read_build
 from tablegen.verification.checks import Check
 from tablegen.verification.directory import some, wrong_files
 from tablegen.verification.session import BuildSession, needed_ticks
+from tablegen.version import __version__
 
 Progress = Callable[[str | Callable[[], str]], None]
 

@@ -294,11 +294,11 @@ def test_the_source_of_the_user_compiles_itself(project: Project) -> None:
 
 
 def test_a_scan_that_becomes_header_only_loses_a_source(project: Project) -> None:
-    """The sources are those of the scan as it is now; NAME.c of before is not compiled, though it is still there."""
+    """The sources are those of the scan as it is now; NAME.c of before is removed."""
     project.append(project.scan, "[emit]\nheader_only = true\n")
     made = project.build()
     assert (made.status, made.runs, made.compiled, made.linked) == (0, 1, {"main"}, True), made.shown
-    assert (project.output / f"{NAME}.c").exists()
+    assert not (project.output / f"{NAME}.c").exists()
     assert project.play().startswith("1250 ticks a line, ")
     does(project.build(), 0, set())
     project.put_back()
