@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from tablegen.emit.content import stored_content
 from tablegen.emit.formats import UnknownFormat, get
+from tablegen.emit.stored import stored_content
 from tablegen.manifest.read import NotABuild, StoredBuild, read_build
 from tablegen.verification.checks import Check
 from tablegen.verification.directory import some, wrong_files

@@ -32,8 +32,8 @@ from verifying import (
     with_a_long_table,
 )
 
-from tablegen.emit.content import stored_content
 from tablegen.emit.formats.c import arrays_file, wrong_arrays, wrong_constants
+from tablegen.emit.stored import stored_content
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.program import Program
 from tablegen.manifest.read import StoredBuild, read_build
