@@ -5,9 +5,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
+from tablegen.emit.format import Comparison
 from tablegen.emit.formats import UnknownFormat, get
 from tablegen.emit.stored import stored_content
 from tablegen.manifest.read import NotABuild, StoredBuild, read_build
+from tablegen.problems import Unphysical
 from tablegen.verification.checks import Check
 from tablegen.verification.directory import some, wrong_files
 from tablegen.verification.session import BuildSession, needed_ticks
@@ -109,6 +111,8 @@ def _format_checks(folder: Path, stored: StoredBuild, notes: list[str]) -> list[
         except UnknownFormat as error:
             notes.append(f"{error}; its files were held against their SHA-256 alone")
             continue
+        except Unphysical as error:  # no build has such a manifest
+            found = [Comparison("files", "0 files", [str(error)])]
         checks += [differing_check(f"{name} {one.subject}", "manifest", one.compared, one.wrong) for one in found]
     return checks
 

@@ -19,7 +19,7 @@ GROUP = "tablegen.formats"
 
 
 class UnknownFormat(ValueError):
-    """There is no format of this name, or it cannot be loaded; the message says what there is."""
+    """There is no format of this name, or it cannot be used; the message says what there is, or why."""
 
 
 def names() -> list[str]:
