@@ -17,7 +17,8 @@ import mpmath
 import numpy as np
 import numpy.typing as npt
 import pytest
-from building import EXAMPLE, VARIANTS, Build, Variant, build, changed, to_toml
+from building import EXAMPLE, FEW, VARIANTS, Build, Variant, build, changed, to_toml
+from sets import quick
 
 from tablegen.config.load import load
 from tablegen.emit.formats import chosen
@@ -77,7 +78,10 @@ REQUIRED: Json = {
 }
 
 
-@pytest.fixture(scope="module", params=VARIANTS)
+@pytest.fixture(
+    scope="module",
+    params=quick(FEW, VARIANTS),
+)
 def built(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Build:
     return build(tmp_path_factory.mktemp("variant"), VARIANTS[request.param])
 

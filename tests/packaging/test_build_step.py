@@ -17,6 +17,7 @@ import pytest
 from building import EXAMPLE, NAME, REPOSITORY, run
 from editing import SCANNER, edited
 from installing import write_command
+from sets import common
 
 from tablegen import __version__
 from tablegen.resources import c_link, c_runtime
@@ -172,7 +173,7 @@ def make_project(tool: str, folder: Path, installed: Path) -> Project:
     return project
 
 
-@pytest.fixture(scope="module", params=TOOLS)
+@pytest.fixture(scope="module", params=common(("make", "Ninja"), TOOLS))
 def built(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory, installed: Path) -> Project:
     """A project that was built once, with four jobs."""
     tool = request.param
@@ -445,7 +446,7 @@ int main(void) { return first_x_table[0] == 0 && second_x_table[0] == 0; }
 """
 
 
-@pytest.fixture(params=TOOLS)
+@pytest.fixture(params=common(("make", "Ninja"), TOOLS))
 def two(request: pytest.FixtureRequest, tmp_path: Path, installed: Path) -> Project:
     """A program that plays two scans."""
     project = make_project(request.param, tmp_path, installed)
