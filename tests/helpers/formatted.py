@@ -18,7 +18,7 @@ from tablegen.emit.render import render
 from tablegen.emit.write import write_files
 from tablegen.planning.line_plan import Plan, make_plan
 
-# A frame of 2648 ticks; words of 16 bits, and of widths that are no whole bytes; tables of an odd length; y in steps.
+# A frame of 13240 ticks; words of 16 bits, and of widths that are no whole bytes; tables of an odd length; y in steps.
 SHORT = VARIANTS["short_frame"]
 _SMALL = {key: value for key, value in SHORT.scan.items() if key != "emit.header_only"}
 BUILDS: dict[str, Variant] = {
@@ -32,7 +32,7 @@ BUILDS: dict[str, Variant] = {
             "x.table": {"mode": "direct", "bits": 16},
             "y.table": {"mode": "direct", "bits": 8},
             "y.motion": "step",
-            "y.turn": 0.5,
+            "y.size_nm": 50.0,
         }
     ),
     "inverting": Variant({**_SMALL, "dac.coding": "twos-complement", "amplifier.gain": -10.0}),

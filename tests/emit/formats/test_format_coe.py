@@ -1,4 +1,4 @@
-"""COE files against the words of the manifest, by AMD's description: srecord 1.64 reads none, and fails to write any."""
+"""COE files against the words of the manifest, by the description of AMD; srecord 1.64 reads none."""
 
 import re
 from pathlib import Path
