@@ -17,11 +17,11 @@ from link_talk import Talk
 from loader_bridge import Simulation
 from loader_device import Loader
 
-from tablegen.device.sequencer import DualProgram
+from tablegen.device.dual_program import DualProgram
 from tablegen.link.image import ProgramImage, make_image
 from tablegen.link.messages import ANSWER, DeviceState, DeviceStatus, Request, Upload
 
-pytestmark = pytest.mark.common
+pytestmark = pytest.mark.rest
 
 UPDATE_RATE_HZ = 50_000
 TICK_EVERY = 50  # clocks
@@ -99,7 +99,6 @@ def status(simulation: Simulation, talk: Talk) -> DeviceStatus:
     return DeviceStatus.unpack(answer.payload)
 
 
-@pytest.mark.rest
 def test_uploads_while_a_scan_plays(loader: Loader, scans: Scans) -> None:
     talk = Talk()
     with Simulation(loader.compiled) as simulation:
@@ -133,7 +132,6 @@ def test_uploads_while_a_scan_plays(loader: Loader, scans: Scans) -> None:
             LineCheck(scans.all["boot"]).follow(log)
 
 
-@pytest.mark.rest
 def test_it_keeps_up_with_the_line(loader: Loader, scans: Scans) -> None:
     """A whole upload without a pause between two bytes."""
     talk, image = Talk(), image_of(scans.others[0], fourier=False)

@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 from building import BENCHES, Variant, write_variant
 from programs import random_dual
-from sets import quick
+from sets import common, quick
 from spi_monitor import Converter, Wires, receive, updates
 from stream_configurations import (
     CONFIGURATIONS,
+    FEW,
     LEAST_PACE,
     LEAST_PACES,
     LOW_AREA,
@@ -170,7 +171,7 @@ def markers_of_a_scan(capture: Words, plan: Plan, frames: int) -> None:
 
 
 @pytest.mark.common
-@pytest.mark.parametrize("name", PLANS)
+@pytest.mark.parametrize("name", common(("bits_16", "turn_0.7", "direct_steps", "settle_5", "guarded"), PLANS))
 def test_whole_frames_of_a_plan(name: str, tmp_path: Path) -> None:
     plan = planned(tmp_path, PLANS[name])
     program = plan.program
@@ -195,7 +196,7 @@ def test_whole_frames_of_a_plan(name: str, tmp_path: Path) -> None:
     assert tuple(codes(played.capture, axis)[-1] for axis in "xy") == park
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize(("simulator", "lines"), [("icarus", 3), ("verilator", 200)])
 def test_the_shipped_example(simulator: str, lines: int, tmp_path: Path) -> None:
     plan = planned(tmp_path, Variant())
@@ -240,7 +241,10 @@ def test_enough_is_played_on_icarus() -> None:
 
 
 @pytest.mark.common
-@pytest.mark.parametrize("name", CONFIGURATIONS)
+@pytest.mark.parametrize(
+    "name",
+    common(FEW, CONFIGURATIONS),
+)
 def test_random_programs(name: str, tmp_path: Path) -> None:
     configuration = CONFIGURATIONS[name]
     script = configuration.script(name)
@@ -254,7 +258,9 @@ def test_random_programs(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.common
-@pytest.mark.parametrize("variant", ["PLAIN_MULTIPLIER", "LOW_AREA", "FOURIER", "digits"])
+@pytest.mark.parametrize(
+    "variant", common(["digits", "FOURIER"], ["PLAIN_MULTIPLIER", "LOW_AREA", "FOURIER", "digits"])
+)
 def test_everything_that_a_host_may_ask(variant: str, tmp_path: Path) -> None:
     shape = SequencerShape(16, 1, 4, 16, 1, 3, 16)
     parameters: dict[str, int | str] = {"COUNT_BITS": 4}
@@ -302,7 +308,7 @@ def test_a_swap_is_requested_at_every_tick_and_taken_at_line_starts(pace: int, t
     follow_their_programs(capture, script.taken)
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize("swaps", [SWAPS, pytest.param(SWAPS_SLOW, marks=pytest.mark.long)])
 def test_no_line_mixes_programs_and_no_step_is_above_the_limit(swaps: int, small_on_verilator: SequencerBench) -> None:
     rng = np.random.default_rng(swaps)
@@ -368,7 +374,7 @@ def test_no_line_drifts(ticks: int, lines: int, played_lines: int, small_on_veri
     assert np.array_equal(np.flatnonzero(flag(playing, "frame")), [0, frame])
 
 
-@pytest.mark.common
+@pytest.mark.rest
 def test_random_programs_on_verilator(tmp_path: Path) -> None:
     shape = SequencerShape(20, 1, 4, 24, 0, 5, 18)
     script = Script((1 << 19, 3))
@@ -379,7 +385,7 @@ def test_random_programs_on_verilator(tmp_path: Path) -> None:
     assert equal(bench, script).samples >= 150_000
 
 
-@pytest.mark.common
+@pytest.mark.rest
 def test_low_area_on_verilator(tmp_path: Path) -> None:
     shape = SequencerShape(20, 1, 4, 24, 0, 5, 16)
     script = Script()

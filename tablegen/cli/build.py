@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from tablegen.api.build import Build
 
 
-@click.command(short_help="Build C, Verilog, tables and a certificate.")
+@click.command(short_help="Write C, Verilog, tables and manifest of a scan.")
 @scan_argument
 @click.option(
     "-o",
@@ -22,21 +22,28 @@ if TYPE_CHECKING:
     default=Path("build"),
     show_default=True,
     metavar="DIR",
-    help="Where the files go; made if it is not there.",
+    help="Output directory. It is created if it does not exist.",
 )
 @format_option
-@click.option("--check", "only_check", is_flag=True, help="Write nothing; exit 1 with a diff if DIR is stale.")
+@click.option(
+    "--check",
+    "only_check",
+    is_flag=True,
+    help="Write nothing. Exit with status 1 and print a diff if the files in DIR are not up to date.",
+)
 @click.option(
     "--depfile",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE",
-    help="Write a rule for make, CMake or Ninja: what was read, as gcc -MD -MP does. FILE exists once the build is "
-    "complete, and not after one that failed.",
+    help="Also write a dependency file for make, CMake or Ninja, like gcc -MD -MP. FILE is removed first and written "
+    "last, so it exists only after a successful build.",
 )
 @click.option(
-    "--depfile-target", metavar="NAME", help="The target of that rule, as gcc -MT has it.  [default: DIR/manifest.json]"
+    "--depfile-target",
+    metavar="NAME",
+    help="Target name in the dependency file, like gcc -MT.  [default: DIR/manifest.json]",
 )
-@click.option("-q", "--quiet", is_flag=True, help="Print no certificate.")
+@click.option("-q", "--quiet", is_flag=True, help="Do not print the certificate.")
 def build(
     scan: Path,
     output: Path,
@@ -46,18 +53,22 @@ def build(
     depfile_target: str | None,
     quiet: bool,
 ) -> int:
-    """Build a scan: tables, constants and a sequencer in C and Verilog, and manifest.json with the certificate.
+    """Write the tables, constants and sequencer of a scan in C and Verilog, and manifest.json with the certificate.
 
-    The same input gives the same bytes on every machine. Files that are already right are not touched. If anything is
-    wrong, nothing is written. A file that an earlier build made and this one does not is removed.
+    The same input gives the same bytes on every machine. A file that is up to date is not written again. If the input
+    has an error, no file is written. Files of an earlier build that this build no longer makes are removed.
 
     \b
-      tablegen build annexin_200nm.toml -o build
-      tablegen build annexin_200nm.toml -o build -f c        C alone; `tablegen formats` lists what there is
-      tablegen build annexin_200nm.toml -o build --check     in CI: is what was committed up to date?
-      tablegen verify build                                  does the sequencer play it, bit for bit?
+    Examples:
+      tablegen build annexin_200nm.toml -o build            write all files to build
+      tablegen build annexin_200nm.toml -o build -f c       write C only
+      tablegen build annexin_200nm.toml -o build --check    for CI: check that build is up to date
 
-    From make and CMake it is called by what `tablegen paths` leads to.
+    \b
+    Exit status: 0 done, 1 DIR is not up to date (--check), 2 wrong input, 3 a limit of the
+    certificate is exceeded, 4 cannot write.
+
+    `tablegen paths` prints the include files that run this command from make or CMake.
     """
     if depfile is None and depfile_target is not None:
         raise click.UsageError("--depfile-target names the target of --depfile FILE; give that as well")

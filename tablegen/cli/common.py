@@ -26,8 +26,8 @@ format_option = click.option(
     "formats",
     multiple=True,
     metavar="NAME",
-    help="Write this format; give it once for each. `tablegen formats` lists them.  [default: emit.formats of the scan "
-    "file, or c and verilog]",
+    help="Output format; repeat the option for several formats. `tablegen formats` lists them.  [default: emit.formats "
+    "of the scan file, or c and verilog]",
 )
 
 

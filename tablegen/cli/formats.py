@@ -3,18 +3,20 @@
 import click
 
 
-@click.command(short_help="List the formats that a build can be written as.")
+@click.command(short_help="List the output formats of build.")
 def formats() -> None:
-    """List the formats that a build can be written as: name, purpose, files.
+    """List the output formats of `tablegen build`: name, purpose and files.
 
     \b
-    A scan file chooses them, or the command line:
+    Choose formats in the scan file:
       [emit]
       formats = ["c", "vhdl"]
 
+    \b
+    or on the command line, which takes precedence:
       tablegen build scan.toml -f c -f vhdl
 
-    Without a choice a build is written as c and verilog. Other packages can add formats; docs/formats.md says how.
+    The default is c and verilog. Other packages can add formats: see docs/formats.md.
     """
     from tablegen.emit.formats import UnknownFormat, get, names
 

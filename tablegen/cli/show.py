@@ -8,15 +8,22 @@ import click
 from tablegen.cli.common import format_option, planned, rendered, scan_argument
 
 
-@click.command(short_help="Show what would be built: drive, rates, certificate, plot.")
+@click.command(short_help="Show drive, rates, accuracy and plots of a scan.")
 @scan_argument
-@click.option("--json", "as_json", is_flag=True, help="The manifest instead of text.")
+@click.option("--json", "as_json", is_flag=True, help="Print manifest.json instead of text.")
 @format_option
-@click.option("--plot/--no-plot", default=True, show_default=True, help="Draw the drive of one period.")
+@click.option("--plot/--no-plot", default=True, show_default=True, help="Plot one period of the drive of each axis.")
 def show(scan: Path, as_json: bool, formats: tuple[str, ...], plot: bool) -> None:
-    """Show what a build of a scan would make, and write nothing.
+    """Show drive, rates, accuracy and plots of a scan. Writes no file.
 
-    Under each plot, > and < mark where the forward and the backward image are taken.
+    Under each plot, > and < mark the imaging windows of the forward and backward lines.
+
+    \b
+    Examples:
+      tablegen show annexin_200nm.toml
+      tablegen show annexin_200nm.toml --json > manifest.json
+
+    Exit status: 0 done, 2 wrong input, 3 a limit of the certificate is exceeded.
     """
     built = planned(scan, list(formats) or None)
     if as_json:

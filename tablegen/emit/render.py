@@ -4,7 +4,6 @@ import re
 from collections.abc import Sequence
 from functools import cache
 
-from tablegen import __version__
 from tablegen.certificate.certificate import Certificate
 from tablegen.certificate.summary import summary
 from tablegen.emit.content import AxisContent, Content
@@ -14,6 +13,7 @@ from tablegen.manifest.format import MANIFEST, content_hash
 from tablegen.manifest.record import plan_record
 from tablegen.manifest.write import manifest_file
 from tablegen.planning.line_plan import LinePlan, Plan
+from tablegen.version import __version__
 
 _FILE_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]*(\.[A-Za-z0-9]+)+")  # of plain files, which manifests can list
 

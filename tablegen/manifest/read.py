@@ -12,8 +12,8 @@ import numpy as np
 from msgspec import Meta, Struct
 
 from tablegen.config.schema import DEFAULT_FORMATS
+from tablegen.device.dual_program import DualProgram
 from tablegen.device.schedule import MAXIMUM_LINE_TICKS, Schedule, Window
-from tablegen.device.sequencer import DualProgram
 from tablegen.fixedpoint.interpolation import guard_bits
 from tablegen.fixedpoint.output import GAIN_BITS, UNIT_GAIN_BITS, Output
 from tablegen.fixedpoint.phase import MAXIMUM_TICKS, RationalPhase

@@ -5,15 +5,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from tablegen import __version__
-from tablegen.emit.content import stored_content
 from tablegen.emit.format import Comparison
 from tablegen.emit.formats import UnknownFormat, get
+from tablegen.emit.stored import stored_content
 from tablegen.manifest.read import NotABuild, StoredBuild, read_build
 from tablegen.problems import Unphysical
 from tablegen.verification.checks import Check
 from tablegen.verification.directory import some, wrong_files
 from tablegen.verification.session import BuildSession, needed_ticks
+from tablegen.version import __version__
 
 Progress = Callable[[str | Callable[[], str]], None]
 

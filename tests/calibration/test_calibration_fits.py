@@ -26,6 +26,7 @@ def test_exact_data_give_exact_parameters(kind: str) -> None:
         assert estimate.standard_error <= 1e-6 * abs(truth), name
 
 
+@pytest.mark.rest
 @pytest.mark.parametrize("kind", CASES)
 def test_standard_errors_are_neither_too_small_nor_too_large(kind: str) -> None:
     """Within three standard deviations of the share; parameters of one fit, which hang together, count as two."""

@@ -102,7 +102,7 @@ def test_help_names_every_command_and_every_exit_status() -> None:
             "verify",
             (
                 "DIR",
-                "--target [verilog|c|cortex-m]",
+                "--target [verilog|c|cortex-m|files]",
                 "--sim [icarus|verilator]",
                 "--ticks N",
                 "--junit FILE",
@@ -364,6 +364,7 @@ def on_a_terminal(*arguments: str | Path) -> str:
     return shown.decode("utf-8").replace("\r\n", "\n")
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("command", ["show", "build", "check"])
 def test_a_terminal_gets_what_a_pipe_gets_apart_from_colour(scan: Path, command: str) -> None:
     extra = ("-o", scan.parent / "out") if command == "build" else ()
@@ -540,6 +541,7 @@ def interrupted(event: str, count: int, *arguments: str | Path) -> subprocess.Co
 LONG = edited(SCAN, "timing.lines = 20000", "x.size_nm = 201.0", "- [limits]")
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(
     ("event", "count"),
     [

@@ -12,7 +12,7 @@ import mpmath
 import numpy as np
 import pytest
 from building import NAME, REPOSITORY, VARIANTS, Build, Variant, build, build_stressed, constants, run, run_clean
-from sets import by_tool, quick
+from sets import by_tool, common
 
 from tablegen.device.sequencer import play_line
 from tablegen.numerics.arrays import Ints
@@ -32,7 +32,7 @@ DIALECTS = {
 STRESS = [(8, 131071), (16, -131072), (21, 131071), (24, -131072), (24, 131071)]
 
 
-@pytest.fixture(scope="module", params=quick(("example", "header_only", "direct_steps"), VARIANTS))
+@pytest.fixture(scope="module", params=common(("example", "header_only", "direct_steps"), VARIANTS))
 def built(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Build:
     return build(tmp_path_factory.mktemp("variant"), VARIANTS[request.param])
 
@@ -228,6 +228,7 @@ def header_only(tmp_path_factory: pytest.TempPathFactory) -> Build:
     return build(tmp_path_factory.mktemp("damaged"), VARIANTS["header_only"])
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("damage", DAMAGES)
 def test_a_damaged_header_does_not_compile(header_only: Build, tmp_path: Path, damage: str) -> None:
     """Negative controls of the static asserts: each is named by every compiler in every dialect."""
@@ -245,7 +246,7 @@ def test_a_damaged_header_does_not_compile(header_only: Build, tmp_path: Path, d
 HOSTILE = ["*/ int broken; /*", "two\nlines", "back\\slash\\", "trigraph ??/", "/* /* */ */", "\u00b5-Scanner \u202e"]
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize("dialect", by_tool(DIALECTS))
 @pytest.mark.parametrize("name", HOSTILE, ids=ascii)
 def test_no_scanner_s_name_leaves_its_comment(tmp_path: Path, name: str, dialect: str) -> None:

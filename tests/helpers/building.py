@@ -98,6 +98,9 @@ VARIANTS: dict[str, Variant] = {
     "low_corner": Variant({"x.offset_v": 11.0, "x.size_nm": 190.0, "y.park_v": 0.0, "timing.lines": 40}),
 }
 
+# In every `make check`, of what is quick.
+FEW = ("example", "bits_24", "direct_steps", "turn_0.7", "left_aligned", "header_only")
+
 
 def stressed(plan: Plan, bits: int, gain_word: int) -> Plan:
     """A plan that no scan makes: noise over the whole range of the words, the largest gain, and limits that clamp."""

@@ -21,6 +21,15 @@ def by_tool(names: Iterable[str]) -> list[Any]:
 
 def quick(few: Collection[Any], parameters: Iterable[Any]) -> list[Any]:
     """Parameters of which a few are quick; with the others the test is common."""
+    return _divided(few, parameters, pytest.mark.common)
+
+
+def common(few: Collection[Any], parameters: Iterable[Any]) -> list[Any]:
+    """Parameters of which a few are as the test is; with the others it is of the rest."""
+    return _divided(few, parameters, pytest.mark.rest)
+
+
+def _divided(few: Collection[Any], parameters: Iterable[Any], others: pytest.MarkDecorator) -> list[Any]:
     every = list(parameters)
     assert set(few) <= set(every)
-    return [each if each in few else pytest.param(each, marks=pytest.mark.common) for each in every]
+    return [each if each in few else pytest.param(each, marks=others) for each in every]

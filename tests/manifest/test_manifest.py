@@ -17,8 +17,9 @@ import mpmath
 import numpy as np
 import numpy.typing as npt
 import pytest
-from building import EXAMPLE, VARIANTS, Build, Variant, build, changed, to_toml
+from building import EXAMPLE, FEW, VARIANTS, Build, Variant, build, changed, to_toml
 from manifest_integers import floor_shift, played_codes
+from sets import quick
 
 from tablegen.config.load import load
 from tablegen.emit.formats import chosen
@@ -78,7 +79,10 @@ REQUIRED: Json = {
 }
 
 
-@pytest.fixture(scope="module", params=VARIANTS)
+@pytest.fixture(
+    scope="module",
+    params=quick(FEW, VARIANTS),
+)
 def built(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Build:
     return build(tmp_path_factory.mktemp("variant"), VARIANTS[request.param])
 

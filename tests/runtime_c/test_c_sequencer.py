@@ -31,8 +31,8 @@ from c_scripts import (
     long_play,
     renderings,
 )
-from sets import quick
-from stream_configurations import SWAPS, SWAPS_SLOW, random_swaps
+from sets import common
+from stream_configurations import FEW, SWAPS, SWAPS_SLOW, random_swaps
 from stream_laws import follow_their_programs
 from stream_scripts import FAULTS, flag, in_any_order, occurrences
 
@@ -59,7 +59,7 @@ def everywhere(benches: Benches, script: Script, shape: SequencerShape, fourier:
 
 
 @pytest.mark.common
-@pytest.mark.parametrize("name", IN_C)
+@pytest.mark.parametrize("name", common(FEW, IN_C))
 def test_random_programs(name: str, benches: Benches) -> None:
     configuration = IN_C[name]
     capture = everywhere(benches, configuration.script(name), configuration.shape)
@@ -134,7 +134,7 @@ def test_a_swap_is_requested_at_every_tick(benches: Benches) -> None:
     assert np.all(flag(capture, "line")[swapped])
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize("swaps", [SWAPS, pytest.param(SWAPS_SLOW, marks=pytest.mark.long)])
 def test_no_line_mixes_programs(swaps: int, benches: Benches) -> None:
     rng = np.random.default_rng(swaps)
@@ -187,7 +187,7 @@ def test_functions_with_sanitizers(compiler: str, tmp_path: Path) -> None:
 # What a build emits.
 
 
-@pytest.mark.parametrize("name", quick(("example", "direct_steps"), VARIANTS))
+@pytest.mark.parametrize("name", common(("example", "direct_steps"), VARIANTS))
 def test_a_build_s_header_plays_a_frame_a_swap_and_parks(name: str, tmp_path: Path) -> None:
     """The words that the converter gets, by ``DAC_PROGRAM`` and ``DAC_CONVERTER`` of the emitted header."""
     built = build(tmp_path, VARIANTS[name])

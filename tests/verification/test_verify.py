@@ -213,8 +213,8 @@ def test_a_constant_that_is_missing_or_new_is_found(folder: Path) -> None:
 @pytest.mark.parametrize("variant", ["direct", "direct_steps", "bits_24", "left_aligned", "inverting"])
 def test_the_header_of_other_builds_is_read_right(variant: str, tmp_path: Path) -> None:
     """Also where no table is interpolated, and where numbers are negative or have 64 bits; nothing is simulated."""
-    from tablegen.emit.content import stored_content
     from tablegen.emit.formats.verilog import wrong_constants
+    from tablegen.emit.stored import stored_content
 
     built = build(tmp_path, VARIANTS[variant])
     assert wrong_constants(built.folder, stored_content(read_build(built.folder)))[1] == []

@@ -16,7 +16,7 @@ from building import NAME, VARIANTS, Build, Variant, build
 from editing import Outcome, run
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from sets import quick
+from sets import common
 from verifying import (
     check_first_difference,
     check_interruption,
@@ -32,8 +32,8 @@ from verifying import (
     with_a_long_table,
 )
 
-from tablegen.emit.content import stored_content
 from tablegen.emit.formats.c import arrays_file, wrong_arrays, wrong_constants
+from tablegen.emit.stored import stored_content
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.program import Program
 from tablegen.manifest.read import StoredBuild, read_build
@@ -108,7 +108,7 @@ def substitute(path: Path, pattern: str, new: str) -> None:
 # What is right
 
 
-@pytest.mark.parametrize("name", quick(["short_frame", "bits_24", "direct_steps"], VARIANTS))
+@pytest.mark.parametrize("name", common(["short_frame", "bits_24", "direct_steps"], VARIANTS))
 def test_a_whole_frame_of_every_build_verifies(name: str, tmp_path: Path) -> None:
     """Every mode, width, coding and alignment, header-only builds, with arrays of 16 and of 32 bits."""
     built = build(tmp_path, VARIANTS[name])
@@ -339,6 +339,7 @@ def test_the_hash_in_the_header_is_held_against_the_manifest(folder: Path, short
 # What is wrong in the arrays
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(("axis", "at", "bit"), [("x", 70, 6), ("x", 250, 14), ("y", 100, 8)])
 def test_a_damaged_table_is_found_at_its_first_tick(folder: Path, axis: str, at: int, bit: int) -> None:
     program: Program = getattr(read_build(folder).program, axis)

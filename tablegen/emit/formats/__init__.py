@@ -7,10 +7,13 @@ object an instance of ``tablegen.emit.format.Format``.
 from collections.abc import Iterable
 from functools import cache
 from importlib import import_module
-from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from tablegen.emit.format import Format
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 GROUP = "tablegen.formats"
 
@@ -52,6 +55,7 @@ def chosen(wanted: Iterable[str]) -> list[Format]:
     return [get(name) for name in dict.fromkeys(wanted)]
 
 
+@cache
 def _own() -> dict[str, str]:
     """Modules of this folder by the names of their formats."""
     modules = (path.stem for path in Path(__file__).parent.glob("*.py"))
@@ -59,9 +63,11 @@ def _own() -> dict[str, str]:
 
 
 @cache
-def _others() -> dict[str, EntryPoint]:
+def _others() -> "dict[str, EntryPoint]":
+    from importlib.metadata import entry_points  # a good part of what a build costs, and seldom needed
+
     return {entry.name: entry for entry in entry_points(group=GROUP) if entry.name not in _own()}
 
 
-def _package(entry: EntryPoint) -> str:
+def _package(entry: "EntryPoint") -> str:
     return entry.dist.name if entry.dist is not None else entry.value

@@ -12,8 +12,8 @@ from editing import SCAN, edited, run, write_pair
 from formatted import BUILDS, Formatted, check_finds_a_flip, formatted
 from manifest_integers import played_codes
 
-from tablegen.emit.content import stored_content
 from tablegen.emit.formats.wav import FORMAT
+from tablegen.emit.stored import stored_content
 from tablegen.manifest.read import read_build
 from tablegen.problems import Unphysical
 

@@ -11,9 +11,9 @@ from editing import Outcome, run
 from formatted import BUILDS, Formatted, formatted
 from verifying import verdicts
 
-from tablegen.emit.content import stored_content
 from tablegen.emit.format import Format
 from tablegen.emit.formats import get, own_names
+from tablegen.emit.stored import stored_content
 from tablegen.emit.waveforms import MOST_TICKS
 from tablegen.manifest.read import read_build
 from tablegen.problems import Unphysical
