@@ -38,6 +38,8 @@ BUILDS: dict[str, Variant] = {
     "inverting": Variant({**_SMALL, "dac.coding": "twos-complement", "amplifier.gain": -10.0}),
 }
 
+FEW = ("short", "bits_18")
+
 
 @dataclass(frozen=True, eq=False)
 class Formatted:

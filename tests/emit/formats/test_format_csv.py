@@ -5,11 +5,12 @@ from pathlib import Path
 
 import pytest
 from building import NAME
-from formatted import BUILDS, Formatted, check_finds_a_flip, formatted
+from formatted import BUILDS, FEW, Formatted, check_finds_a_flip, formatted
 from manifest_integers import markers, played_codes, seconds
+from sets import quick
 
 
-@pytest.fixture(scope="module", params=BUILDS)
+@pytest.fixture(scope="module", params=quick(FEW, BUILDS))
 def built(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Formatted:
     return formatted(tmp_path_factory.mktemp("csv"), request.param, "csv")
 

@@ -4,13 +4,14 @@ from pathlib import Path
 
 import pytest
 from building import NAME, run_clean
-from formatted import BUILDS, Formatted, check_finds_a_flip, formatted, little_endian
+from formatted import BUILDS, FEW, Formatted, check_finds_a_flip, formatted, little_endian
 from manifest_integers import memories
+from sets import quick
 
 from tablegen.emit.formats.intel_hex import _records
 
 
-@pytest.fixture(scope="module", params=BUILDS)
+@pytest.fixture(scope="module", params=quick(FEW, BUILDS))
 def built(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Formatted:
     return formatted(tmp_path_factory.mktemp("intel_hex"), request.param, "intel-hex")
 

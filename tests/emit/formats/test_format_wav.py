@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 from building import NAME
 from editing import SCAN, edited, run, write_pair
-from formatted import BUILDS, Formatted, check_finds_a_flip, formatted
+from formatted import BUILDS, FEW, Formatted, check_finds_a_flip, formatted
 from manifest_integers import played_codes
+from sets import quick
 
 from tablegen.emit.formats.wav import FORMAT
 from tablegen.emit.stored import stored_content
@@ -18,7 +19,7 @@ from tablegen.manifest.read import read_build
 from tablegen.problems import Unphysical
 
 
-@pytest.fixture(scope="module", params=BUILDS)
+@pytest.fixture(scope="module", params=quick(FEW, BUILDS))
 def built(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Formatted:
     return formatted(tmp_path_factory.mktemp("wav"), request.param, "wav")
 

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 from building import NAME, VARIANTS, write_variant
 from editing import Outcome, run
-from formatted import BUILDS, Formatted, formatted
+from formatted import BUILDS, FEW, Formatted, formatted
+from sets import quick
 from verifying import verdicts
 
 from tablegen.emit.format import Format
@@ -52,7 +53,7 @@ def test_the_names_of_files_are_those_that_it_says(together: Formatted, name: st
         assert any(re.fullmatch(pattern, file) for file in files), pattern
 
 
-@pytest.mark.parametrize("build", BUILDS)
+@pytest.mark.parametrize("build", quick(FEW, BUILDS))
 @pytest.mark.parametrize("name", own_names())
 def test_a_build_and_its_manifest_make_the_same_bytes(
     tmp_path_factory: pytest.TempPathFactory, together: Formatted, build: str, name: str
