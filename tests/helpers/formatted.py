@@ -18,9 +18,10 @@ from tablegen.emit.render import render
 from tablegen.emit.write import write_files
 from tablegen.planning.line_plan import Plan, make_plan
 
-# A frame of 13240 ticks; words of 16 bits, and of widths that are no whole bytes; tables of an odd length; y in steps.
+# A frame of 2648 ticks; words of 16 bits, and of widths that are no whole bytes; tables of an odd length; y in steps.
 SHORT = VARIANTS["short_frame"]
 _SMALL = {key: value for key, value in SHORT.scan.items() if key != "emit.header_only"}
+_TIMING: Any = SHORT.scan["timing"]
 BUILDS: dict[str, Variant] = {
     "short": SHORT,
     "bits_18": Variant({**_SMALL, "x.table.bits": 18, "y.table.bits": 24, "dac.bits": 18}),
@@ -28,7 +29,7 @@ BUILDS: dict[str, Variant] = {
     "direct_steps": Variant(
         {
             **_SMALL,
-            "timing.lines": 40,
+            "timing": {**_TIMING, "lines": 40},
             "x.table": {"mode": "direct", "bits": 16},
             "y.table": {"mode": "direct", "bits": 8},
             "y.motion": "step",

@@ -132,6 +132,7 @@ def test_the_plan_is_the_same_in_every_format(tmp_path: Path) -> None:
     assert len(digests) == 1
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("header_only", [False, True])
 def test_c_alone_is_verified_as_c(tmp_path: Path, header_only: bool) -> None:
     scan = write_pair(tmp_path, edited(SCAN, f"+ [emit]\nheader_only = {str(header_only).lower()}"))
@@ -149,6 +150,7 @@ def test_c_alone_is_verified_as_c(tmp_path: Path, header_only: bool) -> None:
     ]
 
 
+@pytest.mark.common
 def test_verilog_alone_is_verified_as_verilog(tmp_path: Path) -> None:
     out = tmp_path / "out"
     assert run("build", write_pair(tmp_path), "-o", out, "-f", "verilog").status == 0
@@ -163,7 +165,7 @@ def test_verilog_alone_is_verified_as_verilog(tmp_path: Path) -> None:
 
 def test_tables_alone_are_verified_as_files(tmp_path: Path) -> None:
     out = tmp_path / "out"
-    assert run("build", write_pair(tmp_path), "-o", out, "-f", "bin", "-f", "csv").status == 0
+    assert run("build", write_pair(tmp_path), "-o", out, "-f", "bin", "-f", "mif").status == 0
     outcome = run("verify", "--target", "files", out)
     assert outcome.status == 0, outcome.err
 
