@@ -87,7 +87,8 @@ def build(
         if not found:
             return ExitStatus.OK
         click.echo("\n".join(found))
-        fail([f"{output} is stale; run: tablegen build {scan} -o {output}"], ExitStatus.STALE)
+        again = "".join(f" -f {name}" for name in formats)
+        fail([f"{output} is stale; run: tablegen build {scan} -o {output}{again}"], ExitStatus.STALE)
     if rule is not None:
         rule.note(built.setup.files, built.formats)
     changed = written(output, files, outdated)
