@@ -247,7 +247,7 @@ def test_a_file_from_the_future_is_named(scan: Path) -> None:
     outcome = run("build", scan, "-o", scan.parent / "out", "--depfile", file)
     assert outcome.status == 2
     assert outcome.err.startswith(f"{scanner}: was changed 35")
-    assert outcome.err.endswith(" s from now by its time; set the clock right, or touch it\n")
+    assert outcome.err.endswith(" s in the future by its time stamp; set the clock, or touch the file\n")
     assert not file.exists()
     os.utime(scanner)
     assert run("build", scan, "-o", scan.parent / "out", "--depfile", file).status == 0
@@ -276,7 +276,7 @@ def test_a_path_that_no_depfile_can_name_is_refused_before_anything_is_written(t
     outcome = run("build", scan, "-o", tmp_path / "out", "--depfile", tmp_path / "build.d")
     assert outcome.status == 2
     assert outcome.messages == [
-        f"{str(scan)!r}: no dependency file can name a path with a line end or a tab; rename it"
+        f"{str(scan)!r}: a dependency file cannot contain a path with a line end or a tab; rename it"
     ]
     assert sorted(path.name for path in tmp_path.iterdir()) == [f"a{blank}b"]
     assert run("build", scan, "-o", tmp_path / "out").status == 0
@@ -285,8 +285,8 @@ def test_a_path_that_no_depfile_can_name_is_refused_before_anything_is_written(t
 @pytest.mark.parametrize(
     ("arguments", "why"),
     [
-        (("--depfile-target", "stamp"), "--depfile-target names the target of --depfile FILE; give that as well"),
-        (("--depfile", "build.d", "--check"), "--check writes nothing; leave out --depfile"),
+        (("--depfile-target", "stamp"), "--depfile-target needs --depfile FILE"),
+        (("--depfile", "build.d", "--check"), "--check cannot be used with --depfile"),
     ],
 )
 def test_options_that_contradict_each_other_are_wrong_usage(scan: Path, arguments: tuple[str, ...], why: str) -> None:

@@ -40,7 +40,7 @@ def get(name: str) -> Format:
     elif name in _others():
         found = _loaded(name, _others()[name])
     else:
-        raise UnknownFormat(f"{name!r} is no format; there are {', '.join(names())}")
+        raise UnknownFormat(f"{name!r} is not a format; formats are {', '.join(names())}")
     if not isinstance(found, Format) or found.name != name:
         raise UnknownFormat(
             f"{name!r} of {_package(_others()[name][0])} is no tablegen.emit.format.Format of that name"
