@@ -11,6 +11,7 @@
 # make bench     what a build costs, against importing numpy
 # make figures   the pictures of the README and the docs
 # make paper     the paper's numbers beside ours, into docs/paper
+# make check-python PYTHON=python3.13  `make check` under another Python, in an environment of its own
 # make clean     remove what these made
 
 PYTHON ?= python3
@@ -114,5 +115,15 @@ $(VENV)/installed-plot: $(VENV)/installed
 	$(PIP) install --editable '.[calibrate,plot]'
 	@touch $@
 
+# The Pythons that the package supports. `make test` runs the wheel under each further one that this machine has.
+PYTHONS := 3.11 3.12 3.13
+.PHONY: pythons check-python
+test: pythons
+pythons: $(VENV)/installed
+	@.ci/further-pythons $(VENV) $(PYTHONS)
+
+check-python:
+	$(MAKE) check VENV=.venv-$$($(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2])')
+
 clean:
-	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) .venv-* build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

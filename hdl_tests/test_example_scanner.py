@@ -10,7 +10,8 @@ import pytest
 from building import BENCHES, REPOSITORY, VARIANTS, build, run_clean
 from spi_monitor import Converter, ProtocolFault, Wires, quiet, receive
 
-from tablegen.device.sequencer import DualProgram, Sequencer
+from tablegen.device.dual_program import DualProgram
+from tablegen.device.sequencer import Sequencer
 from tablegen.resources import verilog_runtime
 from tablegen.verification.simulate import Design, compile_design
 

@@ -17,7 +17,7 @@ from link_talk import Talk
 from loader_bridge import Simulation
 from loader_device import Loader
 
-from tablegen.device.sequencer import DualProgram
+from tablegen.device.dual_program import DualProgram
 from tablegen.link.image import ProgramImage, make_image
 from tablegen.link.messages import ANSWER, DeviceState, DeviceStatus, Request, Upload
 

@@ -1,9 +1,101 @@
-"""Compensated scan waveforms for piezo scanners, as fixed-point tables in C and Verilog.
+"""Compensated scan waveforms for piezo scanners, as fixed-point tables in C, Verilog and other formats.
 
-The data flow is one way::
+From a scan file to arrays and files in two lines::
 
-    scanner.toml + scan.toml -> config -> compensation -> waveform -> fixedpoint -> plan -> emit
-                                                                                    |-> sequencer, certificate
+    scan = tablegen.build("scan.toml", "build")     # plan, certificate, files
+    plot(scan.x.time_s, scan.x.volts)               # numpy arrays of one line, a value a tick
+
+What is public stands in ``tablegen.__all__`` and docs/python.md: ``load``, ``plan``, ``certify`` and ``build`` make a
+scan, ``read_build`` and ``verify`` take one from its directory, ``Device`` talks to an instrument. Everything else may
+change. Names are loaded when they are first used, so that importing tablegen costs nothing.
 """
 
-__version__ = "0.1.0"
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from tablegen.version import __version__
+
+if TYPE_CHECKING:
+    from tablegen.api.build import BrokenLimit, Build, build, certify, load, plan
+    from tablegen.api.samples import Samples
+    from tablegen.certificate.certificate import Certificate
+    from tablegen.config.load import Setup
+    from tablegen.emit.content import Content
+    from tablegen.emit.format import Format
+    from tablegen.emit.write import CannotWrite
+    from tablegen.link.device import Device
+    from tablegen.link.errors import LinkError
+    from tablegen.link.prepare import PreparedScan
+    from tablegen.manifest.read import NotABuild, StoredBuild, read_build
+    from tablegen.planning.line_plan import Plan
+    from tablegen.problems import Problem, Rejected
+    from tablegen.verification.build import Report
+    from tablegen.verification.run import verify
+    from tablegen.verification.simulate import ToolMissing
+
+_HOMES = {
+    "load": "tablegen.api.build",
+    "plan": "tablegen.api.build",
+    "certify": "tablegen.api.build",
+    "build": "tablegen.api.build",
+    "read_build": "tablegen.manifest.read",
+    "verify": "tablegen.verification.run",
+    "Device": "tablegen.link.device",
+    "Setup": "tablegen.config.load",
+    "Plan": "tablegen.planning.line_plan",
+    "Certificate": "tablegen.certificate.certificate",
+    "Build": "tablegen.api.build",
+    "Samples": "tablegen.api.samples",
+    "StoredBuild": "tablegen.manifest.read",
+    "Report": "tablegen.verification.build",
+    "Format": "tablegen.emit.format",
+    "Content": "tablegen.emit.content",
+    "Rejected": "tablegen.problems",
+    "Problem": "tablegen.problems",
+    "BrokenLimit": "tablegen.api.build",
+    "CannotWrite": "tablegen.emit.write",
+    "NotABuild": "tablegen.manifest.read",
+    "ToolMissing": "tablegen.verification.simulate",
+    "LinkError": "tablegen.link.errors",
+    "PreparedScan": "tablegen.link.prepare",
+}
+
+__all__ = [  # noqa: RUF022 - in the order in which they are used
+    "load",
+    "plan",
+    "certify",
+    "build",
+    "read_build",
+    "verify",
+    "Device",
+    "Setup",
+    "Plan",
+    "Certificate",
+    "Build",
+    "Samples",
+    "StoredBuild",
+    "PreparedScan",
+    "Report",
+    "Format",
+    "Content",
+    "Rejected",
+    "Problem",
+    "BrokenLimit",
+    "CannotWrite",
+    "NotABuild",
+    "ToolMissing",
+    "LinkError",
+    "__version__",
+]
+
+
+def __getattr__(name: str) -> object:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'tablegen' has no attribute {name!r}; it has {', '.join(_HOMES)}")
+    found = getattr(import_module(_HOMES[name]), name)
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted([*__all__, "__doc__"])

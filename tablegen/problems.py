@@ -33,13 +33,18 @@ class Rejected(Exception):
 
 @dataclass(frozen=True)
 class Document:
-    """A TOML file as the user named it, and the line on which each of its keys stands."""
+    """A TOML file as the user named it, and the line on which each of its keys stands.
+
+    ``lines`` is None for values that stand in no file.
+    """
 
     name: str
-    lines: dict[str, int] = field(default_factory=dict)
+    lines: dict[str, int] | None = field(default_factory=dict)
 
     def line_of(self, key: str) -> int:
         """The line of a key such as ``x.hysteresis.branches[0].turn``; of what encloses it if it is not written."""
+        if self.lines is None:
+            return 0
         while key:
             if key in self.lines:
                 return self.lines[key]

@@ -23,18 +23,3 @@ def c_runtime() -> list[Path]:
 def c_link() -> list[Path]:
     """The device's end of the serial link in C, which needs the sequencer; every build copies it too."""
     return sorted((resource_folder("firmware_templates") / "c").glob("dac_link*.[ch]"))
-
-
-def deciding_files() -> list[Path]:
-    """What of this package decides the bytes of a build: its modules, the templates and the runtime, in order of path.
-
-    In an installed package the record of the installation too, whose path has the version: package managers that give
-    files the times of an archive would otherwise hide a change of version from make.
-    """
-    package = Path(str(import_module("tablegen").__file__)).parent
-    apart = ("calibration", "cli", "link", "refinement", "verification", "virtual", "examples", "firmware_templates")
-    others = {package / name for name in (*apart, "manifest/read.py")}
-    modules = {path for path in package.rglob("*.py") if not others.intersection((path, *path.parents))}
-    templates = resource_folder("firmware_templates")
-    emitted = {path for language in ("c", "verilog") for path in (templates / language).iterdir() if path.is_file()}
-    return sorted({*modules, *emitted, *package.parent.glob("tablegen-*.dist-info/RECORD")})

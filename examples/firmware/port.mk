@@ -3,7 +3,7 @@ CROSS ?= arm-none-eabi-gcc
 CFLAGS ?= -O2
 
 TABLEGEN ?= tablegen
-include $(or $(shell $(TABLEGEN) paths --make),$(error $(TABLEGEN) does not run: install it, or give TABLEGEN=PATH))
+include $(or $(shell $(TABLEGEN) paths --make),$(error $(TABLEGEN) does not run: install piezo-tablegen, or give TABLEGEN=PATH))
 $(eval $(call tablegen_build,$(SCAN),$(BUILD)/scan))
 
 SCAN_NAME := $(basename $(notdir $(filter-out $(BUILD)/scan/dac_%,$($(BUILD)/scan_HEADERS))))

@@ -31,7 +31,7 @@ endif()
 if(NOT TABLEGEN)
   set(Tablegen_FOUND FALSE)
   set(Tablegen_NOT_FOUND_MESSAGE
-      "tablegen is not found: put it on PATH ('pip install' does), or give -DTABLEGEN=PATH")
+      "tablegen is not found: put it on PATH ('pip install piezo-tablegen' does), or give -DTABLEGEN=PATH")
   return()
 endif()
 

@@ -1,7 +1,7 @@
 # tablegen as a build step of GNU make. In a Makefile:
 #
 #   TABLEGEN ?= tablegen
-#   include $(or $(shell $(TABLEGEN) paths --make),$(error $(TABLEGEN) does not run: install it or give TABLEGEN=PATH))
+#   include $(or $(shell $(TABLEGEN) paths --make),$(error $(TABLEGEN) does not run: install piezo-tablegen or give TABLEGEN=PATH))
 #   $(eval $(call tablegen_build,scan.toml,build/scan))
 #
 #   firmware: main.o $(build/scan_SOURCES:.c=.o)
@@ -27,7 +27,7 @@ TABLEGEN ?= tablegen
 TABLEGEN_IDLE_GOALS ?= clean distclean
 
 ifeq ($(shell command -v $(firstword $(TABLEGEN)) 2>/dev/null),)
-$(error $(firstword $(TABLEGEN)) is not found: put tablegen on PATH ('pip install' does), or give TABLEGEN=PATH)
+$(error $(firstword $(TABLEGEN)) is not found: put tablegen on PATH ('pip install piezo-tablegen' does), or give TABLEGEN=PATH)
 endif
 
 # $(call tablegen_build,SCAN,DIR): to be evaluated; see above.

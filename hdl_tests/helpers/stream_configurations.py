@@ -7,7 +7,7 @@ import numpy as np
 from programs import random_dual
 from stream_scripts import random_play
 
-from tablegen.device.sequencer import DualProgram
+from tablegen.device.dual_program import DualProgram
 from tablegen.verification.bench import SequencerShape
 from tablegen.verification.placement import Placement
 from tablegen.verification.stream import Script

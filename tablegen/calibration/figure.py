@@ -1,4 +1,4 @@
-"""Curves of a calibration as a picture. Needs ``tablegen[plot]``."""
+"""Curves of a calibration as a picture. Needs the extra ``plot``."""
 
 from collections.abc import Sequence
 from io import BytesIO

@@ -1,6 +1,6 @@
 """Images of heights from files: .npy, .tif, .png, Gwyddion's .gwy, and matrices of numbers as text.
 
-Needs ``tablegen[images]`` for .tif and .png.
+Needs the extra ``images`` for .tif and .png.
 """
 
 import hashlib

@@ -4,58 +4,87 @@ Commands import what they need when they run, so that ``--version`` and ``--help
 """
 
 import sys
+from importlib import import_module
 from io import TextIOWrapper
 
 import click
 
-from tablegen import __version__
-from tablegen.cli.build import build
-from tablegen.cli.calibrate import calibrate
-from tablegen.cli.check import check
 from tablegen.cli.common import Failure
-from tablegen.cli.control import clear, park, trigger
-from tablegen.cli.device_status import device_status
 from tablegen.cli.exit_status import ExitStatus
-from tablegen.cli.init import init
-from tablegen.cli.paths import paths
-from tablegen.cli.ports import ports
-from tablegen.cli.readback import readback
-from tablegen.cli.refine import refine
-from tablegen.cli.schema import schema
-from tablegen.cli.show import show
-from tablegen.cli.simulate import simulate
-from tablegen.cli.upload import upload
-from tablegen.cli.verify import verify
+from tablegen.version import __version__
+
+# Commands by name: the module in this folder, and the command in it.
+_COMMANDS = {
+    "build": ("build", "build"),
+    "check": ("check", "check"),
+    "show": ("show", "show"),
+    "calibrate": ("calibrate", "calibrate"),
+    "simulate": ("simulate", "simulate"),
+    "refine": ("refine", "refine"),
+    "verify": ("verify", "verify"),
+    "upload": ("upload", "upload"),
+    "status": ("device_status", "device_status"),
+    "readback": ("readback", "readback"),
+    "park": ("control", "park"),
+    "trigger": ("control", "trigger"),
+    "clear": ("control", "clear"),
+    "ports": ("ports", "ports"),
+    "init": ("init", "init"),
+    "formats": ("formats", "formats"),
+    "paths": ("paths", "paths"),
+    "schema": ("schema", "schema"),
+}
+
+
+class _Commands(click.Group):
+    """Commands are imported when they are asked for: a build is called often, and needs one of them."""
+
+    def list_commands(self, _context: click.Context) -> list[str]:
+        return sorted(_COMMANDS)
+
+    def get_command(self, _context: click.Context, name: str) -> click.Command | None:
+        if name not in _COMMANDS:
+            return None
+        module, command = _COMMANDS[name]
+        found: click.Command = getattr(import_module(f"tablegen.cli.{module}"), command)
+        return found
 
 
 @click.group(
+    cls=_Commands,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
     epilog="""\b
-A first minute:
-  tablegen init demo                        write a commented scanner and scan
-  tablegen show demo/annexin_200nm.toml     what would be played, and how well
-  tablegen build demo/annexin_200nm.toml -o build
-  tablegen verify build                     play its sequencer, against all of it
-  tablegen upload build --port COM3         put it into a running instrument
+First steps:
+  tablegen init demo                               write an example: scanner.toml and a scan
+  tablegen show demo/annexin_200nm.toml            show drive, rates and accuracy; write nothing
+  tablegen build demo/annexin_200nm.toml -o build  write C, Verilog, tables and manifest.json
+  tablegen verify build                            simulate the Verilog and check every sample
+  tablegen upload build --port COM3                send the scan to a running instrument
 
 \b
-Exit status: 0 done, 1 output is stale (build --check), 2 wrong input or usage,
-3 a limit of the certificate is broken, 4 cannot write, 5 a build does not verify or
-a device plays something else, 6 a simulator, compiler or library is missing,
-7 no port, 8 no answer, 9 refused by the device, 10 link lost, 130 interrupted.""",
+Exit status of all commands:
+    0 done
+    1 output is stale (build --check)
+    2 wrong input or wrong usage
+    3 a limit of the certificate is exceeded
+    4 cannot write
+    5 a build fails verification, or the device plays a different scan
+    6 a simulator, compiler or library is missing
+    7 no port: the serial port cannot be opened
+    8 no answer from the device
+    9 refused by the device
+   10 link lost, or timeout
+  130 interrupted""",
 )
 @click.version_option(__version__, prog_name="tablegen", message="%(prog)s %(version)s")
 def cli() -> None:
-    """Make piezo scanners move straight: compensated scan waveforms as fixed-point tables, in C and Verilog.
+    """Compute scan waveforms that compensate the errors of a piezo scanner, and write them as C and Verilog.
 
-    A scan file (what to image today) names a scanner file (calibrated once). Voltages are at the piezo, and
-    units are part of every key.
+    The input is a scan file (SCAN.TOML): what to image. It names a scanner file: the calibrated parameters of one
+    scanner. Names of quantities contain the unit, such as size_nm. All voltages are voltages at the piezo.
+
+    `tablegen COMMAND --help` explains each command.
     """
-
-
-instrument = (upload, device_status, readback, park, trigger, clear, ports)
-for command in (build, check, show, calibrate, simulate, refine, verify, *instrument, init, paths, schema):
-    cli.add_command(command)
 
 
 def main() -> None:

@@ -1,15 +1,19 @@
 """``tablegen build``: the main job."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from tablegen.cli.common import fail, planned, scan_argument, written
+from tablegen.cli.common import fail, format_option, planned, rendered, scan_argument, written
 from tablegen.cli.depfile import Depfile
 from tablegen.cli.exit_status import ExitStatus
 
+if TYPE_CHECKING:
+    from tablegen.api.build import Build
 
-@click.command(short_help="Build C, Verilog, tables and a certificate.")
+
+@click.command(short_help="Write C, Verilog, tables and manifest of a scan.")
 @scan_argument
 @click.option(
     "-o",
@@ -18,74 +22,101 @@ from tablegen.cli.exit_status import ExitStatus
     default=Path("build"),
     show_default=True,
     metavar="DIR",
-    help="Where the files go; made if it is not there.",
+    help="Output directory. It is created if it does not exist.",
 )
-@click.option("--check", "only_check", is_flag=True, help="Write nothing; exit 1 with a diff if DIR is stale.")
+@format_option
+@click.option(
+    "--check",
+    "only_check",
+    is_flag=True,
+    help="Write nothing. Exit with status 1 and print a diff if the files in DIR are not up to date.",
+)
 @click.option(
     "--depfile",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE",
-    help="Write a rule for make, CMake or Ninja: what was read, as gcc -MD -MP does. FILE exists once the build is "
-    "complete, and not after one that failed.",
+    help="Also write a dependency file for make, CMake or Ninja, like gcc -MD -MP. FILE is removed first and written "
+    "last, so it exists only after a successful build.",
 )
 @click.option(
-    "--depfile-target", metavar="NAME", help="The target of that rule, as gcc -MT has it.  [default: DIR/manifest.json]"
+    "--depfile-target",
+    metavar="NAME",
+    help="Target name in the dependency file, like gcc -MT.  [default: DIR/manifest.json]",
 )
-@click.option("-q", "--quiet", is_flag=True, help="Print no certificate.")
+@click.option("-q", "--quiet", is_flag=True, help="Do not print the certificate.")
 def build(
-    scan: Path, output: Path, only_check: bool, depfile: Path | None, depfile_target: str | None, quiet: bool
+    scan: Path,
+    output: Path,
+    formats: tuple[str, ...],
+    only_check: bool,
+    depfile: Path | None,
+    depfile_target: str | None,
+    quiet: bool,
 ) -> int:
-    """Build a scan: NAME.h, NAME.c, NAME.vh, .mem files, and manifest.json.
+    """Write the tables, constants and sequencer of a scan in C and Verilog, and manifest.json with the certificate.
 
-    Beside them go the sequencers that play it: in C, dac_*.c and dac_*.h, and in Verilog, dac_*.v;
-    and the device's end of `tablegen upload`, dac_link*.c and program_loader.v. The same input gives the same bytes on
-    every machine. Files that are already right are not touched, and if anything is wrong nothing is written.
+    The same input gives the same bytes on every machine. A file that is up to date is not written again. If the input
+    has an error, no file is written. Files of an earlier build that this build no longer makes are removed.
 
     \b
-      tablegen build annexin_200nm.toml -o build
-      tablegen build annexin_200nm.toml -o build --check     in CI: is what was committed up to date?
-      tablegen verify build                                  does the sequencer play it, bit for bit?
+    Examples:
+      tablegen build annexin_200nm.toml -o build            write all files to build
+      tablegen build annexin_200nm.toml -o build -f c       write C only
+      tablegen build annexin_200nm.toml -o build --check    for CI: check that build is up to date
 
-    From make and CMake it is called by what `tablegen paths` leads to.
+    \b
+    Exit status: 0 done, 1 DIR is not up to date (--check), 2 wrong input, 3 a limit of the
+    certificate is exceeded, 4 cannot write.
+
+    `tablegen paths` prints the include files that run this command from make or CMake.
     """
     if depfile is None and depfile_target is not None:
         raise click.UsageError("--depfile-target names the target of --depfile FILE; give that as well")
     if depfile is not None and only_check:
         raise click.UsageError("--check writes nothing; leave out --depfile")
     rule = Depfile(depfile, depfile_target or str(output / "manifest.json"), scan) if depfile is not None else None
-    setup, plan, certificates = planned(scan)
-    from tablegen.emit.render import render
-
-    files = render(plan, certificates)
+    built = planned(scan, list(formats) or None)
+    files = rendered(built)
+    outdated, leftovers = built.outdated(output), built.leftovers(output)
     if only_check:
         from tablegen.cli.difference import differences
 
         found = differences(output, files)
+        found += [f"{output / name}: an earlier build made it, this one does not" for name in outdated]
+        found += [_leftover(output / name) for name in leftovers]
         if not found:
             return ExitStatus.OK
         click.echo("\n".join(found))
         fail([f"{output} is stale; run: tablegen build {scan} -o {output}"], ExitStatus.STALE)
     if rule is not None:
-        rule.note(setup.files)
-    changed = written(output, files)
+        rule.note(built.setup.files, built.formats)
+    changed = written(output, files, outdated)
     if rule is not None:
         rule.write()
+    for name in leftovers:
+        click.echo(f"note: {_leftover(output / name)}", err=True)
     if not quiet:
         from tablegen.cli.report import certificate_table
 
-        click.echo("\n".join(certificate_table(plan, certificates)))
-        click.echo(f"\n{output}: {_state(files, changed)}")
+        click.echo("\n".join(certificate_table(built.plan, built.certificates)))
+        click.echo(f"\n{output}: {_state(built, changed)}")
+        if outdated:
+            click.echo(f"{output}: removed what an earlier build had made: {', '.join(outdated)}")
     return ExitStatus.OK
 
 
-def _state(files: dict[str, bytes], changed: list[str]) -> str:
-    """What was written; the runtime, which changes with tablegen only, is many files and one thing."""
-    from tablegen.emit.render import runtime_files
+def _leftover(path: Path) -> str:
+    if path.name.startswith("dac_"):
+        return f"{path}: is no file of this build, and dac_*{path.suffix} matches it; remove it"
+    return f"{path}: an earlier build made it, and it was edited since; remove it"
 
-    runtime = runtime_files()
-    own, count = sum(name not in runtime for name in changed), len(files) - len(runtime)
+
+def _state(built: "Build", changed: list[str]) -> str:
+    """What was written; the runtime, which changes with tablegen only, is many files and one thing."""
+    runtime = built.runtime
+    own, count = sum(name not in runtime for name in changed), len(built.files) - len(runtime)
     if not changed:
-        return f"{count} files and the runtime dac_* up to date"
+        return f"{count} files{' and the runtime dac_*' if runtime else ''} up to date"
     parts = [f"{own} of {count} files"] if own else []
     parts += ["the runtime dac_*"] if own < len(changed) else []
     return " and ".join(parts) + " written"

@@ -21,42 +21,69 @@ from tablegen.cli.calibration_run import (
 from tablegen.cli.common import fail, require
 from tablegen.cli.exit_status import ExitStatus
 
-_points = click.option("--points", is_flag=True, help="Write each amplitude as measured, in place of (22).")
+_RHO_HELP = "Exponent rho of (22); used if all data have the same amplitude, otherwise fitted."
+_REFERENCE_HELP = (
+    "Frequency in Hz at which the size was calibrated.  [default: reference_hz of the scanner file, or the lowest "
+    "frequency in DATA.CSV]"
+)
+_points = click.option(
+    "--points",
+    is_flag=True,
+    help="With --write, write the hysteresis of each measured amplitude instead of the fitted law (22).",
+)
 _data = click.argument("data", type=click.Path(path_type=Path), metavar="DATA.CSV")
-_from_hz = click.option("--from-hz", type=float, default=0.0, metavar="HZ", help="Leave out what is below.")
-_to_hz = click.option("--to-hz", type=float, default=float("inf"), metavar="HZ", help="Leave out what is above.")
+_from_hz = click.option(
+    "--from-hz", type=float, default=0.0, metavar="HZ", help="Ignore rows below this frequency in Hz."
+)
+_to_hz = click.option(
+    "--to-hz", type=float, default=float("inf"), metavar="HZ", help="Ignore rows above this frequency in Hz."
+)
 
 
 @click.group(
-    short_help="Measurements to a scanner file, with standard errors.",
+    short_help="Fit scanner parameters to measurements.",
     epilog="""\b
+Examples:
   tablegen calibrate offset --axis x offsets.csv --scanner scanner.toml
   tablegen calibrate offset --axis x offsets.csv --scanner scanner.toml --write
   tablegen calibrate hysteresis --axis x 30v.csv 60v.csv 100v.csv --v-max 100 --plot x.png
-  tablegen calibrate images --axis x --v-max 100 --pair 100 trace.npy retrace.npy""",
+  tablegen calibrate images --axis x --v-max 100 --pair 100 trace.npy retrace.npy
+
+\b
+Exit status: 0 done, 2 wrong input, 4 cannot write, 6 a library is missing.""",
 )
 def calibrate() -> None:
-    """Calibrate a scanner from CSV files, whose header has units in its names, or from images.
+    """Fit the parameters of a scanner to measurements, in CSV files or images.
 
-    Prints parameters with standard errors, and what they leave of the paper's errors. With --write the scanner file is
-    updated in place; a comment says from which bytes. Points that do not fit are named, and never dropped.
+    The header of a CSV file names the columns; each name contains the unit. Each command prints the parameters with
+    standard errors, and the scan error that remains. Outliers are reported, and never removed.
+
+    With --write, the command updates the scanner file, and adds a comment that names the data files and their SHA-256.
+    Without --write, it changes no file. Numbers in parentheses, such as (22), are equations of the paper.
     """
 
 
-@calibrate.command(short_help="Apparent sizes at several offsets: m_minus, m_plus.")
+@calibrate.command(short_help="Fit m_minus, m_plus to apparent sizes at several offsets.")
 @shared_options
 @_data
 @click.option(
     "--size-v",
     type=click.FloatRange(min=0.0, min_open=True),
     metavar="V",
-    help="Scan voltage of the images: with the size law of FILE, m is then exact.",
+    help="Scan voltage of the images in volts, peak to peak. The fit then uses the size calibration of the scanner "
+    "file.",
 )
 def offset(common: Common, data: Path, size_v: float | None) -> int:
-    """Apparent sizes of one object, or lattice constants, at three or more offset voltages.
+    """Fit m_minus and m_plus, equations (1)-(4), to apparent sizes at three or more offset voltages.
 
-    Columns: offset_v, apparent_nm. They give m_minus and m_plus, (1)-(4). A drive m times as large makes a scan more
-    than m times as large, (6): calibrate the size first, and give --size-v.
+    \b
+    Columns: offset_v, apparent_nm: the size in the image of one object, or of a lattice constant.
+
+    The scan size grows faster than the drive, (6). For exact values, calibrate the size first and give --size-v.
+
+    \b
+    Example:
+      tablegen calibrate offset --axis x offsets.csv --scanner scanner.toml --size-v 20 --write
     """
     from tablegen.calibration.columns import APPARENT, OFFSET
     from tablegen.calibration.offset import fit_offset
@@ -67,18 +94,33 @@ def offset(common: Common, data: Path, size_v: float | None) -> int:
     return finish(common, [table], lambda: fit_offset(table[OFFSET], table[APPARENT], v_max, law, size_v))
 
 
-@calibrate.command(short_help="Actual scan sizes: k, beta, threshold.")
+@calibrate.command(short_help="Fit k_nm_per_v, beta, v_threshold to actual scan sizes.")
 @shared_options
 @_data
-@click.option("--k", type=click.FloatRange(min=1e-6), metavar="NM/V", help="What nominal_nm were set with.")
-@click.option("--base-nm", type=click.FloatRange(min=1e-6), metavar="NM", help="Base size.  [default: FILE's, or 200]")
-@click.option("--threshold", type=float, metavar="V/V_MAX", help="Keep it at this.  [default: fitted, or 0.5]")
+@click.option(
+    "--k",
+    type=click.FloatRange(min=1e-6),
+    metavar="NM/V",
+    help="Linear constant of the controller that converted nominal_nm to volts, in nm/V.",
+)
+@click.option(
+    "--base-nm",
+    type=click.FloatRange(min=1e-6),
+    metavar="NM",
+    help="Base size in nm, at which k_nm_per_v applies.  [default: base_nm of the scanner file, or 200]",
+)
+@click.option(
+    "--threshold",
+    type=float,
+    metavar="V/V_MAX",
+    help="Fix v_threshold at this fraction of v_max.  [default: fitted; 0.5 if the data do not determine it]",
+)
 @click.option(
     "--noise",
     type=click.Choice(("relative", "absolute")),
     default="relative",
     show_default=True,
-    help="Errors in proportion to the size, as in images, or the same for all, as of a sensor.",
+    help="Error model of the sizes: relative to the size (images), or the same for all sizes (sensor).",
 )
 def size(
     common: Common,
@@ -88,15 +130,17 @@ def size(
     threshold: float | None,
     noise: Literal["relative", "absolute"],
 ) -> int:
-    """Actual scan sizes at several drives.
+    """Fit k_nm_per_v, beta and v_threshold, equations (6)-(12), to actual scan sizes at several drives.
 
     \b
-    Columns: drive_v, the scan voltage peak to peak at the piezo,
-             or nominal_nm and --k, the linear constant that made it a voltage;
-    and      actual_nm, from a sensor,
-             or apparent_nm and true_nm of a lattice, and nominal_nm.
+    Columns: drive_v (scan voltage at the piezo, peak to peak),
+             or nominal_nm (size set at the controller) with the option --k;
+    and      actual_nm (size measured by a sensor),
+             or apparent_nm and true_nm (a lattice in the image) with nominal_nm.
 
-    They give k_nm_per_v at the base size, beta and v_threshold, (6)-(12).
+    \b
+    Example:
+      tablegen calibrate size --axis x sizes.csv --scanner scanner.toml --write
     """
     from tablegen.calibration.columns import ACTUAL, APPARENT, DRIVE, NOMINAL, TRUE
     from tablegen.calibration.size import fit_size
@@ -117,17 +161,31 @@ def size(
     return finish(common, [table], lambda: fit_size(drive, actual, v_max, base, threshold, noise))
 
 
-@calibrate.command(short_help="Sensor traces: beta_max, rho, u_peak.")
+@calibrate.command(short_help="Fit beta_max, rho, u_peak to sensor traces.")
 @shared_options
 @click.argument("data", type=click.Path(path_type=Path), metavar="DATA.CSV...", nargs=-1, required=True)
-@click.option("--rho", type=click.FloatRange(1e-6, 100.0), default=1.5, show_default=True, help="With one amplitude.")
 @click.option(
-    "--settle", type=click.IntRange(min=0), metavar="N", help="Periods left out.  [default: 1 of three or more]"
+    "--rho", type=click.FloatRange(1e-6, 100.0), default=1.5, show_default=True, metavar="RHO", help=_RHO_HELP
 )
 @click.option(
-    "--drift", type=click.IntRange(0, 5), metavar="N", help="Order of the drift.  [default: 1 to 3, by periods]"
+    "--settle",
+    type=click.IntRange(min=0),
+    metavar="N",
+    help="Ignore the first N periods of each trace.  [default: 1 if a trace has three periods or more, otherwise 0]",
 )
-@click.option("--delay-s", default="0", show_default=True, metavar="S|fit", help="Of the sensor against the drive.")
+@click.option(
+    "--drift",
+    type=click.IntRange(0, 5),
+    metavar="N",
+    help="Order of the polynomial that describes drift.  [default: 1 to 3, more with more periods]",
+)
+@click.option(
+    "--delay-s",
+    default="0",
+    show_default=True,
+    metavar="S|fit",
+    help="Delay of the sensor relative to the drive in seconds, or `fit` to fit it.",
+)
 @_points
 def hysteresis(
     common: Common,
@@ -138,10 +196,19 @@ def hysteresis(
     delay_s: str,
     points: bool,
 ) -> int:
-    """Displacement against a triangular drive, over one period or more, at several amplitudes.
+    """Fit beta_max and rho, (22), and u_peak, (17), to sensor traces with a triangular drive.
 
-    Columns: time_s, drive_v, displacement_nm; where a file has several traces, trace, or a time that begins anew.
-    A trace an amplitude gives beta_max and rho, (22), and u_peak, (17); traces of another turn give a set of their own.
+    Record one period or more at each of several amplitudes.
+
+    \b
+    Columns: time_s, drive_v, displacement_nm. A file with several traces also has the column
+    trace, a number for each trace; without it, a new trace starts where time_s goes back.
+
+    Traces with different turn (the forward fraction of the period) give separate parameter sets.
+
+    \b
+    Example:
+      tablegen calibrate hysteresis --axis x 30v.csv 60v.csv 100v.csv --scanner scanner.toml --write
     """
     from tablegen.calibration.columns import DISPLACEMENT, DRIVE, TIME, TRACE
     from tablegen.calibration.hysteresis import fit_hysteresis
@@ -159,7 +226,7 @@ def hysteresis(
     return finish(common, tables, lambda: fit_hysteresis(traces, v_max, rho, settle, drift, delay), points)
 
 
-@calibrate.command(short_help="Trace and retrace images: beta_max, rho, u_peak.")
+@calibrate.command(short_help="Fit beta_max, rho, u_peak to trace and retrace images.")
 @shared_options
 @click.option(
     "--pair",
@@ -168,22 +235,44 @@ def hysteresis(
     metavar="VOLTS TRACE RETRACE",
     multiple=True,
     required=True,
-    help="Two images, and the scan voltage peak to peak at the piezo. Once for every amplitude.",
+    help="Scan voltage at the piezo in volts, peak to peak, and its two images. Repeat the option for each amplitude.",
 )
-@click.option("--channel", metavar="NAME|N", help="The data to take from files that have several.")
-@click.option("--retrace-channel", metavar="NAME|N", help="Another one for the retrace.  [default: --channel]")
-@click.option("--retrace-mirrored", is_flag=True, help="The retrace is stored in the order of time, right to left.")
+@click.option("--channel", metavar="NAME|N", help="Data channel, for image files with several channels.")
+@click.option(
+    "--retrace-channel", metavar="NAME|N", help="Data channel of the retrace image.  [default: same as --channel]"
+)
+@click.option(
+    "--retrace-mirrored",
+    is_flag=True,
+    help="The retrace image is stored in order of time: its left pixel is the right end of the line.",
+)
 @click.option(
     "--window",
     type=(float, float),
     default=(0.0, 1.0),
     show_default=True,
     metavar="LOW HIGH",
-    help="Part of the sweep.",
+    help="Imaged part of each sweep, as two fractions of its duration; 0 1 is the whole sweep.",
 )
-@click.option("--turn", type=float, default=0.5, show_default=True, help="Of the triangle.")
-@click.option("--delay-pixels", type=float, default=0.0, show_default=True, metavar="N", help="By which images lag.")
-@click.option("--rho", type=click.FloatRange(1e-6, 100.0), default=1.5, show_default=True, help="With one amplitude.")
+@click.option(
+    "--turn",
+    type=float,
+    default=0.5,
+    show_default=True,
+    metavar="FRACTION",
+    help="Turn of the triangle: forward fraction of the period.",
+)
+@click.option(
+    "--delay-pixels",
+    type=float,
+    default=0.0,
+    show_default=True,
+    metavar="N",
+    help="Delay of the images relative to the drive in pixels.",
+)
+@click.option(
+    "--rho", type=click.FloatRange(1e-6, 100.0), default=1.5, show_default=True, metavar="RHO", help=_RHO_HELP
+)
 @_points
 def images(
     common: Common,
@@ -197,14 +286,20 @@ def images(
     rho: float,
     points: bool,
 ) -> int:
-    """Images of a grating or a lattice, three periods in the line or more, scanned with a triangle. No sensor.
+    """Fit beta_max and rho, (22), and u_peak, (17), to trace and retrace images. No sensor is needed.
+
+    Scan a grating or a lattice with a triangle, three periods of it or more in a line. Take a pair of images at each of
+    several amplitudes.
 
     \b
-    Files:   .npy, .tif, .png, .gwy, or numbers as .txt, .asc, .csv, .dat;
-    Columns: evenly spread in time over --window of each sweep, 0 1 for all of it;
-    Rows:    in the order of time. Left is left in both, or --retrace-mirrored.
+    Files:   .npy, .tif, .png, .gwy, or a matrix of numbers: .txt, .asc, .csv, .dat.
+    Columns: pixels at equal time steps within --window of each sweep.
+    Rows:    scan lines in order of time. Both images have the left end of the line at the
+             left; otherwise give --retrace-mirrored.
 
-    A pair an amplitude gives what sensor traces give: beta_max and rho, (22), and u_peak, (17).
+    \b
+    Example:
+      tablegen calibrate images --axis x --v-max 100 --pair 50 t1.npy r1.npy --pair 100 t2.npy r2.npy
     """
     from tablegen.calibration.image_files import MODULES
     from tablegen.calibration.images import Pair, fit_images
@@ -226,16 +321,21 @@ def images(
     return finish(common, files, fit, points)
 
 
-@calibrate.command(short_help="Gain against frequency: alpha.")
+@calibrate.command(short_help="Fit alpha to gains at several frequencies.")
 @shared_options
 @_data
-@click.option("--reference-hz", type=click.FloatRange(min=1e-6), metavar="HZ", help="[default: FILE's, or the lowest]")
+@click.option("--reference-hz", type=click.FloatRange(min=1e-6), metavar="HZ", help=_REFERENCE_HELP)
 @_from_hz
 @_to_hz
 def frequency(common: Common, data: Path, reference_hz: float | None, from_hz: float, to_hz: float) -> int:
-    """Gain at several frequencies below a tenth of the resonance.
+    """Fit alpha, equation (23), to gains at several frequencies below a tenth of the resonance frequency.
 
-    Columns: frequency_hz, gain or gain_db. They give alpha, (23). The reference is the rate of the size calibration.
+    \b
+    Columns: frequency_hz; gain or gain_db.
+
+    \b
+    Example:
+      tablegen calibrate frequency --axis x gains.csv --scanner scanner.toml --write
     """
     from tablegen.calibration.columns import FREQUENCY, GAIN
     from tablegen.calibration.frequency import fit_frequency
@@ -245,15 +345,20 @@ def frequency(common: Common, data: Path, reference_hz: float | None, from_hz: f
     return finish(common, [table], lambda: fit_frequency(table[FREQUENCY], table[GAIN], reference))
 
 
-@calibrate.command(short_help="Frequency response: resonance, quality, delay.")
+@calibrate.command(short_help="Fit resonance frequency, quality and delay to a response.")
 @shared_options
 @_data
 @_from_hz
 @_to_hz
 def resonance(common: Common, data: Path, from_hz: float, to_hz: float) -> int:
-    """Gain and phase through the resonance.
+    """Fit frequency_hz, quality and delay_s to a frequency response that covers the resonance.
 
-    Columns: frequency_hz, gain or gain_db, phase_deg or phase_rad. They give frequency_hz, quality and delay_s.
+    \b
+    Columns: frequency_hz; gain or gain_db; optionally phase_deg or phase_rad, for delay_s.
+
+    \b
+    Example:
+      tablegen calibrate resonance --axis x response.csv --scanner scanner.toml --write
     """
     from tablegen.calibration.columns import FREQUENCY, GAIN, PHASE
     from tablegen.calibration.resonance import fit_resonance

@@ -40,19 +40,31 @@ class Common:
 def shared_options(command: F) -> F:
     """Those options, as ``common``."""
     options = [
-        click.option("--axis", type=click.Choice(("x", "y")), required=True, help="Which axis was measured."),
+        click.option("--axis", type=click.Choice(("x", "y")), required=True, help="The axis that was measured."),
         click.option(
             "--scanner",
             type=click.Path(path_type=Path, dir_okay=False),
             metavar="FILE",
-            help="The scanner file; v_max is taken from it.",
+            help="Scanner file. The command reads v_max from it.",
         ),
-        click.option("--v-max", type=click.FloatRange(min=1e-3, max=1e5), metavar="V", help="Without a scanner file."),
-        click.option("--write", is_flag=True, help="Update FILE in place, or make it with --v-max."),
         click.option(
-            "--plot", type=click.Path(path_type=Path, dir_okay=False), metavar="PNG", help="Draw it; or .svg, .pdf."
+            "--v-max",
+            type=click.FloatRange(min=1e-3, max=1e5),
+            metavar="V",
+            help="Full-scale voltage of the piezo driver in volts. Required without a scanner file.",
         ),
-        click.option("--json", "as_json", is_flag=True, help="Plain data instead of text."),
+        click.option(
+            "--write",
+            is_flag=True,
+            help="Update the scanner file. With --v-max, create it if it does not exist.",
+        ),
+        click.option(
+            "--plot",
+            type=click.Path(path_type=Path, dir_okay=False),
+            metavar="FILE",
+            help="Plot the data and the fit to FILE: .png, .svg or .pdf.",
+        ),
+        click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text."),
     ]
 
     def run(

@@ -11,15 +11,24 @@ import click
 
 from tablegen.cli.exit_status import ExitStatus
 from tablegen.cli.progress import Progress
+from tablegen.installation import install_advice
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from tablegen.certificate.certificate import Certificate
-    from tablegen.config.load import Setup
-    from tablegen.planning.line_plan import Plan
+    from tablegen.api.build import Build
 
 scan_argument = click.argument("scan", type=click.Path(path_type=Path), metavar="SCAN.TOML")
+
+format_option = click.option(
+    "-f",
+    "--format",
+    "formats",
+    multiple=True,
+    metavar="NAME",
+    help="Output format; repeat the option for several formats. `tablegen formats` lists them.  [default: emit.formats "
+    "of the scan file, or c and verilog]",
+)
 
 
 def finite(_context: click.Context, _option: click.Parameter, value: float | None) -> float | None:
@@ -34,10 +43,7 @@ def require(*modules: str, extra: str, otherwise: str = "") -> None:
     missing = [module for module in modules if not _installed(module)]
     if missing:
         needs = " and ".join(missing)
-        fail(
-            [f"{needs} is missing; install it with: pip install 'tablegen[{extra}]'{otherwise}"],
-            ExitStatus.TOOL_MISSING,
-        )
+        fail([f"{needs} is missing; install it with: {install_advice(extra)}{otherwise}"], ExitStatus.TOOL_MISSING)
 
 
 def _installed(module: str) -> bool:
@@ -64,31 +70,38 @@ def fail(lines: "Sequence[object]", status: ExitStatus) -> NoReturn:
     raise Failure(lines, status)
 
 
-def planned(scan: Path) -> "tuple[Setup, Plan, dict[str, Certificate]]":
+def planned(scan: Path, formats: "Sequence[str] | None" = None) -> "Build":
     """Load, plan and certify a scan; every failure ends the command with its status."""
     # No linear algebra library is used, and its threads would only spin: a good part of what importing numpy costs.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    from tablegen.certificate.certificate import broken_limits, certify
-    from tablegen.config.load import load
-    from tablegen.planning.line_plan import make_plan
+    from tablegen.api.build import BrokenLimit, build
     from tablegen.problems import Rejected
 
     try:
         with Progress() as progress:
-            progress.now("shaping the waveforms")
-            setup = load(scan)
-            plan = make_plan(setup)
-            progress.now("measuring every tick of a line and a frame")
-            certificates = certify(plan)
+            return build(scan, formats=formats, progress=progress.now)
+    except BrokenLimit as broken:
+        fail(broken.problems, ExitStatus.BROKEN_LIMIT)
     except Rejected as rejected:
         fail(rejected.problems, ExitStatus.WRONG_INPUT)
-    if broken := broken_limits(plan, certificates, setup.scan_file):
-        fail(broken, ExitStatus.BROKEN_LIMIT)
-    return setup, plan, certificates
 
 
-def written(folder: Path, files: "Mapping[str, bytes]") -> list[str]:
+def rendered(built: "Build") -> "dict[str, bytes]":
+    """The files of a build; a scan that one of its formats cannot hold ends the command."""
+    from tablegen.problems import Rejected
+
+    try:
+        with Progress() as progress:
+            progress.now("writing the formats")
+            return built.files
+    except Rejected as rejected:
+        fail(rejected.problems, ExitStatus.WRONG_INPUT)
+
+
+def written(folder: Path, files: "Mapping[str, bytes]", outdated: "Sequence[str]" = ()) -> list[str]:
     """Write files and return the names of those that changed; a failure or an interruption ends the command.
+
+    Files that are ``outdated`` are removed.
 
     An interruption waits until all files are in place, so that none is left half renamed; a second one does not wait.
     """
@@ -97,7 +110,7 @@ def written(folder: Path, files: "Mapping[str, bytes]") -> list[str]:
 
     try:
         with held(signal.SIGINT) as came:
-            names = write_files(folder, files)
+            names = write_files(folder, files, outdated)
     except CannotWrite as error:
         fail([error], ExitStatus.CANNOT_WRITE)
     except OSError as error:

@@ -28,13 +28,13 @@ baud_option = click.option(
     envvar="TABLEGEN_BAUD",
     show_envvar=True,
     metavar="RATE",
-    help="Bits a second on the line; where there is none (socket://), for time-outs.",
+    help="Baud rate of the serial line in bit/s. For socket:// it only sets timeouts.",
 )
 key_option = click.option(
     "--key-file",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE",
-    help="The key of a device that has one: 16 to 32 bytes in hexadecimal.",
+    help="File with the key of the device, 16 to 32 bytes in hexadecimal. Needed if the device has a key.",
 )
 source_argument = click.argument("source", type=click.Path(path_type=Path), metavar="SCAN.TOML|DIR")
 
@@ -47,8 +47,8 @@ def port_option(required: bool = True) -> Callable[[Command], Command]:
         envvar="TABLEGEN_PORT",
         show_envvar=True,
         metavar="URL",
-        help="A serial port, or any URL of pyserial: /dev/ttyUSB0, COM3, socket://host:port, rfc2217://host:port; "
-        "`tablegen ports` lists those of this machine.",
+        help="Serial port or pyserial URL of the device: /dev/ttyUSB0, COM3, socket://host:port, rfc2217://host:port. "
+        "`tablegen ports` lists the serial ports of this machine.",
     )
 
 
@@ -105,7 +105,7 @@ def read_scan(source: Path) -> "PreparedScan":
     from tablegen.manifest.read import NotABuild
 
     if not source.is_dir():
-        return PreparedScan.of_plan(planned(source)[1])
+        return planned(source).prepared
     try:
         return PreparedScan.of_build(source)
     except NotABuild as error:

@@ -12,14 +12,23 @@ _PARK_WAIT_S = 60.0
 _START_WAIT_S = 1.0
 
 
-@click.command(short_help="End the scan of a device, and ramp to the park codes.")
+@click.command(short_help="Stop the scan of a device and ramp to the park codes.")
 @port_option()
 @baud_option
 @key_option
-@click.option("--wait", is_flag=True, help="Until the outputs are there.")
-@timeout_option("Of --wait.  [default: 60]")
+@click.option("--wait", is_flag=True, help="Wait until the outputs have reached the park codes.")
+@timeout_option("With --wait: stop waiting after S seconds.  [default: 60]")
 def park(port: str, baud: int, key_file: Path | None, wait: bool, timeout: float | None) -> int:
-    """Park: no more frames, ramp to the park codes within the slew limit, and hold them."""
+    """Stop the scan, ramp both axes to the park codes within the slew limit, and hold them.
+
+    \b
+    Example:
+      tablegen park --wait --port /dev/ttyUSB0
+
+    \b
+    Exit status: 0 done, 6 pyserial is missing, 7 no port, 8 no answer, 9 refused, 10 link lost
+    or timeout.
+    """
     from tablegen.link.messages import DeviceState
 
     with connected(port, baud, key_file) as device:
@@ -34,9 +43,26 @@ def park(port: str, baud: int, key_file: Path | None, wait: bool, timeout: float
 @port_option()
 @baud_option
 @key_option
-@click.option("--frames", type=click.IntRange(min=0, max=1 << 31), default=0, metavar="N", help="0 is without end.")
+@click.option(
+    "--frames",
+    type=click.IntRange(min=0, max=1 << 31),
+    default=0,
+    metavar="N",
+    show_default=True,
+    help="Number of frames to play; 0 plays until `tablegen park`.",
+)
 def trigger(port: str, baud: int, key_file: Path | None, frames: int) -> int:
-    """Arm and trigger: play N frames (without end if not given) of the scan in force, and say whether it plays."""
+    """Arm and trigger the device: it plays N frames of the active scan. Prints whether it plays.
+
+    \b
+    Examples:
+      tablegen trigger --port /dev/ttyUSB0
+      tablegen trigger --frames 10 --port /dev/ttyUSB0
+
+    \b
+    Exit status: 0 done, 6 pyserial is missing, 7 no port, 8 no answer, 9 refused, or it does
+    not play, 10 link lost.
+    """
     from tablegen.link.errors import OutOfTime
     from tablegen.link.messages import DeviceState
 
@@ -66,12 +92,21 @@ def _frames(count: int) -> str:
     return "1 frame" if count == 1 else f"{count} frames"
 
 
-@click.command(short_help="Forget the faults of a device.")
+@click.command(short_help="Clear the faults of a device.")
 @port_option()
 @baud_option
 @key_option
 def clear(port: str, baud: int, key_file: Path | None) -> int:
-    """Forget sticky faults and their counts; `valid` goes high again with the next line that is free of them."""
+    """Clear the fault flags and fault counters of a device.
+
+    The output `valid` goes high again at the next line without a fault.
+
+    \b
+    Example:
+      tablegen clear --port /dev/ttyUSB0
+
+    Exit status: 0 done, 6 pyserial is missing, 7 no port, 8 no answer, 9 refused, 10 link lost.
+    """
     with connected(port, baud, key_file) as device:
         device.clear()
     click.echo("faults forgotten")

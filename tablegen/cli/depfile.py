@@ -8,7 +8,6 @@ from pathlib import Path
 
 from tablegen.cli.common import fail, written
 from tablegen.cli.exit_status import ExitStatus
-from tablegen.resources import deciding_files
 
 
 class Depfile:
@@ -25,9 +24,11 @@ class Depfile:
         self._started_ns = time.time_ns()
         _remove(path, scan)
 
-    def note(self, read: Sequence[Path]) -> None:
-        """Note the files that were read, and those of the package."""
-        self._prerequisites = [*read, *deciding_files()]
+    def note(self, read: Sequence[Path], formats: Sequence[str]) -> None:
+        """Note the files that were read, and those of the package that decide these formats."""
+        from tablegen.emit.depfile import deciding_files
+
+        self._prerequisites = [*read, *deciding_files(formats)]
         for name in (self._target, *map(str, self._prerequisites)):
             if "\n" in name or "\t" in name:
                 why = "no dependency file can name a path with a line end or a tab; rename it"

@@ -15,17 +15,20 @@ _FAULTS = ("slew", "clamp", "overrun", "underrun")
 _FAULT_BITS = (1, 2, 4, 8)
 
 
-@click.command("status", short_help="Say what a device is and does.")
+@click.command("status", short_help="Show state, active scan, faults and limits of a device.")
 @port_option()
 @baud_option
 @key_option
-@click.option("--json", "as_json", is_flag=True, help="JSON instead of text.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")
 def device_status(port: str, baud: int, key_file: Path | None, as_json: bool) -> int:
-    """Ask a device what it is, what it plays, and what it has of an upload.
+    """Show the state, active scan, upload in progress, faults and limits of a device.
 
     \b
+    Examples:
       tablegen status --port /dev/ttyUSB0
       tablegen status --port /dev/ttyUSB0 --json | jq .status.state
+
+    Exit status: 0 done, 6 pyserial is missing, 7 no port, 8 no answer, 9 refused, 10 link lost.
     """
     with connected(port, baud, key_file) as device:
         info, limits, status = device.info, device.limits(), device.status()

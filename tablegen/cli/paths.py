@@ -7,26 +7,26 @@ import click
 from tablegen.cli.exit_status import ExitStatus
 
 
-@click.command(short_help="Print where the files for make, CMake and simulators are.")
-@click.option("--make", is_flag=True, help="The Make include, tablegen.mk.")
-@click.option("--cmake", is_flag=True, help="The directory of the CMake package, TablegenConfig.cmake.")
-@click.option("--runtime-c", is_flag=True, help="The directory of the C sequencer, dac_*.h and dac_*.c.")
-@click.option("--runtime-verilog", is_flag=True, help="The directory of the Verilog sequencer, dac_*.v.")
+@click.command(short_help="Print the paths of the make, CMake, C and Verilog files.")
+@click.option("--make", is_flag=True, help="Print the path of the make include file, tablegen.mk.")
+@click.option("--cmake", is_flag=True, help="Print the directory of TablegenConfig.cmake.")
+@click.option("--runtime-c", is_flag=True, help="Print the directory of dac_*.h and dac_*.c.")
+@click.option("--runtime-verilog", is_flag=True, help="Print the directory of dac_*.v.")
 def paths(**asked: bool) -> int:
-    """Print where the files of this installation are; without an option all of them, as a table.
+    """Print the paths of installed files that other tools need. Without an option, print all of them as a table.
 
     \b
-    In a Makefile, `tablegen build` as a build step:
+    In a Makefile, this runs `tablegen build` as a build step:
       include $(shell tablegen paths --make)
-      $(eval $(call tablegen_build,scan.toml,build/scan))    # then compile $(build/scan_SOURCES)
+      $(eval $(call tablegen_build,scan.toml,build/scan))    # $(build/scan_SOURCES): C files
 
     \b
-    In a CMakeLists.txt, with cmake -DTablegen_DIR="$(tablegen paths --cmake)":
+    In a CMakeLists.txt; then run cmake -DTablegen_DIR="$(tablegen paths --cmake)":
       find_package(Tablegen REQUIRED)
-      tablegen_build(scan.toml TARGET scan)                  # a library to link to
+      tablegen_build(scan.toml TARGET scan)                  # makes the library "scan"
 
     \b
-    To read, lint or link the sequencers, which are also in every build:
+    To read or lint the sequencers, which every build also contains:
       less "$(tablegen paths --runtime-c)/dac_sequencer.h"
       cppcheck "$(tablegen paths --runtime-c)"
 

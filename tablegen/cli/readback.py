@@ -9,25 +9,35 @@ from tablegen.cli.connection import baud_option, connected, key_option, port_opt
 from tablegen.cli.exit_status import ExitStatus
 
 
-@click.command(short_help="Read back what a device plays; compare, or save it.")
+@click.command(short_help="Read the active scan of a device; compare or save it.")
 @click.argument("source", type=click.Path(path_type=Path), metavar="[SCAN.TOML|DIR]", required=False)
 @port_option()
 @baud_option
 @key_option
 @click.option(
-    "-o", "--output", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE", help="Write the image there."
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE",
+    help="Write the program image, as the device holds it, to FILE.",
 )
-@timeout_option("Bounds everything.  [default: 15 s and 4 times what the line takes]")
+@timeout_option("Stop after S seconds.  [default: 15 s plus 4 times the transfer time]")
 def readback(
     source: Path | None, port: str, baud: int, key_file: Path | None, output: Path | None, timeout: float | None
 ) -> int:
-    """Read the scan that plays out of the memory of a device, and compare it with a scan or a build, word by word.
+    """Read the active scan from the memory of a device, and compare it word by word with a scan or a build.
+
+    SCAN.TOML is a scan file; DIR is a directory that `tablegen build` wrote.
 
     \b
+    Examples:
       tablegen readback build --port /dev/ttyUSB0
-      tablegen readback -o playing.bin --port /dev/ttyUSB0
-    Exit status: 0 the same, 5 different (with the first difference), 9 the device does not
-    hold the image, and those of `tablegen upload`.
+      tablegen readback -o active.bin --port /dev/ttyUSB0
+
+    \b
+    Exit status: 0 equal, 2 wrong input, 4 cannot write, 5 different (the first difference is
+    printed), 6 pyserial is missing, 7 no port, 8 no answer, 9 refused or no image to read,
+    10 link lost or timeout.
     """
     if source is None and output is None:
         raise click.UsageError("name a scan or a build to compare with, or a file to write (-o FILE)")

@@ -18,46 +18,77 @@ _FORMATS = (".png", ".svg", ".pdf")
 
 
 @click.command(
-    short_help="A trace of the running scan: learn what the model leaves.",
+    short_help="Correct remaining scan errors from a sensor trace.",
     epilog="""\b
-  tablegen refine scan.toml trace.csv --axis x            what a trace says; writes nothing
-  tablegen refine scan.toml trace.csv --axis x --write    put it into scan.toml; then build, upload, record again""",
+Examples:
+  tablegen refine scan.toml trace.csv --axis x            print the errors; write nothing
+  tablegen refine scan.toml trace.csv --axis x --write    write the correction to scan.toml
+
+Exit status: 0 done, 2 wrong input, 4 cannot write, 6 a library is missing.""",
 )
 @scan_argument
 @click.argument("trace", type=click.Path(path_type=Path), metavar="TRACE.CSV")
-@click.option("--axis", type=click.Choice(("x", "y")), required=True, help="Which axis was measured.")
-@click.option("--write", is_flag=True, help="Update SCAN.TOML in place.")
+@click.option("--axis", type=click.Choice(("x", "y")), required=True, help="The axis that was measured.")
+@click.option("--write", is_flag=True, help="Write the correction to SCAN.TOML.")
 @click.option(
     "--gain",
     type=click.FloatRange(0.0, 2.0, min_open=True, max_open=True),
     default=0.7,
     show_default=True,
     callback=finite,
-    help="The share of the error that a round takes.",
+    metavar="GAIN",
+    help="Fraction of the measured error that this round corrects.",
 )
 @click.option(
-    "--harmonics", type=click.IntRange(1, 512), metavar="N", help="Learn up to this one.  [default: 16, or the bound's]"
+    "--harmonics",
+    type=click.IntRange(1, 512),
+    metavar="N",
+    help="Highest harmonic to correct.  [default: 16, or fewer if more might not converge]",
 )
-@click.option("--triggered", is_flag=True, help="Without drive_v: time 0 is a line start, of y a frame start.")
+@click.option(
+    "--triggered",
+    is_flag=True,
+    help="The trace has no drive_v: its time 0 is a line start (x) or a frame start (y).",
+)
 @click.option(
     "--period-s",
     type=click.FloatRange(min=0.0, min_open=True),
     callback=finite,
     metavar="S",
-    help="By the recorder's clock, triggered.",
+    help="With --triggered: period of a line (x) or frame (y) in seconds by the clock of the recorder.  [default: the "
+    "period of the scan]",
 )
 @click.option(
-    "--delay-s", type=float, default=0.0, callback=finite, show_default=True, metavar="S", help="Of the sensor."
+    "--delay-s",
+    type=float,
+    default=0.0,
+    callback=finite,
+    show_default=True,
+    metavar="S",
+    help="Delay of the sensor relative to the drive in seconds.",
 )
 @click.option(
-    "--settle", type=click.IntRange(min=0), metavar="N", help="Periods left out.  [default: 1 of three or more]"
+    "--settle",
+    type=click.IntRange(min=0),
+    metavar="N",
+    help="Ignore the first N periods.  [default: 1 if the trace has three periods or more, otherwise 0]",
 )
 @click.option(
-    "--drift", type=click.IntRange(0, 5), metavar="N", help="Order of the drift.  [default: 0 to 3, by periods]"
+    "--drift",
+    type=click.IntRange(0, 5),
+    metavar="N",
+    help="Order of the polynomial that describes drift.  [default: 0 to 3, more with more periods]",
 )
-@click.option("--force", is_flag=True, help="Learn even from a trace that is worse than the last one, or that is it.")
-@click.option("--plot", type=click.Path(path_type=Path, dir_okay=False), metavar="PNG", help="Draw it; or .svg, .pdf.")
-@click.option("--json", "as_json", is_flag=True, help="Plain data instead of text.")
+@click.option(
+    "--force", is_flag=True, help="Use the trace even if its error is larger than before, or if it was used already."
+)
+@click.option(
+    "--plot",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE",
+    help="Plot the errors to FILE: .png, .svg or .pdf.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")
 def refine(
     scan: Path,
     trace: Path,
@@ -74,10 +105,13 @@ def refine(
     plot: Path | None,
     as_json: bool,
 ) -> int:
-    """Learn from a displacement sensor what the model leaves of a running scan.
+    """Correct the scan errors that the scanner model leaves, by iterative learning from a displacement sensor.
 
-    Columns: time_s, displacement_nm and drive_v, of several periods. What a round learns becomes [AXIS.refinement] of
-    the scan file, which the next build adds to the drive. Two or three rounds of recording, refining and building do.
+    \b
+    1. Record several periods of the running scan in TRACE.CSV.
+       Columns: time_s, displacement_nm, drive_v.
+    2. Run this command with --write. It writes the correction to [AXIS.refinement] of SCAN.TOML.
+    3. Build, upload, and record again. Two or three rounds are usually enough.
     """
     if period_s is not None and not triggered:
         raise click.UsageError("--period-s is for --triggered; otherwise drive_v has the period")

@@ -3,15 +3,21 @@
 import click
 
 
-@click.command(short_help="Print the JSON Schema of the input files.")
+@click.command(short_help="Print the JSON Schema of a scan or scanner file.")
 @click.argument("kind", type=click.Choice(["scan", "scanner"]), default="scan")
 def schema(kind: str) -> None:
-    """Print the JSON Schema (2020-12) of a scan file, or of a scanner file.
+    """Print the JSON Schema (2020-12) of scan files (the default) or scanner files.
+
+    Editors use the schema to complete and check keys. For taplo and Even Better TOML, save the schema and make this
+    the first line of the scan file:
 
     \b
-    Editors that know TOML take it, for instance taplo and Even Better TOML
-    with this as the first line:
       #:schema ./scan.schema.json
+
+    \b
+    Examples:
+      tablegen schema > scan.schema.json
+      tablegen schema scanner > scanner.schema.json
     """
     import json
 

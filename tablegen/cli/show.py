@@ -5,29 +5,35 @@ from pathlib import Path
 
 import click
 
-from tablegen.cli.common import planned, scan_argument
+from tablegen.cli.common import format_option, planned, rendered, scan_argument
 
 
-@click.command(short_help="Show what would be built: drive, rates, certificate, plot.")
+@click.command(short_help="Show drive, rates, accuracy and plots of a scan.")
 @scan_argument
-@click.option("--json", "as_json", is_flag=True, help="The manifest instead of text.")
-@click.option("--plot/--no-plot", default=True, show_default=True, help="Draw the drive of one period.")
-def show(scan: Path, as_json: bool, plot: bool) -> None:
-    """Show what a build of a scan would make, and write nothing.
+@click.option("--json", "as_json", is_flag=True, help="Print manifest.json instead of text.")
+@format_option
+@click.option("--plot/--no-plot", default=True, show_default=True, help="Plot one period of the drive of each axis.")
+def show(scan: Path, as_json: bool, formats: tuple[str, ...], plot: bool) -> None:
+    """Show drive, rates, accuracy and plots of a scan. Writes no file.
 
-    Under each plot, > and < mark where the forward and the backward image are taken.
+    Under each plot, > and < mark the imaging windows of the forward and backward lines.
+
+    \b
+    Examples:
+      tablegen show annexin_200nm.toml
+      tablegen show annexin_200nm.toml --json > manifest.json
+
+    Exit status: 0 done, 2 wrong input, 3 a limit of the certificate is exceeded.
     """
-    _, plan, certificates = planned(scan)
+    built = planned(scan, list(formats) or None)
     if as_json:
-        from tablegen.emit.render import render
-
-        click.echo(render(plan, certificates)["manifest.json"], nl=False)
+        click.echo(rendered(built)["manifest.json"], nl=False)
         return
-    from tablegen.certificate.summary import notes, summary
     from tablegen.cli.report import plots
 
+    plan = built.plan
     click.echo(click.style(f"{plan.name} on {plan.scanner!r}", bold=True))
-    for text in summary(plan, certificates):
+    for text in built.summary.splitlines():
         heading = text and not text.startswith(" ")
         click.echo(click.style(text, bold=True) if heading else text)
     if plot:
@@ -36,5 +42,5 @@ def show(scan: Path, as_json: bool, plot: bool) -> None:
             click.echo()
             click.echo("\n".join(plots(line, unicode)))
     click.echo()
-    for note in notes(plan):
+    for note in built.notes:
         click.echo(f"note: {note}")

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from tablegen.virtual.simulation import Run
 
 
-@click.command(short_help="Play a scan on a virtual scanner: what accuracy to expect.")
+@click.command(short_help="Simulate a scan on a virtual scanner; print its accuracy.")
 @scan_argument
 @click.option(
     "--scanner-truth",
@@ -25,24 +25,31 @@ if TYPE_CHECKING:
     metavar="default|FILE",
     default="default",
     show_default=True,
-    help="The virtual scanner; the default one was identified from the paper's figures. Format: docs/virtual.md.",
+    help="Parameters of the virtual scanner; docs/virtual.md describes the file. The default was identified from the "
+    "paper's figures.",
 )
 @click.option(
     "--csv",
     "csv_file",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE",
-    help="Drive and displacement of a line of x and of a frame of y, tick by tick up to 10000 ticks, thinned beyond.",
+    help="Write drive and displacement to FILE, for one line of x and one frame of y. Longer records than 10000 ticks "
+    "are thinned.",
 )
 @click.option(
-    "--plot", "plot_file", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE.png", help="A figure."
+    "--plot",
+    "plot_file",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE.png",
+    help="Plot displacement, residual and scaling error to FILE.png.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Plain data instead of text.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")
 @click.option(
     "--calibration/--no-calibration",
     "calibrated",
     default=True,
-    help="Also with a scanner file that was calibrated on the virtual scanner's own data.  [default: also]",
+    help="Also simulate with a scanner file that was calibrated on simulated measurements of the virtual scanner.  "
+    "[default: calibration]",
 )
 @click.option(
     "--noise",
@@ -51,9 +58,11 @@ if TYPE_CHECKING:
     default=0.2,
     show_default=True,
     metavar="PERCENT",
-    help="Of that data, rms.",
+    help="Noise of the simulated measurements in percent, rms.",
 )
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of that noise.")
+@click.option(
+    "--seed", type=click.IntRange(min=0), default=0, show_default=True, metavar="N", help="Random seed of that noise."
+)
 def simulate(
     scan: Path,
     truth_file: str,
@@ -64,12 +73,20 @@ def simulate(
     noise: float,
     seed: int,
 ) -> None:
-    """Play the emitted integers of a scan on a virtual scanner, and print what it does. This is a simulation.
+    """Simulate a scan on a virtual scanner, and print the scan errors that remain.
 
-    The scan is played as a triangle, and with each hysteresis model for which the scanner file has parameters: first
-    with the scanner file as it is, then with one that was calibrated on what a sensor would have measured on this
-    virtual scanner. It has hysteresis of another kind, creep, a resonance and a sensitivity of its own: none of the
-    equations that a build inverts.
+    The virtual scanner plays the integer codes of the build. It has its own models of hysteresis, creep, resonance and
+    sensitivity, different from the equations that a build inverts.
+
+    The command plays the uncompensated triangle, and each hysteresis model for which the scanner file has parameters:
+    first with the scanner file as it is, then with parameters calibrated on simulated sensor data.
+
+    \b
+    Examples:
+      tablegen simulate annexin_200nm.toml
+      tablegen simulate annexin_200nm.toml --no-calibration --plot errors.png
+
+    Exit status: 0 done, 2 wrong input, 4 cannot write, 6 a library is missing.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from tablegen.config.load import load

@@ -29,7 +29,7 @@ _DATA_OVERHEAD_BYTES = 16  # what a DATA has beside its bytes
 _BITS_PER_BYTE = 10
 
 
-@click.command(short_help="Put a scan into a running instrument, by its serial port.")
+@click.command(short_help="Send a scan to a running device over a serial port.")
 @source_argument
 @port_option(required=False)
 @baud_option
@@ -39,15 +39,20 @@ _BITS_PER_BYTE = 10
     type=click.Choice(("auto", "table", "fourier")),
     default="auto",
     show_default=True,
-    help="Send tables, or Fourier words that the device renders; auto: the smaller that it takes, for each axis.",
+    help="Send tables, or Fourier words from which the device computes its tables. auto sends the smaller of those "
+    "that the device supports, for each axis.",
 )
-@click.option("--dry-run", is_flag=True, help="Send nothing: sizes and times; with --port whether it would be taken.")
-@key_option
-@click.option("--force", is_flag=True, help="Send it even if it is in force already.")
 @click.option(
-    "--any-rate", is_flag=True, help="Allow a device that makes other ticks a second than the scan is built for."
+    "--dry-run",
+    is_flag=True,
+    help="Send nothing. Print sizes and transfer times; with --port, also whether the device would accept the scan.",
 )
-@timeout_option("Bounds everything.  [default: 15 s and 4 times what the line takes]")
+@key_option
+@click.option("--force", is_flag=True, help="Send the scan even if it is active already.")
+@click.option(
+    "--any-rate", is_flag=True, help="Accept a device whose tick rate differs from update_rate_hz of the scan."
+)
+@timeout_option("Stop after S seconds.  [default: 15 s plus 4 times the transfer time]")
 def upload(
     source: Path,
     port: str | None,
@@ -59,17 +64,22 @@ def upload(
     any_rate: bool,
     timeout: float | None,
 ) -> int:
-    """Upload a scan, or the build in a directory; the instrument plays its old scan until a line of the new one starts.
+    """Send a scan to a running device. The device plays its old scan until the first line of the new one starts.
 
-    What the device would refuse is said before anything is sent. The device checks everything again itself. An upload
-    that was interrupted goes on where it was; a port that vanishes is opened again.
+    SCAN.TOML is a scan file; DIR is a directory that `tablegen build` wrote.
+
+    Before it sends, the command checks the scan against the limits of the device; the device checks it again. An
+    interrupted upload continues where it stopped. If the port disappears, the command opens it again.
 
     \b
+    Examples:
       tablegen upload annexin_200nm.toml --port /dev/ttyUSB0
       tablegen upload build --port socket://192.168.0.7:5000
-      tablegen upload build --dry-run                          how large, how long?
-    Exit status: 0 in force, 2 wrong input, 7 no port, 8 no answer, 9 refused, 5 the device
-    plays something else, 10 link lost or out of time, 6 pyserial is missing.
+      tablegen upload build --dry-run                          print sizes and transfer times
+
+    \b
+    Exit status: 0 the scan is active, 2 wrong input, 5 the device plays a different scan,
+    6 pyserial is missing, 7 no port, 8 no answer, 9 refused, 10 link lost or timeout.
     """
     if port is None and not dry_run:
         raise click.UsageError("--port is missing; `tablegen ports` lists those of this machine")

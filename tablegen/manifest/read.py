@@ -11,8 +11,9 @@ import msgspec
 import numpy as np
 from msgspec import Meta, Struct
 
+from tablegen.config.schema import DEFAULT_FORMATS
+from tablegen.device.dual_program import DualProgram
 from tablegen.device.schedule import MAXIMUM_LINE_TICKS, Schedule, Window
-from tablegen.device.sequencer import DualProgram
 from tablegen.fixedpoint.interpolation import guard_bits
 from tablegen.fixedpoint.output import GAIN_BITS, UNIT_GAIN_BITS, Output
 from tablegen.fixedpoint.phase import MAXIMUM_TICKS, RationalPhase
@@ -211,9 +212,10 @@ class Manifest(Struct):
     files: dict[FileName, Digest]
     sequence: ManifestSequence
     axes: ManifestAxes
+    formats: list[Annotated[str, Meta(min_length=1, max_length=64)]] = []
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class StoredBuild:
     """A build as its manifest has it."""
 
@@ -221,19 +223,29 @@ class StoredBuild:
     program: DualProgram
     own_hash: str  # the hash worked out again from what the manifest says
 
+    def __repr__(self) -> str:
+        schedule, name = self.program.schedule, self.manifest.name
+        rate = f"{float(schedule.line_rate):.6g} Hz lines of {schedule.ticks} ticks, {schedule.lines} a frame"
+        return f"<tablegen build {name!r}: {rate}\n  formats {', '.join(self.formats)}\n  plan {self.manifest.hash}>"
+
     @property
     def axes(self) -> tuple[tuple[Literal["x", "y"], ManifestAxis], ...]:
         """Both axes with their names, the fast one first."""
         return ("x", self.manifest.axes.x), ("y", self.manifest.axes.y)
+
+    @property
+    def formats(self) -> tuple[str, ...]:
+        """The names of its formats."""
+        return tuple(self.manifest.formats or DEFAULT_FORMATS)
 
     def runtime(self, *suffixes: str) -> list[str]:
         """The files of the build that are parts of a sequencer, by the ends of their names."""
         return sorted(name for name in self.manifest.files if name.startswith("dac_") and name.endswith(suffixes))
 
 
-def read_manifest(folder: Path) -> StoredBuild:
-    """The build in a directory."""
-    path = folder / MANIFEST
+def read_build(folder: str | Path) -> StoredBuild:
+    """The build in a directory. Raises ``NotABuild`` for a manifest that is missing, damaged or cannot be played."""
+    path = Path(folder) / MANIFEST
     try:
         content = path.read_bytes()
     except OSError as error:
@@ -258,7 +270,7 @@ def read_manifest(folder: Path) -> StoredBuild:
 
 def _hash(plain: dict[str, Any]) -> str:
     """The hash of the plan: of everything but version, hash, files and certificates."""
-    record = {key: value for key, value in plain.items() if key not in ("tablegen", "hash", "files")}
+    record = {key: value for key, value in plain.items() if key not in ("tablegen", "hash", "formats", "files")}
     record["axes"] = {
         axis: {key: value for key, value in content.items() if key != "certificate"}
         for axis, content in plain["axes"].items()

@@ -2,18 +2,26 @@
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tablegen import __version__
 from tablegen.certificate.certificate import Certificate
+from tablegen.config.schema import DEFAULT_FORMATS
 from tablegen.manifest.record import certificate_record
+from tablegen.version import __version__
 
 
 def manifest_file(
-    record: dict[str, Any], digest: str, certificates: dict[str, Certificate], files: Mapping[str, bytes]
+    record: dict[str, Any],
+    digest: str,
+    formats: Sequence[str],
+    certificates: dict[str, Certificate],
+    files: Mapping[str, bytes],
 ) -> bytes:
-    """The plan's record with its hash, the certificates, and the SHA-256 of every other file of the build."""
+    """The plan's record with its hash, the certificates, and the SHA-256 of every other file of the build.
+
+    ``formats`` stand in it unless they are those that a build has by default.
+    """
     axes = {
         axis: {**content, "certificate": certificate_record(certificates[axis])}
         for axis, content in record["axes"].items()
@@ -22,6 +30,7 @@ def manifest_file(
         "tablegen": __version__,
         "hash": digest,
         **{key: value for key, value in record.items() if key != "axes"},
+        **({"formats": list(formats)} if sorted(formats) != sorted(DEFAULT_FORMATS) else {}),
         "files": {name: hashlib.sha256(content).hexdigest() for name, content in sorted(files.items())},
         "axes": axes,
     }

@@ -10,9 +10,9 @@ import numpy as np
 from tablegen.compensation.drive import Drive, compensate
 from tablegen.compensation.dynamics import capped_inverse
 from tablegen.config.load import Setup
-from tablegen.config.schema import BandLimit, FastAxis, Limits, SlowAxis
+from tablegen.config.schema import DEFAULT_FORMATS, BandLimit, FastAxis, Limits, SlowAxis
+from tablegen.device.dual_program import DualProgram
 from tablegen.device.schedule import Schedule
-from tablegen.device.sequencer import DualProgram
 from tablegen.fixedpoint.converter import Converter, fit_gain, make_output
 from tablegen.fixedpoint.phase import RationalPhase
 from tablegen.fixedpoint.program import Program
@@ -29,7 +29,7 @@ from tablegen.waveform.series import FourierSeries
 _PEAK_GRID = 1024
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class LinePlan:
     """One axis: what was asked for in volts, the waveform, and the integers that play it.
 
@@ -52,6 +52,11 @@ class LinePlan:
     program: Program
     layer: FourierSeries | None = None
 
+    def __repr__(self) -> str:
+        table = f"{self.program.mode} table of {len(self.program.words)} x {self.program.bits} bits"
+        volts = f"{self.drive.v_amplitude:.6g} V about {self.drive.v_offset:.6g} V"
+        return f"{self.axis}: {volts}, {self.series.harmonics} harmonics, {table}"
+
     @property
     def described(self) -> FourierSeries:
         """The target without the layer: what the scanner's model describes."""
@@ -71,7 +76,7 @@ class LinePlan:
         return self.program.codes(np.arange(start, stop, dtype=np.int64))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Plan:
     """A whole build: both axes and the one schedule they share."""
 
@@ -82,6 +87,12 @@ class Plan:
     y: LinePlan
     limits: Limits
     header_only: bool
+    formats: tuple[str, ...] = DEFAULT_FORMATS
+
+    def __repr__(self) -> str:
+        ticks, rate = self.schedule.ticks, float(self.schedule.line_rate)
+        head = f"<tablegen plan {self.name!r} on {self.scanner!r}: {rate:.6g} Hz lines of {ticks} ticks"
+        return f"{head}, {self.schedule.lines} a frame\n  {self.x!r}\n  {self.y!r}>"
 
     @property
     def lines(self) -> tuple[LinePlan, LinePlan]:
@@ -122,6 +133,7 @@ def make_plan(setup: Setup) -> Plan:
         y,
         scan.limits,
         scan.emit.header_only,
+        tuple(scan.emit.formats or DEFAULT_FORMATS),
     )
 
 

@@ -59,7 +59,8 @@ def _put(text: str, name: str, axis: str, values: Mapping[str, Any]) -> str:
         parent[KEY] = dict(values)
     else:  # a new table by hand: comments above the next one are that one's, which tomlkit does not know
         rows = text.split("\n")
-        lines = [line for key, line in parse_toml(text, name)[1].lines.items() if key.split(".")[0] == axis]
+        places = parse_toml(text, name)[1].lines or {}
+        lines = [line for key, line in places.items() if key.split(".")[0] == axis]
         end = next((i for i in range(max(lines), len(rows)) if rows[i].startswith("[")), len(rows))
         while end > max(lines) and (not rows[end - 1] or rows[end - 1].startswith("#")):
             end -= 1

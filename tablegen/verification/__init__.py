@@ -1,1 +1,1 @@
-"""Hold what streams out of the Verilog sequencer against model and float waveform; needs ``tablegen[hdl]``."""
+"""Hold what streams out of the Verilog sequencer against model and float waveform; needs the extra ``hdl``."""

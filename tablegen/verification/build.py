@@ -5,11 +5,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from tablegen import __version__
-from tablegen.manifest.read import NotABuild, StoredBuild, read_manifest
+from tablegen.emit.format import Comparison
+from tablegen.emit.formats import UnknownFormat, get
+from tablegen.emit.stored import stored_content
+from tablegen.manifest.read import NotABuild, StoredBuild, read_build
+from tablegen.problems import Unphysical
 from tablegen.verification.checks import Check
 from tablegen.verification.directory import some, wrong_files
 from tablegen.verification.session import BuildSession, needed_ticks
+from tablegen.version import __version__
 
 Progress = Callable[[str | Callable[[], str]], None]
 
@@ -24,7 +28,11 @@ class Outcome:
 
 
 class Target(Protocol):
-    """A language in which a build has its sequencer, and something that plays it."""
+    """A format in which a build has its sequencer, and something that plays it."""
+
+    @property
+    def format_name(self) -> str | None:
+        """The format that is played; None where nothing is."""
 
     def require(self) -> None:
         """Raise ``ToolMissing`` unless all that it needs is there."""
@@ -32,23 +40,24 @@ class Target(Protocol):
     def refuse(self, folder: Path, stored: StoredBuild) -> None:
         """Raise ``NotABuild`` for a build that it cannot play."""
 
-    def check_files(self, folder: Path, stored: StoredBuild) -> list[Check]:
-        """Constants and words of the build's files against the manifest."""
-
     def play(
         self, folder: Path, work: Path, stored: StoredBuild, most_ticks: int, seed: int, progress: Progress
     ) -> Outcome:
         """Play the build in ``folder``, in the directory ``work``, and check what comes."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Report:
-    """What came of a verification."""
+    """What came of a verification: ``failures`` are empty if all is well."""
 
     name: str
     checks: list[Check]
     difference: str | None
     notes: list[str]
+
+    def __repr__(self) -> str:
+        failed = len(self.failures)
+        return f"<tablegen report {self.name!r}: {len(self.checks)} checks, {failed or 'none'} failed>"
 
     @property
     def failures(self) -> list[str]:
@@ -61,13 +70,19 @@ def verify_build(folder: Path, work: Path, target: Target, most_ticks: int, seed
 
     Raises ``NotABuild`` and ``ToolMissing``. Everything else that is wrong is a failed check, and none hides another.
     """
-    stored = read_manifest(folder)
+    stored = read_build(folder)
+    if target.format_name is not None and target.format_name not in stored.formats:
+        formats = ", ".join(stored.formats)
+        raise NotABuild(
+            f"{folder}: holds no {target.format_name}, its formats are {formats}; "
+            f"verify another --target, or build it with --format {target.format_name}"
+        )
     target.refuse(folder, stored)
     target.require()
     progress("hashing the files")
-    checks = [*_file_checks(folder, stored), *target.check_files(folder, stored)]
+    notes: list[str] = []
+    checks = [*_file_checks(folder, stored), *_format_checks(folder, stored, notes)]
     outcome = target.play(folder, work, stored, most_ticks, seed, progress)
-    notes = []
     if stored.manifest.tablegen != __version__:
         notes.append(f"built by tablegen {stored.manifest.tablegen}, verified by {__version__}")
     if outcome.session is not None:
@@ -85,6 +100,21 @@ def _file_checks(folder: Path, stored: StoredBuild) -> list[Check]:
         Check("manifest", "its own hash", "1 plan", failure=hashed),
         differing_check("files", "SHA-256 in the manifest", f"{len(manifest.files)} files", wrong),
     ]
+
+
+def _format_checks(folder: Path, stored: StoredBuild, notes: list[str]) -> list[Check]:
+    """What each format of the build finds in its files."""
+    content, checks = stored_content(stored), []
+    for name in stored.formats:
+        try:
+            found = get(name).check(folder, content)
+        except UnknownFormat as error:
+            notes.append(f"{error}; its files were held against their SHA-256 alone")
+            continue
+        except Unphysical as error:  # no build has such a manifest
+            found = [Comparison("files", "0 files", [str(error)])]
+        checks += [differing_check(f"{name} {one.subject}", "manifest", one.compared, one.wrong) for one in found]
+    return checks
 
 
 def differing_check(subject: str, against: str, compared: str, wrong: list[str]) -> Check:

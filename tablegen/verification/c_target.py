@@ -12,13 +12,14 @@ from typing import Any, Literal
 
 import numpy as np
 
+from tablegen.emit.formats.c import arrays_file
+from tablegen.emit.stored import stored_content
 from tablegen.fixedpoint.output import Output
 from tablegen.manifest.read import NotABuild, StoredBuild
 from tablegen.verification import worker
 from tablegen.verification.bench import CAPTURE, SCRIPT, SequencerShape
-from tablegen.verification.build import Outcome, Progress, differing_check
+from tablegen.verification.build import Outcome, Progress
 from tablegen.verification.c_bench import CBench, CPlayed, require_compiler, script_words, storage_bits
-from tablegen.verification.c_files import arrays_file, wrong_arrays, wrong_constants
 from tablegen.verification.checks import (
     Check,
     check_codes,
@@ -45,6 +46,7 @@ class CTarget:
 
     machine: Literal["c", "cortex-m"]
     fourier: bool = False
+    format_name: str = "c"
 
     def require(self) -> None:
         """A compiler, and what runs its output."""
@@ -67,15 +69,6 @@ class CTarget:
             raise NotABuild(
                 f"{folder}: both tables are direct, and no device renders those; verify it without --fourier"
             )
-
-    def check_files(self, folder: Path, stored: StoredBuild) -> list[Check]:
-        """The C header and the arrays."""
-        constants, differing = wrong_constants(folder, stored)
-        words, flipped = wrong_arrays(folder, stored)
-        return [
-            differing_check("header", "manifest", f"{constants} constants", differing),
-            differing_check("arrays", "manifest", f"{words} words", flipped),
-        ]
 
     def play(
         self, folder: Path, work: Path, stored: StoredBuild, most_ticks: int, seed: int, progress: Progress
@@ -157,7 +150,7 @@ def _played(work: Path, job: dict[str, Any]) -> tuple[Words, list[int]]:
 def _sources(folder: Path, work: Path, stored: StoredBuild, fourier: bool) -> tuple[list[Path], list[str]]:
     """Copies of what a user of the build would compile, and the file that hands it to the bench; what is missing."""
     runtime = stored.runtime(".c", ".h")
-    own = sorted({f"{stored.manifest.name}.h", arrays_file(stored)})
+    own = sorted({f"{stored.manifest.name}.h", arrays_file(stored_content(stored))})
     sources, absent = copies(folder, own + runtime, work / "c")
     if not runtime:
         absent.append("the build holds no dac_*.c")

@@ -14,6 +14,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from tablegen.installation import install_advice
 from tablegen.resources import c_runtime
 from tablegen.verification.bench import SequencerShape
 from tablegen.verification.c_bench import BENCH, OPTIONS, CPlayed, defines, script_words, sine_of
@@ -60,7 +61,7 @@ def require_emulator(compiler: str = COMPILERS["arm"]) -> list[str]:
         import elftools  # noqa: F401
         import unicorn  # noqa: F401
     except ImportError as error:
-        raise ToolMissing(f"{error.name} is not installed: pip install 'tablegen[cortex-m]'") from None
+        raise ToolMissing(f"{error.name} is not installed: {install_advice('cortex-m')}") from None
     command = shlex.split(compiler)
     if not command or shutil.which(command[0]) is None:
         name = command[0] if command else compiler

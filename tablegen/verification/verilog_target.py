@@ -9,7 +9,7 @@ from tablegen.device.registers import program_words
 from tablegen.manifest.read import NotABuild, StoredBuild
 from tablegen.verification import worker
 from tablegen.verification.bench import CAPTURE, SCRIPT, SequencerBench, SequencerShape
-from tablegen.verification.build import Outcome, Progress, differing_check
+from tablegen.verification.build import Outcome, Progress
 from tablegen.verification.checks import (
     Check,
     check_codes,
@@ -18,7 +18,7 @@ from tablegen.verification.checks import (
     first_difference,
     make_capture,
 )
-from tablegen.verification.directory import copies, memory_words, some, wrong_constants, wrong_memories
+from tablegen.verification.directory import copies, memory_words, some
 from tablegen.verification.placement import Placement
 from tablegen.verification.session import Memories, make_session
 from tablegen.verification.simulate import SimulationFailed, require
@@ -35,6 +35,7 @@ class VerilogTarget:
 
     simulator: str
     placement: Placement
+    format_name: str = "verilog"
 
     def require(self) -> None:
         """The simulator and cocotb."""
@@ -53,15 +54,6 @@ class VerilogTarget:
             raise NotABuild(
                 f"{folder}: both tables are direct, and no device renders those; verify it without --fourier"
             )
-
-    def check_files(self, folder: Path, stored: StoredBuild) -> list[Check]:
-        """The Verilog header and the memory files."""
-        constants, differing = wrong_constants(folder, stored)
-        words, flipped = wrong_memories(folder, stored)
-        return [
-            differing_check("header", "manifest", f"{constants} constants", differing),
-            differing_check("memories", "manifest", f"{words} words", flipped),
-        ]
 
     def play(
         self, folder: Path, work: Path, stored: StoredBuild, most_ticks: int, seed: int, progress: Progress

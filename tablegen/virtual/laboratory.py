@@ -1,7 +1,7 @@
 """A calibration day on the virtual scanner: its own simulated data through the fits of ``tablegen.calibration``.
 
 What comes out is the scanner file that a laboratory would have, noise and all; nothing is known but what was measured.
-Needs scipy (``tablegen[calibrate]``).
+Needs scipy, of the extra ``calibrate``.
 """
 
 from collections.abc import Sequence

@@ -349,7 +349,7 @@ def test_a_missing_extra_is_status_6(
     monkeypatch.setattr(importlib.util, "find_spec", lambda name, *rest: None if name == module else there(name, *rest))
     outcome = calibrate("offset", *more)
     assert outcome.status == 6
-    assert outcome.err == f"{module} is missing; install it with: pip install 'tablegen[{extra}]'\n"
+    assert outcome.err == f"{module} is missing; install it with: pip install 'piezo-tablegen[{extra}]'\n"
 
 
 def test_help_teaches(lab: Path) -> None:

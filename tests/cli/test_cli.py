@@ -102,7 +102,7 @@ def test_help_names_every_command_and_every_exit_status() -> None:
             "verify",
             (
                 "DIR",
-                "--target [verilog|c|cortex-m]",
+                "--target [verilog|c|cortex-m|files]",
                 "--sim [icarus|verilator]",
                 "--ticks N",
                 "--junit FILE",

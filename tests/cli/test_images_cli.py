@@ -163,7 +163,7 @@ def test_a_missing_library_is_status_6(module: str, ending: str, lab: Path, monk
     monkeypatch.setattr(importlib.util, "find_spec", lambda name, *rest: None if name == module else there(name, *rest))
     outcome = one(f"a.{ending}", f"b.{ending}")
     assert outcome.status == 6
-    assert outcome.err == f"{module} is missing; install it with: pip install 'tablegen[images]'\n"
+    assert outcome.err == f"{module} is missing; install it with: pip install 'piezo-tablegen[images]'\n"
     assert one("t100.npy", "r100.npy").status == 0
 
 

@@ -92,7 +92,7 @@ def test_a_calibration_needs_scipy(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     scan = write_pair(tmp_path, SHORT)
     outcome = run("simulate", scan)
     assert outcome.status == ExitStatus.TOOL_MISSING
-    assert "tablegen[calibrate]" in outcome.err
+    assert "piezo-tablegen[calibrate]" in outcome.err
     assert "--no-calibration" in outcome.err
     assert run("simulate", scan, "--no-calibration").status == 0
 
@@ -142,7 +142,7 @@ def test_a_figure_needs_matplotlib(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     outcome = run("simulate", write_pair(tmp_path, SHORT), "--plot", tmp_path / "figure.png")
     assert outcome.status == ExitStatus.TOOL_MISSING
-    assert "tablegen[plot]" in outcome.err
+    assert "piezo-tablegen[plot]" in outcome.err
     assert not (tmp_path / "figure.png").exists()
 
 

@@ -6,8 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from variants import plan_of
 
+from tablegen.device.dual_program import DualProgram
 from tablegen.device.schedule import Window
-from tablegen.device.sequencer import DualProgram, Fault, Sequencer, SequencerState, Tick, pixel_starts, play_line
+from tablegen.device.sequencer import Fault, Sequencer, SequencerState, Tick, pixel_starts, play_line
 
 SMALL = {
     "timing.lines": "6",

@@ -10,9 +10,10 @@ from building import run as run_tool
 from editing import SCAN, SCANNER, edited, run, write_pair
 from installing import python
 
+from tablegen.config.schema import DEFAULT_FORMATS
 from tablegen.emit import render as module
-from tablegen.emit.depfile import depfile
-from tablegen.resources import deciding_files, resource_folder
+from tablegen.emit.depfile import deciding_files, depfile
+from tablegen.resources import resource_folder
 
 # What a file may have in its name and make can take.
 NAMES = [
@@ -121,7 +122,7 @@ def test_it_names_what_was_read_in_a_fixed_order(measured: Path, monkeypatch: py
     target, prerequisites, without_rule = names(Path("deep/er/build.d"))
     assert target == "out/manifest.json"
     own = ["scans/scan.toml", "scans/../scanner.toml", "scans/../x.csv", "scans/../y.csv"]
-    assert prerequisites == [*own, *sorted(map(str, deciding_files()))]
+    assert prerequisites == [*own, *sorted(map(str, deciding_files(DEFAULT_FORMATS)))]
     assert without_rule == prerequisites
     before = Path("deep/er/build.d").read_bytes()
     assert run("build", "scans/scan.toml", "-o", "out", "--depfile", "deep/er/build.d").status == 0
@@ -166,19 +167,20 @@ def test_nothing_else_is_read(measured: Path, installed: Path) -> None:
 
 @pytest.mark.common
 def test_of_an_installation_the_record_is_named_which_has_the_version(installed: Path) -> None:
-    code = "from tablegen.resources import deciding_files; print(*deciding_files(), sep='\\n')"
+    code = "from tablegen.emit.depfile import deciding_files; print(*deciding_files(['c']), sep='\\n')"
     listed = python(installed.parent, "-c", code, path=installed).splitlines()
-    assert [name for name in listed if "dist-info" in name] == [str(*installed.glob("tablegen-*.dist-info/RECORD"))]
+    (record,) = installed.glob("piezo_tablegen-*.dist-info/RECORD")
+    assert [name for name in listed if "dist-info" in name] == [str(record)]
 
 
 def test_what_builds_do_not_read_is_not_named() -> None:
-    folders = {path.parent.name for path in deciding_files()}
+    folders = {path.parent.name for path in deciding_files(DEFAULT_FORMATS)}
     assert {"c", "verilog", "config", "emit", "fixedpoint"} <= folders
     assert (
         not {"make", "cmake", "calibration", "cli", "link", "verification", "virtual", "examples", "__pycache__"}
         & folders
     )
-    assert "read.py" not in {path.name for path in deciding_files() if path.parent.name == "manifest"}
+    assert "read.py" not in {path.name for path in deciding_files(DEFAULT_FORMATS) if path.parent.name == "manifest"}
     assert resource_folder("firmware_templates") / "c" / "tables.h.j2" in deciding_files()
 
 

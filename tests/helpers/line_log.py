@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tablegen.device.sequencer import DualProgram, LineTicks, Sequencer, Tick, play_line
+from tablegen.device.dual_program import DualProgram
+from tablegen.device.sequencer import LineTicks, Sequencer, Tick, play_line
 from tablegen.numerics.arrays import Ints
 from tablegen.verification.stream import FLAGS
 

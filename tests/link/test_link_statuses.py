@@ -102,7 +102,7 @@ def test_status_6_without_pyserial(folder: Path) -> None:
         for command in (("upload", folder, "--port", "x"), ("status", "--port", "x"), ("ports",)):
             outcome = run(*command)
             assert (outcome.status, outcome.out) == (6, "")
-            assert outcome.err == "pyserial is missing; pip install 'tablegen[serial]'\n"
+            assert outcome.err == "pyserial is missing; pip install 'piezo-tablegen[serial]'\n"
 
 
 def test_status_7_no_port(tmp_path: Path, folder: Path) -> None:

@@ -19,6 +19,7 @@ from editing import SCANNER, edited
 from installing import write_command
 from sets import common
 
+from tablegen import __version__
 from tablegen.resources import c_link, c_runtime
 
 pytestmark = pytest.mark.common
@@ -270,8 +271,8 @@ def test_a_module_of_tablegen_runs_it(project: Project) -> None:
 
 def test_another_version_of_tablegen_runs_it(project: Project) -> None:
     """Though all of its files may be older than the build, as package managers that keep times leave them."""
-    (record,) = project.packages.glob("tablegen-*.dist-info")
-    other = record.rename(record.with_name("tablegen-999.dist-info"))
+    (record,) = project.packages.glob("piezo_tablegen-*.dist-info")
+    other = record.rename(record.with_name("piezo_tablegen-999.dist-info"))
     try:
         does(project.build(), 1, set())
         does(project.build(), 0, set())
@@ -294,11 +295,11 @@ def test_the_source_of_the_user_compiles_itself(project: Project) -> None:
 
 
 def test_a_scan_that_becomes_header_only_loses_a_source(project: Project) -> None:
-    """The sources are those of the scan as it is now; NAME.c of before is not compiled, though it is still there."""
+    """The sources are those of the scan as it is now; NAME.c of before is removed."""
     project.append(project.scan, "[emit]\nheader_only = true\n")
     made = project.build()
     assert (made.status, made.runs, made.compiled, made.linked) == (0, 1, {"main"}, True), made.shown
-    assert (project.output / f"{NAME}.c").exists()
+    assert not (project.output / f"{NAME}.c").exists()
     assert project.play().startswith("1250 ticks a line, ")
     does(project.build(), 0, set())
     project.put_back()
@@ -370,8 +371,9 @@ def test_a_prerequisite_that_is_gone_and_still_named_is_missed_by_name(
 
 
 def test_a_template_that_is_gone_is_no_error_of_the_tool(project: Project) -> None:
-    """As after an update to a version that does not have it."""
+    """As after an update to a version that does not have it, whose CMake package is another file too."""
     project.remove(project.templates / "verilog" / "dac_skew.v")
+    project.edit(project.templates / "cmake" / "TablegenConfigVersion.cmake", "# ", "# New: ")
     does(project.build(), 1, set())
     does(project.build(), 0, set())
 
@@ -546,7 +548,7 @@ def test_without_tablegen_the_examples_say_what_to_do(tmp_path: Path, installed:
         done = project.call(*command, **nowhere(project))
         assert done.returncode != 0
         message = " ".join(done.stderr.split())
-        assert re.search(r"tablegen (does not run|is not on PATH): install it,? or give (-D)?TABLEGEN=PATH", message)
+        assert re.search(r"(does not run|is not on PATH): install piezo-tablegen,? or give (-D)?TABLEGEN=PATH", message)
 
 
 def test_without_tablegen_what_is_included_says_what_to_do(tmp_path: Path, installed: Path) -> None:
@@ -554,7 +556,7 @@ def test_without_tablegen_what_is_included_says_what_to_do(tmp_path: Path, insta
     project = make_project("make", tmp_path, installed)
     (project.folder / "Makefile").write_text(f"include {project.templates}/make/tablegen.mk\nall:\n", "ascii")
     (project.folder / "CMakeLists.txt").write_text(CMAKELISTS, "ascii")
-    remedy = r"put (tablegen|it) on PATH \('pip install' does\), or give (-D)?TABLEGEN=PATH"
+    remedy = r"put (tablegen|it) on PATH \('pip install piezo-tablegen' does\), or give (-D)?TABLEGEN=PATH"
     cmake = ("cmake", "-S", ".", "-B", "build", f"-DTablegen_DIR={project.templates}/cmake")
     for command in (("make",), ("make", "TABLEGEN=/nowhere/tablegen --fast"), cmake):
         done = project.call(*command, **nowhere(project))
@@ -589,8 +591,8 @@ def test_the_program_may_be_named(tmp_path: Path, installed: Path) -> None:
         ("tablegen_build(absent.toml TARGET a)", "absent.toml: cannot be read: No such file or directory"),
         ("find_package(Tablegen 99 REQUIRED)", 'compatible with requested version "99"'),
         (
-            'find_package(Tablegen 0.1.0 EXACT REQUIRED)\nmessage(FATAL_ERROR "version ${Tablegen_VERSION}")',
-            "version 0.1.0",
+            f'find_package(Tablegen {__version__} EXACT REQUIRED)\nmessage(FATAL_ERROR "is ${{Tablegen_VERSION}}")',
+            f"is {__version__}",
         ),
     ],
 )

@@ -16,7 +16,7 @@ from tablegen.config.schema import BandLimit
 from tablegen.emit.render import render
 from tablegen.fixedpoint.synthesis import FourierWords, synthesize
 from tablegen.link.prepare import PreparedScan
-from tablegen.manifest.read import read_manifest
+from tablegen.manifest.read import read_build
 from tablegen.planning.line_plan import Plan, make_plan
 from tablegen.planning.refinement_layer import model_digest
 from tablegen.problems import Rejected
@@ -159,7 +159,7 @@ def test_what_is_printed_and_recorded(tmp_path: Path, plain: Plan, refined: Plan
     assert "refined forward   moves up to" in run("show", path, "--no-plot").out
     built = run("build", path, "-o", tmp_path / "out")
     assert "x     refinement, backward: moves up to" in built.out
-    stored = read_manifest(tmp_path / "out")
+    stored = read_build(tmp_path / "out")
     assert stored.own_hash == stored.manifest.hash
     k = np.arange(1250)
     assert np.max(np.abs(stored.manifest.axes.x.asked(k) - refined.x.codes(0, 1250))) < 1.0

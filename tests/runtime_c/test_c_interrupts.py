@@ -10,7 +10,8 @@ from c_mutants import Mutant, runtime_with
 from following import Differs, Follower
 from programs import random_dual
 
-from tablegen.device.sequencer import DualProgram, Sequencer
+from tablegen.device.dual_program import DualProgram
+from tablegen.device.sequencer import Sequencer
 from tablegen.fixedpoint.program import Program
 from tablegen.resources import c_runtime
 from tablegen.verification.bench import SequencerShape

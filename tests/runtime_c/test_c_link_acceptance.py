@@ -13,7 +13,7 @@ from link_images import damaged, random_image, random_limits
 from link_programs import make_scan
 from link_talk import Talk, is_answer
 
-from tablegen.device.sequencer import DualProgram
+from tablegen.device.dual_program import DualProgram
 from tablegen.link.acceptance import Playing, first_objection
 from tablegen.link.frames import Frame
 from tablegen.link.image import ProgramImage, make_image, take_apart

@@ -31,11 +31,11 @@ from verifying import (
 
 from tablegen.emit.memory import memory_file
 from tablegen.fixedpoint.program import Program
-from tablegen.manifest.read import read_manifest
+from tablegen.manifest.read import read_build
 
 TICKS = 2000
-CHECKS = 15
-FILES = {("files", "SHA-256 in the manifest"), ("memories", "manifest")}
+CHECKS = 17
+FILES = {("files", "SHA-256 in the manifest"), ("verilog memories", "manifest")}
 MODES = (
     "example",
     "bits_8",
@@ -144,7 +144,7 @@ def test_what_was_not_played_is_said(short: Build) -> None:
 @pytest.mark.parametrize(("axis", "at", "bit"), [("x", 70, 6), ("x", 250, 15), ("y", 100, 8)])
 def test_a_flipped_bit_of_a_table_is_found_at_its_first_tick(folder: Path, axis: str, at: int, bit: int) -> None:
     """A bit of the word of that tick."""
-    program: Program = getattr(read_manifest(folder).program, axis)
+    program: Program = getattr(read_build(folder).program, axis)
     word = at * len(program.words) // program.ticks
     flip(folder / f"{NAME}_{axis}.mem", word, bit)
     raw = int((folder / f"{NAME}_{axis}.mem").read_text("ascii").split()[word], 16)
@@ -185,7 +185,7 @@ def test_a_flipped_bit_of_what_is_not_played_is_found_by_its_hash(folder: Path, 
     assert outcome.status == 5
     assert failed(outcome) == FILES
     assert re.search(
-        rf"memories: {NAME}_{suffix}: word 3 is [0-9a-f]{{8}}, it is [0-9a-f]{{8}} in the manifest", outcome.err
+        rf"verilog memories: {NAME}_{suffix}: word 3 is [0-9a-f]{{8}}, it is [0-9a-f]{{8}} in the manifest", outcome.err
     )
     assert "first difference" not in outcome.err
 
@@ -196,7 +196,7 @@ def test_an_edited_constant_is_found(folder: Path) -> None:
     edit(folder / f"{NAME}.vh", f'{NAME.upper()}_X_TABLE_FILE = "{NAME}_x.mem";', f'{NAME.upper()}_X_TABLE_FILE = "";')
     outcome = verify(folder)
     assert outcome.status == 5
-    assert failed(outcome) == {("files", "SHA-256 in the manifest"), ("header", "manifest")}
+    assert failed(outcome) == {("files", "SHA-256 in the manifest"), ("verilog header", "manifest")}
     assert f"{NAME}.vh: {NAME.upper()}_PIXELS is 51, it is 50 in the manifest" in outcome.err
     assert f"{NAME}.vh: {NAME.upper()}_X_TABLE_FILE is '', it is '{NAME}_x.mem' in the manifest" in outcome.err
 
@@ -213,10 +213,11 @@ def test_a_constant_that_is_missing_or_new_is_found(folder: Path) -> None:
 @pytest.mark.parametrize("variant", ["direct", "direct_steps", "bits_24", "left_aligned", "inverting"])
 def test_the_header_of_other_builds_is_read_right(variant: str, tmp_path: Path) -> None:
     """Also where no table is interpolated, and where numbers are negative or have 64 bits; nothing is simulated."""
-    from tablegen.verification.directory import wrong_constants
+    from tablegen.emit.formats.verilog import wrong_constants
+    from tablegen.emit.stored import stored_content
 
     built = build(tmp_path, VARIANTS[variant])
-    assert wrong_constants(built.folder, read_manifest(built.folder))[1] == []
+    assert wrong_constants(built.folder, stored_content(read_build(built.folder)))[1] == []
 
 
 @pytest.mark.common
@@ -327,7 +328,12 @@ def test_a_manifest_that_was_edited_is_found(folder: Path) -> None:
     outcome = verify(folder)
     assert outcome.status == 5
     found = failed(outcome)
-    assert {("manifest", "its own hash"), ("y", "float waveform"), ("x", "slew guard"), ("header", "manifest")} <= found
+    assert {
+        ("manifest", "its own hash"),
+        ("y", "float waveform"),
+        ("x", "slew guard"),
+        ("verilog header", "manifest"),
+    } <= found
 
 
 @pytest.mark.parametrize(
@@ -458,7 +464,7 @@ def test_a_missing_simulator_is_status_6_with_its_remedy(short: Build, tmp_path:
 def test_missing_cocotb_is_status_6_with_its_remedy(short: Build) -> None:
     done = command_without(["cocotb_tools"], short.folder)
     assert (done.returncode, done.stdout) == (6, "")
-    assert done.stderr == "cocotb is not installed: pip install 'tablegen[hdl]'\n"
+    assert done.stderr == "cocotb is not installed: pip install 'piezo-tablegen[hdl]'\n"
 
 
 @pytest.mark.common

@@ -32,12 +32,13 @@ from verifying import (
     with_a_long_table,
 )
 
+from tablegen.emit.formats.c import arrays_file, wrong_arrays, wrong_constants
+from tablegen.emit.stored import stored_content
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.program import Program
-from tablegen.manifest.read import StoredBuild, read_manifest
+from tablegen.manifest.read import StoredBuild, read_build
 from tablegen.verification.bench import SequencerShape
 from tablegen.verification.c_bench import CBench, script_words
-from tablegen.verification.c_files import arrays_file, wrong_arrays, wrong_constants
 from tablegen.verification.c_target import CTarget, _codes, _packed, _sources
 from tablegen.verification.placement import Placement
 from tablegen.verification.session import make_session, varied
@@ -45,9 +46,9 @@ from tablegen.verification.simulate import SimulationFailed
 from tablegen.verification.stream import Script
 
 CAPITAL = NAME.upper()
-CHECKS = 18
+CHECKS = 20
 FILES = ("files", "SHA-256 in the manifest")
-HEADER, ARRAYS, FILL = ("header", "manifest"), ("arrays", "manifest"), ("fill", "integer model")
+HEADER, ARRAYS, FILL = ("c header", "manifest"), ("c arrays", "manifest"), ("fill", "integer model")
 PROGRAM = ("program", "cc")
 # Words that are wider than their codes, of the widest that converters have.
 WIDE = Variant({**VARIANTS["short_frame"].scan, "dac.bits": 12, "dac.word_bits": 32, "dac.align": "left"})
@@ -151,7 +152,7 @@ class Benches:
 @pytest.fixture(scope="module")
 def benches(short: Build, tmp_path_factory: pytest.TempPathFactory) -> Benches:
     """Those of the short build."""
-    folder, stored = tmp_path_factory.mktemp("benches"), read_manifest(short.folder)
+    folder, stored = tmp_path_factory.mktemp("benches"), read_build(short.folder)
     sources, absent = _sources(short.folder, folder, stored, fourier=False)
     assert not absent
     chosen = CTarget("c")._defines(stored)
@@ -232,7 +233,7 @@ def test_codes_come_back_from_converter_words(bits: tuple[int, int], coding: str
 
 def test_the_variation_differs_from_the_program_and_clamps(short: Build) -> None:
     """Otherwise a mixture of the two, or a missing limit, would go unseen; the park code has to stay inside."""
-    program = read_manifest(short.folder).program
+    program = read_build(short.folder).program
     for own, other in ((program.x, varied(program).x), (program.y, varied(program).y)):
         k = np.arange(own.ticks)
         clamped = other.output.unclamped(other.samples(k)) != other.codes(k)
@@ -253,14 +254,14 @@ def defined(folder: Path) -> list[str]:
 @pytest.mark.common
 def test_every_constant_is_held_against_the_manifest(short: Build, tmp_path: Path) -> None:
     """One by one, with what it is and what it is in the manifest; nothing is compiled."""
-    stored = read_manifest(short.folder)
-    count, wrong = wrong_constants(short.folder, stored)
+    content = stored_content(read_build(short.folder))
+    count, wrong = wrong_constants(short.folder, content)
     names = defined(short.folder)
     assert (count, wrong) == (len(names), [])
     for name in set(names) - {"HASH"}:
         shutil.copy(short.folder / f"{NAME}.h", tmp_path)
         old, new = define(tmp_path, name, lambda value: value + 1)
-        assert wrong_constants(tmp_path, stored)[1] == [
+        assert wrong_constants(tmp_path, content)[1] == [
             f"{NAME}.h: {CAPITAL}_{name} is {new}, it is {old} in the manifest"
         ]
 
@@ -270,10 +271,10 @@ def test_every_constant_is_held_against_the_manifest(short: Build, tmp_path: Pat
 def test_headers_and_arrays_of_other_builds_are_read_right(variant: str, tmp_path: Path) -> None:
     """Also where no table is interpolated, where numbers have 64 bits, and where arrays stand in the header."""
     built = build(tmp_path, VARIANTS[variant])
-    stored = read_manifest(built.folder)
-    assert wrong_constants(built.folder, stored) == (len(defined(built.folder)), [])
-    assert wrong_arrays(built.folder, stored)[1] == []
-    assert arrays_file(stored).endswith(".h") == ("header_only" in str(VARIANTS[variant].scan))
+    content = stored_content(read_build(built.folder))
+    assert wrong_constants(built.folder, content) == (len(defined(built.folder)), [])
+    assert wrong_arrays(built.folder, content)[1] == []
+    assert arrays_file(content).endswith(".h") == ("header_only" in str(VARIANTS[variant].scan))
 
 
 # What each constant of a program does when it is wrong: which check beside header and files fails first.
@@ -341,7 +342,7 @@ def test_the_hash_in_the_header_is_held_against_the_manifest(folder: Path, short
 @pytest.mark.common
 @pytest.mark.parametrize(("axis", "at", "bit"), [("x", 70, 6), ("x", 250, 14), ("y", 100, 8)])
 def test_a_damaged_table_is_found_at_its_first_tick(folder: Path, axis: str, at: int, bit: int) -> None:
-    program: Program = getattr(read_manifest(folder).program, axis)
+    program: Program = getattr(read_build(folder).program, axis)
     word = at * len(program.words) // program.ticks
     old, new = put_word(folder, f"{axis}_table", word, lambda value: value ^ 1 << bit)
     heard = first_heard(program, word, new)
@@ -659,4 +660,4 @@ def test_a_missing_cross_compiler_is_status_6_with_its_remedy(short: Build, tmp_
 def test_a_missing_emulator_is_status_6_with_its_remedy(short: Build) -> None:
     done = command_without(["unicorn"], short.folder, "--target", "cortex-m")
     assert (done.returncode, done.stdout) == (6, "")
-    assert done.stderr == "unicorn is not installed: pip install 'tablegen[cortex-m]'\n"
+    assert done.stderr == "unicorn is not installed: pip install 'piezo-tablegen[cortex-m]'\n"

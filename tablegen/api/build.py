@@ -1,0 +1,206 @@
+"""From a scan file, or from values, to a plan, its certificate, its arrays and its files."""
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from tablegen.certificate.certificate import Certificate, broken_limits
+from tablegen.certificate.certificate import certify as certify_plan
+from tablegen.certificate.summary import notes, summary
+from tablegen.config.load import Setup, from_values
+from tablegen.config.load import load as load_files
+from tablegen.emit.format import Format
+from tablegen.emit.formats import UnknownFormat, chosen
+from tablegen.emit.render import render, runtime_files
+from tablegen.emit.write import leftover_files, outdated_files, write_files
+from tablegen.planning.line_plan import Plan, make_plan
+from tablegen.problems import Problem, Rejected, Unphysical
+
+if TYPE_CHECKING:
+    from tablegen.api.samples import Samples
+    from tablegen.link.prepare import PreparedScan
+
+Source = str | Path | Setup
+
+
+class BrokenLimit(Rejected):
+    """A certificate exceeds a limit of the scan file; ``problems`` names each, with a remedy."""
+
+
+def load(path: str | Path) -> Setup:
+    """Read a scan file and the scanner file that it names.
+
+    Raises ``Rejected`` with every fault of both files, each at its file, line and key.
+    """
+    return load_files(path)
+
+
+def plan(
+    source: Source | None = None,
+    *,
+    scan: Mapping[str, Any] | None = None,
+    scanner: Mapping[str, Any] | None = None,
+) -> Plan:
+    """Compensate, shape and quantise a scan: of a scan file, of a setup, or of values without any file.
+
+    ``scan`` and ``scanner`` have the keys of the two files, nested: ``scan={"x": {"size_nm": 200.0, ...}, ...}``.
+    Raises ``Rejected`` with every contradiction.
+    """
+    return make_plan(_setup(source, scan, scanner))
+
+
+def certify(plan: Plan) -> dict[str, Certificate]:
+    """What the emitted integers of a plan promise, by axis "x" and "y": every tick is measured."""
+    return certify_plan(plan)
+
+
+def build(
+    source: Source | None = None,
+    out: str | Path | None = None,
+    *,
+    scan: Mapping[str, Any] | None = None,
+    scanner: Mapping[str, Any] | None = None,
+    formats: Sequence[str] | None = None,
+    progress: Callable[[str], object] = lambda _: None,
+) -> "Build":
+    """Plan and certify a scan, and write it into the directory ``out`` if one is given.
+
+    ``source``, ``scan`` and ``scanner`` are those of ``plan``; ``formats`` those of the scan file unless given.
+    ``progress`` is called with what is being done. Raises ``Rejected`` for wrong input, ``BrokenLimit`` where the
+    certificate exceeds a limit of the scan, ``CannotWrite`` where the directory cannot be written.
+    """
+    progress("shaping the waveforms")
+    setup = _setup(source, scan, scanner)
+    made = make_plan(setup)
+    wanted = _formats(setup, made, formats)
+    progress("measuring every tick of a line and a frame")
+    certificates = certify_plan(made)
+    if broken := broken_limits(made, certificates, setup.scan_file):
+        raise BrokenLimit(broken)
+    built = Build(setup, made, certificates, [each.name for each in wanted], formats is not None)
+    if out is not None:
+        progress("writing the files")
+        built.write(out)
+    return built
+
+
+class Build:
+    """A certified scan: its plan, its arrays, its certificate, and the files that it is emitted as."""
+
+    def __init__(
+        self, setup: Setup, plan: Plan, certificates: dict[str, Certificate], formats: list[str], given: bool
+    ) -> None:
+        self.setup = setup
+        self.plan = plan
+        self.certificates = certificates
+        """By axis, "x" and "y"."""
+        self.formats = formats
+        self._given = given
+
+    @property
+    def name(self) -> str:
+        """The scan's name, which every emitted file and identifier begins with."""
+        return self.plan.name
+
+    @cached_property
+    def x(self) -> "Samples":
+        """One line of x, a value a tick."""
+        return self.samples("x")
+
+    @cached_property
+    def y(self) -> "Samples":
+        """One frame of y, a value a tick."""
+        return self.samples("y")
+
+    def samples(self, axis: Literal["x", "y"], first: int = 0, stop: int | None = None) -> "Samples":
+        """Ticks [first, stop) of the period of an axis: for frames that have too many of them."""
+        from tablegen.api.samples import samples
+
+        return samples(self.plan, axis, first, stop)
+
+    @cached_property
+    def files(self) -> dict[str, bytes]:
+        """Every file by its name, the manifest last. Raises ``Rejected`` for a scan that a format cannot hold."""
+        try:
+            return render(self.plan, self.certificates, self.formats)
+        except (UnknownFormat, Unphysical) as error:
+            raise _refused(self.setup, str(error), self._given) from None
+
+    @property
+    def runtime(self) -> set[str]:
+        """The names of those files that are the same in every build: sequencers and links."""
+        return {name for each in chosen(self.formats) for name in runtime_files(each)}
+
+    @property
+    def manifest(self) -> str:
+        """``manifest.json`` as text."""
+        return self.files["manifest.json"].decode("ascii")
+
+    @property
+    def summary(self) -> str:
+        """Drive and certificate of both axes as text."""
+        return "\n".join(summary(self.plan, self.certificates))
+
+    @property
+    def notes(self) -> list[str]:
+        """What to know before the image is trusted, in sentences."""
+        return notes(self.plan)
+
+    @property
+    def prepared(self) -> "PreparedScan":
+        """What ``Device.upload`` sends: ``device.upload(scan.prepared.image("auto", device.info))``."""
+        from tablegen.link.prepare import PreparedScan
+
+        return PreparedScan.of_plan(self.plan)
+
+    def write(self, folder: str | Path) -> list[str]:
+        """Write what differs into a directory, remove what an earlier build has left there, and name what changed.
+
+        Raises ``CannotWrite``; what stood there before then still stands.
+        """
+        folder = Path(folder)
+        return write_files(folder, self.files, self.outdated(folder))
+
+    def outdated(self, folder: str | Path) -> list[str]:
+        """Files of a directory that an earlier build made and this one does not: ``write`` removes them."""
+        return outdated_files(Path(folder), self.files)
+
+    def leftovers(self, folder: str | Path) -> list[str]:
+        """Files of a directory that look like a build's and are not of this one: ``write`` leaves them there."""
+        return leftover_files(Path(folder), self.files)
+
+    def __repr__(self) -> str:
+        first, *_ = repr(self.plan).splitlines()
+        worst = max(self.certificates.values(), key=lambda one: one.scaling_error_percent)
+        errors = f"error up to {worst.max_error_lsb:.3f} LSB, scaling error {worst.scaling_error_percent:.3g} %"
+        head = first.replace("<tablegen plan", "<tablegen build")
+        return f"{head}\n  {errors} peak to peak\n  x: {self.plan.x.drive.v_amplitude:.6g} V, " + (
+            f"y: {self.plan.y.drive.v_amplitude:.6g} V; formats {', '.join(self.formats)}>"
+        )
+
+    def _repr_html_(self) -> str:
+        """Drive, error and certificate, for notebooks."""
+        from tablegen.api.html import build_html
+
+        return build_html(self.plan, self.certificates)
+
+
+def _setup(source: Source | None, scan: Mapping[str, Any] | None, scanner: Mapping[str, Any] | None) -> Setup:
+    if source is None and scan is not None and scanner is not None:
+        return from_values(scan, scanner)
+    if source is None or scan is not None or scanner is not None:
+        raise TypeError("give a scan file or a setup, or the values of both: scan={...}, scanner={...}")
+    return source if isinstance(source, Setup) else load_files(source)
+
+
+def _formats(setup: Setup, plan: Plan, wanted: Sequence[str] | None) -> list[Format]:
+    try:
+        return chosen(plan.formats if wanted is None else wanted)
+    except UnknownFormat as error:
+        raise _refused(setup, str(error), wanted is not None) from None
+
+
+def _refused(setup: Setup, why: str, given: bool) -> Rejected:
+    """A fault of the formats, at their key or, where they were given beside the file, without a place."""
+    return Rejected([Problem("formats", 0, "", why) if given else setup.scan_file.problem("emit.formats", why)])

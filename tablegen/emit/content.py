@@ -1,0 +1,61 @@
+"""What formats render: the integers of a build, and words for its comments.
+
+``tablegen.emit.render`` makes it from a plan, ``tablegen.emit.stored`` from a manifest.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from tablegen.device.dual_program import DualProgram
+from tablegen.device.schedule import Schedule
+from tablegen.fixedpoint.program import Program
+from tablegen.numerics.arrays import Ints
+
+
+@dataclass(frozen=True, eq=False)
+class AxisContent:
+    """One axis: its program, its Fourier words a0, a1..aH, b1..bH, and the volts of its codes.
+
+    The piezo is at ``v_zero + v_per_code * code``, in V.
+    """
+
+    axis: Literal["x", "y"]
+    program: Program
+    fourier_words: Ints
+    v_zero: float
+    v_per_code: float
+
+    @property
+    def harmonics(self) -> int:
+        """H, the highest harmonic."""
+        return len(self.fourier_words) // 2
+
+
+@dataclass(frozen=True, eq=False)
+class Content:
+    """A build as formats see it. What stands in comments alone is empty where a manifest is the source."""
+
+    name: str
+    hash: str
+    program: DualProgram
+    x: AxisContent
+    y: AxisContent
+    header_only: bool
+    version: str = ""
+    scanner: str = ""
+    summary: tuple[str, ...] = ()
+
+    @property
+    def axes(self) -> tuple[AxisContent, AxisContent]:
+        """Both axes, fast first."""
+        return self.x, self.y
+
+    @property
+    def schedule(self) -> Schedule:
+        """Ticks, lines and windows of the scan."""
+        return self.program.schedule
+
+    @property
+    def sine_index_bits(self) -> int:
+        """log2 of the longest interpolated table, whose sine renders all; 0 where no table is rendered."""
+        return max(axis.program.index_bits for axis in self.axes)

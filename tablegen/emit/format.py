@@ -1,0 +1,107 @@
+"""A format: what a build can be written as. Each is one file in ``tablegen/emit/formats/``, or an entry point.
+
+A format declares its name, what it is for and its files; it renders integers that are made already, and says how its
+files are held against a manifest. Everything else (the writer, ``--check``, dependency files, removal of files that are
+no longer made, ``tablegen verify``) goes through all formats of a build alike.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+from tablegen.emit.content import Content
+from tablegen.problems import Unphysical
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Files of a build held against its manifest: what was compared, and every difference in a sentence."""
+
+    subject: str
+    compared: str
+    wrong: list[str]
+
+
+class Format(ABC):
+    """What a build can be written as. A subclass sets ``name``, ``purpose`` and ``file_names``, and renders."""
+
+    name: ClassVar[str]
+    """How ``[emit] formats`` and ``--format`` call it: lower-case letters, digits and hyphens."""
+    purpose: ClassVar[str]
+    """What it is for, in one line."""
+    file_names: ClassVar[str]
+    """Its files in words, with NAME for the scan's name."""
+    comment: ClassVar[str | None] = None
+    """How a line of comment begins, where the files begin with such lines; they are not compared with a manifest."""
+
+    @abstractmethod
+    def files(self, content: Content) -> dict[str, bytes]:
+        """The files of a build by name, without the runtime. Raises ``Unphysical`` for one that it cannot hold."""
+
+    def runtime(self) -> list[Path]:
+        """Files that go with it unchanged, such as a sequencer."""
+        return []
+
+    def sources(self) -> list[Path]:
+        """Files beside its module that decide what it writes: templates, and the runtime."""
+        return self.runtime()
+
+    def check(self, folder: Path, content: Content) -> list[Comparison]:
+        """The files in a folder against the content of a manifest: unless overridden, made again and compared."""
+        wanted, wrong = self.files(content), []
+        for name, right in wanted.items():
+            try:
+                found = (folder / name).read_bytes()
+            except OSError as error:
+                wrong.append(f"{name}: cannot be read: {error.strerror or error}")
+                continue
+            if difference := self._first_difference(found, right):
+                wrong.append(f"{name}: {difference}")
+        count = len(wanted)
+        return [Comparison("files", f"{count} file{'s' if count != 1 else ''}", wrong)]
+
+    def _first_difference(self, found: bytes, right: bytes) -> str | None:
+        """Where a file and what the manifest makes of it differ first, but for the comment at the beginning."""
+        skipped, body = self._after_comment(found)
+        wanted = self._after_comment(right)[1]
+        if body == wanted:
+            return None
+        try:
+            ours, others = body.decode("ascii").splitlines(), wanted.decode("ascii").splitlines()
+        except UnicodeDecodeError:
+            pairs = enumerate(zip(body, wanted, strict=False))
+            at = next((i for i, (a, b) in pairs if a != b), min(len(body), len(wanted)))
+            return f"byte {at} is not as the manifest has it; {len(body)} bytes, {len(wanted)} by the manifest"
+        for at, (line, other) in enumerate(zip(ours, others, strict=False)):
+            if line != other:
+                return f"line {skipped + at + 1} is {line.strip()[:40]!r}, it is {other.strip()[:40]!r} by the manifest"
+        return f"has {skipped + len(ours)} lines, {skipped + len(others)} by the manifest"
+
+    def _after_comment(self, content: bytes) -> tuple[int, bytes]:
+        """How many lines of comment a file begins with, which no manifest has, and what follows."""
+        lines, skipped = content.splitlines(keepends=True), 0
+        if self.comment is not None:
+            mark = self.comment.encode("ascii")
+            while skipped < len(lines) and (lines[skipped].startswith(mark) or not lines[skipped].strip()):
+                skipped += 1
+        return skipped, b"".join(lines[skipped:])
+
+
+def differing(name: str, found: Mapping[str, int | str], wanted: Mapping[str, int | str]) -> list[str]:
+    """The constants that a header has not, has otherwise, or has beyond those that it is to have."""
+    wrong = []
+    for key, value in wanted.items():
+        if key not in found:
+            wrong.append(f"{name}: {key} is missing, it is {_shown(value)} in the manifest")
+        elif found[key] != value:
+            wrong.append(f"{name}: {key} is {_shown(found[key])}, it is {_shown(value)} in the manifest")
+    return wrong + [f"{name}: {key} is not in the manifest" for key in found if key not in wanted]
+
+
+def _shown(value: int | str) -> str:
+    return repr(value) if isinstance(value, str) else f"{value:x}" if abs(value) >= 1 << 64 else str(value)
+
+
+__all__ = ["Comparison", "Content", "Format", "Unphysical", "differing"]

@@ -1,0 +1,182 @@
+"""C99 tables and constants, with the C sequencer and the device's end of the serial link."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tablegen.emit.constants import axis_constants, scan_constants, sequence_constants
+from tablegen.emit.content import AxisContent, Content
+from tablegen.emit.format import Comparison, Format, differing
+from tablegen.emit.templates import comment_safe, rows, template
+from tablegen.fixedpoint.output import GAIN_BITS
+from tablegen.fixedpoint.phase import PHASE_BITS
+from tablegen.fixedpoint.rounding import signed_limits
+from tablegen.fixedpoint.synthesis import sine_periods
+from tablegen.numerics.arrays import Ints
+from tablegen.resources import c_link, c_runtime, resource_folder
+
+_NUMBER = re.compile(r"(?:U?INT(?:32|64)_C)?\(?(-?\d{1,40})\)?")
+_ARRAY = re.compile(r"\b(\w+)\[\w*\] = \{(.*?)\};", re.DOTALL)
+
+
+class C(Format):
+    """``NAME.h`` and ``NAME.c``, or the header alone."""
+
+    name = "c"
+    purpose = "C99 for firmware: tables, constants, and the sequencer dac_*.c that plays them"
+    file_names = "NAME.h, NAME.c (unless header_only), dac_*.h, dac_*.c"
+
+    def files(self, content: Content) -> dict[str, bytes]:
+        """The header, and the arrays in a file of their own unless the build is header-only."""
+        context = _context(content)
+        files = {f"{content.name}.h": template("c/tables.h.j2", context, literal)}
+        if not content.header_only:
+            files[f"{content.name}.c"] = template("c/tables.c.j2", context, literal)
+        return files
+
+    def runtime(self) -> list[Path]:
+        """The C sequencer and its link."""
+        return [*c_runtime(), *c_link()]
+
+    def sources(self) -> list[Path]:
+        """With the templates."""
+        return [*self.runtime(), *(resource_folder("firmware_templates") / "c").glob("*.j2")]
+
+    def check(self, folder: Path, content: Content) -> list[Comparison]:
+        """The constants of the header, and the words of the arrays."""
+        constants, different = wrong_constants(folder, content)
+        words, flipped = wrong_arrays(folder, content)
+        return [
+            Comparison("header", f"{constants} constants", different),
+            Comparison("arrays", f"{words} words", flipped),
+        ]
+
+
+FORMAT = C()
+
+
+def literal(value: int) -> str:
+    """An integer as C has it, of a type that holds it on every machine."""
+    if value > 0x7FFFFFFF or value < -0x7FFFFFFF:
+        return f"UINT32_C({value})" if 0 <= value <= 0xFFFFFFFF else f"INT64_C({value})"
+    if value > 32767 or value < -32767:  # an int has 16 bits on some microcontrollers
+        return f"INT32_C({value})"
+    return str(value) if value >= 0 else f"({value})"
+
+
+def arrays_file(content: Content) -> str:
+    """Where the arrays stand: in the header if the build has no other C file of its own."""
+    return f"{content.name}.h" if content.header_only else f"{content.name}.c"
+
+
+def wrong_constants(folder: Path, content: Content) -> tuple[int, list[str]]:
+    """How many constants the C header is to have, and those that it has not, or not so."""
+    name, wanted = f"{content.name}.h", _constants(content)
+    try:
+        text = (folder / name).read_text("utf-8", "replace")
+    except OSError as error:
+        return len(wanted), [f"{name}: cannot be read: {error.strerror or error}"]
+    prefix = f"{content.name.upper()}_"
+    defined = re.findall(rf"^[ \t]*#[ \t]*define[ \t]+({prefix}\w+)[ \t]+(\S.*?)[ \t]*$", text, re.MULTILINE)
+    return len(wanted), differing(name, {key: _value(value) for key, value in defined}, wanted)
+
+
+def wrong_arrays(folder: Path, content: Content) -> tuple[int, list[str]]:
+    """How many words the arrays are to have, and in which of them the first wrong one stands."""
+    name, wanted = arrays_file(content), _arrays(content)
+    count = sum(map(len, wanted.values()))
+    try:
+        text = (folder / name).read_text("utf-8", "replace")
+    except OSError as error:
+        return count, [f"{name}: cannot be read: {error.strerror or error}"]
+    found = {array: values.split(",") for array, values in _ARRAY.findall(text)}
+    wrong = []
+    for array, words in wanted.items():
+        if array not in found:
+            wrong.append(f"{name}: {array} is missing")
+        elif len(found[array]) != len(words):
+            wrong.append(f"{name}: {array} has {len(found[array])} words, the manifest {len(words)}")
+        else:
+            pairs = zip(map(str.strip, found[array]), map(str, words.tolist()), strict=True)
+            differs = [(at, word, right) for at, (word, right) in enumerate(pairs) if word != right]
+            wrong += [
+                f"{name}: {array}[{at}] is {word[:16]}, it is {right} in the manifest"
+                for at, word, right in differs[:1]
+            ]
+    return count, wrong
+
+
+def _context(content: Content) -> dict[str, Any]:
+    """What the templates see."""
+    bits, sine = max(axis.program.bits for axis in content.axes), _sine(content)
+    return {
+        "version": content.version,
+        "name": content.name,
+        "NAME": content.name.upper(),
+        "hash": content.hash,
+        "header_only": content.header_only,
+        "scanner": comment_safe(content.scanner),
+        "summary": content.summary,
+        "sequence": sequence_constants(content.schedule),
+        "phase_bits": PHASE_BITS,
+        "least_gain": signed_limits(GAIN_BITS)[0],
+        "greatest_gain": signed_limits(GAIN_BITS)[1],
+        "word_type": "int16_t" if bits <= 16 else "int32_t",  # of both tables: the runtime is compiled for one
+        "sine": {"constants": _sine_constants(content, sine), "rows": rows(sine)} if len(sine) else None,
+        "axes": [_axis(content, axis) for axis in content.axes],
+    }
+
+
+def _axis(content: Content, axis: AxisContent) -> dict[str, Any]:
+    prefix = f"{content.name}_{axis.axis}"
+    return {
+        "axis": axis.axis,
+        "prefix": prefix,
+        "PREFIX": prefix.upper(),
+        "constants": axis_constants(axis.program, axis.harmonics),
+        "table_rows": rows(axis.program.words),
+        "fourier_rows": rows(axis.fourier_words),
+        "interpolated": axis.program.mode == "interpolated",
+        "lines_per_period": "1" if axis.axis == "x" else f"{content.name.upper()}_FRAME_LINES",
+    }
+
+
+def _sine(content: Content) -> Ints:
+    """The sine from which a device renders tables; empty where no table is interpolated."""
+    bits = content.sine_index_bits
+    return sine_periods(bits) if bits else np.zeros(0, dtype=np.int64)
+
+
+def _sine_constants(content: Content, sine: Ints) -> dict[str, int]:
+    return {"SINE_INDEX_BITS": content.sine_index_bits, "SINE_LENGTH": len(sine)} if len(sine) else {}
+
+
+def _constants(content: Content) -> dict[str, int | str]:
+    """Every constant of the header: numbers, and the hash."""
+    own: dict[str, int | str] = {
+        "HASH": content.hash,
+        **scan_constants(content),
+        **_sine_constants(content, _sine(content)),
+    }
+    return {f"{content.name.upper()}_{key}": value for key, value in own.items()}
+
+
+def _arrays(content: Content) -> dict[str, Ints]:
+    """What the arrays have to hold, by name."""
+    arrays: dict[str, Ints] = {}
+    for axis in content.axes:
+        arrays[f"{axis.axis}_table"] = np.asarray(axis.program.words)
+        arrays[f"{axis.axis}_fourier"] = axis.fourier_words
+    if content.sine_index_bits:
+        arrays["sine"] = _sine(content)
+    return {f"{content.name}_{key}": words for key, words in arrays.items()}
+
+
+def _value(text: str) -> int | str:
+    """A number, the content of a string, or what is neither as it stands."""
+    if len(text) > 1 and text[0] == text[-1] == '"':
+        return text[1:-1]
+    number = _NUMBER.fullmatch(text)
+    return int(number[1]) if number else text

@@ -1,0 +1,152 @@
+"""Verilog-2005 constants and memory files for ``$readmemh``, with the Verilog sequencer and its loader."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+from tablegen.emit.constants import axis_constants, scan_constants, sequence_constants
+from tablegen.emit.content import AxisContent, Content
+from tablegen.emit.format import Comparison, Format, differing
+from tablegen.emit.memory import memory_files
+from tablegen.emit.templates import comment_safe, template
+from tablegen.resources import resource_folder, verilog_runtime
+
+_LOCALPARAM = re.compile(r"^localparam\s[^=]*?(\w+)\s*=\s*(.*?)\s*;", re.MULTILINE)
+_NUMBER = re.compile(r"(-?)(?:\d+'s?([dh]))?([0-9a-fA-F]+)")
+
+
+class Verilog(Format):
+    """``NAME.vh`` and one ``.mem`` a table."""
+
+    name = "verilog"
+    purpose = "Verilog-2005 for an FPGA: constants, memory files, and the sequencer dac_*.v that plays them"
+    file_names = "NAME.vh, NAME_*.mem, dac_*.v, program_loader.v"
+
+    def files(self, content: Content) -> dict[str, bytes]:
+        """The header and the memory files."""
+        header = template("verilog/tables.vh.j2", _context(content), literal, range=value_range)
+        return {f"{content.name}.vh": header, **_memories(content)}
+
+    def runtime(self) -> list[Path]:
+        """The Verilog sequencer and the loader."""
+        return verilog_runtime()
+
+    def sources(self) -> list[Path]:
+        """With the template."""
+        return [*self.runtime(), *(resource_folder("firmware_templates") / "verilog").glob("*.j2")]
+
+    def check(self, folder: Path, content: Content) -> list[Comparison]:
+        """The constants of the header, and the words of the memory files."""
+        constants, different = wrong_constants(folder, content)
+        words, flipped = wrong_memories(folder, content)
+        return [
+            Comparison("header", f"{constants} constants", different),
+            Comparison("memories", f"{words} words", flipped),
+        ]
+
+
+FORMAT = Verilog()
+
+
+def literal(value: int) -> str:
+    """An integer as Verilog has it, of 32 or 64 bits."""
+    width = _width(value)
+    return f"{width}'sd{value}" if value >= 0 else f"-{width}'sd{-value}"
+
+
+def value_range(value: int) -> str:
+    """The range of a localparam that holds an integer."""
+    return "[31:0]" if _width(value) == 32 else "[63:0]"
+
+
+def _width(value: int) -> int:
+    return 32 if -0x7FFFFFFF <= value <= 0x7FFFFFFF else 64
+
+
+def wrong_constants(folder: Path, content: Content) -> tuple[int, list[str]]:
+    """How many constants the Verilog header is to have, and those that it has not, or not so."""
+    name, wanted = f"{content.name}.vh", _constants(content)
+    try:
+        text = (folder / name).read_text("utf-8", "replace")
+    except OSError as error:
+        return len(wanted), [f"{name}: cannot be read: {error.strerror or error}"]
+    found: dict[str, int | str] = {key: _value(value) for key, value in _LOCALPARAM.findall(text)}
+    return len(wanted), differing(name, found, wanted)
+
+
+def wrong_memories(folder: Path, content: Content) -> tuple[int, list[str]]:
+    """How many words the memory files are to have, and in which of them the first wrong one stands."""
+    count, wrong = 0, []
+    for name, right in _memories(content).items():
+        wanted = right.decode("ascii").split()
+        count += len(wanted)
+        try:
+            found = (folder / name).read_text("ascii", "replace").split()
+        except OSError as error:
+            wrong.append(f"{name}: cannot be read: {error.strerror or error}")
+            continue
+        if len(found) != len(wanted):
+            wrong.append(f"{name}: has {len(found)} words, the manifest {len(wanted)}")
+        elif found != wanted:
+            at = next(i for i, (word, other) in enumerate(zip(found, wanted, strict=True)) if word != other)
+            wrong.append(f"{name}: word {at} is {found[at][:16]}, it is {wanted[at]} in the manifest")
+    return count, wrong
+
+
+def _memories(content: Content) -> dict[str, bytes]:
+    fourier = {axis.axis: axis.fourier_words for axis in content.axes}
+    return memory_files(content.name, content.schedule, content.x.program, content.y.program, fourier)
+
+
+def _context(content: Content) -> dict[str, Any]:
+    """What the template sees."""
+    return {
+        "version": content.version,
+        "name": content.name,
+        "NAME": content.name.upper(),
+        "hash": content.hash,
+        "scanner": comment_safe(content.scanner),
+        "summary": content.summary,
+        "sequence": sequence_constants(content.schedule),
+        "program_memory": f"{content.name}_program.mem",
+        "sine_memory": f"{content.name}_sine.mem",
+        "sine": content.sine_index_bits,
+        "axes": [_axis(content, axis) for axis in content.axes],
+    }
+
+
+def _axis(content: Content, axis: AxisContent) -> dict[str, Any]:
+    prefix = f"{content.name}_{axis.axis}"
+    return {
+        "PREFIX": prefix.upper(),
+        "constants": axis_constants(axis.program, axis.harmonics),
+        "table_memory": f"{prefix}.mem",
+        "fourier_memory": f"{prefix}_fourier.mem",
+    }
+
+
+def _constants(content: Content) -> dict[str, int | str]:
+    """Every localparam of the header: numbers, and names of files."""
+    name = content.name
+    own: dict[str, int | str] = {"HASH": int(content.hash, 16), **scan_constants(content)}
+    own["PROGRAM_FILE"] = f"{name}_program.mem"
+    if content.sine_index_bits:
+        own["SINE_FILE"] = f"{name}_sine.mem"
+    for axis in "xy":
+        own[f"{axis.upper()}_TABLE_FILE"] = f"{name}_{axis}.mem"
+        own[f"{axis.upper()}_FOURIER_FILE"] = f"{name}_{axis}_fourier.mem"
+    return {f"{name.upper()}_{key}": value for key, value in own.items()}
+
+
+def _value(text: str) -> int | str:
+    """A number, the content of a string, or what is neither as it stands."""
+    if len(text) > 1 and text[0] == text[-1] == '"':
+        return text[1:-1]
+    number = _NUMBER.fullmatch(text)
+    if number is None:
+        return text
+    sign, base, digits = number.groups()
+    try:
+        return int(digits, 16 if base == "h" else 10) * (-1 if sign else 1)
+    except ValueError:
+        return text

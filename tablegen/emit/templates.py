@@ -1,0 +1,54 @@
+"""Text from templates: numbers are spelled by filters in Python, and no template computes."""
+
+from collections.abc import Callable, Mapping
+from functools import cache
+from typing import Any
+
+from tablegen.numerics.arrays import Ints
+from tablegen.resources import resource_folder
+
+_WORDS_PER_ROW = 10
+
+
+def template(
+    name: str, context: Mapping[str, Any], literal: Callable[[int], str], **filters: Callable[..., object]
+) -> bytes:
+    """A template of ``firmware_templates/`` rendered; ``literal`` is the filter that spells an integer."""
+    text: str = _environment(literal, tuple(filters.items())).get_template(name).render(context)
+    return text.encode("ascii")
+
+
+def template_text(
+    text: str, context: Mapping[str, Any], literal: Callable[[int], str], **filters: Callable[..., object]
+) -> bytes:
+    """The same for a template that is given as text."""
+    rendered: str = _environment(literal, tuple(filters.items())).from_string(text).render(context)
+    return rendered.encode("ascii")
+
+
+@cache
+def _environment(literal: Callable[[int], str], filters: tuple[tuple[str, Callable[..., object]], ...]) -> Any:
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined  # not needed to check what was rendered
+
+    environment = Environment(
+        loader=FileSystemLoader(resource_folder("firmware_templates")),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,
+    )
+    environment.filters |= {"literal": literal, **dict(filters)}
+    return environment
+
+
+def comment_safe(text: str) -> str:
+    """Text on one line of ASCII that can neither begin nor end a comment, nor continue a line."""
+    plain = text.encode("unicode_escape").decode("ascii").replace("\\", "/")
+    return plain.replace("*/", "* /").replace("/*", "/ *").replace("?", ".").rstrip()  # ??/ is a backslash in C99
+
+
+def rows(words: Ints | list[str]) -> list[str]:
+    """Words as lines of text, ten a line, with commas between; those that are text already as they are."""
+    values = words if isinstance(words, list) else [str(word) for word in words.tolist()]
+    return [", ".join(values[i : i + _WORDS_PER_ROW]) for i in range(0, len(values), _WORDS_PER_ROW)]

@@ -1,0 +1,78 @@
+"""Verify a build with one call: choose what plays it, and a directory to play it in."""
+
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Literal
+
+from tablegen.manifest.read import read_build
+from tablegen.verification.build import Report, Target, verify_build
+from tablegen.verification.files_target import FilesTarget
+
+TargetName = Literal["verilog", "c", "cortex-m", "files"]
+DEFAULT_TICKS = {"icarus": 300_000, "verilator": 3_000_000, "c": 3_000_000, "cortex-m": 1_000_000, "files": 0}
+
+
+def verify(
+    folder: str | Path,
+    target: TargetName | None = None,
+    *,
+    simulator: Literal["icarus", "verilator"] = "icarus",
+    axis: Literal["pipelined", "blocks", "serial"] = "pipelined",
+    fourier: bool = False,
+    ticks: int | None = None,
+    seed: int = 1,
+    keep: str | Path | None = None,
+    progress: Callable[[str | Callable[[], str]], None] = lambda _: None,
+) -> Report:
+    """Hold a build's files, and what its own sequencer plays, against its manifest.
+
+    ``target`` is "verilog" where the build has it, else "c", else "files", which plays nothing; "cortex-m" plays the C
+    on an emulator. ``axis`` and ``fourier`` say how the Verilog is placed. ``keep`` is a directory to play in, which is
+    kept. What the directory of the build holds is compiled and run. The report's ``failures`` are empty if all is well.
+
+    Raises ``NotABuild`` where there is no build, ``ToolMissing`` without a simulator or compiler, ``OSError`` where
+    nothing can be written.
+    """
+    folder = Path(folder)
+    chosen, most_ticks = _target(target or default_target(folder), simulator, axis, fourier)
+    with _work_folder(None if keep is None else Path(keep)) as work:
+        return verify_build(folder, work, chosen, most_ticks if ticks is None else ticks, seed, progress)
+
+
+def default_target(folder: Path) -> TargetName:
+    """What is played of a build unless something else is asked for. Raises ``NotABuild``."""
+    formats = read_build(folder).formats
+    return "verilog" if "verilog" in formats else "c" if "c" in formats else "files"
+
+
+def _target(
+    name: TargetName,
+    simulator: Literal["icarus", "verilator"],
+    axis: Literal["pipelined", "blocks", "serial"],
+    fourier: bool,
+) -> tuple[Target, int]:
+    """What plays, and how many ticks of it are soon over."""
+    if name == "files":
+        return FilesTarget(), DEFAULT_TICKS[name]
+    if name != "verilog":
+        from tablegen.verification.c_target import CTarget
+
+        return CTarget(name, fourier), DEFAULT_TICKS[name]
+    from tablegen.verification.placement import Placement
+    from tablegen.verification.verilog_target import VerilogTarget
+
+    placement = Placement(axis, fourier)
+    return VerilogTarget(simulator, placement), DEFAULT_TICKS[simulator] // placement.tick_clocks
+
+
+@contextmanager
+def _work_folder(keep: Path | None) -> Iterator[Path]:
+    """Where things are played: removed again, whatever happens, unless it is to be kept."""
+    if keep is not None:
+        keep.mkdir(parents=True, exist_ok=True)
+        yield keep.resolve()
+        return
+    with tempfile.TemporaryDirectory(prefix="tablegen-", ignore_cleanup_errors=True) as folder:
+        yield Path(folder).resolve()
