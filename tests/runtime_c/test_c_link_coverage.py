@@ -21,10 +21,8 @@ UNREACHABLE = ("DAC_LINK_REFUSED, (uint32_t)loaded", "l->config->random(l->nonce
 
 
 def test_every_line_was_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    replays = [
-        random_replay(shapes["16 bits"], 1, keyed=True),
-        random_replay(shapes["direct"], 2),
-    ]
+    shapes = test_c_link.SHAPES
+    replays = [random_replay(shapes["16 bits"], 1, keyed=True), random_replay(shapes["direct"], 2)]
     devices: list[HostDevice] = []
     made = HostDevice.__init__
 
