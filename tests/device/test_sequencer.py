@@ -34,7 +34,7 @@ def programs(tmp_path_factory: pytest.TempPathFactory) -> list[DualProgram]:
         {"x.size_nm": "350.0", "timing.settle_lines": "0"},
     ]
     resonance = {"x.resonance.frequency_hz": "400e3"}
-    return [DualProgram.of(plan_of(folder, SMALL | edit, resonance)) for edit in edits]
+    return [plan_of(folder, SMALL | edit, resonance).program for edit in edits]
 
 
 def run(sequencer: Sequencer, ticks: int) -> list[Tick]:
