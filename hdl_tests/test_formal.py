@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
-from building import REPOSITORY
+from building import REPOSITORY, tool
 from limits import PATIENCE_S
 
 pytestmark = pytest.mark.rest
@@ -70,12 +70,12 @@ def _read(proof: Proof, modules: Mapping[str, str], folder: Path) -> str:
 def _translate(proof: Proof, folder: Path, modules: Mapping[str, str] | None = None) -> Path:
     script, smt2 = folder / "read.ys", folder / "proof.smt2"
     script.write_text(_read(proof, modules or {}, folder) + f"write_smt2 -wires {smt2}\n", "utf-8")
-    subprocess.run(["yosys", "-q", "-s", script], check=True, capture_output=True, text=True)
+    subprocess.run([tool("yosys"), "-q", "-s", script], check=True, capture_output=True, text=True)
     return smt2
 
 
 def _solve(smt2: Path, *options: str | int) -> str:
-    command = ["yosys-smtbmc", "--noprogress", "-s", "z3", *map(str, options), str(smt2)]
+    command = [tool("yosys-smtbmc"), "--noprogress", "-s", Path(tool("z3")).name, *map(str, options), str(smt2)]
     return subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S).stdout
 
 
@@ -102,7 +102,7 @@ def _proven_by_sat(proof: Proof, folder: Path, modules: Mapping[str, str] | None
     script = folder / "prove.ys"
     induction = "memory_map; opt -full; sat -tempinduct -prove-asserts -set-assumes -verify -maxsteps 4\n"
     script.write_text(_read(proof, modules or {}, folder) + induction, "utf-8")
-    done = subprocess.run(["yosys", "-s", script], capture_output=True, text=True, timeout=PATIENCE_S)
+    done = subprocess.run([tool("yosys"), "-s", script], capture_output=True, text=True, timeout=PATIENCE_S)
     proven = "Induction step proven: SUCCESS!" in done.stdout
     assert proven or "proof did fail" in done.stderr, done.stderr  # and not something else
     assert proven == (done.returncode == 0)

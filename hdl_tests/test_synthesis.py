@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
-from building import REPOSITORY
+from building import REPOSITORY, tool
 
 sys.path.insert(0, str(REPOSITORY / "benchmarks"))
 import resources
@@ -52,7 +52,7 @@ def check(top: str, parameters: Mapping[str, int], folder: Path = MODULES) -> su
         f"read_verilog -defer {folder}/*.v; hierarchy -check -top {top} {values}; proc; opt; check -assert; "
         "select -assert-none t:$dlatch t:$adlatch t:$dlatchsr t:$sr t:$_DLATCH_* t:$_SR_*"
     )
-    return subprocess.run(["yosys", "-q", "-p", script], capture_output=True, text=True)
+    return subprocess.run([tool("yosys"), "-q", "-p", script], capture_output=True, text=True)
 
 
 @pytest.mark.parametrize("name", CHECKED)
@@ -113,7 +113,7 @@ def test_page_meets_the_requirements(name: str) -> None:
 
 def pinned() -> bool:
     """The tools are those of the page; with others, only the requirements hold."""
-    version = subprocess.run(["yosys", "-V"], capture_output=True, text=True, check=True).stdout
+    version = subprocess.run([tool("yosys"), "-V"], capture_output=True, text=True, check=True).stdout
     return re.match(r"Yosys 0\.23 ", version) is not None
 
 

@@ -59,8 +59,3 @@ def test_the_corpus_finds_nothing(tmp_path: Path) -> None:
 def test_the_corpus_finds_what_is_broken(name: str, tmp_path: Path) -> None:
     (mutant,) = (each for each in MUTANTS if each.breaks == name)
     assert replay(tmp_path, mutant).returncode != 0
-
-
-def test_the_corpus_finds_an_upload_into_tables_that_play(tmp_path: Path) -> None:
-    (mutant,) = (each for each in MUTANTS if each.breaks == "every upload goes into the same tables")
-    assert replay(tmp_path, mutant).returncode != 0

@@ -24,6 +24,8 @@ from installing import (
 
 from tablegen import __version__
 
+pytestmark = pytest.mark.common
+
 NAME = f"piezo_tablegen-{__version__}"
 MADE = (
     "tests/__pycache__/test_cli.cpython-311.pyc",
