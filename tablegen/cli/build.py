@@ -12,6 +12,8 @@ from tablegen.cli.exit_status import ExitStatus
 if TYPE_CHECKING:
     from tablegen.api.build import Build
 
+_NAMES_SHOWN = 8
+
 
 @click.command(short_help="Write C, Verilog, tables and manifest of a scan.")
 @scan_argument
@@ -102,8 +104,14 @@ def build(
         click.echo("\n".join(certificate_table(built.plan, built.certificates)))
         click.echo(f"\n{output}: {_state(built, changed)}")
         if outdated:
-            click.echo(f"{output}: removed files of an earlier build: {', '.join(outdated)}")
+            click.echo(f"{output}: removed files of an earlier build: {_few(outdated)}")
     return ExitStatus.OK
+
+
+def _few(names: list[str]) -> str:
+    """Names with commas between; of many the first ones."""
+    more = [f"and {len(names) - _NAMES_SHOWN} more"] if len(names) > _NAMES_SHOWN else []
+    return ", ".join([*names[:_NAMES_SHOWN], *more])
 
 
 def _leftover(path: Path) -> str:

@@ -166,8 +166,8 @@ def _remarks(line: LinePlan, measured: Displacement, lesson: Lesson, phase: Phas
         found.append("most of the remaining error is noise: record more periods, or stop refining")
     if measured.correlated > 3.0:
         found.append(
-            f"residuals are correlated over {measured.correlated:.0f} samples: besides noise, they contain drift, hum or "
-            f"what the harmonics leave; standard errors were widened by {measured.correlated**0.5:.2g}"
+            f"residuals are correlated over {measured.correlated:.0f} samples: besides noise, they contain drift, hum "
+            f"or what the harmonics leave; standard errors were widened by {measured.correlated**0.5:.2g}"
         )
     if measured.periods < 1.99:
         found.append("drift cannot be determined from a single period; record several")

@@ -74,8 +74,8 @@ def verify_build(folder: Path, work: Path, target: Target, most_ticks: int, seed
     if target.format_name is not None and target.format_name not in stored.formats:
         formats = ", ".join(stored.formats)
         raise NotABuild(
-            f"{folder}: holds no {target.format_name}, its formats are {formats}; "
-            f"verify another --target, or build it with --format {target.format_name}"
+            f"{folder}: this build has the formats {formats}, and no {target.format_name}; "
+            f"verify it with another --target, or build it with --format {target.format_name}"
         )
     target.refuse(folder, stored)
     target.require()

@@ -146,7 +146,8 @@ def test_c_alone_is_verified_as_c(tmp_path: Path, header_only: bool) -> None:
     refused = run("verify", "--target", "verilog", out)
     assert refused.status == 2
     assert refused.messages == [
-        f"{out}: holds no verilog, its formats are c; verify another --target, or build it with --format verilog"
+        f"{out}: this build has the formats c, and no verilog; verify it with another --target, or build it with "
+        "--format verilog"
     ]
 
 
@@ -160,7 +161,7 @@ def test_verilog_alone_is_verified_as_verilog(tmp_path: Path) -> None:
     assert "verilog header" in outcome.out
     refused = run("verify", "--target", "c", out)
     assert refused.status == 2
-    assert "holds no c, its formats are verilog" in refused.err
+    assert "this build has the formats verilog, and no c;" in refused.err
 
 
 def test_tables_alone_are_verified_as_files(tmp_path: Path) -> None:
