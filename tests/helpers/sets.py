@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-LONG = (pytest.mark.long, pytest.mark.timeout(86_400))
+LONG_TEST = (pytest.mark.long, pytest.mark.timeout(86_400))
 _COMMON = ("clang", "g++", "gcc-c++")  # beginnings of names of tools
 _REST = ("cppcheck", "ghdl", "zig")
 

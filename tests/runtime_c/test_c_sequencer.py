@@ -31,7 +31,7 @@ from c_scripts import (
     long_play,
     renderings,
 )
-from sets import LONG, common
+from sets import LONG_TEST, common
 from stream_configurations import FEW, SWAPS, SWAPS_SLOW, random_swaps
 from stream_laws import follow_their_programs
 from stream_scripts import FAULTS, flag, in_any_order, occurrences
@@ -135,7 +135,7 @@ def test_a_swap_is_requested_at_every_tick(benches: Benches) -> None:
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize("swaps", [SWAPS, pytest.param(SWAPS_SLOW, marks=LONG)])
+@pytest.mark.parametrize("swaps", [SWAPS, pytest.param(SWAPS_SLOW, marks=LONG_TEST)])
 def test_no_line_mixes_programs(swaps: int, benches: Benches) -> None:
     rng = np.random.default_rng(swaps)
     for _ in range(0, swaps, SWAPS):
