@@ -1,8 +1,9 @@
 """What the Verilog modules take: cells, memories, multipliers and clock rates, as a table for docs/resources.md.
 
 ``python benchmarks/resources.py`` prints the table, ``--write`` puts it into the page. It needs yosys and
-nextpnr-ice40; other versions of them give other numbers. iCE40 is placed and routed (HX8K) once a seed, and the slowest
-stands in the table: a rate that one lucky seed reaches is no rate to build on. The others are synthesised only.
+nextpnr-ice40; other versions of them give other numbers. iCE40 (HX8K) is placed and routed once for each of ``SEEDS``,
+and the table has the slowest result. It is not a lower bound: another seed may be slower. The others are synthesised
+only.
 """
 
 import json
@@ -51,7 +52,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Result:
-    """``cells`` and ``mhz`` are of placement: cells the most, mhz the least of the seeds."""
+    """``cells`` and ``mhz`` come from placement: the most cells and the lowest rate of the seeds."""
 
     counts: Mapping[str, int]
     cells: int | None = None
@@ -112,7 +113,7 @@ CASES = {
 
 
 def measure(case: Case, seeds: Sequence[int] = SEEDS) -> Result:
-    """Synthesise a case, and for the HX8K place and route it once a seed."""
+    """Synthesise a case, and for the HX8K place and route it once for each seed."""
     with tempfile.TemporaryDirectory() as folder:
         netlist, statistics = Path(folder, "netlist.json"), Path(folder, "statistics")
         parameters = " ".join(f"-chparam {name} {value}" for name, value in case.parameters.items())

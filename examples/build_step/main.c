@@ -1,4 +1,4 @@
-/* The least that uses a build: prints the first samples of its x table. */
+/* A minimal program that uses a build: prints the first samples of its x table. */
 #include <stdio.h>
 
 #include "annexin_200nm.h"

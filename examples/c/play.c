@@ -4,12 +4,12 @@
  *     cc -std=c99 -Ibuild examples/c/play.c build/annexin_200nm.c -o play
  *     ./play 2
  *
- * prints one row per DAC tick for so many lines: the codes of x and y, and the same as the words that are sent to
- * the converters. A program for an instrument calls play_tick() from its timer interrupt instead. Slew guard, markers
+ * prints one row per DAC tick for this number of lines (here 2): the codes of x and y, and the words that are sent
+ * to the converters. A program for an instrument calls play_tick() from its timer interrupt instead. Slew guard, markers
  * and the change of programs while they play are the business of a sequencer, not of this example.
  *
- * Two things are asked of the compiler that C99 leaves to it, and every compiler for piezo controllers does: int64_t
- * exists, and >> of a negative number is an arithmetic shift.
+ * The compiler must provide int64_t, and an arithmetic >> of negative numbers; C99 does not require these, but every
+ * compiler for piezo controllers has them.
  */
 #include <inttypes.h>
 #include <stdint.h>
@@ -20,7 +20,7 @@
 
 enum { PHASE_BITS = 32, FRACTION_BITS = 15 };
 
-/* What is constant of an axis. Words are fetched by a function, since tables have 8, 16 or 32 bits. */
+/* The constants of an axis. Words are fetched by a function, since tables have 8, 16 or 32 bits. */
 struct axis {
     int32_t (*word)(uint32_t index);
     uint32_t length;
@@ -32,7 +32,7 @@ struct axis {
     int dac_bits, word_bits, twos_complement, left_aligned;
 };
 
-/* Where an axis is: floor(count 2^32 / period), the remainder of that division, and ticks since the last advance. */
+/* The position of an axis: floor(count 2^32 / period), the remainder of that division, ticks since the last advance. */
 struct position {
     uint32_t count, phase, rest, held;
 };
@@ -59,7 +59,7 @@ static int64_t shift_round(int64_t value, int bits)
     return (value + (INT64_C(1) << (bits - 1))) >> bits;
 }
 
-/* The table at a position, with guard_bits below the LSB of a word. */
+/* The table value at a position, with guard_bits below the LSB of a word. */
 static int64_t sample_at(const struct axis *axis, const struct position *at)
 {
     uint32_t index = at->count, fraction = 0;
@@ -81,7 +81,7 @@ static int32_t code_of(const struct axis *axis, int64_t sample)
     return (int32_t)(code < axis->code_min ? axis->code_min : code > axis->code_max ? axis->code_max : code);
 }
 
-/* A code as the converter wants to be sent it. */
+/* Converts a code to the word that the converter receives. */
 static uint32_t dac_word(const struct axis *axis, int32_t code)
 {
     uint32_t word = (uint32_t)code;
@@ -90,7 +90,7 @@ static uint32_t dac_word(const struct axis *axis, int32_t code)
     return axis->left_aligned ? word << (axis->word_bits - axis->dac_bits) : word;
 }
 
-/* One tick on. The phase gains the fraction that its step leaves out by one more whenever the remainder wraps. */
+/* Advances by one tick. The phase gets one more whenever the remainder wraps, for the fraction that the step omits. */
 static void advance(const struct axis *axis, struct position *at)
 {
     if (++at->held < axis->hold)

@@ -1,4 +1,4 @@
-/* What compilers call of their own accord, where there is no C library. */
+/* Functions to which compilers generate calls; needed without a C library. */
 #include <stddef.h>
 
 /* The barriers keep compilers from making a call of the function itself out of its loop. */

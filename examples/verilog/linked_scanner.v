@@ -6,9 +6,9 @@
 //     tablegen upload another_scan.toml --port /dev/ttyUSB0
 //
 // At power-up it boots the scan of the build and holds its park codes, until it is triggered over the line. `permit` is
-// the interlock of the instrument: while it is low no new scan comes into force; the old one goes on. Scans come as
-// Fourier words, in MEMORY_BYTES; 16384 take the tables of this scan as well. X_MAX_STEP and its neighbours are limits
-// that no scan may exceed, whoever sends it: put those of your instrument there.
+// the interlock of the instrument: while it is low, no new scan becomes active and the old one continues. MEMORY_BYTES
+// is enough for scans as Fourier words; 16384 is enough for the tables of this scan. X_MAX_STEP and the parameters next
+// to it are limits that no scan may exceed: set those of your instrument.
 
 `default_nettype none
 

@@ -36,7 +36,7 @@ module play (
 endmodule
 
 
-// One axis. The code of a tick is there four clocks after it. Both multipliers fit a 25 x 18 DSP block; the table,
+// One axis. The code of a tick is valid four clocks after it. Both multipliers fit a 25 x 18 DSP block; the table,
 // read at two places, a dual-port block RAM.
 // Codes are straight binary; a converter in two's complement takes them with the top bit inverted.
 module play_axis #(
@@ -70,7 +70,7 @@ module play_axis #(
     reg signed [BITS-1:0] table_words [0:LENGTH-1];
     initial $readmemh(TABLE_FILE, table_words);
 
-    // Position: phase = floor(count 2^32 / PERIOD), by an integer step and one more whenever the remainder wraps.
+    // Position: phase = floor(count 2^32 / PERIOD): adds an integer step, and one more whenever the remainder wraps.
     reg [31:0] held, count, phase, rest;
     wire [32:0] next_rest = {1'b0, rest} + {1'b0, REMAINDER};
     wire        wraps = next_rest >= {1'b0, PERIOD};

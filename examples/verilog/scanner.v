@@ -5,11 +5,11 @@
 //     iverilog -g2005 -Ibuild -s scanner examples/verilog/scanner.v build/dac_*.v
 //
 // (The memory files are looked up where the simulation or the synthesis runs.) At power-up it boots the scan from its
-// Fourier words, a few hundred, and renders the tables from them. While `run` is high it scans; low, it parks.
+// Fourier words, and computes the tables from them. While `run` is high it scans; low, it parks.
 // `image` says that a pixel may be taken: inside the imaging window, settled, and without a fault.
 //
-// A host that wants to change the scan while it plays takes the place of the constants at `host_write` and its
-// neighbours.
+// To let a host change the scan while it plays, connect it in place of the constants at `host_write` and the ports next
+// to it.
 
 `default_nettype none
 
@@ -47,7 +47,7 @@ module scanner #(
     wire [15:0] x_code, y_code, x_word, y_word;
     wire [3:0] faults;
 
-    // The first program is there with the first tick that has taken it. A new one swaps by itself and needs no trigger.
+    // The first tick takes the first program. A later program is taken at a line start and needs no trigger.
     reg loaded;
     initial loaded = 1'b0;
     always @(posedge clock) begin

@@ -1,4 +1,4 @@
-/* An axis: its code on a tick, and the fast path for many ticks at once. */
+/* One axis: the code of one tick, and the fast path for many ticks at once. */
 #include "dac_axis.h"
 
 bool dac_axis_approach(dac_axis *axis, const dac_bank_axis *bank, int32_t target)
@@ -26,16 +26,16 @@ bool dac_axis_step(dac_axis *axis, const dac_bank_axis *bank, bool *outside)
 
 /* The fast path has one check of clamp and slew guard for DAC_RUN ticks.
  *
- * Why one check does. `base` is the lower end of a window of 2^run_bits codes around the last code, at most max_step + 1 wide and
+ * Why one check is enough. `base` is the lower end of a window of 2^run_bits codes around the last code, at most max_step + 1 wide and
  * inside the limits. If all codes of a run are in it, any two of them differ by max_step at most, and no limit is met:
  * clamp and slew guard would have changed nothing. A code is in it if code - base, unsigned, has no bit above run_bits; the bits of all
  * codes are or-ed together, and looked at once.
  *
- * Why 64 bits do. A position of 96 bits, cut to 64 and rounded up, is at most two units of 2^-32 above the exact one, and every tick
- * adds one more; run_most ticks are so few that these cannot reach the next fraction, which is 1 / period away or more. */
+ * Why 64 bits are enough. A position of 96 bits, cut to 64 and rounded up, is at most two units of 2^-32 above the exact one, and
+ * every tick adds one more; run_most ticks are so few that these cannot reach the next fraction, which is 1 / period away or more. */
 
 #if defined(__ARM_FEATURE_UNALIGNED) && !defined(__ARM_BIG_ENDIAN) && DAC_TABLE_STORAGE_BITS == 16
-/* Two neighbours with one load. */
+/* Reads two neighbouring words with one load. */
 struct pair {
     int32_t words;
 } __attribute__((packed, may_alias));
@@ -56,14 +56,14 @@ struct pair {
 #define CODE(sample)                                                                                                  \
     (((sample) >> DAC_SPLIT) * gain + ((((sample) & ((1 << DAC_SPLIT) - 1)) * gain + low) >> DAC_SPLIT) + rest) >> shift
 #else
-/* Read again for every sample: as a constant it would take two registers, which the loop has not got. */
+/* Read again for every sample: a constant would take two registers, which the loop does not have. */
 #define CONSTANTS(bank)                                                                                               \
     const volatile int64_t offset = (bank)->run_offset;                                                               \
     const int32_t gain = (bank)->run_gain
 #define CODE(sample) (int32_t)((offset + (int64_t)gain * (sample)) >> 32)
 #endif
 
-/* The compiler is to take a value as it is: not to work out beforehand what it will be, nor to make it again when it is needed. */
+/* Hides a value from the optimiser, so that the compiler neither computes it in advance nor computes it again. */
 #if defined(__GNUC__)
 #define OPAQUE(value) __asm__("" : "+r"(value))
 #else
@@ -81,7 +81,7 @@ struct pair {
 #define READ_AGAIN
 #endif
 
-/* Plays from position `at` on, until a code strays; returns how many ticks were played. */
+/* Plays from position `at` until a code leaves the window; returns the number of ticks played. */
 static uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
                      uint32_t ticks)
 {

@@ -1,15 +1,15 @@
-/* Private to the runtime: an axis, from a position in its period to its code, for a tick or for many. */
+/* Private to the runtime: computes the codes of an axis from positions in its period, for one tick or many. */
 #ifndef DAC_AXIS_H
 #define DAC_AXIS_H
 
 #include "dac_sequencer.h"
 
-#define DAC_RUN 16 /* ticks that are checked at once */
+#define DAC_RUN 16 /* ticks that one check covers */
 #ifndef DAC_WAIT
-#define DAC_WAIT 8 /* ticks that are played one by one before a run is tried again that was refused at once */
+#define DAC_WAIT 8 /* ticks that are played one by one after a refused run, before the next run is tried */
 #endif
 
-/* What makes writes visible in their order to the other side. On one core a barrier for the compiler would do. */
+/* Memory barriers: the other side sees writes in order. On a single core a compiler barrier would be enough. */
 #ifndef DAC_RELEASE
 #if defined(__GNUC__)
 #define DAC_RELEASE() __atomic_thread_fence(__ATOMIC_RELEASE)
@@ -23,7 +23,7 @@
 #endif
 #endif
 
-/* Whether 32 by 32 bits to 64 is an instruction and not a call. */
+/* 1 if a 32 x 32 to 64 bit multiplication is an instruction, 0 if it is a call. */
 #ifndef DAC_LONG_MULTIPLY
 #if defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__) || defined(__AVR__)
 #define DAC_LONG_MULTIPLY 0
@@ -32,7 +32,7 @@
 #endif
 #endif
 
-/* Where it is not, runs multiply gain and sample in two halves, the lower one of so many bits. */
+/* Where it is a call, runs multiply gain and sample in two halves; this is the width of the lower half in bits. */
 #if DAC_LONG_MULTIPLY || DAC_TABLE_STORAGE_BITS != 16
 #define DAC_SPLIT 0
 #else
@@ -69,18 +69,18 @@ static inline dac_output dac_coded(const dac_axis *axis, int32_t code)
     return (dac_output)(((uint32_t)code ^ axis->flip) << axis->shift);
 }
 
-/* One tick: moves the code towards where the waveform is, and the position on. Returns whether the code has arrived; sets *outside
- * where the clamp acted. */
+/* One tick: moves the code towards the waveform, and advances the position. Returns whether the code has arrived; sets *outside
+ * if the clamp acted. */
 bool dac_axis_step(dac_axis *axis, const dac_bank_axis *bank, bool *outside);
 
 /* Moves the code towards a target, by at most max_step; returns whether it has arrived. */
 bool dac_axis_approach(dac_axis *axis, const dac_bank_axis *bank, int32_t target);
 
-/* The codes of up to `ticks` ticks to out[0], out[DAC_STRIDE].., not coded yet; returns how many were played. It ends before ticks on
- * which the clamp or the slew guard might have to act, or which need the table's last word: these are played step by step. */
+/* Writes the codes of up to `ticks` ticks to out[0], out[DAC_STRIDE].., not coded yet; returns how many were played. It ends before
+ * ticks on which the clamp or the slew guard might have to act, or which need the table's last word: the caller plays these itself. */
 uint32_t dac_axis_run(dac_axis *axis, const dac_bank_axis *bank, dac_output *out, uint32_t ticks);
 
-/* The position `ticks` ticks on; ticks below 2^24. */
+/* Returns the position `ticks` ticks later; ticks below 2^24. */
 void dac_axis_skip(dac_axis *axis, const dac_bank_axis *bank, uint32_t ticks);
 
 #endif

@@ -5,19 +5,19 @@
 
 #ifndef DAC_SMALL
 #if defined(__OPTIMIZE_SIZE__)
-#define DAC_SMALL 1 /* less code, and some eight times the instructions */
+#define DAC_SMALL 1 /* less code, but about eight times the instructions */
 #else
 #define DAC_SMALL 0
 #endif
 #endif
 
-/* All that stays the same from word to word. */
+/* Values that are the same for all words of a table. */
 struct renderer {
     dac_word *table;
     const int32_t *words;      /* a0, a1..aH, b1..bH */
     const int32_t *sine;
     size_t to_cosine;          /* words from a sine to the cosine of the same angle */
-    unsigned shift;            /* of a 32-bit angle to an index of the sine table */
+    unsigned shift;            /* right shift from a 32-bit angle to an index of the sine table */
     unsigned harmonics;
     uint32_t length;
     int64_t mean;              /* a0 and half an LSB, Q4.60 */
@@ -55,7 +55,7 @@ static void render(const struct renderer *r, unsigned shift)
 /* The terms are summed by n modulo 4, since these sums, with other signs, also belong to length/4 - k, and each of these two k
  * serves length/2 - k, length/2 + k and length - k too: eight words for one walk through the sine table. */
 
-/* Two terms a turn, where speed is wanted. */
+/* Two terms per iteration, for speed. */
 #if defined(__GNUC__) && __GNUC__ >= 8 && !defined(__clang__)
 #define TWICE _Pragma("GCC unroll 2")
 #else

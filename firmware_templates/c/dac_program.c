@@ -1,4 +1,4 @@
-/* Loading a program: what can be wrong with it, and what the sequencer wants to know of it. */
+/* Loads a program: checks it, and derives the values that the sequencer needs. */
 #include "dac_axis.h"
 
 static bool inside(const dac_window *window, uint32_t length)
@@ -23,7 +23,7 @@ static bool good_table(const dac_axis_program *p)
     return p->index_bits >= 3 && p->index_bits <= 16 && p->length == UINT32_C(1) << p->index_bits;
 }
 
-/* x plays a period a line, y one a frame, in as many advances as it has ticks, or lines if it is held for each of them. */
+/* x plays one period per line; y plays one period per frame, with one advance per tick, or per line if it is held for a line. */
 static bool good_periods(const dac_program *p)
 {
     const uint32_t ticks = p->schedule.line_ticks, lines = p->schedule.frame_lines;
@@ -42,7 +42,7 @@ static bool good_output(const dac_axis_program *p)
 {
     return p->gain_word >= -(INT32_C(1) << 17) && p->gain_word < INT32_C(1) << 17
         && p->gain_q == 16u + p->bits + guard_bits(p) - p->dac_bits
-        && p->offset_word > -(INT64_C(2) << (p->dac_bits + p->gain_q)) /* twice what a code needs; 2^42 at most */
+        && p->offset_word > -(INT64_C(2) << (p->dac_bits + p->gain_q)) /* twice the range of a code; at most 2^42 */
         && p->offset_word < INT64_C(2) << (p->dac_bits + p->gain_q)
         && 0 <= p->code_min && p->code_min <= p->park_code && p->park_code <= p->code_max
         && p->code_max < INT32_C(1) << p->dac_bits && p->max_step >= 1 && p->max_step < INT32_C(1) << 24;
@@ -78,10 +78,10 @@ static dac_position power_divided(unsigned zeros, uint32_t divisor)
     return quotient;
 }
 
-/* The windows of dac_axis_run, if there may be runs at all. */
+/* Derives the windows of dac_axis_run, if runs are possible. */
 static void allow_runs(dac_bank_axis *b, const dac_axis_program *p)
 {
-    int32_t widest = (p->code_max - p->code_min) / 32; /* so that most of the range is far enough from the limits */
+    int32_t widest = (p->code_max - p->code_min) / 32; /* keeps most of the range far enough from the limits */
     const uint32_t most = UINT32_MAX / p->phase_period;
 
     b->run_bits = 0;

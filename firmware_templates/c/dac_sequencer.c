@@ -1,9 +1,9 @@
-/* What happens when: requests, swaps, ticks, markers, faults. The arithmetic is in dac_axis.h. */
+/* Requests, program changes, ticks, markers and faults. The arithmetic is in dac_axis.c. */
 #include "dac_axis.h"
 
 enum { COMMIT, WITHDRAW, ARM, TRIGGER, RESET, CLEAR_FAULTS, PARK };
-enum { NOTHING = 2 };         /* plays before the first program */
-#define UNKNOWN UINT32_MAX /* where the pixels are, after ticks that nobody wanted the markers of */
+enum { NOTHING = 2 };         /* value of `playing` before the first program */
+#define UNKNOWN UINT32_MAX /* position of the pixels after ticks that were played without markers */
 
 static void clear_faults(dac_sequencer *s)
 {
@@ -12,7 +12,7 @@ static void clear_faults(dac_sequencer *s)
         s->fault_counts[i] = 0;
 }
 
-/* The producer's side. */
+/* Functions of the producer. */
 
 static void power_up(dac_axis *axis, const dac_converter *converter)
 {
@@ -68,7 +68,7 @@ static bool request(dac_sequencer *s, uint8_t what, uint32_t argument)
 
 bool dac_sequencer_commit(dac_sequencer *s)
 {
-    /* The consumer knows by the number whether the bank is still the one that was loaded. */
+    /* The number tells the consumer whether the bank is still the one that was loaded. */
     if (!s->loaded || !request(s, COMMIT, s->loaded_after))
         return false;
     s->commits++;
@@ -82,7 +82,7 @@ bool dac_sequencer_park(dac_sequencer *s) { return request(s, PARK, 0); }
 bool dac_sequencer_reset(dac_sequencer *s) { return request(s, RESET, 0); }
 bool dac_sequencer_clear_faults(dac_sequencer *s) { return request(s, CLEAR_FAULTS, 0); }
 
-/* Where a processor writes 32 bits in parts, a second look tells. */
+/* A processor may write 32 bits in parts: read until two reads agree. */
 static uint32_t settled(const volatile uint32_t *shared)
 {
     uint32_t first, second = *shared;
@@ -105,7 +105,7 @@ dac_status dac_sequencer_status(const dac_sequencer *s)
     return status;
 }
 
-/* The consumer's side. */
+/* Functions of the consumer. */
 
 void dac_sequencer_report(dac_sequencer *s, uint8_t fault)
 {
@@ -121,7 +121,7 @@ static void to_start(dac_axis *axis)
     axis->at.high = 0;
 }
 
-/* At line 0 of the program that plays. */
+/* Starts at line 0 of the active program. */
 static void begin(dac_sequencer *s)
 {
     s->tick = 0;
@@ -195,7 +195,7 @@ void dac_sequencer_answer(dac_sequencer *s)
     s->tail = tail;
 }
 
-/* Takes the program that waits, if this tick is one to take it on. */
+/* Activates the committed program, if this tick allows it. */
 static bool swap(dac_sequencer *s)
 {
     if (!s->waiting || (s->running && s->tick != 0))
@@ -215,7 +215,7 @@ static bool in(const dac_window *window, uint32_t at)
     return at - window->first < window->count;
 }
 
-/* Ticks from `tick` on, at most `most`, up to the next edge of a window or the turn. */
+/* Returns the number of ticks from `tick` to the next edge of a window or the turn, at most `most`. */
 static uint32_t until_edge(const dac_schedule *plan, uint32_t tick, uint32_t most)
 {
     const uint32_t edges[] = {plan->turn_tick, plan->forward.first, plan->forward.first + plan->forward.count,
@@ -316,7 +316,7 @@ static uint8_t rest(dac_sequencer *s)
     return parked ? DAC_PARKED : 0;
 }
 
-/* One tick, once the requests were answered. */
+/* Plays one tick, after the requests were processed. */
 static void one_tick(dac_sequencer *s, dac_tick *out)
 {
     const uint8_t swapped = swap(s) ? DAC_SWAPPED : 0;
@@ -334,7 +334,7 @@ void dac_sequencer_step(dac_sequencer *s, dac_tick *out)
     one_tick(s, out);
 }
 
-/* As many ticks as both axes play in a run from here on, no more than `most`; their codes are not coded yet. */
+/* Plays as many ticks as both axes can in one run, at most `most`; the codes are not coded yet. */
 static uint32_t run(dac_sequencer *s, dac_output *x, dac_output *y, uint32_t most)
 {
     const dac_bank *const bank = s->now;
@@ -343,7 +343,7 @@ static uint32_t run(dac_sequencer *s, dac_output *x, dac_output *y, uint32_t mos
     const uint32_t x_ticks = dac_axis_run(&s->x, &bank->x, x, most);
     const uint32_t ticks = dac_axis_run(&s->y, &bank->y, y, x_ticks);
 
-    if (ticks != x_ticks) { /* y came to a tick that has to be looked at; x has gone too far */
+    if (ticks != x_ticks) { /* y stopped earlier, at a tick that needs a step; x goes back */
         s->x.at = at;
         s->x.code = ticks != 0 ? (int32_t)x[(ticks - 1) * DAC_STRIDE] : code;
         dac_axis_skip(&s->x, &bank->x, ticks);
@@ -351,7 +351,7 @@ static uint32_t run(dac_sequencer *s, dac_output *x, dac_output *y, uint32_t mos
     return ticks;
 }
 
-/* The markers of ticks that were played in a run, and the way to the tick after them. */
+/* Sets the markers of ticks that were played in a run, and advances to the tick after them. */
 static void pass(dac_sequencer *s, uint8_t *markers, uint32_t ticks)
 {
     s->catching_up = false;
@@ -392,7 +392,7 @@ void dac_sequencer_fill(dac_sequencer *s, dac_output *x, dac_output *y, uint8_t 
             const uint32_t possible = ticks < left ? (uint32_t)ticks : left;
             const uint32_t asked = possible < most ? possible : most;
             done = run(s, x, y, asked);
-            /* What x has played before y refuses was for nothing: ask for little after that, and not at once again. */
+            /* Ticks that x played before y refused are wasted: try a short run next, and not at once. */
             if (done != asked)
                 most = DAC_RUN;
             else if (asked == most)

@@ -1,8 +1,8 @@
 /* Plays compensated scan lines on a microcontroller: two axes from one counter, markers, slew guard, two banks.
  *
- * The arithmetic and what happens on which tick are stated in docs/sequencer.md of tablegen; every code, marker and
- * fault equals its integer model. C99, no heap, nothing of the C library. Two things are asked of the compiler that C99 leaves
- * to it, and every compiler for such controllers does: int64_t exists, and >> of a negative number is arithmetic.
+ * docs/sequencer.md of tablegen defines the arithmetic and what happens on which tick; every code, marker and fault
+ * equals its integer model. C99, no heap, no C library. The compiler must provide int64_t, and an arithmetic >> of negative
+ * numbers; C99 does not require these, but every compiler for such controllers has them.
  *
  *     static const dac_program scan = DAC_PROGRAM(ANNEXIN_200NM, annexin_200nm);
  *     static dac_sequencer sequencer;
@@ -36,17 +36,17 @@
 extern "C" {
 #endif
 
-/* Choices of a whole firmware, the same for all its files; give them to the compiler with -D. */
+/* Options of a firmware. They must be the same for all its files: give them to the compiler with -D. */
 
 #ifndef DAC_TABLE_STORAGE_BITS
-#define DAC_TABLE_STORAGE_BITS 16 /* of a table word in memory: 16, or 32 for tables of 17 to 24 bits */
+#define DAC_TABLE_STORAGE_BITS 16 /* bits of a table word in memory: 16, or 32 for tables of 17 to 24 bits */
 #endif
 #ifndef DAC_OUTPUT_STORAGE_BITS
-#define DAC_OUTPUT_STORAGE_BITS 16 /* of a converter word in memory: 16, or 32 for converters of more */
+#define DAC_OUTPUT_STORAGE_BITS 16 /* bits of a converter word in memory: 16, or 32 for converters with more than 16 bits */
 #endif
 
 #ifndef DAC_STRIDE
-#define DAC_STRIDE 2 /* from one word of an axis to its next in a buffer: 2 where x and y take turns, 1 where each has its own */
+#define DAC_STRIDE 2 /* distance of two words of an axis in a buffer: 2 if x and y alternate, 1 if each has its own buffer */
 #endif
 
 #if DAC_TABLE_STORAGE_BITS == 16
@@ -64,9 +64,9 @@ typedef uint32_t dac_output;
 #error "DAC_OUTPUT_STORAGE_BITS is 16 or 32"
 #endif
 
-/* Programs: what tablegen emits, under the names of its headers. */
+/* Programs: what tablegen emits, with the names of its headers. */
 
-/* Half-open: first <= k < first + count. */
+/* A half-open interval: first <= k < first + count. */
 typedef struct {
     uint32_t first, count;
 } dac_window;
@@ -75,16 +75,16 @@ typedef struct {
 typedef struct {
     const dac_word *table;
     uint32_t length;       /* words: 2^index_bits, or phase_period if not interpolated */
-    uint8_t bits;          /* of a word, 8..24; its guard bits are min(4, 25 - bits) */
+    uint8_t bits;          /* bits of a word, 8..24; it has min(4, 25 - bits) guard bits */
     uint8_t index_bits;    /* 3..16, or 0 if not interpolated */
-    uint32_t phase_period; /* advances of a period, up to 2^31 - 1 */
-    uint32_t hold_ticks;   /* of an advance: 1, or on y the ticks of a line */
+    uint32_t phase_period; /* advances per period, up to 2^31 - 1 */
+    uint32_t hold_ticks;   /* ticks per advance: 1, or for y the ticks of a line */
     int32_t gain_word;     /* signed 18 bits */
     int64_t offset_word;   /* signed, codes with gain_q fraction bits, below 2^(dac_bits + 1) codes */
     uint8_t gain_q;        /* 16 + bits + guard bits - dac_bits */
     int32_t code_min, code_max, park_code; /* straight binary, 0 is the lowest voltage */
-    int32_t max_step;      /* codes a tick, at least 1 */
-    uint8_t dac_bits, word_bits;           /* of a code, 8..24, and of the word sent to the converter */
+    int32_t max_step;      /* codes per tick, at least 1 */
+    uint8_t dac_bits, word_bits;           /* bits of a code, 8..24, and of a converter word */
     bool twos_complement, left_aligned;
 } dac_axis_program;
 
@@ -92,9 +92,9 @@ typedef struct {
 typedef struct {
     uint32_t line_ticks;  /* 1..2^24 */
     uint32_t frame_lines; /* line_ticks * frame_lines < 2^31 */
-    uint32_t pixels;      /* of a window */
+    uint32_t pixels;      /* pixels per window */
     uint32_t settle_lines;
-    uint32_t turn_tick;           /* the first of the backward sweep */
+    uint32_t turn_tick;           /* first tick of the backward sweep */
     dac_window forward, backward; /* ticks of a line */
     dac_window up, down;          /* lines of a frame */
 } dac_schedule;
@@ -104,7 +104,7 @@ typedef struct {
     dac_axis_program x, y;
 } dac_program;
 
-/* The program of an emitted header, as an initialiser: DAC_PROGRAM(ANNEXIN_200NM, annexin_200nm). */
+/* Initialiser for the program of an emitted header: DAC_PROGRAM(ANNEXIN_200NM, annexin_200nm). */
 #define DAC_PROGRAM(NAME, name)                                                                                       \
     {                                                                                                                 \
         {NAME##_LINE_TICKS, NAME##_FRAME_LINES, NAME##_PIXELS, NAME##_SETTLE_LINES, NAME##_TURN_TICK,                 \
@@ -112,7 +112,7 @@ typedef struct {
          {NAME##_UP_FIRST_LINE, NAME##_UP_LINES}, {NAME##_DOWN_FIRST_LINE, NAME##_DOWN_LINES}},                       \
         DAC_AXIS_PROGRAM(NAME##_X, name##_x_table), DAC_AXIS_PROGRAM(NAME##_Y, name##_y_table)                        \
     }
-/* One axis of it, with a table of your own in place of the emitted one if you like. */
+/* Initialiser for one axis of a program, with the emitted table or your own. */
 #define DAC_AXIS_PROGRAM(AXIS, words)                                                                                 \
     {                                                                                                                 \
         words, AXIS##_TABLE_LENGTH, AXIS##_TABLE_BITS, AXIS##_INDEX_BITS, AXIS##_PHASE_PERIOD, AXIS##_HOLD_TICKS,     \
@@ -120,13 +120,13 @@ typedef struct {
         AXIS##_MAX_STEP, AXIS##_DAC_BITS, AXIS##_DAC_WORD_BITS, AXIS##_DAC_TWOS_COMPLEMENT, AXIS##_DAC_LEFT_ALIGNED   \
     }
 
-/* What is soldered to an axis. Programs for another converter are refused. */
+/* The converter of an axis. Programs for a different converter are refused. */
 typedef struct {
     uint8_t bits, word_bits;
     bool twos_complement, left_aligned;
-    int32_t power_up_code; /* straight binary: what it puts out by itself until it is written to */
+    int32_t power_up_code; /* straight binary: output of the converter before the first write */
 } dac_converter;
-/* DAC_CONVERTER(ANNEXIN_200NM_X, 0): the converter that a header was made for. */
+/* Initialiser for the converter that a header was made for: DAC_CONVERTER(ANNEXIN_200NM_X, 0). */
 #define DAC_CONVERTER(AXIS, power_up_code)                                                                            \
     {                                                                                                                 \
         AXIS##_DAC_BITS, AXIS##_DAC_WORD_BITS, AXIS##_DAC_TWOS_COMPLEMENT, AXIS##_DAC_LEFT_ALIGNED, power_up_code     \
@@ -139,47 +139,47 @@ enum {
     DAC_PIXEL = 4,     /* the first tick of a pixel */
     DAC_BACKWARD = 8,  /* on the backward sweep */
     DAC_VALID = 16,    /* inside the imaging window, settled, and no fault */
-    DAC_SWAPPED = 32,  /* another program plays from this tick on */
+    DAC_SWAPPED = 32,  /* a new program plays from this tick on */
     DAC_PLAYING = 64,  /* a scan runs */
     DAC_PARKED = 128   /* both axes rest at their park codes */
 };
 
 /* Sticky faults; only dac_sequencer_clear_faults() and dac_sequencer_reset() clear them. */
 enum {
-    DAC_FAULT_SLEW = 1,     /* the slew guard held a code back although the output had caught up with its program */
-    DAC_FAULT_CLAMP = 2,    /* a code had to be held inside code_min..code_max */
-    DAC_FAULT_OVERRUN = 4,  /* reported by the driver: samples were asked for before the last ones were taken */
-    DAC_FAULT_UNDERRUN = 8  /* reported by the driver: a sample was not ready when the converter wanted it */
+    DAC_FAULT_SLEW = 1,     /* the slew guard limited a step after the output had reached the waveform */
+    DAC_FAULT_CLAMP = 2,    /* a code was clamped to code_min..code_max */
+    DAC_FAULT_OVERRUN = 4,  /* reported by the driver: samples were requested before the last ones were taken */
+    DAC_FAULT_UNDERRUN = 8  /* reported by the driver: a sample was not ready in time for the converter */
 };
 #define DAC_FAULTS 4
 
 /* Why a program was not loaded. */
 typedef enum {
     DAC_LOADED = 0,
-    DAC_BUSY,            /* a program waits to be taken */
+    DAC_BUSY,            /* a committed program has not been taken yet */
     DAC_OTHER_CONVERTER, /* made for other bits, coding or alignment, or too wide for DAC_OUTPUT_STORAGE_BITS */
     DAC_BAD_SCHEDULE,    /* empty, too long, or a window that is not inside its line or frame */
-    DAC_BAD_TABLE,       /* none, or its length or width is outside its range */
-    DAC_BAD_PERIOD,      /* does not belong to the schedule */
-    DAC_BAD_OUTPUT       /* gain, offset, codes or step outside their ranges */
+    DAC_BAD_TABLE,       /* missing, or length or width out of range */
+    DAC_BAD_PERIOD,      /* the period does not fit the schedule */
+    DAC_BAD_OUTPUT       /* gain, offset, codes or step out of range */
 } dac_loaded;
 
-/* What leaves on a tick. */
+/* Output of one tick. */
 typedef struct {
     dac_output x, y; /* converter words: coding and alignment done */
     uint8_t markers, faults;
 } dac_tick;
 
-/* A copy of what the consumer last said of itself. Each value is of one moment; two values may be of two. */
+/* A copy of the state that the consumer published last. Two values may be from two different ticks. */
 typedef struct {
-    uint8_t markers; /* after a fill without markers just DAC_PLAYING of those of a scan */
+    uint8_t markers; /* after a fill without markers, DAC_PLAYING is the only scan marker */
     uint8_t faults;
-    uint32_t fault_counts[DAC_FAULTS]; /* of ticks, in the order of the bits; they stay at 2^32 - 1 */
+    uint32_t fault_counts[DAC_FAULTS]; /* ticks with each fault, in the order of the bits; saturate at 2^32 - 1 */
     uint32_t swaps;                    /* programs taken since power-up */
-    uint32_t line;                     /* of the frame */
+    uint32_t line;                     /* line number within the frame */
 } dac_status;
 
-/* From here on to the functions: private, and here only so that the application can place it. */
+/* Private, down to the functions. It is declared here so that the application can allocate it. */
 
 #ifndef DAC_REQUESTS
 #define DAC_REQUESTS 8 /* a power of two, at most 128 */
@@ -193,16 +193,16 @@ typedef struct {
 
 /* Small things first: a Cortex-M0 reaches bytes at 0..31 and words at 0..124 with one instruction. */
 
-/* What a bank knows of an axis: its program, and what was derived from it when it was loaded. */
+/* One axis of a bank: its program, and values derived from it when it was loaded. */
 typedef struct {
     uint8_t holds, guard, gain_q, run_bits;
     const dac_word *table;
     uint32_t last;              /* index of the last word */
     int32_t gain, run_gain;     /* with gain_q and with 32 fraction bits */
     int32_t code_min, code_max, max_step, park_code;
-    int32_t run_half, run_room; /* half a window of 2^run_bits codes, and by how much it fits between the limits */
-    uint32_t run_most;          /* ticks of a run; 0 where there are none */
-    dac_position step;          /* of an advance, rounded up */
+    int32_t run_half, run_room; /* half a window of 2^run_bits codes, and the room for it between the limits */
+    uint32_t run_most;          /* maximum ticks of a run; 0: no runs */
+    dac_position step;          /* step per advance, rounded up */
     int64_t offset;             /* offset_word and half an LSB */
     int64_t run_offset;         /* the same with 32 fraction bits */
 } dac_bank_axis;
@@ -215,7 +215,7 @@ typedef struct {
 typedef struct {
     int32_t code;
     uint32_t flip;   /* the bit that two's complement inverts */
-    uint8_t shift;   /* of left alignment */
+    uint8_t shift;   /* shift for left alignment */
     uint8_t bits, word_bits;
     dac_position at;
 } dac_axis;
@@ -229,9 +229,9 @@ typedef struct {
     uint8_t running, endless, armed, catching_up;
     /* the producer's own */
     uint8_t loaded, commits;
-    uint32_t loaded_after; /* so many swaps */
+    uint32_t loaded_after; /* value of swaps when the bank was loaded */
     /* the consumer's own */
-    const dac_bank *now; /* the bank that plays, or NULL */
+    const dac_bank *now; /* the active bank, or NULL */
     uint32_t tick, frames_left, armed_frames, settle_left, pixel_rest;
     /* shared: the consumer writes them */
     volatile uint32_t swaps, line, fault_counts[DAC_FAULTS];
@@ -242,71 +242,71 @@ typedef struct {
     dac_bank bank[2];
 } dac_sequencer;
 
-/* PRODUCER. Each request returns false, and changes nothing, when the queue of 8 is full: samples are not asked for.
- * Requests act in order before the next tick that is computed. Cost: below 40 instructions. */
+/* PRODUCER. Each request returns false, and changes nothing, if the queue of 8 is full, that is, if no samples are being requested.
+ * Requests act in order before the next tick that is computed. Cost: less than 40 instructions. */
 
-/* Power-up state: no program, not running, codes at those that the converters put out by themselves. Call it before the
+/* Sets the power-up state: no program, not running, codes at the power-up codes of the converters. Call it before the
  * interrupt is enabled. */
 void dac_sequencer_init(dac_sequencer *s, const dac_converter *x, const dac_converter *y);
 
-/* Whether the idle bank may be written: nothing waits in it, nor will. */
+/* Returns whether the idle bank may be written: it holds no committed program, and no commit is queued. */
 bool dac_sequencer_writable(const dac_sequencer *s);
 
-/* Which of two sets of tables the application may write now, 0 or 1: not the one that plays. Valid while writable; a program
- * that is loaded next plays from the set of this number if the application keeps to it. */
+/* Returns which of two sets of tables the application may write, 0 or 1: the one that does not play. Valid while writable. Use the
+ * set of this number for the program that is loaded next. */
 unsigned dac_sequencer_idle(const dac_sequencer *s);
 
 /* Checks a program and puts it into the idle bank, where it stays until it is committed or another one is loaded. The descriptor
- * is copied, the tables are not. Cost: some 4000 instructions, no dependence on the table's length. */
+ * is copied, the tables are not. Cost: about 4000 instructions, independent of the length of the table. */
 dac_loaded dac_sequencer_load(dac_sequencer *s, const dac_program *program);
 
-/* The program in the idle bank is to be taken at the next line start, or on the next tick while no scan runs. */
+/* Commits the program in the idle bank: it is taken at the next line start, or on the next tick while no scan runs. */
 bool dac_sequencer_commit(dac_sequencer *s);
 
-/* A committed program that was not taken yet is not to be. Whether it came in time shows once the request is answered
- * (dac_sequencer_writable()): status.swaps has grown, or not. */
+/* Withdraws a committed program, if it was not taken yet. Once dac_sequencer_writable() returns true, status.swaps tells whether
+ * the program was taken before: it has then grown. */
 bool dac_sequencer_withdraw(dac_sequencer *s);
 
-/* The next trigger will start so many frames, up to 2^31; 0 is without end. A scan that runs keeps its own count. */
+/* Sets the number of frames that the next trigger starts, up to 2^31; 0: endless. A running scan keeps its own count. */
 bool dac_sequencer_arm(dac_sequencer *s, uint32_t frames);
 
-/* Start at line 0, if armed, not running, and with a program to play. Otherwise nothing. */
+/* Starts at line 0, if armed, not running, and a program is loaded. Otherwise does nothing. */
 bool dac_sequencer_trigger(dac_sequencer *s);
 
-/* Disarm, stop, ramp to the park codes and hold them. */
+/* Disarms, stops, ramps to the park codes and holds them. */
 bool dac_sequencer_park(dac_sequencer *s);
 
-/* Disarm, stop, forget faults and the program that waits. The program that plays and the codes are kept: they ramp. */
+/* Disarms, stops, clears the faults, and withdraws a committed program. Keeps the active program; the codes ramp. */
 bool dac_sequencer_reset(dac_sequencer *s);
 
-/* Forget faults and their counts. */
+/* Clears the faults and their counts. */
 bool dac_sequencer_clear_faults(dac_sequencer *s);
 
-/* Either side, at any time. */
+/* EITHER SIDE, at any time. */
 dac_status dac_sequencer_status(const dac_sequencer *s);
 
 /* CONSUMER. */
 
-/* One tick of both axes. */
+/* Plays one tick of both axes. */
 void dac_sequencer_step(dac_sequencer *s, dac_tick *tick);
 
-/* `ticks` ticks at once, equal to as many steps: converter words of x to x[0], x[DAC_STRIDE], x[2 DAC_STRIDE].., of y alike; DAC_*
+/* Plays `ticks` ticks, equal to as many steps: converter words of x to x[0], x[DAC_STRIDE], x[2 DAC_STRIDE].., of y alike; DAC_*
  * markers to markers[0], markers[1].., unless markers is NULL. For one buffer of both: fill(s, buffer, buffer + 1, NULL, n).
- * Requests act before the first of them. Where markers is NULL, DAC_PIXEL is not told again before the next imaging window. */
+ * Requests act before the first tick. After a fill with markers NULL, DAC_PIXEL is not set before the next imaging window. */
 void dac_sequencer_fill(dac_sequencer *s, dac_output *x, dac_output *y, uint8_t *markers, size_t ticks);
 
-/* Acts on requests now. Only for drivers that have stopped to ask for samples: both functions above do it. */
+/* Acts on requests now. Needed only while a driver requests no samples: the two functions above do it as well. */
 void dac_sequencer_answer(dac_sequencer *s);
 
-/* The driver saw DAC_FAULT_OVERRUN or DAC_FAULT_UNDERRUN. */
+/* Reports a fault that the driver detected: DAC_FAULT_OVERRUN or DAC_FAULT_UNDERRUN. */
 void dac_sequencer_report(dac_sequencer *s, uint8_t fault);
 
-/* PRODUCER, and anybody else: no sequencer is involved. */
+/* ANY CALLER: no sequencer is involved. */
 
-/* Renders Fourier words a0, a1..aH, b1..bH (Q2.30) into the 2^index_bits words of a table, index_bits 3..16, equal to
- * the host's word for word. `sine` is the emitted table NAME_sine of a length of 2^sine_index_bits, sine_index_bits >= index_bits.
- * False, and nothing is written, if the words could leave the accumulator (their magnitudes sum to 4 or more) or a size is
- * outside its range. Not re-entrant on the same table; the table must not be playing. */
+/* Computes the 2^index_bits words of a table, index_bits 3..16, from Fourier words a0, a1..aH, b1..bH (Q2.30), equal to the table
+ * of the build. `sine` is the emitted table NAME_sine of a length of 2^sine_index_bits, sine_index_bits >= index_bits.
+ * Returns false, and writes nothing, if the accumulator could overflow (the magnitudes of the words sum to 4 or more) or a size is
+ * out of range. Not re-entrant on the same table; the table must not be playing. */
 bool dac_synthesize(dac_word *table, unsigned index_bits, unsigned bits, const int32_t *words, unsigned harmonics,
                     const int32_t *sine, unsigned sine_index_bits);
 

@@ -1,4 +1,4 @@
-; What a program has to pass, in the order of the protocol.
+; The checks of a program, in the order of the protocol.
 
 schedule:
         ldp IMAGE
@@ -99,7 +99,7 @@ place:  add2 at
         setp
         ret
 
-; A window at p of what has t1 of them.
+; Checks the window at p against t1, the number of its ticks or lines.
 window: ld4 [p]
         add4 [p]
         jc no_schedule
@@ -139,7 +139,7 @@ digit_2:
         ld4 answer
         ret
 
-; Not more harmonics than the device has.
+; Checks that the device has that many harmonics.
 harmonics:
         ld #12
         call constants
@@ -154,7 +154,7 @@ harmonics:
         call forget
         jmp no_harmonics
 
-; Not more words than the device has, and how many bytes those of x are.
+; Checks that the device has that many words, and computes the bytes of the words of x.
 lengths_of:
         call words_of
         ld1 detail
@@ -163,7 +163,7 @@ lengths_of:
         st4 y_at
         jmp checked
 
-; Of the axis: words in t0, bytes of one in size, of all in t1.
+; For the axis: number of words in t0, bytes per word in size, bytes of all words in t1.
 words_of:
         ld1 x_word_bytes
         st1 size
@@ -434,7 +434,7 @@ load:   call word
         jnc load
         ret
 
-; A word of size bytes at p.
+; Loads the word of size bytes at p.
 word:   ld1 size
         sub #3
         jz word_3

@@ -1,4 +1,4 @@
-; Frames: out of the ring, and onto the line.
+; Frames: read from the ring, and sent on the line.
 
 start:
         ld #0
@@ -69,7 +69,7 @@ frame_ends:
         ld1 too_long
         jnz bad
         ld1 frame_at
-        jz frame_over           ; nothing at all
+        jz frame_over           ; empty frame
         ld1 left
         jnz bad
         ld1 frame_at
@@ -95,7 +95,7 @@ good:   ld #0
         st4 asker
         jmp asked
 
-; A CRC of a bytes from p on.
+; The CRC of a bytes, starting at p.
 crc:    call counted
         ld4 ones
 crc_byte:
@@ -125,7 +125,7 @@ copy_word:
         jnc copy_word
         ret
 
-; Copies a bytes.
+; Copies a bytes from p to q.
 copy_bytes:
         call counted
 copy_byte:
@@ -137,19 +137,19 @@ copy_byte:
         jnc copy_byte
         ret
 
-; The answer to the request, of a bytes.
+; Sends the answer to the request, with a bytes.
 positive:
         st1 answer_length
         ld1 type
         add #0x80
         st1 kind
         ret
-; It stands at PAYLOAD.
+; The answer is at PAYLOAD.
 long_answer:
         call positive
         call send_frame
         jmp main
-; It stands at answer, and is remembered if the request acts.
+; The answer is at `answer`; it is stored if the request acts.
 answered:
         call positive
 replied:
@@ -170,7 +170,7 @@ reply_again:
         ld4 answer+4
         st4 [p]
 
-; The answer that stands at PAYLOAD.
+; Sends the answer at PAYLOAD.
 send_frame:
         ldp FRAME
         ld1 kind
@@ -208,7 +208,7 @@ emitted:
         sub1 distance
         st1 rest
         jnz block
-; The byte in a.
+; Sends the byte in a.
 send_byte:
         st1 byte
 wait_ready:

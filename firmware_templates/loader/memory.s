@@ -1,13 +1,13 @@
-; Where things are in the loader's memory. What has a name here and an address elsewhere: program_loader.v writes it.
+; Addresses in the memory of the loader. program_loader.v writes those that it also defines.
 
 .equ INFO, 0x00           ; what BEGIN announced, 48 bytes
 .equ info_bytes, 0x20
 .equ info_crc, 0x24
 
 ; Constants of the device, by its parameters
-.equ most_ticks, 0x30     ; of a line
-.equ most_lines, 0x34     ; of a frame
-.equ most_bytes, 0x38     ; of an image
+.equ most_ticks, 0x30     ; ticks per line
+.equ most_lines, 0x34     ; lines per frame
+.equ most_bytes, 0x38     ; bytes per image
 .equ half_gain, 0x3c      ; 2^17
 .equ top_code, 0x40
 .equ steps_end, 0x44      ; 2^24
@@ -29,10 +29,10 @@
 .equ IN_FAULTS, 0xf0
 .equ IN_RING, 0xf1        ; where the receiver writes next
 .equ IN_PERMIT, 0xf2      ; 0 or 1, as the next three
-.equ IN_READY, 0xf3       ; to send
-.equ IN_SWAPPED, 0xf4     ; and not SEEN yet
+.equ IN_READY, 0xf3       ; ready to send a byte
+.equ IN_SWAPPED, 0xf4     ; a program was taken, and the processor has not seen it
 .equ IN_WRITABLE, 0xf5
-.equ IN_STATE, 0xf6       ; of STATUS, but for 0
+.equ IN_STATE, 0xf6       ; state as in STATUS, except 0
 
 ; Requests
 .equ COMMIT, 1
@@ -46,8 +46,8 @@
 .equ DEVICE, 0x100        ; as HELLO tells it, 56 bytes
 .equ LIMITS_X, 0x114
 .equ LIMITS_Y, 0x124
-.equ HASH, 0x138          ; of what plays, 32 bytes
-.equ AXIS, 0x158          ; of x and y: half of the offset's range >> 18, words of a table (0: as many as the period
+.equ HASH, 0x138          ; hash of the active program, 32 bytes
+.equ AXIS, 0x158          ; for x and y: half of the offset's range >> 18, words of a table (0: as many as the period
                           ; has), most words, most harmonics, half of the range of a word; 20 bytes each
 .equ FRAME, 0x201         ; a frame, in front of it the 0 that COBS does not end with
 .equ PAYLOAD, 0x207
@@ -60,23 +60,23 @@
 .at 0x6a
 .var has_session 1
 .var ring 1               ; the next byte that is read
-.var session 4            ; the host's
+.var session 4            ; session of the host
 .var asker 4              ; session of the request
-.var pending_asker 4      ; of the COMMIT at work
+.var pending_asker 4      ; session of the COMMIT in progress
 .var received 4
 .var generation 4
 .var bad_frames 4
-.var done_generation 4    ; of the last upload that was taken, 0: none
+.var done_generation 4    ; generation of the last upload that was taken, 0: none
 .var done_line 4
 .var done_crc 4
-.var done_bytes 4         ; 0: the image is not there any more
+.var done_bytes 4         ; 0: the image is not in memory any more
 .var answer 8
-.var kind 1               ; its type
+.var kind 1               ; type of the request
 .var answer_length 1
 .var type 1
 .var seq 1
 .var last 8               ; answer to the last request that acts
-.var last_kind 1          ; 0: at work
+.var last_kind 1          ; 0: in progress
 .var last_length 1
 .var last_type 1          ; 0: none
 .var last_seq 1
@@ -92,7 +92,7 @@
 .var frame_at 2           ; the next byte from the line
 .var left 1               ; bytes to the next zero
 .var too_long 1
-.var length 1             ; of the payload
+.var length 1             ; length of the payload
 .var size 1               ; bytes of a word: 4 of Fourier words
 .var byte 1
 .var distance 1
@@ -101,7 +101,7 @@
 .var upload 1             ; as STATUS tells it
 .var acts 1
 .var pending_seq 1
-.var pending_acts 1       ; its answer is to be remembered
+.var pending_acts 1       ; its answer will be stored
 .var aborting 1
 .var check 1
-.var stop 1               ; how many checks
+.var stop 1               ; number of checks

@@ -1,4 +1,4 @@
-; What a request passes, and requests that change no program.
+; The checks of a request, and requests that change no program.
 
 asked:  ld1 type                ; of an answer that came back nothing is said
         and #0x80
@@ -82,14 +82,14 @@ same:   ld1 type
         cmp1 last_type
         jnz overtaken
         ld1 last_kind
-        jz main                 ; at work
+        jz main                 ; in progress
         ld2 last_kind
         st2 kind
         ld4 last
         st4 answer
         ld4 last+4
         st4 answer+4
-        jmp replied             ; as it was
+        jmp replied             ; repeats the stored answer
 
 hello:  ld1 length
         jz no_payload
@@ -128,7 +128,7 @@ told:   ldp PAYLOAD
 
 status: ldp PAYLOAD
         ld #76
-; The status at p, in an answer of a bytes.
+; Writes the status at p, in an answer of a bytes.
 status_at:
         st1 answer_length
         ld4 generation
@@ -200,7 +200,7 @@ readback:
         sub4 t0
         jc some
         ld #0
-some:   st4 t1                  ; what is there from the offset on
+some:   st4 t1                  ; bytes from the offset to the end
         ld1 rest
         cmp4 t1
         jnc asked_less

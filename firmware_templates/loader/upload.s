@@ -10,7 +10,7 @@ is_free:
         ret
 
 begin:  call is_free
-        ldp PAYLOAD+40          ; what the image is for, against what the device is
+        ldp PAYLOAD+40          ; compares the shape of the image with the device
         ld3 [p]
         cmp4 x_shape
         jnz no_shape
@@ -30,7 +30,7 @@ begin:  call is_free
         cmp4 [p]
         jnc no_length
 
-        ldp INFO                ; is it the one in hand?
+        ldp INFO                ; is it the upload in progress?
         saveq
         ldp PAYLOAD
         ld #0xf4
@@ -54,7 +54,7 @@ another:
         call copy
         ld #0
         st4 received
-        st4 done_bytes          ; the memory is another's from now on
+        st4 done_bytes          ; from now on the memory belongs to the new upload
         ld #1
         st1 upload
 begun:  ld4 received
@@ -92,9 +92,9 @@ data:   ld1 length
         sub #192
         jnc begun
         cmp1 rest
-        jc begun                ; they were complete before
+        jc begun                ; the program words were complete before
 
-; The program words are complete: what must the image be?
+; The program words are complete: compute the length of the image.
         ld #2
         jmp look
 looked: ld4 t1
@@ -206,7 +206,7 @@ commit_answer:
         st1 kind
         ret
 
-; The request is the COMMIT that was at work.
+; The request is the COMMIT in progress.
 commit_ended:
         call forget
         st4 detail

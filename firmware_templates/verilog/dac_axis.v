@@ -1,24 +1,24 @@
-// One axis, a sample a clock: phase, table, interpolation, gain and offset, limits, slew guard.
+// One axis, one sample per clock: phase, table, interpolation, gain and offset, limits, slew guard.
 //
 // A tick comes in with its flags on one clock; the code is there LATENCY clocks later. The next tick may come on the
 // next clock. A new program comes in with the tick that has `load`, and travels down the pipeline with that tick: its
-// phase, its bank of the table, its gain and its limits each change just before it, so that no sample is of two
+// phase, its bank of the table, its gain and its limits each change just before it, so that no sample mixes two
 // programs.
 
 `default_nettype none
 
 module dac_axis #(
-    parameter INTERPOLATED = 1,     // 0: a table word an advance
+    parameter INTERPOLATED = 1,     // 0: no interpolation, one table word per advance
     parameter INDEX_BITS = 11,      // a bank of the table holds 2^INDEX_BITS words
     parameter WORD_BITS = 16,
     parameter DAC_BITS = 16,
     parameter PERIOD_BITS = 31,
     parameter PLAIN_MULTIPLIER = 0,  // 1: multiplier blocks; 0: look-up tables
     parameter [63:0] POWER_UP_CODE = 0,
-    parameter LATENCY = PLAIN_MULTIPLIER ? 22 : 34  // follows from the others
+    parameter LATENCY = PLAIN_MULTIPLIER ? 22 : 34  // derived: do not set it
 ) (
     input  wire                  clock,
-    // to the idle program: a register, or a word of the table
+    // writes to a register or a table word of the idle program
     input  wire                  write,
     input  wire [3:0]            write_address,
     input  wire [31:0]           write_data,
@@ -26,13 +26,13 @@ module dac_axis #(
     input  wire [INDEX_BITS-1:0] table_address,
     input  wire [WORD_BITS-1:0]  table_data,
     input  wire                  take,      // the tick of the next clock is the first one of a new program
-    // a tick; flag i of a vector is that of the tick i clocks ago
+    // flags of a tick; bit i of a vector is the flag of the tick i clocks ago
     input  wire [LATENCY-4:0]    ticks,
     input  wire [LATENCY-4:0]    loads,     // a new program begins
-    input  wire [LATENCY-4:0]    runnings,  // a scan plays; otherwise to the park code
-    input  wire                  bank,      // that plays
+    input  wire [LATENCY-4:0]    runnings,  // 1: a scan plays; 0: the axis goes to the park code
+    input  wire                  bank,      // the bank that plays
     input  wire                  restart,   // advance 0 of a period
-    input  wire                  advance,   // the next advance
+    input  wire                  advance,   // the tick advances the phase
     output wire [DAC_BITS-1:0]   code,
     output wire                  reached,   // the code is at its target
     output wire                  clamped    // a limit has changed the target
@@ -40,7 +40,7 @@ module dac_axis #(
     localparam GUARD_BITS = WORD_BITS > 21 ? 25 - WORD_BITS : 4;
     localparam SAMPLE_BITS = WORD_BITS + GUARD_BITS;
     localparam SAMPLE_AT = PLAIN_MULTIPLIER ? 10 : 15;  // clocks from the tick to its sample
-    localparam TARGET_AT = LATENCY - 4;                 // and to its target
+    localparam TARGET_AT = LATENCY - 4;                 // clocks from the tick to its target
 
     wire signed [SAMPLE_BITS-1:0] sample;
     wire unused_flags = &{loads, ticks, runnings, take};
@@ -53,7 +53,7 @@ module dac_axis #(
             wire read_bank;
             wire signed [WORD_BITS-1:0] here, there;
             wire [14:0] fraction;
-            wire unused = &phase;  // its bits below the fraction
+            wire unused = &phase;  // the bits of phase below the fraction are unused
 
             dac_phase #(.PERIOD_BITS(PERIOD_BITS)) position (
                 .clock(clock), .write(write), .write_address(write_address), .write_data(write_data),

@@ -1,14 +1,14 @@
-// One axis in little area: the arithmetic of dac_axis, one step a clock, with one adder for the sample and none to
-// spare.
+// One axis in little area: the arithmetic of dac_axis, one step per clock, with a single adder for the sample. Every
+// sample takes the same number of clocks.
 //
-// A tick starts it; CLOCKS later the code is there, and not before that may the next tick come. The program of both
-// banks is in a block RAM, and read word by word as it is needed. Multiplication is Booth's, two bits a clock: a and
-// m hold sum and factor, q the other factor, whose place the low half of the product takes.
+// A tick starts the calculation; `done` marks its end, and the next tick may come only then. The programs of both
+// banks are in one block RAM, which is read word by word. Multiplication is Booth's, two bits per clock: a holds the
+// sum, m one factor, and q the other factor, which the low half of the product replaces.
 
 `default_nettype none
 
 module dac_axis_serial #(
-    parameter INTERPOLATED = 1,     // 0: a table word an advance
+    parameter INTERPOLATED = 1,     // 0: no interpolation, one table word per advance
     parameter INDEX_BITS = 11,      // a bank of the table holds 2^INDEX_BITS words
     parameter WORD_BITS = 16,
     parameter DAC_BITS = 16,
@@ -16,20 +16,20 @@ module dac_axis_serial #(
     parameter [63:0] POWER_UP_CODE = 0
 ) (
     input  wire                  clock,
-    // to the idle program: a register, or a word of the table
+    // writes to a register or a table word of the idle program
     input  wire                  write,
     input  wire [3:0]            write_address,
     input  wire [31:0]           write_data,
     input  wire                  table_write,
     input  wire [INDEX_BITS-1:0] table_address,
     input  wire [WORD_BITS-1:0]  table_data,
-    input  wire                  bank,      // that plays; with the tick, and until the code is there
-    input  wire                  loaded,    // it holds a program
+    input  wire                  bank,      // the bank that plays; stable from the tick until done
+    input  wire                  loaded,    // the bank holds a program
     input  wire                  tick,
     input  wire                  restart,   // with the tick: advance 0 of a period
-    input  wire                  advance,   // with the tick: the next advance
-    input  wire                  running,   // with the tick, and until the code is there: a scan plays
-    output reg                   done,      // the code is there
+    input  wire                  advance,   // with the tick: the tick advances the phase
+    input  wire                  running,   // a scan plays; stable from the tick until done
+    output reg                   done,      // one clock: the code is valid
     output reg  [DAC_BITS-1:0]   code,
     output reg                   reached,   // the code is at its target
     output reg                   clamped    // a limit has changed the target
@@ -43,10 +43,10 @@ module dac_axis_serial #(
     localparam GAIN_Q = 16 + SAMPLE_BITS - DAC_BITS;
     localparam WIDEST_1 = SAMPLE_BITS > DAC_BITS ? SAMPLE_BITS : DAC_BITS;
     localparam WIDEST_2 = GAIN_Q > 20 ? GAIN_Q : 20;
-    localparam BITS = (WIDEST_1 > WIDEST_2 ? WIDEST_1 : WIDEST_2) + 3;  // every value, its sign, and twice it
+    localparam BITS = (WIDEST_1 > WIDEST_2 ? WIDEST_1 : WIDEST_2) + 3;  // fits twice the largest value, and the sign
 
-    // The words of both programs. The half that makes a floor a rounding goes into the low word of the offset where
-    // it has such a bit, or beside it, above its 18 bits. The period is kept inverted, since it is subtracted.
+    // The words of both programs. To round, half a unit is added: LOW_HALF to the low word of the offset, or HIGH_HALF
+    // where that bit lies above the 18 bits of the low word. The period is stored inverted, because it is subtracted.
     localparam LOW_HALF = GAIN_Q < 19 ? 1 << (GAIN_Q - 1) : 0;
     localparam [BITS-1:0] HIGH_HALF = GAIN_Q < 19 ? 0 : {{BITS-1{1'b0}}, 1'b1} << (GAIN_Q - 1);
     reg [31:0] words [0:31];
@@ -67,7 +67,7 @@ module dac_axis_serial #(
         table_word <= table_words[{bank, index}];
     end
 
-    // The steps: what happens in the clock of each. A word that is used in a step was asked for in the one before.
+    // The steps, one per clock. A word that a step uses was addressed in the step before.
     localparam [5:0] WAIT = 6'd0, REST = 6'd1, WRAP = 6'd2, PHASE = 6'd3, HERE = 6'd5, THERE = 6'd6, DIFFERENCE = 6'd7;
     localparam [5:0] INTERPOLATE = 6'd8, BACK = 6'd16, FROM_HERE = 6'd17, SAMPLE = 6'd18, FACTOR = 6'd19;
     localparam [5:0] MULTIPLY = 6'd20;
@@ -80,7 +80,7 @@ module dac_axis_serial #(
         advances = 1'b0;
     end
     wire [5:0] next = step == WAIT ? (tick ? REST : WAIT) : step == DONE ? WAIT : step + 1;
-    // Decided a clock ahead, since the sum waits for them.
+    // These flags are registered one clock ahead, to keep them off the path of the sum.
     reg wrapping, shifts, interpolates, subtracts, compares_above, compares_below;
     initial begin
         wrapping = 1'b0;
@@ -118,7 +118,7 @@ module dac_axis_serial #(
 
     generate
         if (INTERPOLATED) begin : interpolated
-            // phase = floor(k 2^32 / N), as dac_phase makes it, over three clocks.
+            // phase = floor(k 2^32 / N), as in dac_phase, over three clocks.
             reg [31:0] phase;
             reg [PERIOD_BITS:0] rest;
             reg wraps;
@@ -146,11 +146,11 @@ module dac_axis_serial #(
         end
     endgenerate
 
-    // sum = a + term, where the term is 0, m or 2 m, or less that.
+    // sum = a + term, where the term is 0, m, 2 m, -m or -2 m.
     reg signed [BITS-1:0] a, m;
-    reg [18:0] q;  // and below it the bit that went last
+    reg [18:0] q;  // q[0] is the bit shifted out last
     reg limited, is_low, is_high;
-    // Interpolation has here - there for a factor, and so subtracts it.
+    // Interpolation uses here - there as the factor, and therefore subtracts it.
     wire once = !shifts || q[1] != q[0];
     wire twice = shifts && q[2] != q[1] && q[1] == q[0];
     wire less = shifts ? q[2] ^ interpolates : subtracts || compares_above;
@@ -243,7 +243,7 @@ module dac_axis_serial #(
     generate
         if (INTERPOLATED) begin : between
             assign fraction = interpolated.phase[17-INDEX_BITS +: 15];
-            // a counts words, and the highest bits of q are what lies below.
+            // a is in units of a table word; the highest bits of q are the fraction below it.
             assign sample = {a[WORD_BITS-1:0], q[18 -: GUARD_BITS]};
         end else begin : exact
             assign fraction = 15'd0;

@@ -1,7 +1,7 @@
-// Which bank plays, and whether the other one may be written: the commit of a new program, and its taking.
+// Decides which bank plays, and whether the other one may be written.
 //
-// A commit says that the idle program is complete. From then on nobody writes it, until the scan takes it at the start
-// of a line and the last sample of the old program has left the pipeline (`drained`), or it is withdrawn.
+// A commit says that the idle program is complete. The idle bank is then locked until the scan has taken the program at
+// the start of a line and the last sample of the old program has left the pipeline (`drained`), or until a withdrawal.
 
 `default_nettype none
 
@@ -9,13 +9,13 @@ module dac_bank (
     input  wire clock,
     input  wire reset,      // empties the idle bank
     input  wire commit,
-    input  wire withdraw,   // a committed program that was not taken yet is not to be played
+    input  wire withdraw,   // discards a committed program that was not taken yet
     input  wire take,       // the tick of this clock is the first of the committed program
-    input  wire drained,    // no sample of the old program is on its way any more
-    output reg  bank,       // that plays, from the tick that took it
+    input  wire drained,    // the pipeline holds no sample of the old program
+    output reg  bank,       // the bank that plays
     output reg  committed,
-    output reg  loaded,     // there is a program
-    output wire writable    // the idle one
+    output reg  loaded,     // the bank that plays holds a program
+    output wire writable    // the idle bank may be written
 );
     reg draining;
 

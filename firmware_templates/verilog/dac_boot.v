@@ -1,9 +1,9 @@
-// Loads a program at power-up, from the memory files of a build; after that the host's writes pass through.
+// Loads a program from the memory files of a build at power-up; afterwards passes the writes of the host through.
 //
 // With FOURIER = 0 X_FILE and Y_FILE are the tables, <name>_x.mem and <name>_y.mem; with FOURIER = 1 the Fourier
-// words, <name>_x_fourier.mem and <name>_y_fourier.mem, which take a few hundred bits of memory instead of many
-// thousand, and which a sequencer with FOURIER = 1 renders. PROGRAM_FILE is <name>_program.mem either way. It ends
-// with a commit: arm and trigger are the user's.
+// words, <name>_x_fourier.mem and <name>_y_fourier.mem, from which a sequencer with FOURIER = 1 computes its tables;
+// they take less memory. PROGRAM_FILE is <name>_program.mem either way. The boot ends with a commit; arm and trigger
+// are left to the host.
 
 `default_nettype none
 
@@ -12,33 +12,33 @@ module dac_boot #(
     parameter X_FILE = "",
     parameter Y_FILE = "",
     parameter FOURIER = 0,
-    parameter X_WORDS = 2048,     // of X_FILE
+    parameter X_WORDS = 2048,     // number of words in X_FILE
     parameter Y_WORDS = 2048,
-    parameter X_WORD_BITS = 16,   // of a word of X_FILE; 32 with FOURIER
+    parameter X_WORD_BITS = 16,   // bits of a word in X_FILE; 32 with FOURIER
     parameter Y_WORD_BITS = 16,
-    parameter X_HARMONICS = 0,    // with FOURIER
+    parameter X_HARMONICS = 0,    // with FOURIER: number of harmonics in X_FILE
     parameter Y_HARMONICS = 0
 ) (
     input  wire        clock,
-    input  wire        reset,           // begins again
+    input  wire        reset,           // starts the boot again
     input  wire        host_write,
     input  wire [2:0]  host_region,
     input  wire [15:0] host_address,
     input  wire [31:0] host_data,
     input  wire        host_commit,
-    input  wire        writable,        // of the sequencer; the boot waits while it is low
+    input  wire        writable,        // from the sequencer; the boot waits while it is low
     output wire        write,
     output wire [2:0]  write_region,
     output wire [15:0] write_address,
     output wire [31:0] write_data,
     output wire        commit,
-    output reg         booting          // host writes are lost
+    output reg         booting          // the boot is running; host writes are lost
 );
     localparam PROGRAM_WORDS = 48;
     localparam [31:0] LAST_PROGRAM = PROGRAM_WORDS - 1, LAST_X = X_WORDS - 1, LAST_Y = Y_WORDS - 1;
     localparam [5:0] X_HARMONICS_AT = 6'd26, Y_HARMONICS_AT = 6'd42;
     localparam [31:0] X_H = X_HARMONICS, Y_H = Y_HARMONICS;
-    localparam [1:0] PROGRAM = 2'd0, X = 2'd1, COMMIT = 2'd3;  // and 2 for y
+    localparam [1:0] PROGRAM = 2'd0, X = 2'd1, COMMIT = 2'd3;  // 2 is Y
     localparam X_ADDRESS_BITS = X_WORDS > 1 ? $clog2(X_WORDS) : 1;
     localparam Y_ADDRESS_BITS = Y_WORDS > 1 ? $clog2(Y_WORDS) : 1;
 
@@ -51,7 +51,7 @@ module dac_boot #(
         if (Y_FILE != "") $readmemh(Y_FILE, y_words);
     end
 
-    // A word is read on one clock and written on the next; both wait while the sequencer takes no write.
+    // A word is read on one clock and written on the next; both wait while the sequencer accepts no write.
     reg [1:0] reads, writes;
     reg [16:0] read_at;
     reg [15:0] write_at;

@@ -1,4 +1,4 @@
-// The two-bank memory of a table that has a word an advance: one read a sample. The word is there two clocks after
+// The two-bank memory of a table without interpolation: one read per sample. The word is valid two clocks after
 // `index`.
 
 `default_nettype none

@@ -10,7 +10,7 @@ module dac_faults #(
     input  wire                         clear,
     input  wire [FAULTS-1:0]            happens,
     output reg  [FAULTS-1:0]            faults,
-    output reg  [FAULTS*COUNT_BITS-1:0] counts   // that of fault 0 lowest
+    output reg  [FAULTS*COUNT_BITS-1:0] counts   // the counter of fault 0 is in the lowest bits
 );
     initial faults = 0;
 

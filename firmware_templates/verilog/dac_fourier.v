@@ -95,10 +95,10 @@ module dac_fourier #(
         if (write && !busy && write_address >> ADDRESS_BITS == 11'd0)
             coefficients[{write_axis, write_address[ADDRESS_BITS-1:0]}] <= write_data;
 
-    // What is rendered.
+    // The axis that is rendered, and its number of harmonics.
     reg axis_now;
     reg [9:0] least_harmonics;  // H - 1
-    reg last;  // after the last table word
+    reg last;  // one clock, after the last table word
 
     initial begin
         busy = 1'b0;
@@ -123,12 +123,12 @@ module dac_fourier #(
     localparam [1:0] SHIFT = 2'd0, TERMS = 2'd1, GAP = 2'd2, OUT = 2'd3;
 
     reg [1:0] slot;
-    reg second;                     // of the slots of OUT
+    reg second;                     // second of the two OUT slots
     reg [3:0] digit;
-    reg [INDEX_BITS-1:0] k, index;  // index is n k, and a quarter more for a cosine
+    reg [INDEX_BITS-1:0] k, index;  // index is n k, plus a quarter period for a cosine
     reg [10:0] address;
     reg is_sine;
-    reg sines_follow, last_term;    // after the term of this slot
+    reg sines_follow, last_term;    // the sines, or the end, follow the term of this slot
 
     initial begin
         slot = SHIFT;
@@ -210,7 +210,7 @@ module dac_fourier #(
         .product(product), .negative(digit_negative)
     );
 
-    // What goes along with a slot, up to the stage at which its product is there.
+    // Flags that accompany a slot to the stage at which its product is valid.
     wire [4:0] leaving = {slot == SHIFT, slot == TERMS, slot == OUT, is_sine, index[INDEX_BITS-1]};
     reg [5*STAGES-1:0] passing;
     wire shift_s, term_s, out_s, sine_s, second_half_s;
@@ -225,7 +225,7 @@ module dac_fourier #(
         else
             passing <= {passing[5*STAGES-6:0], leaving};
 
-    // The two sums, of k and of length - k, and which of them is put out.
+    // The sums of k and of length - k, and which of them is output.
     reg mirrored;
     wire clear = !busy || (out_s && mirrored);
     wire negative = second_half_s ^ digit_negative;
@@ -259,9 +259,9 @@ module dac_fourier #(
     wire fits = axis_now ? y_fits : x_fits;
     wire [23:0] limit = axis_now ? y_limit : x_limit;
 
-    // Where the words go: the place of each that leaves, in steps of the longer table.
+    // The table address of each word, in steps of the longer table.
     reg out_1, out_2, mirrored_1, mirrored_2;
-    reg [INDEX_BITS-1:0] position;  // k once more, as late as the words
+    reg [INDEX_BITS-1:0] position;  // k, delayed as much as the words
     wire at_end = position[INDEX_BITS-1];
     wire [INDEX_BITS-1:0] from_start = mirrored_2 ? -position : position;
     wire [15:0] x_address = {{(16-INDEX_BITS){1'b0}}, from_start} >> X_STEP_BITS;

@@ -9,9 +9,9 @@
 //                     18 x 18 DSP blocks.
 //
 // The coefficient belongs one clock after the sine word and its digit's number, as block RAMs deliver them when one of
-// them gets its address from a register more. LATENCY is that of the product after the sine word: 2 clocks or 4.
+// them gets its address one register later. The product is valid 2 or 4 clocks after the sine word.
 //
-// `negative` comes with the product: it is to be taken off.
+// `negative` comes with the product and says that it is to be subtracted.
 
 `default_nettype none
 
@@ -21,7 +21,7 @@ module dac_fourier_product #(
     input  wire                         clock,
     input  wire        [30:0]           sine,
     input  wire        [3:0]            digit_number,  // 0 is the lowest digit
-    input  wire signed [31:0]           coefficient,   // a clock later
+    input  wire signed [31:0]           coefficient,   // one clock later than sine
     output wire signed [DIGIT_BITS+31:0] product,
     output wire                         negative
 );

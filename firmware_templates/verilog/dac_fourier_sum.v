@@ -1,7 +1,7 @@
-// One sum of dac_fourier: of the products of all terms with one digit, and what the digits below have left of theirs.
+// One sum of dac_fourier: the products of all terms with one digit, plus the carry from the digits below.
 //
 //   add      sum += or -= product, by `negative`
-//   shift    sum = floor(sum / 2^DIGIT_BITS): on to the next digit
+//   shift    sum = floor(sum / 2^DIGIT_BITS): go on to the next digit
 //   clear    sum = 0
 //
 // It is a pipeline of two, operand and sum: `add` and `shift` are in the sum two clocks later, `clear` one clock later.
@@ -25,7 +25,7 @@ module dac_fourier_sum #(
     reg signed [DIGIT_BITS+32:0] operand;
     reg one;  // -product is ~product + 1
 
-    // The 1 rides in on a carry from a bit below, so that there is one adder and not two.
+    // The 1 enters as the carry of an extra lowest bit, which saves a second adder.
     wire [DIGIT_BITS+33:0] next = {sum, 1'b1} + {operand, one};
     wire unused = &{1'b0, next[0]};
 

@@ -1,7 +1,7 @@
 // The sample between two table words: (here << GUARD_BITS) + round((there - here) fraction / 2^(15 - GUARD_BITS)),
 // ties up.
 //
-// One a clock; LATENCY clocks after its input. GUARD_BITS is min(4, 25 - WORD_BITS).
+// One sample per clock, LATENCY clocks after its input. GUARD_BITS is min(4, 25 - WORD_BITS).
 
 `default_nettype none
 
@@ -9,7 +9,7 @@ module dac_interpolator #(
     parameter WORD_BITS = 16,
     parameter GUARD_BITS = 4,
     parameter PLAIN_MULTIPLIER = 0,
-    parameter LATENCY = PLAIN_MULTIPLIER ? 5 : 10  // follows from the others
+    parameter LATENCY = PLAIN_MULTIPLIER ? 5 : 10  // derived: do not set it
 ) (
     input  wire                                   clock,
     input  wire signed [WORD_BITS-1:0]            here,
@@ -49,7 +49,7 @@ module dac_interpolator #(
 
     dac_delay #(.BITS(WORD_BITS), .CLOCKS(LATENCY - 1)) start (.clock(clock), .in(here), .out(from));
 
-    // Between two words, so that nothing is lost by dropping the bits above; the half rounds as a carry.
+    // The sample lies between two words, so the upper bits can be dropped. The added half rounds it.
     wire [SAMPLE_BITS:0] sum = {from, {GUARD_BITS{1'b0}}, 1'b1} + step[SAMPLE_BITS:0];
     wire unused = &{sum[0], step[STEP_BITS-1]};
 

@@ -1,6 +1,6 @@
-// The markers of a tick, three clocks after it: line, frame, pixel, direction, and whether it images.
+// The markers of a tick, three clocks after it: line, frame, pixel, direction, imaging.
 //
-// The outputs hold from tick to tick. Windows of x are in ticks of a line, those of y in lines of a frame.
+// The outputs hold from tick to tick. Windows of x count ticks of a line, windows of y count lines of a frame.
 
 `default_nettype none
 
@@ -13,7 +13,7 @@ module dac_markers #(
     input  wire [3:0]           write_address,
     input  wire [31:0]          write_data,
     input  wire                 take,    // the tick of the next clock is the first one of a new program
-    input  wire                 load,    // that of this clock is
+    input  wire                 load,    // the tick of this clock is the first one of a new program
     input  wire                 tick,
     input  wire                 runs,
     input  wire                 begins,
@@ -25,7 +25,7 @@ module dac_markers #(
     output reg                  frame_marker,
     output wire                 pixel_marker,
     output reg                  backward_marker,
-    output reg                  images           // inside the windows, and settled
+    output reg                  images           // the tick is inside both windows, after the settling lines
 );
     localparam [3:0] SETTLE_LINES = 4'd2, TURN_TICK = 4'd3, FORWARD_FIRST = 4'd4, FORWARD_COUNT = 4'd5;
     localparam [3:0] BACKWARD_FIRST = 4'd6, BACKWARD_COUNT = 4'd7, UP_FIRST = 4'd8, UP_COUNT = 4'd9;
@@ -98,13 +98,13 @@ module dac_markers #(
         .clock(clock), .write(write && write_address == SETTLE_LINES), .data(write_data[7:0]), .load(load),
         .value(settle_lines)
     );
-    wire [TICK_BITS:0] forward_count, backward_count;  // of the idle program
+    wire [TICK_BITS:0] forward_count, backward_count;  // window lengths of the idle program
     reg [TICK_BITS:0] idle_pixels, pixels;
     initial begin
         idle_pixels = 0;
         pixels = 0;
     end
-    reg signed [TICK_BITS+1:0] forward_less, backward_less;  // pixels less ticks of a window
+    reg signed [TICK_BITS+1:0] forward_less, backward_less;  // pixels - ticks of a window
     initial begin
         forward_less = 0;
         backward_less = 0;
@@ -123,7 +123,7 @@ module dac_markers #(
         .pixels_less_count(forward_imaging ? forward_less : backward_less), .pixel(pixel_marker)
     );
 
-    reg [7:0] settle_left;  // lines to go, this one included
+    reg [7:0] settle_left;  // settling lines left, including this one
     initial settle_left = 0;
 
     initial begin

@@ -5,8 +5,8 @@
 // least significant digit comes first and what a stage has finished is shifted out, so that no adder is wider than a
 // is. Such a digit and two bits of a are the four inputs of a look-up table.
 //
-// Digit i is wanted i clocks after a, so that a constant b needs no delay line, and a new one can follow its first a.
-// The result is there DIGITS clocks after a.
+// Digit i must come i clocks after a, so that a constant b needs no delay line, and a new one can follow its first a.
+// The result is valid DIGITS clocks after a.
 
 `default_nettype none
 
@@ -18,8 +18,8 @@ module dac_multiply_digits #(
 ) (
     input  wire                          clock,
     input  wire signed [A_BITS-1:0]      a,
-    input  wire [DROP-1:0]               low,     // with a; unsigned
-    input  wire [2*DIGITS-1:0]           digits,  // of b + 0101..01
+    input  wire [DROP-1:0]               low,     // unsigned; comes with a
+    input  wire [2*DIGITS-1:0]           digits,  // the digits of b + 0101..01
     output wire signed [RESULT_BITS-1:0] result
 );
     localparam PAIRS_DROPPED = DROP / 2 < DIGITS ? DROP / 2 : DIGITS;

@@ -1,18 +1,18 @@
-// The offset of the output stage: a program register of two words, that plays less code_min and with a half added.
+// The offset of the output stage: a program register of two words. It holds offset - code_min + a half, to round.
 //
-// Its low part is wanted with the product, its high part after it; each has a load of its own.
+// The low part is used with the product and the high part after it; each part has its own load.
 
 `default_nettype none
 
 module dac_offset #(
-    parameter BITS = 38,       // of the sum, signed; 20 .. 44
+    parameter BITS = 38,       // bits of the sum, signed; 20 .. 44
     parameter LOW_BITS = 20,
-    parameter GAIN_Q = 20,     // fraction bits
+    parameter GAIN_Q = 20,     // fraction bits of the gain
     parameter CODE_BITS = 16
 ) (
     input  wire                     clock,
     input  wire                     write_low,   // bits 17..0
-    input  wire                     write_high,  // the rest
+    input  wire                     write_high,  // bits 18 and up
     input  wire [25:0]              data,
     input  wire [CODE_BITS:0]       minus_min,   // -code_min of the idle program, signed
     input  wire                     load_low,

@@ -17,7 +17,7 @@ module dac_output #(
     parameter DAC_BITS = 16,
     parameter PLAIN_MULTIPLIER = 0,
     parameter [63:0] POWER_UP_CODE = 0,
-    parameter LATENCY = PLAIN_MULTIPLIER ? 8 : 15  // follows from the others
+    parameter LATENCY = PLAIN_MULTIPLIER ? 8 : 15  // derived: do not set it
 ) (
     input  wire                          clock,
     input  wire                          write,
@@ -25,9 +25,9 @@ module dac_output #(
     input  wire [31:0]                   write_data,
     input  wire [LATENCY+1:0]            loads,
     input  wire signed [SAMPLE_BITS-1:0] sample,
-    input  wire                          running,   // of the sample that came LATENCY - 2 clocks ago
+    input  wire                          running,   // a scan plays; belongs to the sample of LATENCY - 2 clocks ago
     output reg  [DAC_BITS-1:0]           target,
-    output reg  [DAC_BITS-1:0]           max_step,    // a clock after its target
+    output reg  [DAC_BITS-1:0]           max_step,    // one clock after its target
     output reg  [DAC_BITS-1:0]           step_inverse,
     output reg                           clamped    // with its target: a limit has changed it
 );
@@ -35,14 +35,14 @@ module dac_output #(
     localparam [3:0] CODE_MIN = 4'd6, CODE_MAX = 4'd7, MAX_STEP = 4'd8, PARK_CODE = 4'd9;
 
     localparam GAIN_Q = 16 + SAMPLE_BITS - DAC_BITS;
-    localparam LOW_BITS = GAIN_Q < SAMPLE_BITS ? GAIN_Q : SAMPLE_BITS;  // of the offset, added inside the product
+    localparam LOW_BITS = GAIN_Q < SAMPLE_BITS ? GAIN_Q : SAMPLE_BITS;  // bits of the offset added in the product
     localparam SUM_BITS = SAMPLE_BITS + 18;  // |gain sample| <= 2^(SAMPLE_BITS + 16), and the offset is below that
     localparam HIGH_BITS = SUM_BITS - LOW_BITS;
     localparam CODE_BITS = DAC_BITS + 2;
     localparam CODE_SHIFT = GAIN_Q - LOW_BITS;
 
     wire unused = &write_data;
-    // Of the idle program.
+    // Registers of the idle program.
     reg [DAC_BITS:0] minus_min;
     reg [DAC_BITS-1:0] idle_max, idle_park_inverse, idle_step;
     always @(posedge clock) begin
@@ -56,7 +56,7 @@ module dac_output #(
     wire [LOW_BITS-1:0] low;
     wire [HIGH_BITS-1:0] high;
 
-    // The offset, less code_min, and the half that makes the floor a rounding.
+    // The offset - code_min + a half, which turns the floor into a rounding.
     dac_offset #(.BITS(SUM_BITS), .LOW_BITS(LOW_BITS), .GAIN_Q(GAIN_Q), .CODE_BITS(DAC_BITS)) offset (
         .clock(clock),
         .write_low(write && write_address == OFFSET_LOW), .write_high(write && write_address == OFFSET_HIGH),
@@ -91,7 +91,7 @@ module dac_output #(
         end
     endgenerate
 
-    // Of the playing one.
+    // Registers of the playing program.
     reg [CODE_BITS-1:0] span;       // code_max - code_min
     reg [CODE_BITS-1:0] park_room;  // code_max - park_code
     reg [DAC_BITS-1:0] code_max;

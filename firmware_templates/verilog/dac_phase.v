@@ -13,10 +13,10 @@ module dac_phase #(
     input  wire [3:0]  write_address,
     input  wire [31:0] write_data,
     input  wire        take,     // the tick of the next clock is the first one of a new program, and a restart
-    input  wire        load,     // that of this clock is
+    input  wire        load,     // the tick of this clock is the first one of a new program
     input  wire        tick,
     input  wire        restart,  // with a tick: advance 0 of a period
-    input  wire        advance,  // with a tick: the next advance
+    input  wire        advance,  // with a tick: the tick advances the phase
     output reg  [31:0] phase
 );
     localparam [3:0] PHASE_STEP = 4'd0, PHASE_REMAINDER = 4'd1, PHASE_PERIOD = 4'd2;

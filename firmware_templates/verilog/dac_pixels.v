@@ -11,7 +11,7 @@ module dac_pixels #(
     input  wire                   tick,
     input  wire                   opens,   // the first tick of a window
     input  wire                   imaging,
-    input  wire [BITS:0]          pixels,  // of the program
+    input  wire [BITS:0]          pixels,  // pixels per window, from the program
     input  wire signed [BITS+1:0] pixels_less_count,
     output reg                    pixel
 );

@@ -1,6 +1,6 @@
-// Between a host's commit and that of the banks: renders the tables that came as Fourier words, x then y.
+// Between the commit of the host and that of the banks: computes the tables that came as Fourier words, x, then y.
 //
-// The program's `harmonics` says how: 0, and the table was uploaded; H, and 2 H + 1 Fourier words were. The commit
+// The program word `harmonics` is 0 if the table was uploaded, or H if 2 H + 1 Fourier words were uploaded. The commit
 // goes on when the last table word is in its bank, so that a bank that waits to be taken is always complete. A reset
 // or a withdrawal ends a rendering; its commit never comes.
 
@@ -23,8 +23,8 @@ module dac_render #(
     input  wire        write_y_word,
     input  wire [10:0] write_address,
     input  wire [31:0] write_data,
-    input  wire        commit,       // the host's
-    output reg         rendered,     // the commit goes on
+    input  wire        commit,       // from the host
+    output reg         rendered,     // the commit to the banks
     output wire        rendering,
     output wire        x_write,      // a table word
     output wire        y_write,

@@ -1,7 +1,7 @@
 // The scan: one counter for both axes. It decides what the next tick is, and when a committed program is taken.
 //
-// Requests are pulses of one clock, and act after a tick of the same clock; where several come together the later in
-// this list has the last word: arm, trigger, park, reset. All outputs belong to the tick that `tick_out` announces,
+// Requests are pulses of one clock, and act after a tick of the same clock. If several come together, the later in this
+// list takes precedence: arm, trigger, park, reset. All outputs belong to the tick that `tick_out` announces,
 // one clock after `tick`. A line has at least 8 ticks.
 
 `default_nettype none
@@ -9,7 +9,7 @@
 module dac_scan #(
     parameter TICK_BITS = 24,   // a line has at most 2^TICK_BITS ticks
     parameter LINE_BITS = 16,   // a frame has at most 2^LINE_BITS lines
-    parameter FRAME_BITS = 16   // frames that can be counted
+    parameter FRAME_BITS = 16   // bits of the frame counter
 ) (
     input  wire                  clock,
     input  wire                  reset,
@@ -18,22 +18,22 @@ module dac_scan #(
     input  wire [31:0]           write_data,
     input  wire                  tick,
     input  wire                  arm,
-    input  wire [FRAME_BITS-1:0] arm_frames,  // with arm; 0 is without end
+    input  wire [FRAME_BITS-1:0] arm_frames,  // with arm; 0: endless
     input  wire                  trigger,
     input  wire                  park,
     input  wire                  committed,   // a program waits to be taken
     input  wire                  loaded,      // there is a program to play
-    output wire                  take,        // it is taken by the tick of this clock
+    output wire                  take,        // the tick of this clock takes the program
     output reg                   armed,
     output reg                   running,     // the next tick will play
-    // of the tick that was
+    // flags of the tick that tick_out announces
     output reg                   tick_out,
     output reg                   load,        // the first one of a new program
     output reg                   runs,        // a scan plays
     output reg                   begins,      // a scan or a program begins with it
     output reg                   line,        // the first tick of a line
-    output reg                   frame,       // and of a frame
-    output reg                   y_advance,   // y goes on by one advance
+    output reg                   frame,       // the first tick of a frame
+    output reg                   y_advance,   // the tick advances y
     output reg [TICK_BITS-1:0]   tick_number,
     output reg [LINE_BITS-1:0]   line_number
 );
@@ -64,12 +64,12 @@ module dac_scan #(
         end
     end
 
-    // The tick to come.
+    // The next tick.
     reg [TICK_BITS-1:0] at_tick;
     initial at_tick = 0;
     reg [LINE_BITS-1:0] at_line;
     initial at_line = 0;
-    reg first, last;              // of its line
+    reg first, last;              // the next tick is the first, the last of its line
     initial begin
         first = 1;
         last = 0;

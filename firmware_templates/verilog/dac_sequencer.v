@@ -1,21 +1,21 @@
-// The two-axis DAC sequencer: plays compensated scan lines, changes programs at line starts, and says what it did.
+// The two-axis DAC sequencer: plays compensated scan lines, changes programs at line starts, and outputs markers.
 //
-//   host    writes the idle program (`write`, while `writable`), then `commit`: it is taken on both axes by the first
-//           tick of a line, or by the next tick while nothing plays. docs/verilog.md has the map of the words.
-//   scan    `arm` and `trigger` start frames, `park` and `reset` end them; codes always move under the slew guard.
-//   tick    one clock long, at the converter's update rate. Codes and markers of a tick leave together, with `strobe`,
-//           LATENCY clocks after it (LOW_AREA: as soon as they are ready; `busy` until then).
+//   host    writes the idle program (`write`, while `writable`), then pulses `commit`. Both axes change to the new
+//           program at the first tick of a line, or at the next tick while nothing plays. docs/verilog.md has the map
+//           of the program words.
+//   scan    `arm` and `trigger` start frames, `park` and `reset` end them. The slew guard limits every step.
+//   tick    is one clock long, at the update rate of the converter. `strobe` comes with the codes and markers of a
+//           tick: 36 clocks after it, 24 with PLAIN_MULTIPLIER = 1, 41 with LOW_AREA = 1 (`busy` is high until then).
 //
-// What happens on which tick, and every bit of every code, is docs/sequencer.md. All inputs belong to `clock`; those
-// that do not must be synchronised outside. The design relies on power-up values of its registers, as FPGAs have
-// them: a reset must not move a code.
+// docs/sequencer.md defines what happens on which tick, and every bit of every code. All inputs must be synchronous to
+// `clock`. The design relies on power-up values of its registers, as FPGAs have them: a reset must not move a code.
 
 `default_nettype none
 
 module dac_sequencer #(
     parameter DAC_BITS = 16,
-    parameter X_INTERPOLATED = 1,    // 0: a table word an advance
-    parameter X_INDEX_BITS = 11,     // a bank holds 2^X_INDEX_BITS words; an interpolated table has exactly so many
+    parameter X_INTERPOLATED = 1,    // 0: no interpolation, one table word per advance
+    parameter X_INDEX_BITS = 11,     // a bank holds 2^X_INDEX_BITS words; an interpolated table has exactly this length
     parameter X_WORD_BITS = 16,
     parameter Y_INTERPOLATED = 1,
     parameter Y_INDEX_BITS = 11,
@@ -23,30 +23,30 @@ module dac_sequencer #(
     parameter TICK_BITS = 24,        // a line has at most 2^TICK_BITS ticks
     parameter LINE_BITS = 16,        // a frame has at most 2^LINE_BITS lines
     parameter PERIOD_BITS = 31,      // a period has less than 2^PERIOD_BITS advances
-    parameter COUNT_BITS = 16,       // of a fault counter
-    parameter PLAIN_MULTIPLIER = 0,  // 1: `*`, for multiplier blocks; 0: look-up tables
-    parameter LOW_AREA = 0,          // 1: some 50 clocks a sample, in a third of the area
-    parameter FOURIER = 0,           // 1: renders tables from Fourier words
-    parameter HARMONICS = 64,        // at most, with FOURIER
-    parameter SINE_FILE = "",        // with FOURIER: quarter sine of the longer table
-    parameter [63:0] X_POWER_UP_CODE = 0,  // what the converters put out before the first program
+    parameter COUNT_BITS = 16,       // bits of a fault counter
+    parameter PLAIN_MULTIPLIER = 0,  // 1: multiplies with `*`, in multiplier blocks; 0: in look-up tables
+    parameter LOW_AREA = 0,          // 1: 41 clocks per sample, less area, no multiplier blocks
+    parameter FOURIER = 0,           // 1: computes tables from Fourier words
+    parameter HARMONICS = 64,        // with FOURIER: largest number of harmonics
+    parameter SINE_FILE = "",        // with FOURIER: file with a quarter sine for the longer table
+    parameter [63:0] X_POWER_UP_CODE = 0,  // output code before the first program
     parameter [63:0] Y_POWER_UP_CODE = 0
 ) (
     input  wire                    clock,
     input  wire                    reset,
-    // the idle program
+    // writes to the idle program
     input  wire                    write,
     input  wire [2:0]              write_region,   // 0 program, 1 x table, 2 y table, 3 x, 4 y Fourier words
     input  wire [15:0]             write_address,
     input  wire [31:0]             write_data,
-    output wire                    writable,       // otherwise a write is refused
-    output reg                     refused,        // a write was; until the faults are cleared
+    output wire                    writable,       // low: a write is refused
+    output reg                     refused,        // a write was refused; holds until clear_faults or reset
     input  wire                    commit,
     input  wire                    withdraw,
     output wire                    committed,
     // requests
     input  wire                    arm,
-    input  wire [15:0]             arm_frames,     // 0: without end
+    input  wire [15:0]             arm_frames,     // 0: endless
     input  wire                    trigger,
     input  wire                    park,
     input  wire                    clear_faults,
@@ -54,7 +54,7 @@ module dac_sequencer #(
     output wire                    running,        // the next tick will play
     // samples
     input  wire                    tick,
-    input  wire                    underrun,       // an output could not take a sample in time: counts as a fault
+    input  wire                    underrun,       // an output missed a sample: counted as a fault
     output wire                    busy,
     output wire                    strobe,
     output wire [DAC_BITS-1:0]     x_code,
@@ -75,9 +75,9 @@ module dac_sequencer #(
     localparam [11:0] SCAN_PAGE = 12'd0, X_PAGE = 12'd1, Y_PAGE = 12'd2;
     localparam LATENCY = PLAIN_MULTIPLIER ? 22 : 34;
     localparam MARKERS_AT = 3;
-    localparam X_PERIOD_BITS = TICK_BITS + 1;  // a line
+    localparam X_PERIOD_BITS = TICK_BITS + 1;  // the period of x is a line
 
-    // Writes, a clock late and only into the idle bank; a commit is as late, so that it never overtakes one.
+    // Writes go to the idle bank, one clock late. A commit is as late, so that it never overtakes a write.
     wire idle_writable, rendered, rendering;
     reg host_write, host_commit;
     initial begin
@@ -116,7 +116,7 @@ module dac_sequencer #(
     wire x_table_write, y_table_write;
     wire [15:0] table_address;
     wire [23:0] table_data;
-    wire unused_bits = &{table_address, table_data};  // a table has as many words, of as many bits, as it has
+    wire unused_bits = &{table_address, table_data};  // upper bits, unused for short tables and words
 
     wire bank, loaded, take, drained;
     dac_bank banks (
@@ -136,7 +136,7 @@ module dac_sequencer #(
         .y_advance(y_advance_0), .tick_number(tick_number), .line_number(line_number)
     );
 
-    // The request to clear faults goes with the next tick, as everything that decides about a tick does.
+    // The request to clear faults takes effect with the next tick.
     reg clear_waits, clears_0;
     initial begin
         clear_waits = 0;
@@ -168,9 +168,9 @@ module dac_sequencer #(
             always @(posedge clock) works <= accepted_tick || (works && !done);
             assign busy = works;
             assign overrun = tick && busy;
-            assign done = x_done;  // y takes as many clocks
+            assign done = x_done;  // y takes the same number of clocks
             assign drained = done;
-            // These hold until the next tick.
+            // The flags hold until the next tick.
             reg runs, begins, swapped;
             always @(posedge clock)
                 if (tick_0) begin
@@ -206,7 +206,7 @@ module dac_sequencer #(
                 .advance(y_advance_0), .running(runs), .done(y_done), .code(y), .reached(y_reached), .clamped(y_clamped)
             );
         end else begin : pipelined
-            // Flag i is that of the tick i clocks ago.
+            // Bit i is the flag of the tick i clocks ago.
             reg [LATENCY-1:0] ticks, loads, runnings;
             initial begin
                 ticks = 0;

@@ -20,13 +20,13 @@ module dac_slew #(
     input  wire            valid,        // a target is there: one a tick
     input  wire [BITS-1:0] target,
     input  wire [BITS-1:0] max_step,     // a clock after its target
-    input  wire [BITS-1:0] step_inverse, // of max_step
+    input  wire [BITS-1:0] step_inverse, // max_step, inverted
     output wire [BITS-1:0] code,
     output reg             reached       // the code is at its target
 );
-    // Clock 1: the way from target to target. Clock 2: less and plus the step.
+    // Clock 1: the difference of two targets. Clock 2: that difference minus and plus the step.
     reg delta_valid, limit_valid, behind_valid;
-    reg [BITS-1:0] delta_inverse, limit_inverse, behind_inverse, code_inverse;  // of the target, and of the code
+    reg [BITS-1:0] delta_inverse, limit_inverse, behind_inverse, code_inverse;  // inverted values
     reg [BITS:0] delta;
     reg [BITS+1:0] delta_less, delta_plus;
 

@@ -9,7 +9,7 @@ module dac_uart_rx #(
     parameter CLOCKS_PER_BIT = 434  // 8 or more
 ) (
     input  wire       clock,
-    input  wire       line,         // need not belong to the clock
+    input  wire       line,         // may be asynchronous
     output reg  [7:0] data,
     output reg        received      // for one clock; `data` stays for half a bit at least
 );

@@ -12,11 +12,11 @@ module dac_verdict #(
 ) (
     input  wire                    clock,
     input  wire                    tick,
-    // of this tick
+    // inputs of this tick
     input  wire                    runs,
     input  wire                    begins,
     input  wire                    swapped,
-    input  wire                    clears,      // faults are forgotten with it
+    input  wire                    clears,      // the tick clears the faults
     input  wire                    line,
     input  wire                    frame,
     input  wire                    pixel,
@@ -26,10 +26,10 @@ module dac_verdict #(
     input  wire [DAC_BITS-1:0]     y,
     input  wire                    reached,     // both are at their targets
     input  wire                    clamped,     // a limit changed one of them
-    // of any clock
+    // inputs of any clock
     input  wire                    overrun,
     input  wire                    underrun,
-    output reg                     strobe,      // all that follows is new
+    output reg                     strobe,      // one clock: the outputs below are new
     output reg  [DAC_BITS-1:0]     x_code,
     output reg  [DAC_BITS-1:0]     y_code,
     output reg                     line_marker,

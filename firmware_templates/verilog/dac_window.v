@@ -1,24 +1,24 @@
 // An imaging window of a program, [first, first + count): whether a position is inside, for positions that count up
 // from 0.
 //
-// Also for an empty window. `imaging` and `opens` are those of the position two clocks ago.
+// The window may be empty. `imaging` and `opens` belong to the position two clocks ago.
 
 `default_nettype none
 
 module dac_window #(
-    parameter BITS = 24  // of a position
+    parameter BITS = 24  // bits of a position
 ) (
     input  wire          clock,
     input  wire          write_first,
     input  wire          write_count,
     input  wire [BITS:0] data,
     input  wire          load,      // the position of the next clock is the first one of a new program
-    input  wire          valid,     // a position is there
-    input  wire          restart,   // it is 0
+    input  wire          valid,     // the position advances, or restarts
+    input  wire          restart,   // the position is 0
     input  wire [BITS-1:0] position,
-    output reg           opens,     // it is `first`
+    output reg           opens,     // the position is `first`
     output reg           imaging,
-    output reg  [BITS:0] idle_count  // of the idle program
+    output reg  [BITS:0] idle_count  // length of the window in the idle program
 );
     reg [BITS:0] idle_first, first, stop;
     initial begin

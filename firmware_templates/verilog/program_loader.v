@@ -16,7 +16,7 @@
 module program_loader #(
     parameter CLOCKS_PER_BIT = 434,      // 115200 baud at 50 MHz; from 16 on it keeps up with the line
     parameter MEMORY_BYTES = 2048,       // 2^11..2^16
-    parameter WINDOW = 8,                // frames on the way
+    parameter WINDOW = 8,                // frames that may be unacknowledged
     parameter DAC_BITS = 16,
     parameter X_INTERPOLATED = 1,
     parameter X_INDEX_BITS = 11,
@@ -28,7 +28,7 @@ module program_loader #(
     parameter LINE_BITS = 16,            // at most 16
     parameter FOURIER = 0,
     parameter HARMONICS = 64,
-    parameter CONVERTER = DAC_BITS,      // bits of its word, + 64 two's complement, + 128 left-aligned
+    parameter CONVERTER = DAC_BITS,      // bits of the converter word, + 64 two's complement, + 128 left-aligned
     parameter [31:0] X_CODE_MIN = 0,     // limits of every program
     parameter [31:0] X_CODE_MAX = (1 << DAC_BITS) - 1,
     parameter [31:0] X_MAX_STEP = (1 << DAC_BITS) - 1,
@@ -43,7 +43,7 @@ module program_loader #(
     input  wire        line_in,
     output wire        line_out,
     input  wire        permit,
-    input  wire [31:0] boot,             // what tells one start from another
+    input  wire [31:0] boot,             // a number that differs from start to start
     input  wire        booting,
     // to the sequencer
     output wire        write,

@@ -52,13 +52,13 @@ def fit_frequency(frequency_hz: Floats, gain: Floats, reference_hz: float | None
                 f"the gain rises by {-100.0 * alpha.value:.3g} % a decade, where (23) has it fall; leave out what "
                 f"is near the resonance (--to-hz), above a tenth of it"
             )
-        remarks.append("no loss with frequency can be seen; alpha is taken as 0")
+        remarks.append("the gain does not fall with frequency; alpha is set to 0")
         alpha = Estimate(0.0, alpha.standard_error)
     if alpha.value > _LARGEST_ALPHA:
         raise Unphysical(f"alpha = {alpha.value:.3g} is no loss of some percent a decade; are these gains?")
     expected = solution.values[1] * scale * (1.0 - raw * decades)
     if solution.freedom == 0:
-        remarks.append("two points fit exactly: nothing is left to tell errors from; measure more frequencies")
+        remarks.append("two points fit exactly, so errors cannot be estimated; measure more frequencies")
     if "alpha" in solution.undetermined:
         remarks.append("alpha is not determined by these points; measure over two decades or more")
     if _rises(frequency_hz, solution.residuals, solution.jacobian):

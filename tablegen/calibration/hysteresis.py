@@ -120,10 +120,11 @@ def _remarks(fit: TraceFit) -> list[str]:
     found = []
     if fit.triangle.departure > _MAX_DRIVE_DEPARTURE:
         found.append(
-            f"the drive departs from a triangle by {100.0 * fit.triangle.departure:.2g} % rms; the fit takes it for one"
+            f"the drive departs from a triangle by {100.0 * fit.triangle.departure:.2g} % rms; "
+            "the fit assumes a triangle"
         )
     if fit.inverted:
-        found.append("the displacement falls where the drive rises; its sign was turned")
+        found.append("the displacement falls where the drive rises; its sign was inverted")
     worst = float(np.max(np.abs(fit.residual_percent)))
     if worst > _POOR_FIT_PERCENT:
         found.append(
@@ -132,8 +133,8 @@ def _remarks(fit: TraceFit) -> list[str]:
         )
     if fit.correlated > 3.0:
         found.append(
-            f"residuals are alike over {fit.correlated:.0f} samples: a part is no noise but what model and drift "
-            f"leave; standard errors were widened by {fit.correlated**0.5:.2g}"
+            f"residuals are correlated over {fit.correlated:.0f} samples: besides noise, they contain what "
+            f"model and drift do not describe; standard errors were widened by {fit.correlated**0.5:.2g}"
         )
     if fit.strays:
         shown = ", ".join(str(i + 1) for i in fit.strays[:5]) + (", ..." if len(fit.strays) > 5 else "")

@@ -54,7 +54,7 @@ def read_image(path: Path, channel: str | None = None) -> ScanImage:
 
     reader = _READERS.get(path.suffix.lower())
     if reader is None:
-        raise refuse(f"{path.suffix or 'no ending'} is none of {', '.join(_READERS)}; export it as one of these")
+        raise refuse(f"{path.suffix or 'no ending'} is not one of {', '.join(_READERS)}; export it as one of these")
     content = file_content(path, name)
     if not content:
         raise refuse("is empty")
@@ -83,7 +83,7 @@ def read_image(path: Path, channel: str | None = None) -> ScanImage:
 def _chosen(channels: list[_Channel], wanted: str | None) -> _Channel:
     """By title, or by number. Raises ``ValueError``."""
     if not channels:
-        raise ValueError("has no image in it")
+        raise ValueError("contains no image")
     there = ", ".join(
         f"{number} ({title})" if title else f"{number}" for number, title, _ in channels[:_MAX_CHANNELS_LISTED]
     )
@@ -102,7 +102,7 @@ def _npy(content: bytes, _: str) -> list[_Channel]:
     try:
         array = np.load(BytesIO(content), allow_pickle=False)
     except (ValueError, OSError, EOFError, SyntaxError, MemoryError, OverflowError) as error:
-        raise ValueError(f"is no whole .npy file of numbers ({_first_line(error)})") from None
+        raise ValueError(f"is not a complete .npy file of numbers ({_first_line(error)})") from None
     if not isinstance(array, np.ndarray):
         raise ValueError("is an .npz archive; save one array with numpy.save")
     if array.ndim == 3:
@@ -127,7 +127,7 @@ def _png(content: bytes, _: str) -> list[_Channel]:
         Pillow.DecompressionBombError,
         Warning,
     ) as error:
-        raise ValueError(f"is no whole PNG file ({_first_line(error)})") from None
+        raise ValueError(f"is not a complete PNG file ({_first_line(error)})") from None
     mode = picture.mode
     if mode in ("1", "L") or mode.startswith("I"):
         return [(0, "", np.asarray(picture))]
@@ -135,7 +135,7 @@ def _png(content: bytes, _: str) -> list[_Channel]:
         colours = np.asarray(picture.convert("RGB")).astype(np.float64)
         if np.array_equal(colours[..., 0], colours[..., 1]) and np.array_equal(colours[..., 0], colours[..., 2]):
             return [(0, "", colours[..., 0])]
-        raise ValueError("is in colour, which is no height; export it in grey, 16 bits, or as numbers")
+        raise ValueError("is in colour, not heights; export it in grey, 16 bits, or as numbers")
     raise ValueError(f"has pixels of the kind {mode}; export it in grey, 16 bits, or as numbers")
 
 
@@ -147,10 +147,10 @@ def _tiff(content: bytes, _: str) -> list[_Channel]:
             pages = [page.asarray() for page in file.pages]
     except Exception as error:  # the library raises whatever a damaged structure leads to
         advice = "save it without compression" if "codec" in str(error) else "copy or export it again"
-        raise ValueError(f"is no TIFF file that can be read ({_first_line(error)}); {advice}") from None
+        raise ValueError(f"is not a readable TIFF file ({_first_line(error)}); {advice}") from None
     for page in pages:
         if page.ndim == 3 and page.shape[-1] in (3, 4):
-            raise ValueError("is in colour, which is no height; export it in grey, 16 bits or floating point")
+            raise ValueError("is in colour, not heights; export it in grey, 16 bits or floating point")
     return [(number, "", page) for number, page in enumerate(pages)]
 
 
@@ -178,7 +178,7 @@ def _ascii(content: bytes, name: str) -> list[_Channel]:
             values.append([float(cell) for cell in cells])
         except ValueError:
             wrong = next(cell for cell in cells if not _is_number(cell)).strip()
-            why = f"{wrong[:40]!r} is not a number; lines that are no row begin with #"
+            why = f"{wrong[:40]!r} is not a number; comment lines must begin with #"
             raise Rejected([Problem(name, line, "", why)]) from None
         if len(values[-1]) != len(values[0]):
             why = f"{len(values[-1])} numbers where the first row has {len(values[0])}"

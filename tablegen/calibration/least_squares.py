@@ -80,7 +80,7 @@ def solve(
         max_nfev=200,
     )
     if not found.success or not np.all(np.isfinite(found.x)):
-        raise Unphysical("the fit does not settle; look at the data for gaps, steps and wrong units")
+        raise Unphysical("the fit does not converge; check the data for gaps, steps and wrong units")
     values, left = found.x, found.fun
     jac = np.asarray(found.jac)
     _, size, directions = np.linalg.svd(jac * scales, full_matrices=False)

@@ -97,7 +97,7 @@ def _shape(p: Floats) -> Floats:
 def _remarks(p: Floats, solution: Solution) -> list[str]:
     remarks = []
     if solution.freedom == 0:
-        remarks.append("three points fit exactly: nothing is left to tell errors from; measure at two more")
+        remarks.append("three points fit exactly, so errors cannot be estimated; measure at two more offsets")
     low, high = float(np.min(p)), float(np.max(p))
     for name, gap, volts in (("m_minus", low + 1.0, "0 V"), ("m_plus", 1.0 - high, "v_max")):
         if gap > 0.4:

@@ -294,7 +294,7 @@ def settle(model: PeriodicModel, start: Floats, free: Bools) -> FitState:
         damping = damping / 10.0 if damping > 1e-14 else 0.0
         if gained <= 1e-11 * state.cost or float(np.max(np.abs(step[: int(np.sum(free))]))) < 1e-11:
             return state
-    raise Unphysical("the fit does not settle; is this a periodic sample, and are the images those of one scan?")
+    raise Unphysical("the fit does not converge; is the sample periodic, and are the images from one scan?")
 
 
 def _products(

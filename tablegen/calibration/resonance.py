@@ -37,7 +37,7 @@ def fit_resonance(frequency_hz: Floats, gain: Floats, phase_deg: Floats | None =
         raise Unphysical(f"{len(np.unique(f))} frequencies do not determine a resonance; measure 20 or more around it")
     phase, remarks = None, []
     if phase_deg is None:
-        remarks.append("without phase_deg the delay is not determined; it is taken as 0")
+        remarks.append("without phase_deg the delay is not determined; delay_s is set to 0")
     else:
         phase = np.unwrap(np.radians(phase_deg[order]))
         turned = round(float(phase[0]) / pi)  # 180 degrees at low frequency: an inverting amplifier or sensor
@@ -61,7 +61,7 @@ def fit_resonance(frequency_hz: Floats, gain: Floats, phase_deg: Floats | None =
                 raise Unphysical(
                     f"the phase leads as by a delay of {delay.value:.3g} s; a lag has to be negative in phase_deg"
                 )
-            remarks.append("no delay can be seen; it is taken as 0")
+            remarks.append("no delay is measurable; delay_s is set to 0")
             delay = Estimate(0.0, delay.standard_error)
     for name in solution.undetermined:
         remarks.append(f"{name} is not determined by these points; measure more of them around the resonance")

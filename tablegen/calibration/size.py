@@ -46,7 +46,7 @@ def fit_size(
     if float(np.max(v)) > 1.0:
         raise Unphysical(f"a drive of {np.max(drive_v):g} V is above v_max = {v_max:g} V")
     if float(np.min(v)) <= 0.0:
-        raise Unphysical(f"a drive of {np.min(drive_v):g} V is no scan; drives are volts peak to peak")
+        raise Unphysical(f"a drive of {np.min(drive_v):g} V is not a scan; drives are in volts peak to peak")
     different = len(np.unique(np.round(v, 9)))
     if different < 2:
         raise Unphysical("one size does not determine k and beta; measure a second one, best three times as large")
@@ -175,7 +175,7 @@ def _unit(v: Floats, beta: float, threshold: float) -> Floats:
 def _remarks(solution: Solution, v: Floats, at_base: float, base_nm: float, actual_nm: Floats) -> list[str]:
     remarks = []
     if solution.freedom <= 0 or len(solution.residuals) == len(solution.names):
-        remarks.append("as many points as parameters fit exactly: nothing is left to tell errors from; measure more")
+        remarks.append("as many points as parameters fit exactly, so errors cannot be estimated; measure more points")
     if not float(np.min(v)) * 0.8 <= at_base <= float(np.max(v)) * 1.25:
         low, high = float(np.min(actual_nm)), float(np.max(actual_nm))
         remarks.append(

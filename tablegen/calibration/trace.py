@@ -67,7 +67,7 @@ def fit_trace(
         raise Unphysical(f"{periods:.3g} of a period are recorded; at least one whole period is needed")
     settle = settle_periods if settle_periods is not None else (1 if periods >= 2.99 else 0)
     if periods - settle < 0.99:
-        raise Unphysical(f"{periods:.3g} periods are recorded, and {settle} to settle leave no whole one")
+        raise Unphysical(f"{periods:.3g} periods are recorded, which leaves no whole period after {settle} to settle")
     used = (
         time_s >= time_s[0] + (settle - 0.5 / per_period) * triangle.period_s if settle else np.ones(len(time_s), bool)
     )

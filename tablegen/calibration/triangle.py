@@ -100,7 +100,7 @@ def _first_guess(time_s: Floats, drive_v: Floats) -> Triangle:
     rises, falls = ([s for s in sweeps if (s[1] > 0) == up] for up in (True, False))
     if not rises or not falls:
         raise Unphysical(
-            "the drive makes no whole sweep up and one down, each of eight samples or more; begin the record "
+            "the drive has no complete sweep up and down of eight samples each; begin the record "
             "at a turn, or record two periods"
         )
     rise, fall = (float(np.median([1.0 / abs(slope) for _, slope in side])) for side in (rises, falls))
@@ -108,7 +108,7 @@ def _first_guess(time_s: Floats, drive_v: Floats) -> Triangle:
     periods = [later[0] - earlier[0] for earlier, later in pairwise(same)]
     period = float(np.median(periods)) if periods else rise + fall
     if not 0.5 < period / (rise + fall) < 2.0:
-        raise Unphysical("the drive is no triangle or sawtooth: it rests, or its sweeps differ")
+        raise Unphysical("the drive is not a triangle or sawtooth: it rests, or its sweeps differ")
     turn = rise / (rise + fall)
     return Triangle(period, rises[0][0] - 0.5 * turn * period, turn, low, low + height, np.zeros((3, 3)), 0.0)
 

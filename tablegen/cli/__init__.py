@@ -117,7 +117,7 @@ def _run() -> int:
         return _reader_left() if sys.stdout is not stdout else int(end.code or 0)
     except OSError as error:
         sys.stdout = None
-        click.echo(f"cannot write what is printed: {error.strerror or error}", err=True)
+        click.echo(f"cannot write to stdout: {error.strerror or error}", err=True)
         return ExitStatus.CANNOT_WRITE
 
 

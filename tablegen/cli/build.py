@@ -12,6 +12,8 @@ from tablegen.cli.exit_status import ExitStatus
 if TYPE_CHECKING:
     from tablegen.api.build import Build
 
+_NAMES_SHOWN = 8
+
 
 @click.command(short_help="Write C, Verilog, tables and manifest of a scan.")
 @scan_argument
@@ -71,9 +73,9 @@ def build(
     `tablegen paths` prints the include files that run this command from make or CMake.
     """
     if depfile is None and depfile_target is not None:
-        raise click.UsageError("--depfile-target names the target of --depfile FILE; give that as well")
+        raise click.UsageError("--depfile-target needs --depfile FILE")
     if depfile is not None and only_check:
-        raise click.UsageError("--check writes nothing; leave out --depfile")
+        raise click.UsageError("--check cannot be used with --depfile")
     rule = Depfile(depfile, depfile_target or str(output / "manifest.json"), scan) if depfile is not None else None
     built = planned(scan, list(formats) or None)
     files = rendered(built)
@@ -82,12 +84,13 @@ def build(
         from tablegen.cli.difference import differences
 
         found = differences(output, files)
-        found += [f"{output / name}: an earlier build made it, this one does not" for name in outdated]
+        found += [f"{output / name}: left over from an earlier build" for name in outdated]
         found += [_leftover(output / name) for name in leftovers]
         if not found:
             return ExitStatus.OK
         click.echo("\n".join(found))
-        fail([f"{output} is stale; run: tablegen build {scan} -o {output}"], ExitStatus.STALE)
+        again = "".join(f" -f {name}" for name in formats)
+        fail([f"{output} is stale; run: tablegen build {scan} -o {output}{again}"], ExitStatus.STALE)
     if rule is not None:
         rule.note(built.setup.files, built.formats)
     changed = written(output, files, outdated)
@@ -101,14 +104,20 @@ def build(
         click.echo("\n".join(certificate_table(built.plan, built.certificates)))
         click.echo(f"\n{output}: {_state(built, changed)}")
         if outdated:
-            click.echo(f"{output}: removed what an earlier build had made: {', '.join(outdated)}")
+            click.echo(f"{output}: removed files of an earlier build: {_few(outdated)}")
     return ExitStatus.OK
+
+
+def _few(names: list[str]) -> str:
+    """Names with commas between; of many the first ones."""
+    more = [f"and {len(names) - _NAMES_SHOWN} more"] if len(names) > _NAMES_SHOWN else []
+    return ", ".join([*names[:_NAMES_SHOWN], *more])
 
 
 def _leftover(path: Path) -> str:
     if path.name.startswith("dac_"):
-        return f"{path}: is no file of this build, and dac_*{path.suffix} matches it; remove it"
-    return f"{path}: an earlier build made it, and it was edited since; remove it"
+        return f"{path}: is not a file of this build but matches dac_*{path.suffix}; remove it"
+    return f"{path}: left over from an earlier build, and edited since; remove it"
 
 
 def _state(built: "Build", changed: list[str]) -> str:

@@ -123,7 +123,7 @@ def within(table: "MeasuredTable", from_hz: float, to_hz: float) -> "MeasuredTab
 
     kept = (table[FREQUENCY] >= from_hz) & (table[FREQUENCY] <= to_hz)
     if not kept.any():
-        fail([f"{table.file}: no row lies from {from_hz:g} to {to_hz:g} Hz"], ExitStatus.WRONG_INPUT)
+        fail([f"{table.file}: no row is between {from_hz:g} and {to_hz:g} Hz"], ExitStatus.WRONG_INPUT)
     return replace(
         table, columns={name: values[kept] for name, values in table.columns.items()}, lines=table.lines[kept]
     )
@@ -151,7 +151,7 @@ def full_scale(common: Common) -> float:
             fail([f"{common.scanner}: v_max: {found:g} there, and --v-max {common.v_max:g}"], ExitStatus.WRONG_INPUT)
         return float(found)
     if values:
-        fail([f"{common.scanner}: v_max: missing, or no voltage"], ExitStatus.WRONG_INPUT)
+        fail([f"{common.scanner}: v_max: missing, or not a voltage"], ExitStatus.WRONG_INPUT)
     if common.v_max is None:
         raise click.UsageError("give --scanner FILE, or --v-max V, the driver's maximum output")
     return common.v_max

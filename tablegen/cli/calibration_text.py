@@ -43,7 +43,7 @@ def calibration_text(fit: Fit, axis: str, tables: Sequence[MeasuredTable | ScanI
     for row in fit.outliers:
         place = f"{tables[0].file}:{tables[0].lines[row]}" if isinstance(tables[0], MeasuredTable) else tables[0].file
         lines.append(
-            f"outlier: {place}: far from what the other points say; kept. Remove the row if it was measured wrongly"
+            f"outlier: {place}: far from the other points, but used. Remove the row if the measurement was wrong"
         )
     return lines + [f"note: {remark}" for remark in fit.remarks]
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from tablegen.link.prepare import PreparedScan
 
 Command = TypeVar("Command", bound=Callable[..., Any])
-INTERRUPTED = "interrupted; the device goes on as it was"
+INTERRUPTED = "interrupted; the device continues as before"
 _KEY_BYTES = range(16, 33)
 
 baud_option = click.option(
@@ -92,9 +92,9 @@ def _read_key(path: Path) -> bytes:
     except OSError as error:
         fail([f"{path}: cannot be read: {error.strerror or error}"], ExitStatus.WRONG_INPUT)
     except ValueError:  # what is no ASCII as well
-        fail([f"{path}: a key is 32 to 64 hexadecimal digits, and nothing else"], ExitStatus.WRONG_INPUT)
+        fail([f"{path}: the file must contain 32 to 64 hexadecimal digits and nothing else"], ExitStatus.WRONG_INPUT)
     if len(key) not in _KEY_BYTES:
-        fail([f"{path}: a key of {len(key)} bytes; devices have 16 to 32"], ExitStatus.WRONG_INPUT)
+        fail([f"{path}: the key has {len(key)} bytes; 16 to 32 are needed"], ExitStatus.WRONG_INPUT)
     return key
 
 

@@ -35,7 +35,7 @@ def park(port: str, baud: int, key_file: Path | None, wait: bool, timeout: float
         device.park()
         if wait:
             device.wait_for(DeviceState.PARKED, _PARK_WAIT_S if timeout is None else timeout)
-    click.echo("parked" if wait else "on its way to park")
+    click.echo("parked" if wait else "ramping to the park codes")
     return ExitStatus.OK
 
 
@@ -69,11 +69,14 @@ def trigger(port: str, baud: int, key_file: Path | None, frames: int) -> int:
     with connected(port, baud, key_file) as device:
         before = device.status()
         if before.state == DeviceState.NO_PROGRAM:
-            fail(["the device has no scan yet; `tablegen upload` brings one"], ExitStatus.REFUSED)
+            fail(["the device has no scan yet; send one with `tablegen upload`"], ExitStatus.REFUSED)
         if before.state == DeviceState.PLAYING:
             if frames:
-                fail(["it plays already, and would not count frames; `tablegen park --wait` first"], ExitStatus.REFUSED)
-            click.echo(f"plays already, line {before.line}")
+                fail(
+                    ["the device already plays, so --frames would have no effect; run `tablegen park --wait` first"],
+                    ExitStatus.REFUSED,
+                )
+            click.echo(f"already playing, line {before.line}")
             return ExitStatus.OK
         device.arm(frames)
         device.trigger()
@@ -81,8 +84,8 @@ def trigger(port: str, baud: int, key_file: Path | None, frames: int) -> int:
             device.wait_for(DeviceState.PLAYING, _START_WAIT_S)
         except OutOfTime:
             if not frames:
-                fail(["triggered, but it does not play; `tablegen status` tells what it does"], ExitStatus.REFUSED)
-            click.echo(f"triggered; {_frames(frames)} over, or it did not start: `tablegen status` tells")
+                fail(["triggered, but the device does not play; see `tablegen status`"], ExitStatus.REFUSED)
+            click.echo(f"triggered; {_frames(frames)} over, or the scan did not start: see `tablegen status`")
             return ExitStatus.OK
     click.echo(f"plays {_frames(frames)}" if frames else "plays until it is parked")
     return ExitStatus.OK
@@ -109,5 +112,5 @@ def clear(port: str, baud: int, key_file: Path | None) -> int:
     """
     with connected(port, baud, key_file) as device:
         device.clear()
-    click.echo("faults forgotten")
+    click.echo("faults cleared")
     return ExitStatus.OK

@@ -31,7 +31,7 @@ class Depfile:
         self._prerequisites = [*read, *deciding_files(formats)]
         for name in (self._target, *map(str, self._prerequisites)):
             if "\n" in name or "\t" in name:
-                why = "no dependency file can name a path with a line end or a tab; rename it"
+                why = "a dependency file cannot contain a path with a line end or a tab; rename it"
                 fail([f"{name!r}: {why}"], ExitStatus.WRONG_INPUT)
 
     def write(self) -> None:
@@ -44,7 +44,9 @@ class Depfile:
         ahead_ns = times[newest] - _changed_ns(self._path)
         if ahead_ns > 0:  # whatever depends on it is out of date when it is built: make would not end
             self._path.unlink()
-            why = f"was changed {ahead_ns * 1e-9:.1f} s from now by its time; set the clock right, or touch it"
+            why = (
+                f"was changed {ahead_ns * 1e-9:.1f} s in the future by its time stamp; set the clock, or touch the file"
+            )
             fail([f"{newest}: {why}"], ExitStatus.WRONG_INPUT)
         os.utime(self._path, ns=(self._started_ns, self._started_ns))
 
@@ -60,9 +62,9 @@ def _changed_ns(path: Path) -> int:
 def _remove(path: Path, scan: Path) -> None:
     try:
         if not stat.S_ISREG(path.lstat().st_mode):
-            fail([f"{path}: is no regular file; --depfile needs a file of its own"], ExitStatus.WRONG_INPUT)
+            fail([f"{path}: is not a regular file; --depfile needs its own file"], ExitStatus.WRONG_INPUT)
         if scan.exists() and path.samefile(scan):
-            fail([f"{path}: is the scan; --depfile needs a file of its own"], ExitStatus.WRONG_INPUT)
+            fail([f"{path}: is the scan file; --depfile needs its own file"], ExitStatus.WRONG_INPUT)
         path.unlink()
     except FileNotFoundError:
         pass

@@ -95,35 +95,35 @@ def _rows(info: "DeviceInfo", limits: "tuple[AxisLimits, AxisLimits]", status: "
     from tablegen.link.messages import DeviceState, Feature, Upload
 
     state = {
-        DeviceState.NO_PROGRAM: "no scan yet; `tablegen upload` brings one",
-        DeviceState.PARKED: "parked; `tablegen trigger` starts the scan",
-        DeviceState.PARKING: "on its way to park",
+        DeviceState.NO_PROGRAM: "no scan yet; send one with `tablegen upload`",
+        DeviceState.PARKED: "parked; start the scan with `tablegen trigger`",
+        DeviceState.PARKING: "ramping to the park codes",
         DeviceState.PLAYING: f"playing, line {status.line}",
     }[status.state]
-    scan = status.hash.hex()[:12] if any(status.hash) else "not known by its hash"
+    scan = status.hash.hex()[:12] if any(status.hash) else "hash unknown"
     upload = {
-        Upload.NONE: "none in hand",
-        Upload.RECEIVING: f"{status.received} bytes in hand; the same upload goes on from there",
+        Upload.NONE: "none in progress",
+        Upload.RECEIVING: f"{status.received} bytes received; repeat the upload to continue",
         Upload.CHECKING: "being checked",
         Upload.WAITING: "complete, waiting for the start of a line",
     }[status.upload]
     counts = [f"{name} {count}" for name, count in zip(_FAULTS, status.fault_counts, strict=True) if count]
-    faults = f"{', '.join(counts)}; `tablegen clear` forgets them" if counts or status.faults else "none"
+    faults = f"{', '.join(counts)}; clear with `tablegen clear`" if counts or status.faults else "none"
     rows = [("state", state), ("scan", f"{scan}, generation {status.generation}"), ("upload", upload)]
     rows.append(("faults", faults))
     if Feature.INTERLOCK in info.features:
-        rows.append(("interlock", "closed" if status.permits else "open: no upload comes into force"))
-    rate = f"{info.update_rate_hz} ticks a second" if info.update_rate_hz else "rate not known"
+        rows.append(("interlock", "closed" if status.permits else "open: no upload can become active"))
+    rate = f"{info.update_rate_hz} ticks/s" if info.update_rate_hz else "rate unknown"
     takes = [*(["tables"] if Feature.TABLES in info.features else [])]
     takes += [f"Fourier words of {info.harmonics} harmonics"] if Feature.FOURIER in info.features else []
     key = ", has a key" if Feature.KEY in info.features else ""
-    rows.append(("device", f"{rate}, takes {' and '.join(takes)}, {info.image_bytes} bytes{key}"))
+    rows.append(("device", f"{rate}, accepts {' and '.join(takes)}, {info.image_bytes} bytes{key}"))
     for name, shape, limit in (("x", info.x, limits[0]), ("y", info.y, limits[1])):
         rows.append(
             (
                 name,
                 f"2^{shape.index_bits} words of {shape.word_bits} bits, codes {limit.code_min}..{limit.code_max} of "
-                f"{shape.dac_bits} bits, steps to {limit.max_step}, jumps to {limit.max_jump}",
+                f"{shape.dac_bits} bits, steps up to {limit.max_step}, jumps up to {limit.max_jump}",
             )
         )
     rows.append(("line", f"{status.bad_frames} bad frames since start {status.boot}"))

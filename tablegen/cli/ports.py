@@ -35,7 +35,7 @@ def ports(as_json: bool) -> int:
         click.echo(f"{port.device:<{width}}  {told}".rstrip())
     if not found:
         fail(
-            ["this machine has no serial port; is the cable in? URLs like socket://host:port work as well"],
+            ["this machine has no serial port; is the cable connected? URLs like socket://host:port work as well"],
             ExitStatus.NO_PORT,
         )
     return ExitStatus.OK

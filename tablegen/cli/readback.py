@@ -40,7 +40,7 @@ def readback(
     10 link lost or timeout.
     """
     if source is None and output is None:
-        raise click.UsageError("name a scan or a build to compare with, or a file to write (-o FILE)")
+        raise click.UsageError("give a scan or a build to compare with, or a file to write (-o FILE)")
     scan = None if source is None else read_scan(source)
     with connected(port, baud, key_file) as device:
         image = device.readback(timeout_s=timeout)
@@ -53,6 +53,6 @@ def readback(
         found = differences(scan, image)
         if found:
             more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
-            fail([f"the device does not play {scan.name}: {found[0]}{more}"], ExitStatus.MISMATCH)
-        click.echo(f"the device plays {scan.name} {scan.digest[:12]}: {len(image)} bytes, all the same")
+            fail([f"the device plays a different scan than {scan.name}: {found[0]}{more}"], ExitStatus.MISMATCH)
+        click.echo(f"the device plays {scan.name} {scan.digest[:12]}: {len(image)} bytes, all equal")
     return ExitStatus.OK

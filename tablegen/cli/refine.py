@@ -176,7 +176,7 @@ def _learnt_before(scan: Path, axis: str, found: "Round", source: "Source", text
 
     if found.line.layer is None or not any(source.sha256 in row for row in rounds_of(text, str(scan), axis)):
         return ""
-    return f"[{axis}.refinement] was learnt from this trace already; build, upload and record again"
+    return f"[{axis}.refinement] was already learnt from this trace; build, upload and record again"
 
 
 def _read(trace: Path, triggered: bool) -> "MeasuredTable":
@@ -186,7 +186,7 @@ def _read(trace: Path, triggered: bool) -> "MeasuredTable":
 
     table = read_table(trace, [TIME, DISPLACEMENT], [DRIVE])
     if DRIVE not in table and not triggered:
-        why = "missing; or say --triggered where time 0 is a line start"
+        why = "missing; or give --triggered if time 0 is a line start"
         raise Rejected([Problem(table.file, int(table.lines[0]) - 1, DRIVE.name, why)])
     return table
 
@@ -199,7 +199,7 @@ def _write(scan: Path, axis: str, found: "Round", source: "Source", text: str, q
     from tablegen.refinement.scan_file import with_layer
 
     if found.refinement is None or not found.lesson.harmonics:
-        click.echo(f"{scan}: left as it is", err=quiet)
+        click.echo(f"{scan}: not changed", err=quiet)
         return
     values = msgspec.json.decode(msgspec.json.encode(found.refinement))  # as a file has it
     try:
@@ -208,4 +208,4 @@ def _write(scan: Path, axis: str, found: "Round", source: "Source", text: str, q
     except Rejected as rejected:
         fail(rejected.problems, ExitStatus.WRONG_INPUT)
     written(path.parent, {path.name: content})
-    click.echo(f"{scan}: {axis}.refinement written; build it, play it, and record it again", err=quiet)
+    click.echo(f"{scan}: {axis}.refinement written; build, upload and record again", err=quiet)

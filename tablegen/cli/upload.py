@@ -97,10 +97,10 @@ def upload(
     def interrupted() -> str:
         bar.close()
         if not told[0]:
-            return "interrupted; the device goes on with its old scan"
+            return "interrupted; the device continues with its old scan"
         return (
-            f"interrupted; the device plays its old scan and keeps {told[0]} bytes: the same command goes on from "
-            "there (`tablegen status` tells; a complete upload may still come into force)"
+            f"interrupted; the device plays its old scan and keeps {told[0]} bytes: run the same command to continue "
+            "the upload (see `tablegen status`; a complete upload may still become active)"
         )
 
     from tablegen.link.messages import DeviceState
@@ -119,7 +119,7 @@ def upload(
             bar.close()
         click.echo(_summary(scan, image, result))
         if device.hello.state == DeviceState.PARKED:
-            click.echo("it is parked; `tablegen trigger` starts it")
+            click.echo("the device is parked; start the scan with `tablegen trigger`")
     return ExitStatus.OK
 
 
@@ -145,9 +145,9 @@ def _sizes(scan: "PreparedScan", baud: int) -> list[str]:
 def _verdict(device: "Device", image: "ProgramImage") -> str:
     status = device.hello
     if status.hash == image.info.hash:
-        return "\nthe device has it in force already"
-    text = f"\nthe device would take it: {len(image.data)} bytes as {_form(image)}"
-    return text if status.permits else f"{text}, but its interlock is open: no upload comes into force"
+        return "\nthe scan is already active on the device"
+    text = f"\nthe device would accept the scan: {len(image.data)} bytes as {_form(image)}"
+    return text if status.permits else f"{text}, but its interlock is open: no upload can become active"
 
 
 def _form(image: "ProgramImage") -> str:
@@ -160,8 +160,8 @@ def _form(image: "ProgramImage") -> str:
 def _summary(scan: "PreparedScan", image: "ProgramImage", result: "UploadResult") -> str:
     name = f"{scan.name} {scan.digest[:_HASH_DIGITS]}"
     if result.already_running:
-        return f"{name} is in force already, generation {result.generation}: nothing sent (--force sends it again)"
-    text = f"{name} in force, generation {result.generation}"
+        return f"{name} is already active, generation {result.generation}: nothing sent (--force sends it again)"
+    text = f"{name} is active, generation {result.generation}"
     if result.line is not None:
         text += f", after line {result.line} of the old scan"
     rate = (
@@ -169,7 +169,7 @@ def _summary(scan: "PreparedScan", image: "ProgramImage", result: "UploadResult"
     )
     text += f"\n{result.bytes} bytes as {_form(image)} in {result.seconds:.2f} s{rate}"
     if result.resumed:
-        text += f", of which the device had {result.resumed} already"
+        text += f"; the device already had {result.resumed} bytes"
     if result.retransmissions:
-        text += f"; {result.retransmissions} frames sent again"
+        text += f"; {result.retransmissions} frames retransmitted"
     return text

@@ -61,7 +61,7 @@ class _Decoder:
                 if value in kind.values and isinstance(value, str):
                     return value
                 accepted = ", ".join(map(repr, kind.values))
-                return self._wrong(key, f"{_shown(value)} is none of {accepted}")
+                return self._wrong(key, f"{_shown(value)} is not one of {accepted}")
             case types.BoolType():
                 return value if isinstance(value, bool) else self._wrong(key, f"{_shown(value)} is not true or false")
         raise NotImplementedError(kind)  # pragma: no cover - a type that the schema does not use

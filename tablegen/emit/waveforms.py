@@ -39,8 +39,8 @@ def require_short_frame(content: Content) -> None:
     ticks = content.schedule.frame_ticks
     if ticks > MOST_TICKS:
         raise Unphysical(
-            f"a frame of {ticks} ticks is {ticks / MOST_TICKS:.3g} times too long for a file of its samples, which "
-            f"has at most {MOST_TICKS}; a lower dac.update_rate_hz, fewer timing.lines or a higher timing.line_rate_hz "
+            f"a frame of {ticks} ticks is {ticks - MOST_TICKS} ticks too long for a file of its samples, which has at "
+            f"most {MOST_TICKS}; a lower dac.update_rate_hz, fewer timing.lines or a higher timing.line_rate_hz "
             "would fit, and formats of tables have no such limit"
         )
 

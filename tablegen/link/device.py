@@ -145,7 +145,7 @@ class Device:
         if playing.hash not in (image.info.hash, _NO_HASH):
             raise NotPlaying(
                 f"the device took the upload, and plays {playing.hash.hex()[:12]} instead of "
-                f"{image.info.hash.hex()[:12]}; did another program upload as well, or was it reset?"
+                f"{image.info.hash.hex()[:12]}; did another program upload too, or was the device reset?"
             )
         return result
 
@@ -173,7 +173,7 @@ class Device:
             after = self.status()
             if (before.boot, before.generation) == (after.boot, after.generation):
                 return image
-        raise OutOfTime("the scan changes while it is read; does another program upload?")
+        raise OutOfTime("the scan changed while it was read; is another program uploading?")
 
     def park(self) -> None:
         """End the scan: ramp to the park codes, and hold them. ``wait_for(State.PARKED)`` waits for that."""
@@ -182,7 +182,7 @@ class Device:
     def arm(self, frames: int = 0) -> None:
         """Let the next trigger play so many frames; 0 is without end."""
         if not 0 <= frames < 1 << 32:
-            raise ValueError(f"{frames} frames; 0 (without end) to 2^32 - 1")
+            raise ValueError(f"{frames} frames; 0 (endless) to 2^32 - 1")
         self._act(Request.ARM, frames.to_bytes(4, "little"))
 
     def trigger(self) -> None:

@@ -54,7 +54,7 @@ def differences(scan: PreparedScan, image: bytes) -> list[Difference]:
                 found.append(Difference(f"{axis}: {what} word {index}", at + size * index, word, other))
         at += size * len(words)
     if len(image) > at:
-        found.append(Difference("what follows the last word", at, 0, len(image) - at))
+        found.append(Difference("after the last word", at, 0, len(image) - at))
     return found
 
 

@@ -61,4 +61,4 @@ class NotUnderstood(LinkError):
     """The device answers, but not as docs/protocol.md has it."""
 
     def __init__(self, what: str) -> None:
-        super().__init__(f"the device gives an answer that makes no sense: {what}; do tablegen and firmware fit?")
+        super().__init__(f"the device sent an invalid answer: {what}; do the versions of tablegen and firmware match?")

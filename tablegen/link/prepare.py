@@ -67,7 +67,7 @@ class PreparedScan:
         """
         if form == "fourier" and (direct := [name for name, axis, _ in self.axes if axis.mode == "direct"]):
             raise Unsuitable(
-                [f"{name}: a direct table cannot be rendered from Fourier words; --as table" for name in direct]
+                [f"{name}: a direct table cannot be computed from Fourier words; use --as table" for name in direct]
             )
         chosen = [
             words if form == "fourier" or (form == "auto" and _rendered(axis, words, info)) else None
@@ -120,17 +120,17 @@ def _device(image: ProgramImage, info: DeviceInfo, scan: PreparedScan) -> list[s
     found = []
     harmonics = harmonics_of(image.data)
     if any(harmonics) and not info.features & Feature.FOURIER:
-        found.append("the device renders no Fourier words; upload --as table")
+        found.append("the device does not support Fourier words; upload --as table")
     elif max(harmonics) > info.harmonics:
         found.append(
-            f"{max(harmonics)} harmonics; the device renders at most {info.harmonics}: lower band_limit.harmonics, or "
+            f"{max(harmonics)} harmonics; the device supports at most {info.harmonics}: lower band_limit.harmonics, or "
             "upload --as table"
         )
     if not all(harmonics) and not info.features & Feature.TABLES:
-        found.append("the device takes no tables; upload --as fourier")
+        found.append("the device does not support tables; upload --as fourier")
     if len(image.data) > info.image_bytes:
         found.append(
-            f"{len(image.data)} bytes; the device takes {info.image_bytes}: upload --as fourier, or make the tables "
+            f"{len(image.data)} bytes; the device accepts {info.image_bytes}: upload --as fourier, or make the tables "
             "shorter"
         )
     return found
@@ -141,7 +141,7 @@ def _rate(scan: PreparedScan, info: DeviceInfo) -> list[str]:
     if not info.update_rate_hz or abs(wanted - info.update_rate_hz) <= _RATE_TOLERANCE_HZ:
         return []
     return [
-        f"built for {wanted:g} ticks a second; the device makes {info.update_rate_hz}: every line would take "
+        f"built for {wanted:g} ticks a second; the device runs at {info.update_rate_hz}: each line would take "
         f"{wanted / info.update_rate_hz:.4g} times as long; set dac.update_rate_hz, or allow it with --any-rate"
     ]
 

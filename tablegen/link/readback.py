@@ -51,7 +51,7 @@ def _some(session: LinkSession, wanted: range, deadline: float) -> dict[int, byt
         if at in found:
             continue
         if session.now() >= deadline:
-            raise OutOfTime("out of time: reading back takes as long as an upload; allow more (--timeout)")
+            raise OutOfTime("timeout: reading back takes as long as an upload; increase --timeout")
         payload = session.ask(Request.READBACK, _REQUEST.pack(at, DATA_BYTES), 4 + DATA_BYTES, deadline)
         found[at] = _piece(payload, at)
     return found

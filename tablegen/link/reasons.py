@@ -15,26 +15,25 @@ Limits = tuple[AxisLimits, AxisLimits]
 
 # Of these `detail` is an axis, and where there is one 2 times the index of a word.
 _AXIS_REASONS = {
-    Reason.SHAPE: "its table is longer than the device's, or of other widths; build for this device",
-    Reason.PERIOD: "its period, phase step and remainder do not belong together; build it again",
-    Reason.OUTPUT: "gain, offset, code limits or max_step are out of order or range; build it again",
-    Reason.FOURIER: "its Fourier words sum to 4.0 or more, beyond what a device adds up; upload --as table",
+    Reason.SHAPE: "its table is too long for the device, or its words have a different width; build for this device",
+    Reason.PERIOD: "its period, phase step and remainder do not match; build it again",
+    Reason.OUTPUT: "gain, offset, code limits or max_step are out of range or order; build it again",
+    Reason.FOURIER: "its Fourier words sum to 4.0 or more, too much for the device; upload --as table",
 }
 _MESSAGES = {
-    Reason.TYPE: "the device does not know this request; its firmware is older, or made without it",
-    Reason.PAYLOAD: "the device finds its length or a value in it wrong; do versions of tablegen and firmware fit?",
-    Reason.SESSION: "the device has been reset, or another program talks to it; try again",
-    Reason.OLD: "a later request has overtaken it; try again",
-    Reason.BUSY: "a program is being checked or waits for its line; try again when it has come into force",
-    Reason.UPLOAD: "the device has no upload of this image in hand; upload again",
+    Reason.TYPE: "the device does not know this request; its firmware is older, or was built without it",
+    Reason.PAYLOAD: "the device reports a wrong length or value; do the versions of tablegen and firmware match?",
+    Reason.SESSION: "the device was reset, or another program uses it; try again",
+    Reason.OLD: "a later request has replaced it; try again",
+    Reason.BUSY: "a program is being checked or waits for a line start; try again when it is active",
+    Reason.UPLOAD: "the device has no upload of this image in progress; upload again",
     Reason.INTERLOCK: "the interlock input is open; close it and try again",
-    Reason.IMAGE: "the memory of the device does not hold what was sent; upload again, and if it comes back distrust "
-    "its memory",
+    Reason.IMAGE: "the memory of the device does not contain what was sent; upload again. If it happens again, the "
+    "memory may be faulty",
     Reason.SCHEDULE: "line_ticks, frame_lines or a window of the schedule are out of range; build it again",
     Reason.WITHDRAWN: "it was withdrawn, by an ABORT or a reset of the sequencer; upload again",
-    Reason.READBACK: "there is nothing that could be read: the scan came with the firmware, or a later upload uses "
-    "its memory",
-    Reason.TICKS: "nobody asks the sequencer for samples; does the timer of the device run?",
+    Reason.READBACK: "there is nothing to read: the scan came with the firmware, or a later upload uses its memory",
+    Reason.TICKS: "no samples are requested from the sequencer; does the timer of the device run?",
 }
 
 
@@ -81,7 +80,7 @@ def explain(
 
 
 def _key(detail: int, info: DeviceInfo | None) -> str:
-    return "its tag is missing or wrong; give the key of this device (--key-file FILE)"
+    return "the tag is missing or wrong; give the key of this device (--key-file FILE)"
 
 
 def _version(detail: int, info: DeviceInfo | None) -> str:
@@ -91,22 +90,22 @@ def _version(detail: int, info: DeviceInfo | None) -> str:
 def _length(detail: int, info: DeviceInfo | None) -> str:
     most = info.image_bytes if info is not None else None
     if detail == most:
-        return f"the device takes images of at most {detail} bytes; upload --as fourier, or make the tables shorter"
-    return f"the image is not as long as it says: it should have {detail} bytes, or at most that; build it again"
+        return f"the device accepts images of at most {detail} bytes; upload --as fourier, or make the tables shorter"
+    return f"the length of the image is wrong: it should have {detail} bytes, or at most that; build it again"
 
 
 def _harmonics(detail: int, info: DeviceInfo | None) -> str:
     if not detail:
-        return "the device renders no Fourier words; upload --as table"
-    return f"the device renders at most {detail} harmonics; lower band_limit.harmonics, or upload --as table"
+        return "the device does not support Fourier words; upload --as table"
+    return f"the device supports at most {detail} harmonics; lower band_limit.harmonics, or upload --as table"
 
 
 def _incomplete(detail: int, info: DeviceInfo | None) -> str:
-    return f"the device has received {detail} bytes only; upload again, it goes on from there"
+    return f"the device has received {detail} bytes only; repeat the upload to continue"
 
 
 def _other(detail: int, info: DeviceInfo | None) -> str:
-    return f"its sequencer refused the program for a reason of its own ({detail}); build for this device"
+    return f"its sequencer refused the program for an internal reason ({detail}); build for this device"
 
 
 _SENTENCES: dict[Reason, Callable[[int, DeviceInfo | None], str]] = {

@@ -93,7 +93,7 @@ class LinkSession:
                 self._hello_patiently(deadline)
                 return
             except (NoPort, LinkLost) as error:
-                why = LinkLost(f"the link is lost, and does not come back: {error}")
+                why = LinkLost(f"the link is lost: {error}")
 
     def _hello_patiently(self, deadline: float) -> None:
         """Some devices start anew when their port is opened; to open it again would not help them."""
@@ -168,16 +168,16 @@ class LinkSession:
 
     def contested(self) -> LinkError:
         """The error where sessions do not last."""
-        return LinkLost("another program talks to the device, or it is reset again and again; close the other one")
+        return LinkLost("another program uses the device, or the device resets repeatedly; close the other program")
 
     def silent(self) -> LinkError:
         """The error where nobody answers."""
         if self._heard:
-            return Silent("the device does not answer any more; is it still on?")
+            return Silent("the device no longer answers; is it still on?")
         if self.exchange.noise:
-            why = "what comes are no frames of it: is --baud that of the device?"
+            why = "the received bytes are not frames of the device: is --baud the rate of the device?"
         else:
-            why = "is it on, is its firmware made with the link, do port and --baud fit, are TX and RX crossed?"
+            why = "is it on, does its firmware include the link, are port and --baud right, are TX and RX crossed?"
         return NoAnswer(f"the port is open, but no device answers: {why}")
 
     def _repeat(self, kind: Request, number: int | None, payload: bytes, answer_bytes: int, deadline: float) -> bytes:

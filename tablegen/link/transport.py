@@ -66,12 +66,12 @@ def _why_not(url: str, error: Exception) -> str:
     if number == errno.ENOENT or "FileNotFoundError" in why:
         why = "there is no such port"
     elif number == errno.EACCES or "PermissionError" in why:
-        why, remedy = "you may not", "is another program using it, or your user not in its group (dialout)?"
+        why, remedy = "you may not", "is another program using it, or is your user not in its group (dialout)?"
     elif number in (errno.EAGAIN, errno.EBUSY):
         why, remedy = "another program has it open", "close that one first"
     elif "://" in url:
         why = why.rpartition("] ")[2] or why
-        remedy = "is the other end listening, and the URL one of pyserial's?"
+        remedy = "is the other end listening, and is this a URL that pyserial supports?"
     return f"{url}: cannot be opened: {why}; {remedy}"
 
 
@@ -113,4 +113,4 @@ class SerialTransport:
         return time.monotonic()
 
     def _lost(self, error: Exception) -> LinkLost:
-        return LinkLost(f"{self._name}: the port has gone: {error}; is the cable in, and the device on?")
+        return LinkLost(f"{self._name}: the port disappeared: {error}; is the cable connected, and the device on?")

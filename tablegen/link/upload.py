@@ -391,9 +391,10 @@ class Uploader:
 
     def _out_of_time(self) -> OutOfTime:
         if self._commit is not None:
-            what = "the device has everything, but has not come to the start of a line; `tablegen status` tells"
+            what = "the device has received everything, but has not reached the start of a line; see `tablegen status`"
         elif self._busy:
             what = "the device is busy with another upload; try again later"
         else:
-            what = f"the device has {self._confirmed} of {len(self._image.data)} bytes and keeps them: upload again"
-        return OutOfTime(f"out of time: {what}, or allow more (--timeout)")
+            have = f"{self._confirmed} of {len(self._image.data)} bytes"
+            what = f"the device has {have} and keeps them: repeat the upload to continue"
+        return OutOfTime(f"timeout: {what}, or increase --timeout")

@@ -100,7 +100,7 @@ def departure(line: LinePlan, measured: Displacement, share: Floats | None = Non
     found = _straightened(points, measured.series.value(points.times), 1.0)
     if not abs(found.size_nm) > 0.0 or found.rms_percent > 100.0 * _MAX_DEPARTURE:
         raise Unphysical(
-            f"the displacement is {found.rms_percent:.3g} % of the line off what this scan asks; is it another axis, "
+            f"the displacement is {found.rms_percent:.3g} % of the line away from this scan; is it another axis, "
             f"or is time 0 no line start?"
         )
     return found

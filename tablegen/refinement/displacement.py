@@ -48,7 +48,9 @@ def fit_displacement(
     settle = settle_periods if settle_periods is not None else (1 if periods >= 2.99 else 0)
     periods -= settle
     if periods < 0.99:
-        raise Unphysical(f"{periods + settle:.3g} periods are recorded, and {settle} to settle leave no whole one")
+        raise Unphysical(
+            f"{periods + settle:.3g} periods are recorded, which leaves no whole period after {settle} to settle"
+        )
     used = turns >= turns[0] + settle - 0.5 / per_turn if settle else np.ones(len(turns), bool)
     if order is None:
         order = int(np.searchsorted([1.99, 3.99, 5.99], periods, side="right"))

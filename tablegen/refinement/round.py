@@ -155,24 +155,24 @@ def _remarks(line: LinePlan, measured: Displacement, lesson: Lesson, phase: Phas
         )
     if lesson.before.size_nm < 0.0:
         doubt = "; if the sensor counts upwards, time 0 is where the line turns, and this is not to be learnt"
-        turned = "the displacement falls where the drive rises; its sign was turned"
+        turned = "the displacement falls where the drive rises; its sign was inverted"
         found.append(turned + (doubt if phase.drive is None else ""))
     if measured.stray is not None:
         at = float(time_s[measured.stray])
-        found.append(f"the reading at {at:.9g} s is far off the others; without such there is less noise")
+        found.append(f"the reading at {at:.9g} s is far off the others; it adds noise")
     if lesson.harmonics == 0:
-        found.append("nothing stands out of the sensor's noise: there is nothing more to learn from such a trace")
+        found.append("the error is within the noise of the sensor: there is nothing more to learn from this trace")
     elif lesson.after.rms_percent > _FINISHED_RATIO * lesson.before.rms_percent:
-        found.append("most of what is left is noise: record more periods, or leave it at that")
+        found.append("most of the remaining error is noise: record more periods, or stop refining")
     if measured.correlated > 3.0:
         found.append(
-            f"residuals are alike over {measured.correlated:.0f} samples: a part is no noise but drift, hum or what "
-            f"the harmonics leave; errors were widened by {measured.correlated**0.5:.2g}"
+            f"residuals are correlated over {measured.correlated:.0f} samples: besides noise, they contain drift, hum "
+            f"or what the harmonics leave; standard errors were widened by {measured.correlated**0.5:.2g}"
         )
     if measured.periods < 1.99:
-        found.append("drift cannot be told from a single period; record several")
+        found.append("drift cannot be determined from a single period; record several")
     if phase.drive is None:
-        found.append("without drive_v nothing says that the trace is of this build")
+        found.append("without drive_v it is not checked that the trace belongs to this build")
     return tuple(found)
 
 

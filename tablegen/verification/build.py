@@ -74,8 +74,8 @@ def verify_build(folder: Path, work: Path, target: Target, most_ticks: int, seed
     if target.format_name is not None and target.format_name not in stored.formats:
         formats = ", ".join(stored.formats)
         raise NotABuild(
-            f"{folder}: holds no {target.format_name}, its formats are {formats}; "
-            f"verify another --target, or build it with --format {target.format_name}"
+            f"{folder}: this build has the formats {formats}, and no {target.format_name}; "
+            f"verify it with another --target, or build it with --format {target.format_name}"
         )
     target.refuse(folder, stored)
     target.require()
@@ -94,7 +94,7 @@ def _file_checks(folder: Path, stored: StoredBuild) -> list[Check]:
     manifest = stored.manifest
     hashed = None
     if stored.own_hash != manifest.hash:
-        hashed = "manifest: edited: the hash of its plan is another than it says; build it again"
+        hashed = "manifest: edited: its plan does not match its hash; build it again"
     wrong = wrong_files(folder, stored)
     return [
         Check("manifest", "its own hash", "1 plan", failure=hashed),
@@ -109,7 +109,7 @@ def _format_checks(folder: Path, stored: StoredBuild, notes: list[str]) -> list[
         try:
             found = get(name).check(folder, content)
         except UnknownFormat as error:
-            notes.append(f"{error}; its files were held against their SHA-256 alone")
+            notes.append(f"{error}; only the SHA-256 of its files was checked")
             continue
         except Unphysical as error:  # no build has such a manifest
             found = [Comparison("files", "0 files", [str(error)])]
@@ -131,7 +131,7 @@ def _coverage(stored: StoredBuild, session: BuildSession) -> list[str]:
         ticks = stored.program.schedule.frame_ticks
         notes.append(f"not a whole frame of {ticks} ticks was played; --ticks {needed} plays one")
     if not session.swapped_in_frame:
-        notes.append(f"no line ended in time for a swap in mid-frame; --ticks {needed} has one")
+        notes.append(f"too few ticks for a program change within a frame; --ticks {needed} has one")
     return notes
 
 

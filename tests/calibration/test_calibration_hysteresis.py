@@ -122,7 +122,7 @@ def test_residuals_that_are_no_noise_widen_the_errors() -> None:
     assert bent.correlated > 5.0
     assert bent.forward.beta.standard_error > 10.0 * clean.forward.beta.standard_error
     fit = fit_hysteresis([crooked], V_MAX)
-    assert any("residuals are alike over" in remark for remark in fit.remarks)
+    assert any("residuals are correlated over" in remark for remark in fit.remarks)
 
 
 def test_errors_of_a_slow_sensor_are_honest() -> None:

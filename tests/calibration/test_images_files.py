@@ -126,7 +126,7 @@ def test_channels_by_title_and_by_number(tmp_path: Path) -> None:
     ("name", "content", "said"),
     [
         ("a.npy", b"", "is empty"),
-        ("a.jpg", b"x", ".jpg is none of .npy, .tif, .tiff, .png, .gwy, .txt"),
+        ("a.jpg", b"x", ".jpg is not one of .npy, .tif, .tiff, .png, .gwy, .txt"),
         ("a", b"x", "no ending is none of"),
         ("a.npy", npy(HEIGHTS)[:-9], "is no whole .npy file of numbers"),
         ("a.npy", b"\x93NUMPY\x01\x00\xff\xff" + b"{" * 100, "is no whole .npy file of numbers"),
@@ -140,7 +140,7 @@ def test_channels_by_title_and_by_number(tmp_path: Path) -> None:
         ("a.tif", b"II*\x00" + bytes(3), "is no TIFF file that can be read"),
         ("a.tif", b"hello" * 20, "is no TIFF file that can be read"),
         ("a.gwy", b"hello" * 20, "does not begin as a Gwyddion file does"),
-        ("a.gwy", b"GWYP" + b"GwyContainer\0" + struct.pack("<I", 0), "has no image in it"),
+        ("a.gwy", b"GWYP" + b"GwyContainer\0" + struct.pack("<I", 0), "contains no image"),
         ("a.gwy", b"GWYP" + b"GwyContainer\0" + struct.pack("<I", 99), "ends in the middle of an object"),
         ("a.gwy", b"GWYP" + b"GwyContainer\0" + struct.pack("<I", 3) + b"a\0z", "has a component of the unknown type"),
         ("a.txt", b"# nothing\n\n", "has no numbers"),

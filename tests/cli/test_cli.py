@@ -490,7 +490,7 @@ def test_a_full_disk_behind_stdout_is_told(scan: Path, command: str) -> None:
     with open("/dev/full", "wb") as full:
         done = tablegen(*arguments[command], stdout=full)
     assert done.returncode == 4
-    assert done.stderr == b"cannot write what is printed: No space left on device\n"
+    assert done.stderr == b"cannot write to stdout: No space left on device\n"
 
 
 @pytest.mark.parametrize("command", ["show", "check"])

@@ -143,7 +143,7 @@ def test_a_mirrored_retrace_and_a_window(lab: Path) -> None:
         (["--pair", "x", "t100.npy", "r100.npy"], "'x' is not a valid float"),
         (["--pair", "0", "t100.npy", "r100.npy"], "0.0 is not in the range"),
         (["--pair", "100", "t100.npy", "absent.npy"], "absent.npy: is not a file"),
-        (["--pair", "100", "t100.npy", "scan.toml"], "scan.toml: .toml is none of .npy"),
+        (["--pair", "100", "t100.npy", "scan.toml"], "scan.toml: .toml is not one of .npy"),
         (["--pair", "120", "t100.npy", "r100.npy"], "a scan of 120 V is outside the driver's 0..100 V"),
         (["--pair", "100", "r100.npy", "t100.npy"], "r100.npy and t100.npy: both sweeps lead the drive"),
         (["--pair", "100", "t100.npy", "t60.npy"], "t100.npy and t60.npy:"),

@@ -64,10 +64,10 @@ def test_an_upload_says_what_came_of_it(bench: Bench, folder: Path, scan: Prepar
     assert lines[0] == f"{name} in force, generation 2, after line 0 of the old scan"
     assert lines[1].startswith(f"{len(scan.image('fourier').data)} bytes as Fourier words in 0.")
     assert lines[1].endswith(" kB/s)")
-    assert lines[2:] == ["it is parked; `tablegen trigger` starts it"]
+    assert lines[2:] == ["the device is parked; start the scan with `tablegen trigger`"]
     bench.run("trigger")
     again = bench.run("upload", folder)
-    assert again.out == f"{name} is in force already, generation 2: nothing sent (--force sends it again)\n"
+    assert again.out == f"{name} is already active, generation 2: nothing sent (--force sends it again)\n"
     forced = bench.run("upload", folder, "--force", "--as", "table", "--baud", "460800")
     assert forced.out.startswith(f"{name} in force, generation 3")
     assert f"{len(scan.image('table').data)} bytes as tables in " in forced.out
@@ -119,7 +119,7 @@ def test_a_dry_run_with_a_port_asks_and_sends_nothing(bench: Bench, folder: Path
     small = Bench(model(replace(info, image_bytes=500)))
     outcome = small.run("upload", folder, "--dry-run")
     assert (outcome.status, outcome.err.count("\n")) == (9, 1)
-    assert "bytes; the device takes 500: " in outcome.err
+    assert "bytes; the device accepts 500: " in outcome.err
 
 
 def test_a_direct_table_is_said_to_have_no_fourier_form(tmp_path: Path) -> None:
@@ -139,9 +139,9 @@ def test_status_in_words(bench: Bench, folder: Path, scan: PreparedScan) -> None
     shown = bench.run("status")
     assert (shown.status, shown.err) == (0, "")
     rows = dict(line.split(maxsplit=1) for line in shown.out.splitlines())
-    assert rows["state"].startswith("parked; `tablegen trigger`") or rows["state"] == "on its way to park"
+    assert rows["state"].startswith("parked; `tablegen trigger`") or rows["state"] == "ramping to the park codes"
     assert rows["scan"] == f"{BOOT.digest[:12]}, generation 1"
-    assert rows["upload"] == "none in hand"
+    assert rows["upload"] == "none in progress"
     assert rows["faults"] == "none"
     assert rows["device"].startswith("500000 ticks a second, takes tables and Fourier words of 64 harmonics")
     assert rows["x"].startswith("2^11 words of 16 bits, codes 0..65535 of 16 bits, steps to 2621")
@@ -159,10 +159,10 @@ def test_status_of_a_device_that_waits_for_much(info: DeviceInfo) -> None:
     bench.device.permits = False
     bench.device.player.faults, bench.device.player.fault_counts = 5, (3, 0, 1, 0)  # type: ignore[misc]
     rows = dict(line.split(maxsplit=1) for line in bench.run("status").out.splitlines())
-    assert rows["state"] == "no scan yet; `tablegen upload` brings one"
+    assert rows["state"] == "no scan yet; send one with `tablegen upload`"
     assert rows["scan"] == "not known by its hash, generation 0"
-    assert rows["faults"] == "slew 3, overrun 1; `tablegen clear` forgets them"
-    assert rows["interlock"] == "open: no upload comes into force"
+    assert rows["faults"] == "slew 3, overrun 1; clear with `tablegen clear`"
+    assert rows["interlock"] == "open: no upload can become active"
     assert "rate not known" in rows["device"]
     assert rows["device"].endswith("has a key")
 
@@ -192,7 +192,7 @@ def test_trigger_and_park(bench: Bench, folder: Path) -> None:
     bench.options["tick_hz"] = 500_000_000
     short = bench.run("trigger", "--frames", "1")
     assert (short.status, short.out) in [
-        (0, "triggered; 1 frame over, or it did not start: `tablegen status` tells\n"),
+        (0, "triggered; 1 frame over, or the scan did not start: see `tablegen status`\n"),
         (0, "plays 1 frame\n"),
     ]
     assert bench.run("clear").out == "faults forgotten\n"

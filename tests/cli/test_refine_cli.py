@@ -121,7 +121,7 @@ def test_the_trigger_and_the_drive_agree(folder: Path) -> None:
     trace = record(folder, clock=0.0, without=("drive_v",))
     missing = refining(folder, trace)
     assert missing.status == 2
-    assert missing.messages == [f"{trace}:1: drive_v: missing; or say --triggered where time 0 is a line start"]
+    assert missing.messages == [f"{trace}:1: drive_v: missing; or give --triggered if time 0 is a line start"]
     triggered = refining(folder, trace, "--triggered", "--json")
     assert triggered.status == 0, triggered.err
     one, other = json.loads(with_drive.out), json.loads(triggered.out)
@@ -204,7 +204,7 @@ def test_a_trace_is_learnt_from_once(folder: Path) -> None:
     outcome = refining(folder, trace, "--write")
     assert outcome.status == 2
     assert outcome.messages == [
-        f"{trace}: [x.refinement] was learnt from this trace already; build, upload and record again"
+        f"{trace}: [x.refinement] was already learnt from this trace; build, upload and record again"
     ]
     assert path.read_text("utf-8") == text
     assert refining(folder, trace, "--write", "--force").status == 0

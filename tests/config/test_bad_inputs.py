@@ -55,7 +55,7 @@ TYPES = [
     case("dac.v_max = inf", says="scan.toml:9: dac.v_max: inf is not a finite number"),
     case("dac.v_min = true", says="scan.toml:8: dac.v_min: true is not a number"),
     case("dac.v_max = {}", says="scan.toml:9: dac.v_max: a table is not a number"),
-    case("dac.coding = 1", says="scan.toml:7: dac.coding: 1 is none of 'offset-binary', 'twos-complement'"),
+    case("dac.coding = 1", says="scan.toml:7: dac.coding: 1 is not one of 'offset-binary', 'twos-complement'"),
     case("timing.pixels = 200.5", says="scan.toml:18: timing.pixels: 200.5 is not a whole number"),
     case("name = 7", says="scan.toml:2: name: 7 is not a text in quotes"),
     case("scanner = 5", says="scan.toml:3: scanner: 5 is not a text in quotes"),
@@ -328,22 +328,24 @@ KEYS = [
 ]
 
 CHOICES = [
-    case("dac.coding = 'gray'", says="scan.toml:7: dac.coding: 'gray' is none of 'offset-binary', 'twos-complement'"),
-    case("dac.align = 'middle'", says="scan.toml:6: dac.align: 'middle' is none of 'left', 'right'"),
-    case("x.size_of = 'frame'", says="scan.toml:23: x.size_of: 'frame' is none of 'line', 'window'"),
+    case(
+        "dac.coding = 'gray'", says="scan.toml:7: dac.coding: 'gray' is not one of 'offset-binary', 'twos-complement'"
+    ),
+    case("dac.align = 'middle'", says="scan.toml:6: dac.align: 'middle' is not one of 'left', 'right'"),
+    case("x.size_of = 'frame'", says="scan.toml:23: x.size_of: 'frame' is not one of 'line', 'window'"),
     case(
         "x.band_limit.method = 'boxcar'",
-        says="scan.toml:28: x.band_limit.method: 'boxcar' is none of 'lanczos', 'truncate', 'window'",
+        says="scan.toml:28: x.band_limit.method: 'boxcar' is not one of 'lanczos', 'truncate', 'window'",
     ),
     case(
         "x.band_limit.directions = 'backward'",
-        says="scan.toml:31: x.band_limit.directions: 'backward' is none of 'both', 'forward'",
+        says="scan.toml:31: x.band_limit.directions: 'backward' is not one of 'both', 'forward'",
     ),
-    case("x.table.mode = 'cubic'", says="scan.toml:34: x.table.mode: 'cubic' is none of 'direct', 'interpolated'"),
-    case("y.motion = 'jump'", says="scan.toml:39: y.motion: 'jump' is none of 'ramp', 'step'"),
+    case("x.table.mode = 'cubic'", says="scan.toml:34: x.table.mode: 'cubic' is not one of 'direct', 'interpolated'"),
+    case("y.motion = 'jump'", says="scan.toml:39: y.motion: 'jump' is not one of 'ramp', 'step'"),
     case(
         scanner="x.hysteresis.model = 'preisach'",
-        says="scanner.toml:16: x.hysteresis.model: 'preisach' is none of 'harmonic', 'sinusoidal', 'triangle'",
+        says="scanner.toml:16: x.hysteresis.model: 'preisach' is not one of 'harmonic', 'sinusoidal', 'triangle'",
     ),
 ]
 
@@ -1339,7 +1341,7 @@ def test_every_fault_of_both_files_is_reported_in_one_run(here: Path) -> None:
         "scan.toml:18: timing.lines: missing; this key is required",
         "scan.toml:23: x.size_v: size_nm is given as well; keep one of the two",
         "scan.toml:26: x.turn: 1.5 is not below 1",
-        "scan.toml:35: x.table.mode: 'cubic' is none of 'direct', 'interpolated'",
+        "scan.toml:35: x.table.mode: 'cubic' is not one of 'direct', 'interpolated'",
         "scan.toml:39: y: missing; give size_nm or size_v",
         "scan.toml:46: y.band_limit.window: [0.9, 0.1] does not ascend",
         "scanner.toml:3: v_max: -1 is below 0.001",

@@ -151,28 +151,28 @@ WRONG = {
     "bytes": (
         lambda info: replace(info, image_bytes=5000),
         "table",
-        ["8384 bytes; the device takes 5000: upload --as fourier, or make the tables shorter"],
+        ["8384 bytes; the device accepts 5000: upload --as fourier, or make the tables shorter"],
     ),
     "harmonics": (
         lambda info: replace(info, harmonics=20),
         "fourier",
-        ["64 harmonics; the device renders at most 20: lower band_limit.harmonics, or upload --as table"],
+        ["64 harmonics; the device supports at most 20: lower band_limit.harmonics, or upload --as table"],
     ),
     "no Fourier": (
         lambda info: replace(info, features=Feature.TABLES),
         "fourier",
-        ["the device renders no Fourier words; upload --as table"],
+        ["the device does not support Fourier words; upload --as table"],
     ),
     "no tables": (
         lambda info: replace(info, features=Feature.FOURIER),
         "table",
-        ["the device takes no tables; upload --as fourier"],
+        ["the device does not support tables; upload --as fourier"],
     ),
     "rate": (
         lambda info: replace(info, update_rate_hz=250000),
         "table",
         [
-            "built for 500000 ticks a second; the device makes 250000: every line would take 2 times as long; set "
+            "built for 500000 ticks a second; the device makes 250000: each line would take 2 times as long; set "
             "dac.update_rate_hz, or allow it with --any-rate"
         ],
     ),
@@ -304,7 +304,7 @@ def test_the_first_difference_is_named(scan: PreparedScan, form: str, at: int, s
 def test_an_image_of_another_length_is_told(scan: PreparedScan) -> None:
     image = scan.image("table").data
     assert str(differences(scan, image[:-1])[0]) == "its image ends before y: table word 2047 (byte 8382)"
-    assert str(differences(scan, image + b"12")[0]) == "what follows the last word (byte 8384) is 2, not 0"
+    assert str(differences(scan, image + b"12")[0]) == "after the last word (byte 8384) is 2, not 0"
     assert len(differences(scan, image[:-100])) == 50
     assert str(differences(scan, b"")[0]) == "its image ends before scan: line_ticks (byte 0)"
     assert str(differences(scan, image[:190])[0]) == "its image ends before y: unused word 15 (byte 188)"

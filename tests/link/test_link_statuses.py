@@ -184,4 +184,4 @@ def test_an_interrupted_request_is_no_upload(bench: Bench) -> None:
 
     bench.options["spoil_out"] = interrupt
     outcome = bench.run("park")
-    assert (outcome.status, outcome.err) == (130, "interrupted; the device goes on as it was\n")
+    assert (outcome.status, outcome.err) == (130, "interrupted; the device continues as before\n")

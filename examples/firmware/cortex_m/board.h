@@ -1,4 +1,4 @@
-/* What the firmware asks of a board: a UART, a timer, and a place for the log of what left the converters. */
+/* The board functions that the firmware uses: a UART, a timer, and an output for the log of the samples. */
 #ifndef BOARD_H
 #define BOARD_H
 
@@ -11,7 +11,7 @@ void board_start(void);
 void board_start_timer(uint32_t hz); /* its interrupt calls player_timer() */
 
 bool board_can_put(void); /* whether board_putc() would not wait */
-void board_putc(char c);  /* what comes goes to control_received() */
+void board_putc(char c);  /* received characters go to control_received() */
 
 bool board_log_ready(void); /* whether board_log_putc() would not wait */
 void board_log_putc(char c);

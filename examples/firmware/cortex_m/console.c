@@ -22,7 +22,7 @@ char *console_line(void)
     while ((c = receive(&input)) >= 0) {
         if (c == '\n' || c == '\r') {
             if (length == 0)
-                continue; /* of "\r\n" the second */
+                continue; /* skip the second character of "\r\n" */
             line[length] = 0;
             length = 0;
             return line;

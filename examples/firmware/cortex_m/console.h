@@ -5,17 +5,17 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-void console_received(char c); /* from the interrupt of the UART */
+void console_received(char c); /* called by the interrupt of the UART */
 
-/* A whole line that has come in, without its end, or NULL. */
+/* Returns a complete received line, without its end, or NULL. */
 char *console_line(void);
 
 void console_text(const char *text);
 void console_number(const char *name, uint32_t value); /* " name value" */
 
-/* Whether a line begins with this word; *rest is moved to what follows it. */
+/* Returns whether a line begins with this word; sets *rest to the text after it. */
 bool console_word(char **rest, const char *word);
-/* A decimal number, which ends the line; false if there is none. */
+/* Reads a decimal number at the end of the line; returns false if there is none. */
 bool console_decimal(const char *rest, uint32_t *value);
 
 #endif

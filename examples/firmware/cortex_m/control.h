@@ -1,13 +1,13 @@
-/* What the firmware is told over its UART: control_link.c takes frames (docs/protocol.md), control_console.c text. */
+/* Commands over the UART: control_link.c receives frames (docs/protocol.md), control_console.c lines of text. */
 #ifndef CONTROL_H
 #define CONTROL_H
 
 #include <stdbool.h>
 #include <stdint.h>
 
-bool control_start(void);           /* before anything else runs: the scan of the build waits to be taken */
-void control_ready(bool good);      /* it plays, or was refused */
-void control_received(uint8_t byte); /* from the interrupt of the UART */
-void control_work(void);            /* from the main loop */
+bool control_start(void);           /* called first: commits the scan of the build */
+void control_ready(bool good);      /* called when the scan is active (good) or was refused */
+void control_received(uint8_t byte); /* called by the interrupt of the UART */
+void control_work(void);            /* called by the main loop */
 
 #endif

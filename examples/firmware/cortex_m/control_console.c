@@ -1,12 +1,12 @@
 /* Commands in lines of text.
  *
  *     status           what the sequencer does, its faults and their counts
- *     arm N            the next trigger starts N frames; 0 is without end
+ *     arm N            the next trigger starts N frames; 0 is endless
  *     trigger, park, reset, clear
- *     swap             the other program, from the next line on: the whole scan, or the half one
- *     withdraw         the program that waits is not to be taken
+ *     swap             change to the other program at the next line: the whole scan, or the half one
+ *     withdraw         discard the committed program
  *
- * Each is answered by one line: ok, or error and why.
+ * Each command is answered by one line: ok, or error and the reason.
  */
 #include "console.h"
 #include "control.h"

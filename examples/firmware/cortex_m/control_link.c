@@ -1,4 +1,4 @@
-/* Frames of docs/protocol.md: all of it is dac_link.c. */
+/* Commands as frames of docs/protocol.md; dac_link.c does all the work. */
 #include "board.h"
 #include "control.h"
 #include "dac_link.h"
@@ -8,7 +8,7 @@
 
 static dac_link link;
 
-/* Survives a reset, and begins anywhere: another number at each start is all that is asked for. */
+/* Not initialised, so that it survives a reset: the number only has to differ from start to start. */
 static uint32_t boots __attribute__((section(".noinit")));
 
 bool control_start(void)
@@ -19,7 +19,7 @@ bool control_start(void)
 
 void control_ready(bool good)
 {
-    (void)good; /* a host asks */
+    (void)good; /* the host asks for the status */
 }
 
 void control_received(uint8_t byte)

@@ -5,13 +5,14 @@
 
 #include "dac_sequencer.h"
 
-/* Whether a sample can be put out now. True on hardware; the log is full at times, and then time stands still. */
+/* Returns whether a sample can be output now. Always true on hardware. If the log of the emulator is full, the timer
+ * waits. */
 bool dac_ready(void);
 
-/* A sample of both axes, from the interrupt of the timer. */
+/* Outputs a sample of both axes; called by the interrupt of the timer. */
 void dac_put(dac_output x, dac_output y, uint8_t markers);
 
-/* From the main loop: what is not for an interrupt to do. */
+/* Called by the main loop, for slow work. */
 void dac_work(void);
 
 #endif

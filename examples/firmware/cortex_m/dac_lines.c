@@ -20,7 +20,7 @@ void dac_put(dac_output x, dac_output y, uint8_t markers)
 {
     if (!line_tick(&played, x, y, markers, sequencer.faults, &lines[head % LINES]))
         return;
-    __asm__ volatile("" ::: "memory"); /* the line before what says that it is there */
+    __asm__ volatile("" ::: "memory"); /* write the line before `head` */
     head = head + 1;
 }
 

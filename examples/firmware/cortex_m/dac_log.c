@@ -24,7 +24,7 @@ void dac_put(dac_output x, dac_output y, uint8_t markers)
     next->x = x;
     next->y = y;
     next->markers = markers;
-    __asm__ volatile("" ::: "memory"); /* the sample before what says that it is there */
+    __asm__ volatile("" ::: "memory"); /* write the sample before `head` */
     head = head + 1;
 }
 

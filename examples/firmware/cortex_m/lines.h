@@ -1,4 +1,4 @@
-/* Ticks by the line: what a line was made of, in a few numbers. */
+/* Summarises the ticks of each line in a few numbers. */
 #ifndef LINES_H
 #define LINES_H
 
@@ -6,11 +6,11 @@
 #include "dac_sequencer.h"
 
 typedef struct {
-    uint32_t generation; /* of the program that played it */
-    uint32_t line;       /* of the frame */
+    uint32_t generation; /* generation of the program that played it */
+    uint32_t line;       /* line number within the frame */
     uint32_t ticks, crc; /* CRC-32 over x, y (32 bits each, lowest byte first) and markers of every tick */
-    uint8_t markers;     /* all of them, or-ed */
-    uint8_t faults;      /* at its end */
+    uint8_t markers;     /* markers of all ticks, or-ed */
+    uint8_t faults;      /* faults at the end of the line */
 } line_record;
 
 typedef struct {
@@ -26,7 +26,8 @@ static inline uint32_t line_add(uint32_t crc, uint32_t value, unsigned bytes)
     return crc;
 }
 
-/* A tick, and the faults before it. True: a line is over, and in *ended. Ticks while no scan plays belong to none. */
+/* Adds a tick, and the faults before it. Returns true if a line ended, and writes it to *ended. Ticks without a scan
+ * are not counted. */
 static inline bool line_tick(line_log *log, uint32_t x, uint32_t y, uint8_t markers, uint8_t faults, line_record *ended)
 {
     line_record *const now = &log->now;

@@ -54,7 +54,7 @@ void board_start(void)
     GPIO_DEN(PORT_D) |= 3u << 2;
     start_uart(CONSOLE);
     start_uart(LOG);
-    /* What was received before: the interrupt comes when the FIFO fills to its level, and not while it is above. */
+    /* Read what was received before: the interrupt comes only when the FIFO fills to its level. */
     while ((UART_FR(CONSOLE) & RECEIVE_EMPTY) == 0)
         (void)UART_DR(CONSOLE);
     UART_IM(CONSOLE) = RECEIVE_INTERRUPT | RECEIVE_TIMEOUT;
@@ -75,7 +75,7 @@ void board_timer_interrupt(void)
 
 void board_uart_interrupt(void)
 {
-    UART_ICR(CONSOLE) = RECEIVE_INTERRUPT | RECEIVE_TIMEOUT; /* first: what comes after it asks again */
+    UART_ICR(CONSOLE) = RECEIVE_INTERRUPT | RECEIVE_TIMEOUT; /* clear first: a later character sets it again */
     while ((UART_FR(CONSOLE) & RECEIVE_EMPTY) == 0)
         control_received((uint8_t)UART_DR(CONSOLE));
 }

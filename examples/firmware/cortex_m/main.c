@@ -1,4 +1,4 @@
-/* Plays a build of tablegen: what is to be done comes over a UART, samples leave in an interrupt. */
+/* Plays a build of tablegen: commands come over a UART, an interrupt outputs the samples. */
 #include "board.h"
 #include "control.h"
 #include "dac.h"
@@ -6,7 +6,7 @@
 #include "scan.h"
 
 #ifndef UPDATE_RATE_HZ
-#define UPDATE_RATE_HZ 20000 /* of the timer */
+#define UPDATE_RATE_HZ 20000 /* rate of the timer in Hz */
 #endif
 
 dac_sequencer sequencer;
@@ -18,7 +18,7 @@ int main(void)
     board_start();
     player_start();
     board_start_timer(UPDATE_RATE_HZ);
-    while (good && dac_sequencer_status(&sequencer).swaps == 0) /* before it no trigger would be heard */
+    while (good && dac_sequencer_status(&sequencer).swaps == 0) /* a trigger before that has no effect */
         dac_work();
     control_ready(good);
     for (;;) {

@@ -50,7 +50,7 @@ void board_timer_interrupt(void)
 
 void board_uart_interrupt(void)
 {
-    UART_INTCLEAR(CONSOLE) = RECEIVED_ONE; /* first: what comes after it asks again */
+    UART_INTCLEAR(CONSOLE) = RECEIVED_ONE; /* clear first: a later character sets it again */
     while ((UART_STATE(CONSOLE) & RECEIVE_FULL) != 0)
         control_received((uint8_t)UART_DATA(CONSOLE));
 }

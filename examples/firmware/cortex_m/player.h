@@ -1,4 +1,4 @@
-/* The consumer of the sequencer: what the interrupts do. player_step.c is the simple one, player_fill.c the fast one.
+/* The consumer of the sequencer: the interrupt handlers. player_step.c is the simple one, player_fill.c the fast one.
  * */
 #ifndef PLAYER_H
 #define PLAYER_H
@@ -7,7 +7,7 @@
 
 extern dac_sequencer sequencer;
 
-void player_start(void);  /* before the timer */
+void player_start(void);  /* called before the timer starts */
 void player_timer(void);  /* interrupt: a sample is due */
 void player_pended(void); /* interrupt of the lowest priority, PendSV */
 

@@ -7,14 +7,14 @@
 #define ICSR REGISTER(0xE000ED04)
 enum { PEND = 1 << 28 };
 
-enum { HALF = 32 }; /* ticks: requests act that much later, and so much later than computed does a sample leave */
+enum { HALF = 32 }; /* ticks per half buffer: requests take effect, and computed samples leave, this much later */
 
 static dac_output codes[2][2 * HALF];
 static uint8_t markers[2][HALF];
 static volatile uint8_t full[2];      /* set by PendSV, cleared by the timer */
 /* Counted by the timer, reported by PendSV: a consumer does not interrupt itself. */
 static volatile uint32_t underruns;
-static unsigned half, at;             /* the timer's own */
+static unsigned half, at;             /* used by the timer only */
 
 static void pend(void)
 {
@@ -32,7 +32,7 @@ void player_timer(void)
     if (!dac_ready())
         return;
     if (!full[half]) {
-        underruns = underruns + 1; /* the outputs stay where they are */
+        underruns = underruns + 1; /* the outputs keep their values */
         pend();
         return;
     }
@@ -54,7 +54,7 @@ void player_pended(void)
         dac_sequencer_report(&sequencer, DAC_FAULT_UNDERRUN);
     while (!full[next]) {
         dac_sequencer_fill(&sequencer, codes[next], codes[next] + 1, markers[next], HALF);
-        __asm__ volatile("" ::: "memory"); /* the samples before what says that they are there */
+        __asm__ volatile("" ::: "memory"); /* write the samples before `full` */
         full[next] = 1;
         next ^= 1;
     }

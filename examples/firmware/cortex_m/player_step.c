@@ -1,4 +1,4 @@
-/* A tick is computed when it is due. Its time of execution is the jitter of the output, unless the converter is
+/* Computes each tick when it is due. Variations of the execution time are jitter of the output, unless the converter is
  * latched. */
 #include "dac.h"
 #include "player.h"

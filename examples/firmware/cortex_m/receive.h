@@ -1,10 +1,10 @@
-/* Characters from the interrupt of a UART to the main loop: one writes, one reads, nobody waits. */
+/* A queue of characters from the interrupt of a UART to the main loop. Neither side waits. */
 #ifndef RECEIVE_H
 #define RECEIVE_H
 
 #include <stdint.h>
 
-enum { RECEIVED = 256 }; /* a power of two; a longer line than that is lost in part */
+enum { RECEIVED = 256 }; /* a power of two; longer lines lose characters */
 
 typedef struct {
     volatile char characters[RECEIVED];
@@ -17,7 +17,7 @@ static inline void received(receive_queue *queue, char c)
     if (head - queue->tail == RECEIVED)
         return;
     queue->characters[head % RECEIVED] = c;
-    queue->head = head + 1; /* volatile accesses stay in order, and one core sees its own */
+    queue->head = head + 1; /* volatile accesses stay in order on a single core */
 }
 
 static inline int receive(receive_queue *queue)

@@ -14,7 +14,7 @@ static bool halve(dac_axis_program *axis, dac_word *table, const int32_t *words,
 {
     axis->gain_word /= 2;
     if (axis->index_bits == 0)
-        return true; /* direct tables are made on the host: that of the whole scan serves */
+        return true; /* a direct table cannot be computed here: use the table of the whole scan */
     axis->table = table;
 #ifdef SCAN_SINE
     return dac_synthesize(table, axis->index_bits, axis->bits, words, harmonics, NAMED(_sine),

@@ -1,4 +1,4 @@
-/* The programs of this firmware: the scan that was built, and one of half its size in its middle. */
+/* The programs of this firmware: the scan of the build, and its central half. */
 #ifndef SCAN_H
 #define SCAN_H
 
@@ -7,7 +7,7 @@
 extern const dac_converter scan_x_converter, scan_y_converter;
 extern const dac_program scan_whole;
 
-/* The half one, with tables that are rendered here from Fourier words, into one of two places: dac_sequencer_idle(). */
+/* The half scan. Its tables are computed here from Fourier words, into one of two places: see dac_sequencer_idle(). */
 bool scan_half(dac_program *program, unsigned place);
 
 #endif

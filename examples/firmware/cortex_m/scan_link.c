@@ -1,5 +1,5 @@
-/* The link of a build. Its tables may be as long as those of the scan that was built, its limits are those of that scan.
- * To be given with -D: LINK_X_INDEX_BITS and LINK_Y_INDEX_BITS for longer tables, LINK_HARMONICS, LINK_MAX_JUMP in codes,
+/* The link of a build. It accepts tables as long as those of the build, and has the limits of that scan.
+ * Options, with -D: LINK_X_INDEX_BITS and LINK_Y_INDEX_BITS for longer tables, LINK_HARMONICS, LINK_MAX_JUMP in codes,
  * LINK_KEY as the bytes of an array; DAC_LINK_RING.
  */
 #include "scan_link.h"
@@ -7,7 +7,7 @@
 #include SCAN_HEADER
 #include "names.h"
 
-/* The length of a table that is not interpolated is none of 2^n. */
+/* A table that is not interpolated need not have 2^n words. */
 #define BITS_FOR(n) ((n) <= 8 ? 3 : (n) <= 16 ? 4 : (n) <= 32 ? 5 : (n) <= 64 ? 6 : (n) <= 128 ? 7 : (n) <= 256 ? 8 \
     : (n) <= 512 ? 9 : (n) <= 1024 ? 10 : (n) <= 2048 ? 11 : (n) <= 4096 ? 12 : (n) <= 8192 ? 13 : (n) <= 16384 ? 14 \
     : (n) <= 32768 ? 15 : 16)
@@ -27,7 +27,7 @@
 #define SINE NAMED(_sine)
 #define SINE_BITS CONSTANT(_SINE_INDEX_BITS)
 #define HARMONICS LINK_HARMONICS
-#else /* a build without interpolated tables has no sine: nothing can be rendered */
+#else /* a build without interpolated tables has no sine table, and cannot compute tables */
 #define SINE NULL
 #define SINE_BITS 0
 #define HARMONICS 0

@@ -1,4 +1,4 @@
-/* What this firmware lets a host do: memory for two programs, limits, a key. */
+/* The link of this firmware: memory for two programs, limits, a key. */
 #ifndef SCAN_LINK_H
 #define SCAN_LINK_H
 

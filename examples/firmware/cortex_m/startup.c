@@ -1,4 +1,4 @@
-/* From reset to main(): vectors, memory, and what compilers call by themselves, since there is no C library. */
+/* From reset to main(): vectors and memory. */
 #include <stdint.h>
 
 #include "board.h"
@@ -28,7 +28,7 @@ void fault(void)
         ;
 }
 
-/* The interrupts of all boards: each has a UART and a timer, at places of its own. */
+/* The interrupts of all boards: each board has its own vectors for UART and timer. */
 typedef union {
     void *stack;
     void (*handler)(void);

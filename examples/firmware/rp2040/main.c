@@ -1,6 +1,6 @@
 /* RP2040: core 0 is the producer, core 1 the consumer, and two state machines of the PIO are the clock of the samples:
- * each shifts 16 bits to a converter of its own in 34 of its cycles, for ever, as long as core 1 keeps their queues
- * filled. Not tried on hardware. */
+ * each shifts 16 bits to its own converter in 34 cycles, as long as core 1 keeps the queues filled. Not tested on
+ * hardware. */
 #include "dac_sequencer.h"
 #include SCAN_HEADER
 #include "rp2040.h"
@@ -12,7 +12,7 @@
 #define CONVERTER(AXIS) DAC_CONVERTER(AXIS, 0)
 
 enum { X, Y };                                            /* state machines */
-enum { TICKS = 32 };                                      /* computed at once */
+enum { TICKS = 32 };                                      /* ticks computed at once */
 enum { SYSTEM_HZ = 125000000, SAMPLE_CYCLES = 34 };
 enum { DIVIDER = SYSTEM_HZ / SAMPLE_CYCLES / UPDATE_RATE_HZ }; /* a whole number: no jitter */
 enum { X_DATA = 2, X_CLOCK = 3, X_SELECT = 4, Y_DATA = 5, Y_CLOCK = 6, Y_SELECT = 7 };
@@ -68,8 +68,8 @@ static void start_machine(unsigned machine, uint32_t data, uint32_t clock)
     PIO0_CLKDIV(machine) = (uint32_t)DIVIDER << 16;
     PIO0_EXECCTRL(machine) = (LENGTH - 1) << 12;    /* wraps after the last */
     PIO0_SHIFTCTRL(machine) = UINT32_C(1) << 30;    /* all eight words for output; the highest bit first */
-    PIO0_PINCTRL(machine) = 3u << 26 | data << 5;   /* for a moment three pins to set, from the data pin on */
-    PIO0_INSTR(machine) = 0xE087;                   /* set pindirs, 7: all of them are outputs */
+    PIO0_PINCTRL(machine) = 3u << 26 | data << 5;   /* three pins for SET, starting at the data pin */
+    PIO0_INSTR(machine) = 0xE087;                   /* set pindirs, 7: all three pins are outputs */
     /* Two side-set pins from the clock on, one pin to shift out to. */
     PIO0_PINCTRL(machine) = UINT32_C(2) << 29 | 1u << 20 | clock << 10 | data;
     PIO0_INSTR(machine) = 0x1000;                   /* jmp 0 side 0b10 */
@@ -147,7 +147,7 @@ int main(void)
     (void)dac_sequencer_commit(&sequencer);
     start_core1();
     while (dac_sequencer_status(&sequencer).swaps == 0)
-        ; /* until the program is taken */
+        ; /* wait until the program is taken */
     (void)dac_sequencer_arm(&sequencer, 0);
     (void)dac_sequencer_trigger(&sequencer);
     for (;;)

@@ -1,5 +1,5 @@
 /* STM32F4: a timer triggers both channels of the converter, DMA feeds them from two half buffers, and an interrupt per
- * half fills the one that was just sent. No instruction of the processor is in the time of a sample. Not tried on
+ * half fills the one that was just sent. The timing of samples does not depend on the processor. Not tested on
  * hardware. */
 #include "dac_sequencer.h"
 #include SCAN_HEADER
@@ -27,7 +27,7 @@ static const dac_converter x_converter = CONVERTER(CONSTANT(_X)), y_converter = 
 static dac_sequencer sequencer;
 static union {
     dac_output codes[4 * HALF]; /* x, y, x, y.. */
-    uint32_t words[2 * HALF];   /* as DMA takes them: aligned, x in the lower half */
+    uint32_t words[2 * HALF];   /* the same for DMA: aligned words, x in the lower half */
 } buffer;
 
 void dma_interrupt(void);
@@ -69,7 +69,7 @@ static void start_converters(void)
     /* Channel 7, high priority, words, memory counts up, circular, to the peripheral, interrupts, on. */
     DMA1_S5CR = 7u << 25 | 2u << 16 | 2u << 13 | 2u << 11 | 1u << 10 | 1u << 8 | 1u << 6 | 1u << 4 | 1u << 3 | 1u;
     NVIC_ISER0 = UINT32_C(1) << DMA1_STREAM5;
-    /* Both channels on TIM6's trigger; the first asks for DMA, and the word it gets is for both. */
+    /* TIM6 triggers both channels; channel 1 requests DMA, and one word serves both. */
     DAC_CR = 1u << 18 | 1u << 16 | 1u << 12 | 1u << 2 | 1u;
     TIM6_ARR = TIMER_HZ / UPDATE_RATE_HZ - 1;
     TIM6_CR2 = 2u << 4; /* its update is the trigger */
@@ -80,7 +80,7 @@ void dma_interrupt(void)
 {
     const uint32_t flags = DMA1_HISR & (HALF_TRANSFER | TRANSFER_COMPLETE);
 
-    DMA1_HIFCR = flags; /* first: what comes after it asks again */
+    DMA1_HIFCR = flags; /* clear first: a later event sets it again */
     if (flags == (HALF_TRANSFER | TRANSFER_COMPLETE) || (DAC_SR & 1u << 13) != 0) {
         dac_sequencer_report(&sequencer, DAC_FAULT_UNDERRUN); /* a half was sent twice, or not in time */
         DAC_SR = 1u << 13;
@@ -100,7 +100,7 @@ int main(void)
             ;
     (void)dac_sequencer_commit(&sequencer);
     (void)dac_sequencer_arm(&sequencer, 0);
-    fill(0); /* takes the program, and begins to ramp to its park codes */
+    fill(0); /* takes the program; the outputs begin to ramp to its park codes */
     (void)dac_sequencer_trigger(&sequencer);
     fill(1);
     start_converters();

@@ -38,15 +38,13 @@ def get(name: str) -> Format:
     if name in _own():
         found: object = import_module(f"{__name__}.{_own()[name]}").FORMAT
     elif name in _others():
-        entry = _others()[name]
-        try:
-            found = entry.load()
-        except Exception as error:
-            raise UnknownFormat(f"{name!r} of {_package(entry)} cannot be loaded: {error}") from error
+        found = _loaded(name, _others()[name])
     else:
-        raise UnknownFormat(f"{name!r} is no format; there are {', '.join(names())}")
+        raise UnknownFormat(f"{name!r} is not a format; formats are {', '.join(names())}")
     if not isinstance(found, Format) or found.name != name:
-        raise UnknownFormat(f"{name!r} of {_package(_others()[name])} is no tablegen.emit.format.Format of that name")
+        raise UnknownFormat(
+            f"{name!r} of {_package(_others()[name][0])} is no tablegen.emit.format.Format of that name"
+        )
     return found
 
 
@@ -63,10 +61,27 @@ def _own() -> dict[str, str]:
 
 
 @cache
-def _others() -> "dict[str, EntryPoint]":
+def _others() -> "dict[str, list[EntryPoint]]":
     from importlib.metadata import entry_points  # a good part of what a build costs, and seldom needed
 
-    return {entry.name: entry for entry in entry_points(group=GROUP) if entry.name not in _own()}
+    found: dict[str, list[EntryPoint]] = {}
+    for entry in entry_points(group=GROUP):
+        if entry.name not in _own():
+            found.setdefault(entry.name, []).append(entry)
+    return found
+
+
+def _loaded(name: str, entries: "list[EntryPoint]") -> object:
+    """What the one entry point of a name leads to."""
+    entry, *more = entries
+    if more:
+        packages = " and ".join(sorted(map(_package, entries)))
+        raise UnknownFormat(f"{name!r} is a format of {packages}; uninstall all of them but one")
+    try:
+        return entry.load()
+    except Exception as error:
+        why = f"{type(error).__name__}: {error}"
+        raise UnknownFormat(f"{name!r} of {_package(entry)} cannot be loaded: {why}") from error
 
 
 def _package(entry: "EntryPoint") -> str:

@@ -1,5 +1,5 @@
 // Plays a build of tablegen from an Arduino: Uno, Mega (AVR) or Teensy 4, with a dual 12-bit converter MCP4922 on SPI.
-// Put what `tablegen build scan.toml --output src` writes beside this file, in its folder src. Not tried on hardware.
+// Run `tablegen build scan.toml --output src` in the folder of this file. Not tested on hardware.
 #include <Arduino.h>
 #include <SPI.h>
 
@@ -7,7 +7,7 @@
 #include "src/dac_sequencer.h"
 
 #if defined(__IMXRT1062__)
-static const uint32_t UPDATE_RATE_HZ = 50000;  // two words of 16 bits at 20 MHz take 2 us, and their selects as much
+static const uint32_t UPDATE_RATE_HZ = 50000;  // two words of 16 bits at 20 MHz take 2 us, their selects another 2 us
 #else
 static const uint32_t UPDATE_RATE_HZ = 2000;
 #endif
@@ -31,7 +31,7 @@ static void send(uint16_t channel, dac_output code)
 
 static void play()
 {
-    digitalWrite(LATCH, LOW);  // what was sent last time
+    digitalWrite(LATCH, LOW);  // outputs the words that were sent last time
     digitalWrite(LATCH, HIGH);
     send(0x0000, next.x);
     send(0x8000, next.y);
@@ -49,7 +49,7 @@ static void start_timer()
 ISR(TIMER1_COMPA_vect)
 {
     play();
-    if (TIFR1 & (1 << OCF1A)) {  // the next one is due already
+    if (TIFR1 & (1 << OCF1A)) {  // the next tick is due already
         TIFR1 = 1 << OCF1A;
         dac_sequencer_report(&sequencer, DAC_FAULT_UNDERRUN);
     }
