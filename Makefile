@@ -1,7 +1,9 @@
 # make demo      set up, build the example, print its certificate
-# make test      set up, check and run every test but the slow ones
-# make test-hdl  only those of the Verilog: simulation, mutants, proofs, lint, synthesis
-# make test-slow a hundred thousand random swaps, a thousand uploads with faults, every mutant of the link
+# make check     set up; format, lint, types and the quick tests, with a C compiler and Icarus
+# make test      that, and everything that a change could break in common use
+# make test-all  that and the rest: mutants, proofs, exotic compilers, emulators (test-rest: these by themselves)
+# make test-hdl  only the tests of the Verilog: simulation, mutants, proofs, lint, synthesis
+# make test-long a hundred thousand random swaps
 # make resources what the Verilog takes on FPGAs, into docs/resources.md
 # make instructions what the C takes on Cortex-M, into docs/instructions.md
 # make link      what an upload takes, into docs/upload.md
@@ -9,6 +11,7 @@
 # make bench     what a build costs, against importing numpy
 # make figures   the pictures of the README and the docs
 # make paper     the paper's numbers beside ours, into docs/paper
+# make check-python PYTHON=python3.13  `make check` under another Python, in an environment of its own
 # make clean     remove what these made
 
 PYTHON ?= python3
@@ -16,35 +19,51 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 
-# What the tests compile, simulate, prove and synthesise with.
+# What the sets of tests compile, simulate, prove and synthesise with; tests/README.md tells the sets.
+CHECK_TOOLS := gcc iverilog
+COMMON_TOOLS := $(CHECK_TOOLS) make g++ clang libclang-rt-dev cmake ninja-build
 HDL_TOOLS := make g++ iverilog yosys nextpnr-ice40 z3
 FIRMWARE_TOOLS := gcc-arm-none-eabi qemu-system-arm gcc-avr avr-libc simavr gcc-riscv64-unknown-elf gcc-mips-linux-gnu \
     libc6-dev-mips-cross qemu-user
-TOOLS := $(FIRMWARE_TOOLS) gcc clang libclang-rt-dev cppcheck cmake ninja-build ghdl $(HDL_TOOLS)
-# A file of tests goes to one process: what its tests share is made once.
-# OpenBLAS threads only spin beside the other processes.
-PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist loadfile
+TOOLS := $(COMMON_TOOLS) $(HDL_TOOLS) $(FIRMWARE_TOOLS) cppcheck ghdl
+# A process that has nothing more to do takes tests from the end of the other's: neighbours stay together, so that what
+# they share is made once. OpenBLAS threads only spin beside the other processes.
+PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist worksteal
 
-.PHONY: demo test test-hdl test-slow resources instructions link fuzz bench figures paper clean
+.PHONY: demo lint check test test-rest test-all test-hdl test-long resources instructions link fuzz bench figures paper clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/installed
 	$(BIN)/tablegen build examples/annexin_200nm.toml -o build/demo
 
-test: $(VENV)/installed-test
-	@.ci/system-packages $(TOOLS)
+lint: $(VENV)/installed-test
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(PYTEST)
+
+check: lint
+	@.ci/system-packages $(CHECK_TOOLS)
+	$(PYTEST) -m 'not (common or rest or long)'
+
+test: lint
+	@.ci/system-packages $(COMMON_TOOLS)
+	$(PYTEST) -m 'not (rest or long)'
+
+test-rest: $(VENV)/installed-test
+	@.ci/system-packages $(TOOLS)
+	$(PYTEST) -m 'rest and not long'
+
+test-all:
+	@$(MAKE) test
+	@$(MAKE) test-rest
 
 test-hdl: $(VENV)/installed-test
 	@.ci/system-packages $(HDL_TOOLS)
 	$(PYTEST) hdl_tests
 
-test-slow: $(VENV)/installed-test
-	@.ci/system-packages $(TOOLS)
-	$(BIN)/python -m pytest -m slow
+test-long: $(VENV)/installed-test
+	@.ci/system-packages $(COMMON_TOOLS)
+	$(PYTEST) -m long
 
 resources: $(VENV)/installed-test
 	@.ci/system-packages $(HDL_TOOLS)
@@ -96,5 +115,15 @@ $(VENV)/installed-plot: $(VENV)/installed
 	$(PIP) install --editable '.[calibrate,plot]'
 	@touch $@
 
+# The Pythons that the package supports. `make test` runs the wheel under each further one that this machine has.
+PYTHONS := 3.11 3.12 3.13
+.PHONY: pythons check-python
+test: pythons
+pythons: $(VENV)/installed
+	@.ci/further-pythons $(VENV) $(PYTHONS)
+
+check-python:
+	$(MAKE) check VENV=.venv-$$($(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2])')
+
 clean:
-	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) .venv-* build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -49,9 +49,10 @@ _BITS = 10  # of a byte on the wire
 _FILL_TICKS = 256
 _PHASES = 25  # of the line in which an upload begins
 _NOTE = f"""
-Made by `make link`, of the shipped example: the real client on a virtual line, its time from BEGIN until the scan is in
-force; instructions counted in emulation, {CLOCKS} clocks each; "in force" is the longest from the first byte of HELLO,
-over all places of a line at which an upload can begin. How long the host computes is not in it.
+`make link` measures this table on the shipped example: the real client on a virtual line, its time from BEGIN until the
+scan is active. Instructions are counted in emulation, with {CLOCKS} clocks each. "Active" is the longest time from the
+first byte of HELLO, over all places of a line at which an upload can begin. It does not include the computing time of
+the host.
 """
 _MOST = AxisLimits(0, 65535, 65535, 65535)
 
@@ -205,7 +206,7 @@ def table() -> str:
         ("tables, 115200 baud, 1 ms each way: share of the line rate", f"{slow.payload:.1%}", "92 %"),
         ("the same with all bytes on the wire", f"{slow.wire:.1%}", ""),
         ("tables, 460800 baud, 16 ms from device to host: all bytes on the wire", f"{fast.wire:.1%}", "85 %"),
-        ("the same, the image alone", f"{fast.payload:.1%}", ""),
+        ("the same, the program image alone", f"{fast.payload:.1%}", ""),
         ("bytes from the host from BEGIN to COMMIT, tables", f"{slow.wire_bytes}", ""),
         ("the same, Fourier words", f"{small.wire_bytes}", f"{slow.wire_bytes // 8}"),
     ]
@@ -221,7 +222,7 @@ def table() -> str:
         for part in PARTS:
             checks_s = device_s(part, count(part.core, words, Path(folder)))
             latest = 1e3 * max(until_in_force(scan, words, part, checks_s))
-            what = f"Fourier words, 115200 baud, {part.name}: in force"
+            what = f"Fourier words, 115200 baud, {part.name}: active"
             rows.append((f"{what} ({1e3 * checks_s:.0f} ms of it in the device), ms", f"{latest:.0f}", "150"))
     head = "| | measured | asked for |\n|---|---|---|\n"
     return head + "".join(f"| {what} | {value} | {asked} |\n" for what, value, asked in rows) + _NOTE

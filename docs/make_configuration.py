@@ -4,6 +4,7 @@ Usage: python docs/make_configuration.py
 """
 
 from pathlib import Path
+from textwrap import fill
 
 import msgspec.inspect as types
 
@@ -13,13 +14,16 @@ PAGE = Path(__file__).with_name("configuration.md")
 INTRODUCTION = """\
 # The two input files
 
-Written by `python docs/make_configuration.py` from `tablegen/config/schema.py`. `tablegen init` writes a commented
-pair to start from, `tablegen schema scan` and `tablegen schema scanner` print JSON Schema for editors.
+This page lists all keys of the scan file and the scanner file. It is for everybody who writes these files. Start with
+the commented pair that `tablegen init` writes; [calibration](calibration.md) explains how to measure the values of the
+scanner file. `tablegen schema scan` and `tablegen schema scanner` print JSON Schema for editors.
+`python docs/make_configuration.py` writes this page from `tablegen/config/schema.py`.
 
 Voltages are at the piezo unless a key says otherwise. Units are part of every key. A key without a default may be left
-out where its meaning names an alternative ("or give"). Unknown keys are errors. Beyond the ranges below, a build
-checks that the drive stays inside the driver and the converter, the slew rate inside the amplifier, the harmonics
-inside what a line and a table carry, and the hysteresis inside where its model holds.
+out if its meaning names an alternative ("or give"). Unknown keys are errors. In addition to the ranges below, a build
+checks that the drive stays within the range of the driver and the converter, and the slew rate within that of the
+amplifier. It also checks that a line and a table can carry the harmonics, and that the hysteresis is in the range in
+which its model holds. Numbers in parentheses, such as (17), are equations of the paper.
 """
 
 
@@ -37,7 +41,8 @@ def _tables(kind: types.Type, path: str, written: dict[type, str]) -> list[str]:
     written[kind.cls] = path.strip("[]")
     name = f"`[{path}]`: " if path else ""
     path = path.strip("[]")
-    rows = [f"{name}{_summary(kind)}\n", "| key | accepts | default | meaning |", "|---|---|---|---|"]
+    heading = fill(f"{name}{_summary(kind)}", 120, break_long_words=False, break_on_hyphens=False)
+    rows = [f"{heading}\n", "| key | accepts | default | meaning |", "|---|---|---|---|"]
     inner_tables = []
     for field in kind.fields:
         inner, description = _plain(field.type)

@@ -21,6 +21,8 @@ from spi_bench import (
 
 from tablegen.verification.simulate import Design, compile_design
 
+pytestmark = pytest.mark.common
+
 
 @dataclass(frozen=True)
 class Beat:
@@ -109,6 +111,7 @@ def test_the_stream_keeps_the_rule_of_axi(tmp_path: Path, word_bits: int, pauses
         assert missed > 50
 
 
+@pytest.mark.rest
 @pytest.mark.parametrize(
     ("old", "new", "found"),
     [

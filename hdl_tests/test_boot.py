@@ -22,6 +22,8 @@ from tablegen.resources import verilog_runtime
 from tablegen.verification.bench import SequencerShape
 from tablegen.verification.simulate import Design, compile_design
 
+pytestmark = pytest.mark.common
+
 BENCH = BENCHES / "boot_bench.v"
 BOOT = next(path for path in verilog_runtime() if path.name == "dac_boot.v")
 X_TABLE, X_FOURIER = 1, 3  # regions; those of y are one more
@@ -273,6 +275,7 @@ def mutants_captured(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list
     return play(tmp_path_factory.mktemp("boot") / "mutants", benches)
 
 
+@pytest.mark.rest
 @pytest.mark.parametrize("name", MUTANTS)
 def test_a_mutant_is_found(mutants_captured: dict[str, list[str]], name: str) -> None:
     with pytest.raises(Wrong):

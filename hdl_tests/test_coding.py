@@ -9,6 +9,8 @@ from spi_bench import AD5541A, CODING, Mutant, Spi
 
 from tablegen.verification.simulate import Design, compile_design
 
+pytestmark = pytest.mark.common
+
 
 def codings() -> list[Spi]:
     """Every coding and alignment of 8 to 24 bits in words of their own width, of 16, of 24 and of 32."""
@@ -69,6 +71,7 @@ def test_coding_equals_the_model(tmp_path: Path) -> None:
     assert differing(results) == []
 
 
+@pytest.mark.rest
 @pytest.mark.parametrize(
     ("old", "new", "touched"),
     [

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from building import (
     BENCHES,
+    FEW,
     NAME,
     REPOSITORY,
     VARIANTS,
@@ -21,6 +22,7 @@ from building import (
     fourier_words,
     run_clean,
 )
+from sets import quick
 
 from tablegen.device.sequencer import play_line
 from tablegen.numerics.arrays import Ints
@@ -29,7 +31,10 @@ PLAYER = REPOSITORY / "examples" / "verilog" / "play.v"
 LINES = 2  # of configurations whose frame is too long to be played whole
 
 
-@pytest.fixture(scope="module", params=VARIANTS)
+@pytest.fixture(
+    scope="module",
+    params=quick(FEW, VARIANTS),
+)
 def built(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Build:
     return build(tmp_path_factory.mktemp("variant"), VARIANTS[request.param])
 

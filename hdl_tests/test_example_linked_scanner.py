@@ -3,11 +3,14 @@
 import subprocess
 from pathlib import Path
 
+import pytest
 from building import BENCHES, REPOSITORY, VARIANTS, build, run_clean
 from limits import PATIENCE_S
 from link_talk import Talk
 
 from tablegen.link.messages import DeviceInfo, DeviceStatus, Feature, Request
+
+pytestmark = pytest.mark.common
 
 EXAMPLE = REPOSITORY / "examples" / "verilog" / "linked_scanner.v"
 BENCH = BENCHES / "linked_scanner_bench.v"

@@ -10,9 +10,12 @@ import pytest
 from building import BENCHES, REPOSITORY, VARIANTS, build, run_clean
 from spi_monitor import Converter, ProtocolFault, Wires, quiet, receive
 
-from tablegen.device.sequencer import DualProgram, Sequencer
+from tablegen.device.dual_program import DualProgram
+from tablegen.device.sequencer import Sequencer
 from tablegen.resources import verilog_runtime
 from tablegen.verification.simulate import Design, compile_design
+
+pytestmark = pytest.mark.common
 
 SCANNER = REPOSITORY / "examples" / "verilog" / "scanner.v"
 BENCH = BENCHES / "scanner_bench.v"
@@ -54,6 +57,7 @@ def test_it_elaborates_as_its_header_says(tmp_path: Path) -> None:
     assert program.exists()
 
 
+@pytest.mark.rest
 def test_the_converters_receive_the_codes_of_the_model(captured: tuple[DualProgram, np.ndarray]) -> None:
     program, levels = captured
     sclk, x_data, y_data, select_n, load_n = (levels >> i & 1 for i in range(5))
@@ -77,6 +81,7 @@ def test_the_converters_receive_the_codes_of_the_model(captured: tuple[DualProgr
         assert set(np.diff(frames.start).tolist()) == {CLOCKS_PER_TICK}, "every sample is as long as every other"
 
 
+@pytest.mark.rest
 def test_a_capture_with_a_wrong_bit_is_not_taken(captured: tuple[DualProgram, np.ndarray]) -> None:
     """Negative control: the select of one frame rises a clock early."""
     _, levels = captured

@@ -12,8 +12,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
-from building import REPOSITORY
+from building import REPOSITORY, tool
 from limits import PATIENCE_S
+
+pytestmark = pytest.mark.rest
 
 FORMAL = REPOSITORY / "hdl_tests" / "formal"
 MODULES = REPOSITORY / "firmware_templates" / "verilog"
@@ -68,21 +70,16 @@ def _read(proof: Proof, modules: Mapping[str, str], folder: Path) -> str:
 def _translate(proof: Proof, folder: Path, modules: Mapping[str, str] | None = None) -> Path:
     script, smt2 = folder / "read.ys", folder / "proof.smt2"
     script.write_text(_read(proof, modules or {}, folder) + f"write_smt2 -wires {smt2}\n", "utf-8")
-    subprocess.run(["yosys", "-q", "-s", script], check=True, capture_output=True, text=True)
+    subprocess.run([tool("yosys"), "-q", "-s", script], check=True, capture_output=True, text=True)
     return smt2
 
 
 def _solve(smt2: Path, *options: str | int) -> str:
-    command = ["yosys-smtbmc", "--noprogress", "-s", "z3", *map(str, options), str(smt2)]
+    command = [tool("yosys-smtbmc"), "--noprogress", "-s", Path(tool("z3")).name, *map(str, options), str(smt2)]
     return subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S).stdout
 
 
-QUICK = [
-    name if name != "sequencer_of_look_up_tables" else pytest.param(name, marks=pytest.mark.slow) for name in PROOFS
-]
-
-
-@pytest.mark.parametrize("name", QUICK)
+@pytest.mark.parametrize("name", PROOFS)
 def test_holds_for_ever(name: str, tmp_path: Path) -> None:
     proof = PROOFS[name]
     smt2 = _translate(proof, tmp_path)
@@ -105,14 +102,15 @@ def _proven_by_sat(proof: Proof, folder: Path, modules: Mapping[str, str] | None
     script = folder / "prove.ys"
     induction = "memory_map; opt -full; sat -tempinduct -prove-asserts -set-assumes -verify -maxsteps 4\n"
     script.write_text(_read(proof, modules or {}, folder) + induction, "utf-8")
-    done = subprocess.run(["yosys", "-s", script], capture_output=True, text=True, timeout=PATIENCE_S)
+    done = subprocess.run([tool("yosys"), "-s", script], capture_output=True, text=True, timeout=PATIENCE_S)
     proven = "Induction step proven: SUCCESS!" in done.stdout
     assert proven or "proof did fail" in done.stderr, done.stderr  # and not something else
     assert proven == (done.returncode == 0)
     return proven
 
 
-@pytest.mark.parametrize("name", ["slew_8_bits", pytest.param("slew_16_bits", marks=pytest.mark.slow), "serial"])
+@pytest.mark.timeout(86_400)  # of 16 bits it takes two minutes
+@pytest.mark.parametrize("name", WIDER)
 def test_holds_for_ever_by_sat(name: str, tmp_path: Path) -> None:
     assert _proven_by_sat(WIDER[name], tmp_path)
 

@@ -187,6 +187,7 @@ def mixed_jobs(parameters: Parameters, seed: int) -> list[Job]:
     return jobs
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("multiplier", [0, 1])
 @pytest.mark.parametrize(
     ("index_bits", "word_bits", "harmonics"),
@@ -199,6 +200,7 @@ def test_small_tables_equal_the_host_s(
     assert failures(tmp_path, parameters, mixed_jobs(parameters, seed=harmonics)) == 0
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(
     "parameters",
     [
@@ -215,6 +217,7 @@ def test_longer_tables_equal_the_host_s(tmp_path: Path, parameters: Parameters) 
     assert failures(tmp_path, parameters, jobs) == 0
 
 
+@pytest.mark.common
 def test_512_harmonics(tmp_path: Path) -> None:
     """The most that the addresses allow, far above what the table resolves: n k goes round many times."""
     parameters = Parameters((5, 4), (16, 16), 512, multiplier=1)
@@ -223,6 +226,7 @@ def test_512_harmonics(tmp_path: Path) -> None:
     assert failures(tmp_path, parameters, jobs) == 0
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("multiplier", [0, 1])
 def test_tables_equal_exact_arithmetic(tmp_path: Path, multiplier: int) -> None:
     """Whole tables against the formula, by a route that shares nothing with ``synthesize``."""
@@ -251,6 +255,7 @@ def test_the_jobs_reach_what_they_are_for() -> None:
         assert above != below
 
 
+@pytest.mark.rest
 def test_the_example(tmp_path: Path) -> None:
     """Words of a real plan, 2048 and 4096 long, at the word widths of its tables; on Verilator, for the length."""
     plan = plan_of(tmp_path, {"y.table.length": "4096"})
@@ -321,6 +326,7 @@ MUTANTS = {
 }
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("multiplier", [0, 1])
 def test_what_comes_while_it_renders(tmp_path: Path, multiplier: int) -> None:
     """And all that the mutants below are asked."""
@@ -328,6 +334,7 @@ def test_what_comes_while_it_renders(tmp_path: Path, multiplier: int) -> None:
     assert failures(tmp_path, parameters, [*eventful_jobs(parameters), *mixed_jobs(parameters, seed=3)]) == 0
 
 
+@pytest.mark.rest
 @pytest.mark.parametrize("name", MUTANTS)
 def test_a_mutant_is_found(tmp_path: Path, name: str) -> None:
     """Negative control: with one thing wrong in the Verilog the comparison fails."""
@@ -345,6 +352,7 @@ def test_a_mutant_is_found(tmp_path: Path, name: str) -> None:
     assert failures(tmp_path, parameters, jobs, sources=sources) == 1
 
 
+@pytest.mark.common
 def test_a_wrong_word_is_found(tmp_path: Path) -> None:
     """Negative control of the comparison itself: the last bit of one expected word."""
     jobs = mixed_jobs(SMALL, seed=3)

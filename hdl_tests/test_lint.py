@@ -54,6 +54,7 @@ def test_each_module_by_itself(module: str) -> None:
     assert lint(module, {}) == ""
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("name", SEQUENCERS)
 def test_sequencer(name: str) -> None:
     assert lint("dac_sequencer", SEQUENCERS[name]) == ""

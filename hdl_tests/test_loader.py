@@ -51,6 +51,7 @@ def golden(dialogue: dict[str, Any], loader: Loader, words: list[int]) -> None:
         hold(dialogue, LoaderDevice(simulation, info, MADE["boot"], TOLD))
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("dialogue", dialogues(*LACKS), ids=lambda dialogue: dialogue["name"])
 def test_golden_dialogues(dialogue: dict[str, Any], loader: Loader) -> None:
     golden(dialogue, loader, [])
@@ -67,7 +68,8 @@ def random_dialogue(loader: Loader, seed: int, steps: int, words: list[int]) -> 
     return dialogue
 
 
-@pytest.mark.parametrize("seed", [*range(2), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(2, 40))])
+@pytest.mark.rest
+@pytest.mark.parametrize("seed", range(40))
 def test_random_dialogues(seed: int, loader: Loader) -> None:
     dialogue = random_dialogue(loader, seed, 120, [])
     assert len(dialogue.seen) > 10
@@ -85,7 +87,8 @@ def checked_uploads(loader: Loader, seed: int, uploads: int, words: list[int]) -
     return dialogue
 
 
-@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 20))])
+@pytest.mark.rest
+@pytest.mark.parametrize("seed", range(20))
 def test_every_check_is_that_of_the_model(seed: int, loader: Loader) -> None:
     seen = checked_uploads(loader, seed, 40, []).seen
     reasons = {key[1] for key in seen if isinstance(key, tuple) and key[0] == Request.COMMIT}
@@ -117,7 +120,7 @@ def exact_limits(loader: Loader, words: list[int]) -> None:
                 assert answer.payload == expected
 
 
-@pytest.mark.slow
+@pytest.mark.rest
 def test_limits_are_exact(loader: Loader) -> None:
     exact_limits(loader, [])
 
@@ -133,6 +136,7 @@ def bad_frames(simulation: Simulation) -> int:
     return DeviceStatus.unpack(answers[-1].payload).bad_frames
 
 
+@pytest.mark.common
 def test_golden_frames(loader: Loader) -> None:
     golden_frames(loader, [])
 
@@ -170,6 +174,7 @@ def upload(simulation: Simulation, talk: Talk, before_commit: Callable[[], None]
 # The line
 
 
+@pytest.mark.common
 def test_a_baud_rate_may_be_off_by_three_per_cent(loader: Loader) -> None:
     talk = Talk()
     with Simulation(loader.compiled) as simulation:
@@ -183,6 +188,7 @@ def test_a_baud_rate_may_be_off_by_three_per_cent(loader: Loader) -> None:
         assert simulation.talk(talk.hello()) == b"", "negative control: 10 % are too much"
 
 
+@pytest.mark.common
 def test_what_is_no_byte_spoils_at_most_a_frame(loader: Loader) -> None:
     talk = Talk()
     with Simulation(loader.compiled) as simulation:
@@ -195,6 +201,7 @@ def test_what_is_no_byte_spoils_at_most_a_frame(loader: Loader) -> None:
         assert [answer.type for answer in talk.answers(simulation.talk(inside))] == [Request.STATUS | 0x80]
 
 
+@pytest.mark.common
 def test_a_backlog_of_requests_is_answered(loader: Loader) -> None:
     """As many bytes as the ring holds, while the loader is still answering."""
     talk = Talk()
@@ -204,6 +211,7 @@ def test_a_backlog_of_requests_is_answered(loader: Loader) -> None:
         assert len(answers) == 6
 
 
+@pytest.mark.common
 def test_a_reset_forgets_session_and_upload_but_not_what_plays(loader: Loader) -> None:
     talk = Talk()
     with Simulation(loader.compiled) as simulation:
@@ -234,9 +242,10 @@ FINDERS: dict[str, Callable[[Loader, list[int]], object]] = {
 }
 
 
+@pytest.mark.rest
 @pytest.mark.parametrize(
     "mutant",
-    [pytest.param(mutant, marks=[] if mutant.quick else [pytest.mark.slow], id=mutant.breaks) for mutant in MUTANTS],
+    [pytest.param(mutant, id=mutant.breaks) for mutant in MUTANTS],
 )
 def test_a_program_with_a_fault_is_found(mutant: Mutant, loader: Loader) -> None:
     words = mutant.words()
@@ -244,6 +253,7 @@ def test_a_program_with_a_fault_is_found(mutant: Mutant, loader: Loader) -> None
         FINDERS[mutant.by](loader, words)
 
 
+@pytest.mark.rest
 def test_no_processor_commits_against_the_interlock(loader: Loader) -> None:
     """Even one that does not ask."""
     (mutant,) = (mutant for mutant in MUTANTS if mutant.breaks == "the interlock is ignored")

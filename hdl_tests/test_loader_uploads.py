@@ -17,9 +17,11 @@ from link_talk import Talk
 from loader_bridge import Simulation
 from loader_device import Loader
 
-from tablegen.device.sequencer import DualProgram
+from tablegen.device.dual_program import DualProgram
 from tablegen.link.image import ProgramImage, make_image
 from tablegen.link.messages import ANSWER, DeviceState, DeviceStatus, Request, Upload
+
+pytestmark = pytest.mark.rest
 
 UPDATE_RATE_HZ = 50_000
 TICK_EVERY = 50  # clocks

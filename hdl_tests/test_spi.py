@@ -30,6 +30,7 @@ def all_played(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Played]:
     return play("icarus", tmp_path_factory.mktemp("spi"), SETUPS, 80, {})
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("name", SETUPS)
 def test_converters_receive_every_sample_that_is_not_missed(all_played: dict[str, Played], name: str) -> None:
     want = check(all_played[name])
@@ -37,6 +38,7 @@ def test_converters_receive_every_sample_that_is_not_missed(all_played: dict[str
     assert len(want.missed) > 10, "and to miss"
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("name", SETUPS)
 def test_strobes_a_tick_apart_do_not_wait(all_played: dict[str, Played], name: str) -> None:
     """The formula of the clocks that a tick takes: the first strobes of a stimulus are exactly that apart."""
@@ -49,6 +51,7 @@ def test_strobes_a_tick_apart_do_not_wait(all_played: dict[str, Played], name: s
     assert not played.wires["missed"][: strobes[-1]].any()
 
 
+@pytest.mark.common
 def test_a_reset_at_any_clock_tears_no_frame(all_played: dict[str, Played]) -> None:
     """``check`` compares every frame; this says that resets were met at every clock of a tick."""
     for name in ("ad5541a", "ad5791", "dac8562", "two_selects", "chain"):
@@ -85,6 +88,7 @@ def random_setup(generator: random.Random) -> Spi:
     )
 
 
+@pytest.mark.rest
 def test_random_parameters_on_verilator(tmp_path: Path) -> None:
     generator = random.Random(2024)
     setups = {f"random_{index}": random_setup(generator) for index in range(16)}
@@ -179,6 +183,7 @@ def mutants_played(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Played
     return play("icarus", tmp_path_factory.mktemp("mutants"), setups, 60, MUTANTS)
 
 
+@pytest.mark.rest
 @pytest.mark.parametrize("name", MUTANTS)
 def test_a_mutant_is_found(mutants_played: dict[str, Played], name: str) -> None:
     with pytest.raises((ProtocolFault, Difference), match=MUTANTS[name].found):

@@ -12,9 +12,11 @@ import numpy as np
 import pytest
 from building import BENCHES, Variant, write_variant
 from programs import random_dual
+from sets import LONG_TEST, common, quick
 from spi_monitor import Converter, Wires, receive, updates
 from stream_configurations import (
     CONFIGURATIONS,
+    FEW,
     LEAST_PACE,
     LEAST_PACES,
     LOW_AREA,
@@ -168,7 +170,8 @@ def markers_of_a_scan(capture: Words, plan: Plan, frames: int) -> None:
     assert seen["backward"] == frames * schedule.lines * (schedule.ticks - schedule.turn_tick)
 
 
-@pytest.mark.parametrize("name", PLANS)
+@pytest.mark.common
+@pytest.mark.parametrize("name", common(("bits_16", "turn_0.7", "direct_steps", "settle_5", "guarded"), PLANS))
 def test_whole_frames_of_a_plan(name: str, tmp_path: Path) -> None:
     plan = planned(tmp_path, PLANS[name])
     program = plan.program
@@ -193,6 +196,7 @@ def test_whole_frames_of_a_plan(name: str, tmp_path: Path) -> None:
     assert tuple(codes(played.capture, axis)[-1] for axis in "xy") == park
 
 
+@pytest.mark.rest
 @pytest.mark.parametrize(("simulator", "lines"), [("icarus", 3), ("verilator", 200)])
 def test_the_shipped_example(simulator: str, lines: int, tmp_path: Path) -> None:
     plan = planned(tmp_path, Variant())
@@ -212,6 +216,7 @@ def test_the_shipped_example(simulator: str, lines: int, tmp_path: Path) -> None
         markers_of_a_scan(played.capture, plan, 1)
 
 
+@pytest.mark.common
 def test_the_longest_table(tmp_path: Path) -> None:
     plan = planned(tmp_path, _short(x__table__length=65536, timing={**TIMING, "ticks_per_line": 1249}))
     program = plan.program
@@ -235,7 +240,11 @@ def test_enough_is_played_on_icarus() -> None:
     assert sum(configuration.samples for configuration in CONFIGURATIONS.values()) >= SAMPLES_ON_ICARUS
 
 
-@pytest.mark.parametrize("name", CONFIGURATIONS)
+@pytest.mark.common
+@pytest.mark.parametrize(
+    "name",
+    common(FEW, CONFIGURATIONS),
+)
 def test_random_programs(name: str, tmp_path: Path) -> None:
     configuration = CONFIGURATIONS[name]
     script = configuration.script(name)
@@ -248,7 +257,10 @@ def test_random_programs(name: str, tmp_path: Path) -> None:
         assert all(seen[name] for name in (*FLAGS, *FAULTS[:2])), seen
 
 
-@pytest.mark.parametrize("variant", ["PLAIN_MULTIPLIER", "LOW_AREA", "FOURIER", "digits"])
+@pytest.mark.common
+@pytest.mark.parametrize(
+    "variant", common(["digits", "FOURIER"], ["PLAIN_MULTIPLIER", "LOW_AREA", "FOURIER", "digits"])
+)
 def test_everything_that_a_host_may_ask(variant: str, tmp_path: Path) -> None:
     shape = SequencerShape(16, 1, 4, 16, 1, 3, 16)
     parameters: dict[str, int | str] = {"COUNT_BITS": 4}
@@ -277,7 +289,7 @@ def small_on_verilator(tmp_path_factory: pytest.TempPathFactory) -> SequencerBen
     return SequencerBench("verilator", SMALL, tmp_path_factory.mktemp("small"))
 
 
-@pytest.mark.parametrize("pace", [1, 3])
+@pytest.mark.parametrize("pace", quick([1], [1, 3]))
 def test_a_swap_is_requested_at_every_tick_and_taken_at_line_starts(pace: int, tmp_path: Path) -> None:
     shape = SequencerShape(16, 1, 3, 16, 1, 2, 16)
     rng = np.random.default_rng(pace)
@@ -296,7 +308,8 @@ def test_a_swap_is_requested_at_every_tick_and_taken_at_line_starts(pace: int, t
     follow_their_programs(capture, script.taken)
 
 
-@pytest.mark.parametrize("swaps", [SWAPS, pytest.param(SWAPS_SLOW, marks=pytest.mark.slow)])
+@pytest.mark.rest
+@pytest.mark.parametrize("swaps", [SWAPS, pytest.param(SWAPS_SLOW, marks=LONG_TEST)])
 def test_no_line_mixes_programs_and_no_step_is_above_the_limit(swaps: int, small_on_verilator: SequencerBench) -> None:
     rng = np.random.default_rng(swaps)
     samples = 0
@@ -309,6 +322,7 @@ def test_no_line_mixes_programs_and_no_step_is_above_the_limit(swaps: int, small
     assert samples >= SAMPLES_ON_VERILATOR * swaps // SWAPS
 
 
+@pytest.mark.common
 def test_laws_of_swaps_can_be_broken() -> None:
     script, programs = random_swaps(np.random.default_rng(0), 40)
     script.text()
@@ -340,6 +354,7 @@ def test_laws_of_swaps_can_be_broken() -> None:
 # Long runs on Verilator.
 
 
+@pytest.mark.rest
 @pytest.mark.parametrize(("ticks", "lines", "played_lines"), [(211, 1009, 1010), (65537, 5, 6)])
 def test_no_line_drifts(ticks: int, lines: int, played_lines: int, small_on_verilator: SequencerBench) -> None:
     rng = np.random.default_rng(ticks)
@@ -359,6 +374,7 @@ def test_no_line_drifts(ticks: int, lines: int, played_lines: int, small_on_veri
     assert np.array_equal(np.flatnonzero(flag(playing, "frame")), [0, frame])
 
 
+@pytest.mark.rest
 def test_random_programs_on_verilator(tmp_path: Path) -> None:
     shape = SequencerShape(20, 1, 4, 24, 0, 5, 18)
     script = Script((1 << 19, 3))
@@ -369,6 +385,7 @@ def test_random_programs_on_verilator(tmp_path: Path) -> None:
     assert equal(bench, script).samples >= 150_000
 
 
+@pytest.mark.rest
 def test_low_area_on_verilator(tmp_path: Path) -> None:
     shape = SequencerShape(20, 1, 4, 24, 0, 5, 16)
     script = Script()
@@ -389,6 +406,7 @@ def with_sine(folder: Path, shape: SequencerShape, harmonics: int = HARMONICS) -
     return {"FOURIER": 1, "HARMONICS": harmonics, "SINE_FILE": str(sine)}
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("plain", [0, 1])
 def test_tables_are_rendered_while_a_program_plays(plain: int, tmp_path: Path) -> None:
     shape = SequencerShape(16, 1, 4, 16, 1, 3, 14)
@@ -399,6 +417,7 @@ def test_tables_are_rendered_while_a_program_plays(plain: int, tmp_path: Path) -
     assert script.swaps >= 8
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("low_area", [0, 1])
 def test_a_plan_from_its_fourier_words(low_area: int, tmp_path: Path) -> None:
     """The swap is from the uploaded plan to the same, rendered from a fiftieth of the words: no code may differ."""
@@ -429,6 +448,7 @@ def test_a_plan_from_its_fourier_words(low_area: int, tmp_path: Path) -> None:
 # Writes and faults.
 
 
+@pytest.mark.common
 def test_words_can_be_written_in_any_order(tmp_path: Path) -> None:
     shape = SequencerShape(16, 1, 3, 16, 0, 3, 16)
     rng = np.random.default_rng(3)
@@ -444,6 +464,7 @@ def test_words_can_be_written_in_any_order(tmp_path: Path) -> None:
     equal(SequencerBench("icarus", shape, tmp_path), script)
 
 
+@pytest.mark.common
 def test_an_underrun_is_a_fault(tmp_path: Path) -> None:
     """The model has no clock and cannot have one: it adds a sticky fault to a scan, and `valid` is low from then on."""
     plan = planned(tmp_path, PLANS["settle_0"])
@@ -479,6 +500,7 @@ def test_an_underrun_is_a_fault(tmp_path: Path) -> None:
     assert np.any(flag(expected, "valid")[at:])
 
 
+@pytest.mark.common
 def test_a_tick_that_comes_too_early_is_a_fault(tmp_path: Path) -> None:
     """With a tick a clock earlier than the least pace every second one is refused, and the others go on as if alone."""
     plan = planned(tmp_path, PLANS["settle_0"])
@@ -521,6 +543,7 @@ class Chip:
 CHIPS = {"bits_16": Chip(16, 16, 0, False), "bits_20": Chip(20, 24, 0x100000, True)}
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("name", CHIPS)
 def test_volts_at_the_piezo(name: str, tmp_path: Path) -> None:
     chip = CHIPS[name]

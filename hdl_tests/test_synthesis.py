@@ -11,10 +11,12 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
-from building import REPOSITORY
+from building import REPOSITORY, tool
 
 sys.path.insert(0, str(REPOSITORY / "benchmarks"))
 import resources
+
+pytestmark = pytest.mark.rest
 
 MODULES = resources.MODULES
 CHECKED: dict[str, tuple[str, Mapping[str, int]]] = {
@@ -50,7 +52,7 @@ def check(top: str, parameters: Mapping[str, int], folder: Path = MODULES) -> su
         f"read_verilog -defer {folder}/*.v; hierarchy -check -top {top} {values}; proc; opt; check -assert; "
         "select -assert-none t:$dlatch t:$adlatch t:$dlatchsr t:$sr t:$_DLATCH_* t:$_SR_*"
     )
-    return subprocess.run(["yosys", "-q", "-p", script], capture_output=True, text=True)
+    return subprocess.run([tool("yosys"), "-q", "-p", script], capture_output=True, text=True)
 
 
 @pytest.mark.parametrize("name", CHECKED)
@@ -111,7 +113,7 @@ def test_page_meets_the_requirements(name: str) -> None:
 
 def pinned() -> bool:
     """The tools are those of the page; with others, only the requirements hold."""
-    version = subprocess.run(["yosys", "-V"], capture_output=True, text=True, check=True).stdout
+    version = subprocess.run([tool("yosys"), "-V"], capture_output=True, text=True, check=True).stdout
     return re.match(r"Yosys 0\.23 ", version) is not None
 
 
@@ -130,7 +132,7 @@ def test_meets_the_requirements(name: str) -> None:
         assert result.mhz >= int(row[9]) - 0.5
 
 
-@pytest.mark.slow
+@pytest.mark.rest
 @pytest.mark.parametrize("name", resources.CASES)
 def test_page_is_what_is_measured(name: str) -> None:
     case = resources.CASES[name]

@@ -13,6 +13,8 @@ change. Names are loaded when they are first used, so that importing tablegen co
 from importlib import import_module
 from typing import TYPE_CHECKING
 
+from tablegen.version import __version__
+
 if TYPE_CHECKING:
     from tablegen.api.build import BrokenLimit, Build, build, certify, load, plan
     from tablegen.api.samples import Samples
@@ -30,8 +32,6 @@ if TYPE_CHECKING:
     from tablegen.verification.build import Report
     from tablegen.verification.run import verify
     from tablegen.verification.simulate import ToolMissing
-
-__version__ = "0.2.0"
 
 _HOMES = {
     "load": "tablegen.api.build",

@@ -6,7 +6,7 @@ The distribution is not called like the package: on PyPI ``tablegen`` is another
 import re
 from pathlib import Path
 
-from tablegen import __version__
+from tablegen.version import __version__
 
 PROJECT = "piezo-tablegen"  # as in pyproject.toml; for a source tree that is not installed
 _COMMAND = ("tablegen", "tablegen.cli:main")

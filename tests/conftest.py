@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from hypothesis import settings
-from installing import install, make_wheel
+from installing import install, make_wheel, told_pythons
 
 # Without deadlines: how long an example takes is the machine's affair. In CI Hypothesis's examples are fixed.
 settings.register_profile("tablegen", settings(), deadline=None)
@@ -26,3 +26,8 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """That wheel, installed into a folder of packages of its own; to be copied before it is changed."""
     return install(wheel, tmp_path_factory.mktemp("installed"))
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Say which other Pythons were at hand, since tests for those that were not are not there to be skipped."""
+    terminalreporter.write_line(told_pythons())

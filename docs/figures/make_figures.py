@@ -20,12 +20,12 @@ GREY, RED, BLUE, ORANGE = "#777777", "#c23b22", "#1f5fa8", "#d98e04"
 
 
 def position(t: Floats, w: Floats) -> Floats:
-    """Where the modelled piezo is at a drive w: the inverse of the branch being swept."""
+    """The position of the modelled piezo at a drive w: the inverse of the branch being swept."""
     return np.where(t <= SHAPE.turn, FORWARD.inverse(w), 1.0 - BACKWARD.inverse(1.0 - w))
 
 
 def scan_line() -> None:
-    """What the compensation does to a scan line: drive, position error, scaling error."""
+    """The effect of the compensation on a scan line: drive, position error, scaling error."""
     t = np.linspace(0.0, 1.0, 4001)
     triangle = np.where(t <= 0.5, 2 * t, 2 - 2 * t)
     window = band_limited(SHAPE, BandLimit(), HARMONICS)

@@ -1,4 +1,4 @@
-"""How every picture looks: lines are ours, open circles what the paper prints."""
+"""The style of every picture: lines are our numbers, open circles the numbers that the paper prints."""
 
 import io
 from collections.abc import Sequence

@@ -13,8 +13,8 @@ from tablegen.numerics.arrays import Floats
 from tablegen.virtual.experiments import apparent_sizes
 
 TITLE = "Figure 2: offset voltage"
-TEXT = """The virtual scanner was identified on the +25 % and -8 % of figure 2; what it says here is no prediction. (1)
-goes through the three lattice constants of figures 2b to 2d at 7, 50 and 93 V."""
+TEXT = """The virtual scanner was identified on the +25 % and -8 % of figure 2; its results here are no prediction. The
+curve of (1) goes through the three lattice constants of figures 2b to 2d at 7, 50 and 93 V."""
 
 LATTICE_NM = 17.7
 SIZE_V, OFFSETS_V = 13.0, (7.0, 50.0, 93.0)
@@ -28,13 +28,13 @@ def apparent(offsets_v: Floats) -> Floats:
 
 @cache
 def at_ends() -> tuple[float, float]:
-    """Of the lattice at 7 and 93 V, in percent of that at 50 V."""
+    """The change of the lattice at 7 and 93 V, in percent of the lattice at 50 V."""
     low, high = (float(value) for value in 100.0 * (apparent(np.array([7.0, 93.0])) / LATTICE_NM - 1.0))
     return low, high
 
 
 def range_difference() -> float:
-    """Between the scan ranges at 7 and 93 V, in percent of that at 50 V."""
+    """The difference between the scan ranges at 7 and 93 V, in percent of the range at 50 V."""
     low, high = at_ends()
     return 100.0 * (1.0 / (1.0 + 0.01 * low) - 1.0 / (1.0 + 0.01 * high))
 
@@ -50,19 +50,19 @@ def rows() -> list[Row]:
     simulated, fitted = Source.IDENTIFIED, law()
     return [
         Row("sec. 3, 5", "200 nm at 13 V, in nm/V", between("12", "20", "nm/V"), 200.0 / 13.0, Source.ARITHMETIC),
-        Row("2b", "lattice at 50 V, where it is calibrated", exact("17.7", "nm"), LATTICE_NM, Source.FITTED),
+        Row("2b", "lattice at 50 V, the offset of the calibration", exact("17.7", "nm"), LATTICE_NM, Source.FITTED),
         Row(
             "2c",
             "lattice at 93 V",
             about("22.3", "nm"),
             LATTICE_NM * (1.0 + 0.01 * high),
             simulated,
-            why="22.3 nm is 26.0 % above 17.7 nm, and the virtual scanner was identified on the 25 % printed beside it",
+            why="22.3 nm is 26.0 % above 17.7 nm, but the virtual scanner was identified on the printed 25 %",
         ),
-        Row("2c", "the same, increase", about("25", "%"), high, simulated),
+        Row("2c", "lattice at 93 V, increase", about("25", "%"), high, simulated),
         Row("2c", "22.3 nm above 17.7 nm", about("25", "%"), 100.0 * (22.3 / 17.7 - 1.0), Source.ARITHMETIC),
         Row("2d", "lattice at 7 V", about("16.3", "nm"), LATTICE_NM * (1.0 + 0.01 * low), simulated),
-        Row("2d", "the same, decrease", about("8", "%"), -low, simulated),
+        Row("2d", "lattice at 7 V, decrease", about("8", "%"), -low, simulated),
         Row("2b-d", "difference of the scan ranges at 7 V and 93 V", about("30", "%"), range_difference(), simulated),
         Row(
             "2e",
@@ -71,7 +71,13 @@ def rows() -> list[Row]:
             fitted.factor(1.0),
             Source.FITTED,
         ),
-        Row("2e", "m at p = -1, by the same", between("0.85", "0.95"), fitted.factor(-1.0), Source.FITTED),
+        Row(
+            "2e",
+            "m at p = -1, by (1) through figures 2b to 2d",
+            between("0.85", "0.95"),
+            fitted.factor(-1.0),
+            Source.FITTED,
+        ),
     ]
 
 

@@ -15,22 +15,22 @@ from tablegen.numerics.arrays import Floats
 from tablegen.virtual.experiments import triangle_size
 
 TITLE = "Figure 3: scan size"
-TEXT = """The laws are (6) and (10) with beta = 0.53 and a threshold of 0.5, calibrated at 200 nm = 13 V as in section
-5; but 436 and 467 nm take 200 nm = 20 V. The virtual scanner was identified on these laws; its calibration is
-`tablegen calibrate size` on its own sizes, without noise."""
+TEXT = """The laws are (6) and (10) with beta = 0.53 and a threshold of 0.5, calibrated at 200 nm = 13 V, the value of
+section 5. Only the 436 and 467 nm need a calibration at 200 nm = 20 V. The virtual scanner was identified on these
+laws. It is calibrated by `tablegen calibrate size` on its own sizes, without noise."""
 
 SIZES_V = np.array([3.0, 5, 7, 10, 13, 20, 30, 39, 50, 60, 70, 80, 90, 100])
 SMALLEST_NM, LARGEST_NM = 1.0, 200.0 / laws.BASE_V  # nominal; the latter takes all of v_max
 
 
 def needed(size_law: SizeLaw, nominal_nm: float) -> float:
-    """What the drive has to change by for the correct size, in percent: the factor of figure 3d, less 1."""
+    """The change of the drive for the correct size, in percent: the factor of figure 3d, minus 1."""
     return 100.0 * (nominal_nm / laws.uncorrected(size_law, nominal_nm) - 1.0)
 
 
 @cache
 def virtual_sizes() -> Floats:
-    """Of the virtual scanner, in nm, at ``SIZES_V``."""
+    """The sizes of the virtual scanner at ``SIZES_V``, in nm."""
     return np.array([triangle_size(axis(), float(v), 0.5 * V_MAX, RATE_HZ) for v in SIZES_V])
 
 
@@ -52,14 +52,14 @@ def rows() -> list[Row]:
     shrunk = 17.7 * 390.0 / laws.uncorrected(law, 390.0)
     beta_3b = _beta_of_3b()
     why_3b = (
-        f"with 0.53 and 200 nm at 13 V, (6) enlarges 390 nm by less; 16.4 nm takes beta = {beta_3b:.2f}, which is "
-        f"inside the 0.5 to 1 of the paper's scanners"
+        f"with beta = 0.53 and 200 nm at 13 V, (6) enlarges 390 nm less; 16.4 nm needs beta = {beta_3b:.2f}, which is "
+        f"inside the range of 0.5 to 1 of the paper's scanners"
     )
     alone, hybrid = calibrated(1.0), calibrated()
     off = _quadratic_alone()
     beside = (
-        f"it was identified on this number, beside its hysteresis and offsets; its sizes are within "
-        f"{hybrid.largest_percent:.1f} % of the law that fits best"
+        f"the virtual scanner was identified on this number together with hysteresis and offsets; its sizes are "
+        f"within {hybrid.largest_percent:.1f} % of the law that fits best"
     )
     example = [
         laws.uncorrected(laws.size_law(beta, laws.EXAMPLE_BASE_V), 400.0, laws.EXAMPLE_BASE_V) for beta in (0.5, 1.0)
@@ -67,9 +67,9 @@ def rows() -> list[Row]:
     exact_law, simulated = Source.LAW, Source.IDENTIFIED
     return [
         Row("3b", "lattice at 390 nm, calibrated at 200 nm", exact("16.4", "nm"), shrunk, exact_law, why_3b),
-        Row("3b", "the same, smaller by", about("8", "%"), 100.0 * (1.0 - shrunk / 17.7), exact_law, why_3b),
+        Row("3b", "lattice at 390 nm, decrease", about("8", "%"), 100.0 * (1.0 - shrunk / 17.7), exact_law, why_3b),
         Row("3b", "16.4 nm below 17.7 nm", about("8", "%"), 100.0 * (1.0 - 16.4 / 17.7), Source.ARITHMETIC),
-        Row("3b", "beta of typical scanners; the one that 3b takes", between("0.5", "1"), beta_3b, Source.FITTED),
+        Row("3b", "beta of typical scanners; here the beta of figure 3b", between("0.5", "1"), beta_3b, Source.FITTED),
         Row("3d", "error of small scans", about("7", "%", before="up to "), needed(law, SMALLEST_NM), exact_law),
         Row("3d", "error of large scans", about("25", "%", before="up to "), -needed(law, LARGEST_NM), exact_law),
         Row(
@@ -79,41 +79,41 @@ def rows() -> list[Row]:
             alone.beta.value,
             simulated,
             (
-                f"the virtual scanner follows (10) with 0.53 beyond the threshold, and (6) alone averages over both; "
-                f"with (10) it has {hybrid.beta.value:.2f}"
+                f"the virtual scanner follows (10) with 0.53 beyond the threshold, and a fit of (6) alone averages "
+                f"over both ranges; the fit of (6) and (10) gives {hybrid.beta.value:.2f}"
             ),
         ),
         Row(
             "3e",
-            "(6) off at large sizes",
+            "error of (6) at large sizes",
             about("6", "%", before="up to "),
             off,
             exact_law,
             (
-                f"between (6) and (10) with the same beta; fitted to all sizes of the virtual scanner (6) leaves "
-                f"{alone.largest_percent:.1f} %. The paper does not print beta of the hybrid"
+                f"this is the difference of (6) and (10) with the same beta; a fit of (6) to all sizes of the virtual "
+                f"scanner leaves {alone.largest_percent:.1f} %. The paper does not print beta of the hybrid"
             ),
         ),
         Row("3f", "beta of (6) and (10)", exact("0.53"), hybrid.beta.value, simulated, beside),
         Row("3f", "threshold of (10)", about("0.5"), hybrid.v_threshold.value, simulated),
         Row(
             "3f",
-            "what (6) leaves over what (6) and (10) leave",
+            "error of (6) over error of (6) and (10)",
             limits("more", "times", low=1.0, decimals=0),
             (alone.largest_percent / hybrid.largest_percent),
             simulated,
         ),
         Row("sec. 6", "400 nm uncorrected, beta = 0.5", exact("436", "nm"), example[0], exact_law),
         Row("sec. 6", "400 nm uncorrected, beta = 1", exact("467", "nm"), example[1], exact_law),
-        Row("sec. 6", "the same, error for beta = 0.5", exact("9", "%"), example[0] / 4.0 - 100.0, exact_law),
-        Row("sec. 6", "the same, error for beta = 1", exact("17", "%"), example[1] / 4.0 - 100.0, exact_law),
+        Row("sec. 6", "error of these 400 nm, beta = 0.5", exact("9", "%"), example[0] / 4.0 - 100.0, exact_law),
+        Row("sec. 6", "error of these 400 nm, beta = 1", exact("17", "%"), example[1] / 4.0 - 100.0, exact_law),
         Row(
             "sec. 6",
-            "200 nm in v_max, that 436 nm take",
+            "scan voltage of 200 nm for the 436 nm, in v_max",
             about("0.13"),
             _base_of_436(),
             Source.FITTED,
-            ("not the 13 V of section 5: (6) gives 436 and 467 nm for 200 nm at 0.2 of v_max, 10 nm/V at 100 V"),
+            ("it is not the 13 V of section 5: (6) gives 436 and 467 nm if 200 nm is 0.2 of v_max, 10 nm/V at 100 V"),
         ),
     ]
 

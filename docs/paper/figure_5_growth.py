@@ -10,9 +10,9 @@ from paper.rows import Row, Source, about, between, exact, limits
 
 TITLE = "Figures 5k, 5l and section 11: growth of the hysteresis"
 TEXT = """The line rate follows the size so that the forward scan has 100 µm/s, as in section 9. beta and rho of the
-virtual scanner are what `tablegen calibrate hysteresis` finds on its triangles from 10 to 100 V, without noise. It was
-identified on (22) with figure 5k's parameters below full scale, but on no other turn than 0.5. rho has no unit:
-V / V_max in (22) has none, and the paper's nm⁻¹ is a slip."""
+virtual scanner are the results of `tablegen calibrate hysteresis` on its triangles from 10 to 100 V, without noise. The
+virtual scanner was identified on (22) with figure 5k's parameters below full scale, but on no other turn than 0.5. rho
+has no unit, because V / V_max in (22) has none; the paper's nm⁻¹ is a slip."""
 
 
 def rows() -> list[Row]:
@@ -20,8 +20,8 @@ def rows() -> list[Row]:
     known, law = Source.IDENTIFIED, Source.LAW
     side = calibrated().branches[0]
     compromise = (
-        "the size law (6), the branch itself, asks for more hysteresis at medium sizes than (22) has, and no operator "
-        "of this kind meets both: see [what it does not reach](../virtual.md#what-it-does-not-reach-and-why)"
+        "the size law (6), which is the branch itself, needs more hysteresis at medium sizes than (22) gives, and no "
+        "operator of this kind meets both: see [what it does not reach](../virtual.md#what-it-does-not-reach-and-why)"
     )
     return [
         Row("5k", "beta_max forward", exact("0.037"), side.forward.beta_max.value, known, compromise),
@@ -45,15 +45,19 @@ def rows() -> list[Row]:
         ),
         Row("sec. 9", "forward at 200 nm = 13 V, (22)", between("2", "3", "%"), growth(BASE_V, FORWARD_GROWTH), law),
         Row(
-            "sec. 9", "the same on the virtual scanner", between("2", "3", "%"), -triangle(13.0).forward.peak[0], known
+            "sec. 9",
+            "forward at 200 nm = 13 V, virtual scanner",
+            between("2", "3", "%"),
+            -triangle(13.0).forward.peak[0],
+            known,
         ),
         Row(
             "sec. 9",
-            "largest, of either direction, (22)",
+            "largest of both directions, (22)",
             about("10", "%"),
             max(growth(1.0, FORWARD_GROWTH), growth(1.0, BACKWARD_GROWTH)),
             law,
-            "5k and section 8 end at 8.0 % and 8.5 % backward, and at 3.7 % forward, of which the sentence speaks",
+            "the sentence means the forward scan, which ends at 3.7 %; 5k and section 8 reach 8.0 % and 8.5 % backward",
         ),
         *_turn_rows(),
         *_z_rows(),
@@ -61,15 +65,15 @@ def rows() -> list[Row]:
 
 
 def _increase(turn: float) -> float:
-    """How much more forward residual a sawtooth of 100 V has than a triangle, in percent of it."""
+    """The increase of the forward residual from a triangle to a sawtooth, at 100 V, in percent."""
     return 100.0 * (triangle(100.0, turn).forward.peak[0] / triangle(100.0).forward.peak[0] - 1.0)
 
 
 def _turn_rows() -> list[Row]:
-    what = "more forward residual at 100 V, turn {}"
+    what = "increase of the forward residual at 100 V, turn {}"
     why = (
-        "the virtual scanner's hysteresis does not depend on the rate; what grows with the turn is the creep after a "
-        'faster flyback alone. The paper\'s "increased to" is read as a change, since it sees no major difference'
+        "the virtual scanner's hysteresis does not depend on the rate; only the creep after a faster flyback grows "
+        'with the turn. We read the paper\'s "increased to" as a change, because the paper sees no major difference'
     )
     return [
         Row("5l", what.format("0.7"), about("10", "%"), _increase(0.7), Source.SIMULATED, decimals=2),
@@ -86,8 +90,8 @@ def _z_rows() -> list[Row]:
         for side in (FORWARD_GROWTH, BACKWARD_GROWTH)
     )
     why = (
-        f"(22) saturates early here, and in percent of the scan leaves "
-        f"{growth(0.5, FORWARD_GROWTH) / growth(1.0, FORWARD_GROWTH):.2f}; the paper does not say what it counts"
+        f"(22) saturates early here, and in percent of the scan gives "
+        f"{growth(0.5, FORWARD_GROWTH) / growth(1.0, FORWARD_GROWTH):.2f}; the paper does not say which unit it uses"
     )
     return [
         Row("sec. 11", "residual in nm at 50 V over 100 V, forward", said, forward, Source.LAW, why),

@@ -11,8 +11,9 @@ from paper.rows import Row, Source, exact, exactly
 from tablegen.compensation.hysteresis import BranchShape
 
 TITLE = "Figures 5b, 5g, 5h: the models"
-TEXT = """The inverse of (15) and (17), as `tablegen` builds them: where a piezo of this kind is, less the drive u.
-"Exactly" is taken at its word, to a thousandth; 5g says of the sinusoidal model that it is so there too."""
+TEXT = """The residual is the inverse of (15) and (17), as `tablegen` builds them, minus the drive u: the position of
+such a piezo, minus the ideal position. "Exactly" is checked to a thousandth; the caption of 5g says "exactly" for the
+sinusoidal model too."""
 
 BETAS, SINUSOIDAL_PEAKS = ("0.03", "0.06", "0.09"), ("0.53", "0.56", "0.59")
 HARMONIC_PEAK, PEAKS, BETA_5H = "0.48", ("0.37", "0.5", "0.65"), "0.035"
@@ -33,7 +34,7 @@ def rows() -> list[Row]:
             exact("0.9"),
             _beta_of(-9.0),
             Source.LAW,
-            "a slip of the paper: 0.9 would run backwards and, by (16), peak at 1.4; figures 5b and 5g have 0.09",
+            "a slip of the paper: 0.9 would run backwards and, by (16), peak at 1.4; figures 5b and 5g use 0.09",
             decimals=3,
         )
     )

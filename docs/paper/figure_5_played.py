@@ -1,4 +1,4 @@
-"""Figures 5a, 5c to 5f, 5i and 5j, sections 7 and 8: what a line of 100 V leaves, as played on the virtual scanner."""
+"""Figures 5a, 5c to 5f, 5i and 5j, sections 7 and 8: errors of a line of 100 V, played on the virtual scanner."""
 
 from functools import cache
 from math import pi
@@ -12,14 +12,17 @@ from tablegen.virtual.line_error import BranchError, LineError
 from tablegen.virtual.paper import triangle_line
 
 TITLE = "Figures 5a, 5c to 5f, 5i, 5j: a line of 100 V"
-TEXT = """[full_scale.toml](full_scale.toml) is planned for each model and every tick of its 16-bit codes is played on
-the virtual scanner. It was identified on 5a and on (17) with the parameters that section 8 found for the harmonic
-model, so that 5i and 5j are no prediction; 5d to 5f follow from the same loop. Residuals are against the triangle;
-residuals and scaling errors are over x = 0.1..0.9. "The law" is no simulation, but a piezo that is (17) itself with
-these parameters. In the pictures, peak-to-peak values that are printed stand beside the curve, about its middle."""
+TEXT = """[full_scale.toml](full_scale.toml) is planned for each model, and every tick of its 16-bit codes is played on
+the virtual scanner. The virtual scanner was identified on 5a, and on (17) with the parameters that section 8 found for
+the harmonic model, so that 5i and 5j are no prediction; 5d to 5f follow from the same loop. Residuals are against the
+triangle; residuals and scaling errors are over x = 0.1..0.9. "The law" is no simulation, but a piezo that follows (17)
+exactly with these parameters. In the pictures, printed peak-to-peak values stand beside the curve, about its middle."""
 
 SIDES = ("forward", "backward")
-COMPROMISE = "it was identified on this number, beside (22), sizes and offsets, which its loops cannot meet all at once"
+COMPROMISE = (
+    "the virtual scanner was identified on this number together with (22), sizes and offsets; its loops cannot meet "
+    "all of them at once"
+)
 
 
 def largest(branch: BranchError) -> float:
@@ -47,7 +50,7 @@ def _optimised_for_the_law() -> tuple[float, float]:
 
 
 def rows() -> list[Row]:
-    """By section and figure."""
+    """All rows, by section and figure."""
     return [*_triangle_rows(), *_scaling_rows(), *_sinusoidal_rows(), *_harmonic_rows()]
 
 
@@ -55,7 +58,7 @@ def _triangle_rows() -> list[Row]:
     error, known = full_scale("triangle").error, Source.IDENTIFIED
     (forward, at), (backward, back_at) = error.forward.peak, error.backward.peak
     found = calibrated().branches[0].traces[-1]
-    fitted = "the calibration weighs the whole branch; " + COMPROMISE
+    fitted = "the calibration fits the whole branch; " + COMPROMISE
     ideal = triangle_line(axis(), V_MAX)
     floats = [f"{COMPROMISE}; an ideal triangle in floats has {getattr(ideal, side).peak[0]:+.2f} %" for side in SIDES]
     return [
@@ -64,7 +67,7 @@ def _triangle_rows() -> list[Row]:
         Row("5a", "backward over forward", limits("more than 2 times", "times", low=2.0), -backward / forward, known),
         Row("5a", "place of the forward peak", about("0.35"), at, known),
         Row("5a", "place of the backward peak", about("0.55"), back_at, known),
-        Row("5a", "the same along the sweep", about("0.45"), 1.0 - back_at, known),
+        Row("5a", "place of the backward peak along the sweep", about("0.45"), 1.0 - back_at, known),
         Row("sec. 8", "beta forward, of 100 V", exact("0.035"), found.forward.beta.value, known, fitted),
         Row("sec. 8", "u_peak forward, of 100 V", exact("0.37"), found.forward.u_peak.value, known, fitted),
         Row("sec. 8", "beta backward, of 100 V", exact("0.085"), found.backward.beta.value, known, fitted),
@@ -77,16 +80,16 @@ def _scaling_rows() -> list[Row]:
     forward, backward = error.forward.scaling_peak_to_peak, error.backward.scaling_peak_to_peak
     of_law = own.forward.scaling_peak_to_peak, own.backward.scaling_peak_to_peak
     slopes = (
-        "the law itself has {:.0f} %: residuals of this height and shape have no such slope; the paper differentiates "
-        "a measured curve, which steepens towards the edges"
+        "the law itself has {:.0f} %, because residuals of this height and shape have no such slope; the paper "
+        "differentiates a measured curve, which steepens towards the edges"
     )
     flatter = (
-        f"the law has {of_law[0] / largest(own.forward):.1f}; the forward loop of the virtual scanner is less crooked "
-        f"where it begins"
+        f"the law has {of_law[0] / largest(own.forward):.1f}; the forward loop of the virtual scanner is less curved "
+        f"at its beginning"
     )
     left, right = (float(np.max(np.abs(half))) for half in _halves(error.forward))
     mostly = limits("mainly in the left half", "times", low=2.0, decimals=0)
-    against = "figure 5e against the rule of section 8: six times the residuals of 5a are 21 % and 51 %"
+    against = "figure 5e disagrees with the rule of section 8: six times the residuals of 5a are 21 % and 51 %"
     six, sine = about("6", "times"), "scaling error over peak residual, of a sine, peak to peak"
     scaling, ratio = "triangle: scaling error peak to peak", "scaling error over peak residual"
     paper = Source.ARITHMETIC
@@ -113,9 +116,9 @@ def _sinusoidal_rows() -> list[Row]:
     first, second = optimised()
     why = (
         f"the law has ±{largest(own.forward):.1f} % forward and ±{largest(own.backward):.1f} % backward; "
-        f"the paper does not print the beta that it optimised, here the least peak is at {first:g} and {second:g}"
+        f"the paper does not print its optimised beta; here the smallest peak is at {first:g} and {second:g}"
     )
-    slope = f"the law has {own.forward.scaling_peak_to_peak:.0f} %; the paper does not print the beta that it optimised"
+    slope = f"the law has {own.forward.scaling_peak_to_peak:.0f} %; the paper does not print its optimised beta"
     peak, scaling = "sinusoidal model: peak residual", "sinusoidal model: scaling error peak to peak"
     return [
         Row("5d", f"{peak}, forward", about("1.5", "%", "±"), largest(forward), follows, why),
@@ -129,8 +132,8 @@ def _harmonic_rows() -> list[Row]:
     error, before, known = full_scale("harmonic").error, full_scale("sinusoidal").error, Source.IDENTIFIED
     forward, backward = error.forward, error.backward
     why = (
-        "less is left here, and that is no merit: the virtual scanner was identified on the very (17) that this "
-        "inverts, while the paper's piezo has a shape of its own"
+        "the smaller residual is no merit: the virtual scanner was identified on the same (17) that is inverted here, "
+        "while the shape of the paper's piezo differs from (17)"
     )
     peak, scaling = "harmonic model: peak residual", "harmonic model: scaling error peak to peak"
     share = largest(forward) / largest(before.forward)
@@ -139,7 +142,7 @@ def _harmonic_rows() -> list[Row]:
         Row("5i", f"{peak}, backward", about("1", "%", "±"), largest(backward), known, why, decimals=2),
         Row(
             "5i",
-            "the forward one over that of the sinusoidal model",
+            "forward peak residual over that of the sinusoidal model",
             limits("about one third", low=0.3, high=0.3667, decimals=2),
             share,
             known,

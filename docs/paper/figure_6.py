@@ -15,28 +15,29 @@ from tablegen.compensation.frequency import frequency_gain
 from tablegen.virtual.experiments import frequency_response
 
 TITLE = "Figure 6: scan rate"
-TEXT = """(23) with 3 % a decade, R normalised to its value at the reference as its 0.03 has to be read. The virtual
-scanner was identified on the 3 % a decade and on the resonance of figure 6c. A frame is taken for 200 lines."""
+TEXT = """The law is (23) with 3 % a decade. R is normalised to its value at the reference, because its 0.03 has to be
+read in this way. The virtual scanner was identified on the 3 % a decade and on the resonance of figure 6c. A frame is
+assumed to have 200 lines."""
 
 SLOW_FPS, FAST_FPS, LINES = 0.5, 7.3, 200
 LATTICE_NM = 17.7
 
 
 def grown() -> float:
-    """Of the lattice from 0.5 to 7.3 fps by (23), as a factor."""
+    """The factor of the apparent lattice constant from 0.5 to 7.3 fps by (23)."""
     return frequency_gain(FAST_FPS, LOSS, SLOW_FPS)
 
 
 @cache
 def virtual_grown() -> float:
-    """The same of the virtual scanner's response to small signals."""
+    """The same factor from the virtual scanner's response to small signals."""
     slow, fast = frequency_response(axis(), [SLOW_FPS * LINES, FAST_FPS * LINES])["gain"]
     return float(slow / fast)
 
 
 @cache
 def resonance_khz() -> float:
-    """Where the virtual scanner's response is largest."""
+    """The frequency at which the virtual scanner's response is largest."""
     f = np.geomspace(1e4, 1e5, 8001)
     return float(f[np.argmax(np.abs(axis().response(f)))]) / 1e3
 
@@ -49,7 +50,7 @@ def loss() -> float:
 
 
 def change_of(factor: float) -> float:
-    """What a change of the rate does to the size by (23), in percent."""
+    """The change of the size by a change of the rate, by (23), in percent."""
     return 100.0 * LOSS * log10(factor)
 
 
@@ -58,19 +59,26 @@ def rows() -> list[Row]:
     law, known = Source.LAW, Source.IDENTIFIED
     rate = FAST_FPS / SLOW_FPS
     why = (
-        f"18.3 nm over 17.7 nm is {100.0 * (18.3 / 17.7 - 1.0):.1f} %; 0.03 a decade, itself of one digit, is "
+        f"18.3 nm over 17.7 nm is {100.0 * (18.3 / 17.7 - 1.0):.1f} %; 0.03 a decade, a number of one digit, gives "
         f"{100.0 * (grown() - 1.0):.1f} % for 14.6 times the rate"
     )
     return [
-        Row("6b", "7.3 fps over 0.5 fps", exact("14"), rate, Source.ARITHMETIC, "14.6, cut off and not rounded"),
+        Row(
+            "6b",
+            "7.3 fps over 0.5 fps",
+            exact("14"),
+            rate,
+            Source.ARITHMETIC,
+            "the paper cuts 14.6 off and does not round it",
+        ),
         Row("6b", "lattice at 7.3 fps, 17.7 nm at 0.5 fps, (23)", exact("18.3", "nm"), LATTICE_NM * grown(), law),
-        Row("6b", "the same on the virtual scanner", exact("18.3", "nm"), LATTICE_NM * virtual_grown(), known),
+        Row("6b", "lattice at 7.3 fps, virtual scanner", exact("18.3", "nm"), LATTICE_NM * virtual_grown(), known),
         Row("6b", "18.3 nm above 17.7 nm", exact("3", "%"), 100.0 * (18.3 / 17.7 - 1.0), Source.ARITHMETIC),
-        Row("6b", "the same by (23)", exact("3", "%"), 100.0 * (grown() - 1.0), law, why),
+        Row("6b", "increase of the lattice by (23)", exact("3", "%"), 100.0 * (grown() - 1.0), law, why),
         Row("6c", "resonance", about("50", "kHz"), resonance_khz(), known),
         Row("sec. 3", "resonance in the scanner", about("40", "kHz"), resonance_khz(), known, "figure 6c has 50 kHz"),
         Row("6d", "alpha_DL", exact("0.03"), loss(), known),
-        Row("sec. 10", "the same, a decade", about("3", "%"), 100.0 * loss(), known),
+        Row("sec. 10", "loss of size, a decade", about("3", "%"), 100.0 * loss(), known),
         Row("sec. 10", "two times the rate", limits("below 1 to 2 %", "%", high=2.0), change_of(2.0), law),
         Row("sec. 10", "three times the rate", limits("below 1 to 2 %", "%", high=2.0), change_of(3.0), law),
     ]

@@ -1,4 +1,4 @@
-"""What the virtual scanner does, made once: emitted integers at full scale, triangles of many sizes, calibrations."""
+"""Results of the virtual scanner, computed once: emitted integers at full scale, triangles, calibrations."""
 
 from dataclasses import dataclass, replace
 from functools import cache
@@ -71,7 +71,7 @@ def optimised() -> tuple[float, float]:
 
 
 def modelled(shape: LineShape) -> LineError:
-    """What a drive leaves of a piezo that is (17) itself with section 8's parameters: no simulation, the law alone."""
+    """The error that a drive leaves on a piezo that follows (17) with section 8's parameters: no simulation."""
     t = np.arange(TICKS) / TICKS
     w = shape.value(t)
     forward, backward = SECTION_8.forward.inverse(w), 1.0 - SECTION_8.backward.inverse(1.0 - w)

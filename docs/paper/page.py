@@ -1,4 +1,4 @@
-"""The page: every printed number, ours, and whether they are the same; with the pictures that it has."""
+"""The page: every printed number, our number, and whether they are the same; with the pictures of the page."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -20,43 +20,47 @@ PICTURES: Pictures = {name: picture for *_, pictures in SECTIONS for name, pictu
 
 _HEAD = """# The paper's numbers, and ours
 
-Every number that the text, Table 1 and the captions of *Feedforward Compensation of Piezo Nonlinearity for
-High-Precision High-Speed Atomic Force Microscopy* (Umeda and Kodera) print of a result. `make paper` writes this
-page and its pictures; `tests/test_paper.py` holds it against what the program does.
+This page compares every result that the text, Table 1 and the captions of *Feedforward Compensation of Piezo
+Nonlinearity for High-Precision High-Speed Atomic Force Microscopy* (Umeda and Kodera) print with our number. It is for
+readers of the paper who want to check tablegen. The page on the [virtual scanner](../virtual.md) describes the
+simulation behind many of our numbers. `make paper` writes this page and its pictures; `tests/docs/test_paper.py`
+compares the page with the program.
 
-The paper measured a piezo. We did not: what is not an equation here is the [virtual scanner](../virtual.md), **a
-simulation, and identified on some of these very numbers**. Hence the column "from":
+The paper measured a piezo; we did not. A number of ours that is neither an equation nor arithmetic comes from the
+virtual scanner. It is **a simulation, and was identified on some of these numbers**. The column "from" says where our
+number comes from:
 
-| from | what agreement is worth |
+| from | what agreement shows |
 |---|---|
-| law | an equation as `tablegen` has it, with the paper's parameters: that we compute what the paper computes |
-| law, fitted | an equation through the paper's own numbers: that these belong together |
-| arithmetic | the paper's numbers against each other; nothing of ours |
-| simulation, identified | none: the virtual scanner was made for it; a difference is what it cannot do at once |
-| simulation | some: it follows from other numbers, this one was not used |
+| law | our number is an equation of `tablegen` with the paper's parameters: we compute what the paper computes |
+| law, fitted | our number is an equation fitted to the paper's own numbers: these numbers belong together |
+| arithmetic | the paper's numbers are consistent with each other; nothing of ours is used |
+| simulation, identified | nothing: it was made to give this number, but cannot meet all numbers at once |
+| simulation | something: the number follows from other numbers, and was not used itself |
 
-A row is "same" if our number lies in the range "same if": half a unit of the last printed digit; where the paper
-says about, approximately, roughly or ~, a tenth of the value if that is more, with three digits a unit of the last; a
-thousandth where it says exactly. The verdict is computed. Pictures have ours as lines and what the paper prints as open
-circles; its curves are not available. Figures 1 and 4 print no result.
+A row is "same" if our number lies in the range "same if". The range is half a unit of the last printed digit. If the
+paper says about, approximately, roughly or ~, it is a tenth of the value if that is more, and for three digits a unit
+of the last digit. If the paper says exactly, it is a thousandth. The program computes the verdict. The pictures show
+our numbers as lines and the printed numbers as open circles; the paper's curves are not available. Figures 1 and 4
+print no result.
 """
 
 _SLIPS = """## Slips in the paper
 
-What has to be read differently than it is printed; the program does so.
+The following places have to be read differently than they are printed; the program does so.
 
 | where | printed | read |
 |---|---|---|
-| (8) | k_scan, in nm/V by (5) | nm per full scale, k times V_max: otherwise alpha is off by V_max |
+| (8) | k_scan, in nm/V by (5) | nm per full scale, k times V_max: otherwise alpha is wrong by a factor of V_max |
 | section 8, figure 5b | beta = 0.9 for -9 % | 0.09 |
-| section 8 | the inverse of (16) is plotted in 5b | of (15) |
+| section 8 | the inverse of (16) is plotted in 5b | the inverse of (15) |
 | section 9 | rho in nm⁻¹ | no unit: V / V_max in (22) has none |
-| (20) | gamma | infinite at u_peak - beta = 0.2197 and 0.7803, beyond which the sign is wrong; xi, xi gamma are not |
+| (20) | gamma | infinite at u_peak - beta = 0.2197 and 0.7803, and of wrong sign beyond; xi, xi gamma are finite |
 | (17), figure 5a | backward u_peak 0.48, peak near 0.55 | 0.48 along the sweep; on the drive's axis 1 - 0.48 = 0.52 |
-| figure 5h, caption | dependence on gamma | on u_peak, as the text has it |
-| (23) | R less alpha_DL, a difference of nm and a number | R normalised to its value at f_DH |
+| figure 5h, caption | dependence on gamma | dependence on u_peak, as in the text |
+| (23) | R minus alpha_DL, a difference of nm and a number | R normalised to its value at f_DH |
 | section 10 | f_DL for the reference frequency | f_DH |
-| sections 5 and 6 | 200 nm is 13 V; 400 nm becomes 436 nm | 436 nm takes 200 nm at 20 V: another scanner |
+| sections 5 and 6 | 200 nm is 13 V; 400 nm becomes 436 nm | 436 nm needs 200 nm at 20 V: another scanner |
 """
 
 
@@ -86,7 +90,9 @@ def pictures() -> dict[str, bytes]:
 
 
 def _table(rows: list[Row]) -> str:
-    head = "| in the paper | what | paper | same if | ours | from | same, or why not |\n|---|---|---|---|---|---|---|\n"
+    head = (
+        "| in the paper | what | paper | same if | ours | from | same, or the reason |\n|---|---|---|---|---|---|---|\n"
+    )
     cells = (
         (row.figure, row.what, row.printed.text, row.printed.within, row.ours_text, row.source, row.verdict)
         for row in rows

@@ -9,7 +9,7 @@ ABOUT = 0.1  # what "about" leaves open, of the value
 
 
 class Source(StrEnum):
-    """Where our number comes from, hence what it is worth where both agree."""
+    """Where our number comes from. This decides how much an agreement shows."""
 
     LAW = "law"
     FITTED = "law, fitted"
@@ -45,7 +45,7 @@ class Printed:
 
 @dataclass(frozen=True)
 class Row:
-    """What a figure or section prints, what we have, from where, and ``why`` they differ: given if they do.
+    """The number that a figure or section prints, our number, its source, and ``why`` they differ, if they do.
 
     ``decimals`` of our number; by default one more than the paper's, so that it can be seen by how much it agrees.
     """
@@ -86,7 +86,7 @@ class Row:
 
 
 def faults(rows: Iterable[Row]) -> list[str]:
-    """Rows that differ and do not say why, agree and say why not, have no number, or are shown as what they are not."""
+    """Rows with a missing reason, a needless reason, no number, or a rounded number with another verdict."""
     found = []
     for row in rows:
         name = f"{row.figure}, {row.what}: {row.printed.text} in the paper, {row.ours_text} here"
@@ -108,7 +108,7 @@ def exact(value: str, unit: str = "", mark: str = "") -> Printed:
 
 
 def exactly(value: str, unit: str = "") -> Printed:
-    """A number that the paper says is met exactly: the same to a thousandth of it."""
+    """A number that the paper calls exact: the same to a thousandth of it."""
     return _around(value, unit, "exactly ", 1e-3 * abs(float(value)), _decimals(value) + 2)
 
 
@@ -128,7 +128,7 @@ def between(low: str, high: str, unit: str = "", word: str = "") -> Printed:
 
 
 def limits(text: str, unit: str = "", low: float = -inf, high: float = inf, decimals: int = 1) -> Printed:
-    """What a sentence says as bounds."""
+    """The bounds that a sentence states."""
     return Printed(text, unit, low, high, decimals)
 
 

@@ -6,8 +6,8 @@ from paper.measured import full_scale
 from paper.rows import Printed, Row, Source, about, between, limits
 
 TITLE = "Table 1"
-TEXT = """What each cause does to an image of an uncorrected scanner, and what a correction leaves. Details are in the
-sections below."""
+TEXT = """The table shows the effect of each cause on an image of an uncorrected scanner, and the error that a
+correction leaves. The sections below have the details."""
 
 
 def rows() -> list[Row]:
@@ -21,7 +21,7 @@ def rows() -> list[Row]:
     in_order = [offset, size, hysteresis, rate]
     place = [sorted(in_order, reverse=True).index(value) + 1 for value in in_order]
     known, law = Source.IDENTIFIED, Source.LAW
-    typical = "typical: the 600 nm that section 6 calibrates at, (6)"
+    typical = "typical scan size: 600 nm, the calibration of section 6, by (6)"
     found = [
         Row("table 1", "offset voltage", about("30", "%", before="max. "), offset, known),
         Row("table 1", "scan size, at full scale, (10)", about("25", "%", before="max. "), size, law),
@@ -45,16 +45,16 @@ def rows() -> list[Row]:
 
 
 def _improvement() -> list[Row]:
-    """By what the corrections divide the errors of the virtual scanner."""
+    """The factors by which the corrections reduce the errors of the virtual scanner."""
     before, after = full_scale("triangle").error, full_scale("harmonic").error
     said = limits("an order of magnitude", "times", low=10.0, decimals=0)
     forward, backward = (abs(getattr(before, side).peak[0] / getattr(after, side).peak[0]) for side in SIDES)
-    why = "the paper's own residuals improve 7 times forward, 3.5 % to 0.5 %, and 8.5 times backward"
+    why = "the paper's own residuals improve by a factor of 7 forward, from 3.5 % to 0.5 %, and of 8.5 backward"
     size = figure_3.calibrated()
     ratio = size.before_percent / size.largest_percent
     known = Source.IDENTIFIED
     return [
-        Row("abstract", "residual before over after (17), forward", said, forward, known, why),
-        Row("abstract", "residual before over after (17), backward", said, backward, known),
-        Row("abstract", "size error before over after (6) and (10)", said, ratio, known),
+        Row("abstract", "residual, ratio before to after (17), forward", said, forward, known, why),
+        Row("abstract", "residual, ratio before to after (17), backward", said, backward, known),
+        Row("abstract", "size error, ratio before to after (6) and (10)", said, ratio, known),
     ]

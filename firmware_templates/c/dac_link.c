@@ -1,4 +1,4 @@
-/* Bytes in, bytes out, and what every request has to pass: docs/protocol.md. */
+/* Bytes from the line, and what every request has to pass: docs/protocol.md. */
 #include "dac_link.h"
 
 #include "dac_axis.h"
@@ -63,47 +63,7 @@ static uint8_t next_byte(dac_link *l)
     return byte;
 }
 
-int dac_link_transmit(dac_link *l)
-{
-    if (!l->sending)
-        return -1;
-    DAC_ACQUIRE();
-    const uint8_t byte = l->out[l->out_at];
-    if (++l->out_at == l->out_length) {
-        DAC_RELEASE();
-        l->sending = 0;
-    }
-    return byte;
-}
-
-static void send(dac_link *l, const dac_link_answer *a)
-{
-    l->out[1] = a->type;
-    l->out[2] = a->seq;
-    dac_link_put(l->out + 3, a->session);
-    l->out_length = dac_link_seal(l->out, (uint16_t)(a->length + DAC_LINK_HEADER));
-    l->out_at = 0;
-    DAC_RELEASE();
-    l->sending = 1;
-}
-
 /* Requests. */
-
-void dac_link_remember(dac_link *l, uint8_t type, const uint8_t *payload, uint8_t length)
-{
-    l->last.type = type;
-    l->last.length = length;
-    dac_link_copy(l->last.payload, payload, length);
-}
-
-void dac_link_refuse(dac_link_answer *a, uint8_t request, dac_link_finding why)
-{
-    a->type = DAC_LINK_REFUSAL;
-    a->length = 6;
-    a->payload[0] = request;
-    a->payload[1] = why.reason;
-    dac_link_put(a->payload + 2, why.detail);
-}
 
 static bool in(unsigned set, uint8_t request)
 {
@@ -148,21 +108,6 @@ static dac_link_finding check_payload(const dac_link *l, uint8_t request, const 
     else if (good && request == DAC_LINK_ARM)
         good = dac_link_get(payload) <= MOST_FRAMES;
     return good ? dac_link_fine() : dac_link_because(DAC_LINK_PAYLOAD, 0);
-}
-
-bool dac_link_tagged(const dac_link *l, const uint8_t *nonce, const uint8_t *request, uint8_t bytes,
-                     const uint8_t *digest, const uint8_t *tag)
-{
-    uint8_t right[DAC_LINK_TAG];
-    dac_link_mac m;
-
-    dac_link_mac_begin(&m, DAC_LINK_TAG, l->config->key, l->config->key_bytes);
-    dac_link_mac_add(&m, nonce, sizeof l->nonce);
-    dac_link_mac_add(&m, request, bytes);
-    if (digest != NULL)
-        dac_link_mac_add(&m, digest, 32);
-    dac_link_mac_end(&m, right);
-    return dac_link_same(right, tag, DAC_LINK_TAG);
 }
 
 /* Of a request that acts, but for COMMIT, whose tag covers the image. The challenge is used up, right or wrong. */
@@ -255,9 +200,7 @@ static void judge(dac_link *l)
     a.session = dac_link_get(frame + 2);
     dac_link_finding found = admit(l, frame, length, acts, &again);
     if (again) {
-        a.type = l->last.type;
-        a.length = l->last.length;
-        dac_link_copy(a.payload, l->last.payload, a.length);
+        dac_link_recall(l, &a);
     } else if (found.reason != DAC_LINK_NO_REASON) {
         dac_link_refuse(&a, request, found);
     } else {
@@ -276,31 +219,7 @@ static void judge(dac_link *l)
             dac_link_remember(l, a.type, a.payload, a.length);
     }
     if (a.type != DAC_LINK_SILENT)
-        send(l, &a);
-}
-
-/* Answers that had to wait, one a call. */
-static void answer_late(dac_link *l)
-{
-    dac_link_answer a = {l->commit_type, l->commit_seq, l->commit_length, l->commit_session,
-                         l->out + 1 + DAC_LINK_HEADER};
-
-    if (l->commit_due) {
-        dac_link_copy(a.payload, l->commit_payload, a.length);
-        l->commit_due = false;
-    } else {
-        a.type = DAC_LINK_ABORT | DAC_LINK_ANSWER;
-        a.seq = l->abort_seq[l->aborts_said];
-        a.session = l->abort_session[l->aborts_said];
-        a.length = 4;
-        dac_link_put(a.payload, l->abort_generation);
-        l->aborts_said++;
-        if (l->aborts_said == l->aborts) {
-            l->aborts = l->aborts_said = 0;
-            l->aborts_due = false;
-        }
-    }
-    send(l, &a);
+        dac_link_send(l, &a);
 }
 
 bool dac_link_work(dac_link *l)
@@ -311,7 +230,7 @@ bool dac_link_work(dac_link *l)
         dac_link_check_on(l);
     /* While an answer leaves, what comes stays in the ring: each finds its place. */
     if (!l->sending && (l->commit_due || l->aborts_due)) {
-        answer_late(l);
+        dac_link_send_late(l);
     } else if (!l->sending) {
         for (unsigned left = DAC_LINK_SLICE; left != 0 && received(l) != 0; left--) {
             const dac_link_read read = dac_link_read_byte(&l->reader, next_byte(l));

@@ -1,4 +1,4 @@
-/* Private to the link: what is asked and answered, an image in memory, and its checks. */
+/* Private to the link: what is asked and answered, the key, an image in memory, and its checks. */
 #ifndef DAC_LINK_PARTS_H
 #define DAC_LINK_PARTS_H
 
@@ -118,6 +118,28 @@ static inline const uint8_t *dac_link_shape(const dac_link_image *image, unsigne
     return image->info + DAC_LINK_SHAPES + 4 * axis;
 }
 
+/* dac_link_answer.c */
+
+void dac_link_refuse(dac_link_answer *a, uint8_t request, dac_link_finding why);
+
+/* What the last request that acted was told; and that again, if it comes again. */
+void dac_link_remember(dac_link *l, uint8_t type, const uint8_t *payload, uint8_t length);
+void dac_link_recall(const dac_link *l, dac_link_answer *a);
+
+/* Onto the line, when nothing else is leaving. */
+void dac_link_send(dac_link *l, const dac_link_answer *a);
+
+/* Answers that had to wait, one a call: there is one if commit_due or aborts_due. */
+void dac_link_send_late(dac_link *l);
+
+/* dac_link_key.c */
+
+/* Whether a tag is that of a request under the key. `digest`: the 32 bytes of a COMMIT, or NULL. */
+bool dac_link_tagged(const dac_link *l, const uint8_t *nonce, const uint8_t *request, uint8_t bytes,
+                     const uint8_t *digest, const uint8_t *tag);
+
+/* dac_link_image.c */
+
 /* Words of a table. */
 uint32_t dac_link_table_words(const dac_link_image *image, unsigned axis);
 
@@ -133,15 +155,13 @@ uint8_t dac_link_load_byte(const dac_link *l, dac_link_place *at);
 /* Bytes of the image of the tables that play, by offset; returns how many there are up to its end. */
 uint8_t dac_link_read_back(const dac_link *l, uint32_t offset, uint8_t *bytes, uint8_t count);
 
-/* The checks of a commit, a slice a call, from a check of all zeros on: a reason, or whether all have *passed. */
-dac_link_finding dac_link_check_work(dac_link *l, bool *passed);
-
-/* Whether a tag is that of a request under the key. `digest`: the 32 bytes of a COMMIT, or NULL. */
-bool dac_link_tagged(const dac_link *l, const uint8_t *nonce, const uint8_t *request, uint8_t bytes,
-                     const uint8_t *digest, const uint8_t *tag);
-
 /* The program as the sequencer wants it. */
 void dac_link_program_of(const dac_link *l, dac_program *program);
+
+/* dac_link_check.c */
+
+/* The checks of a commit, a slice a call, from a check of all zeros on: a reason, or whether all have *passed. */
+dac_link_finding dac_link_check_work(dac_link *l, bool *passed);
 
 /* Requests, by what they do: a finding, or an answer's payload in *a. */
 dac_link_finding dac_link_hello(dac_link *l, uint32_t session, dac_link_answer *a);
@@ -154,11 +174,11 @@ dac_link_finding dac_link_readback(const dac_link *l, const uint8_t *payload, da
 dac_link_finding dac_link_challenge(dac_link *l, dac_link_answer *a);
 dac_link_finding dac_link_set_limits(dac_link *l, const uint8_t *payload, uint8_t length, dac_link_answer *a);
 
-void dac_link_refuse(dac_link_answer *a, uint8_t request, dac_link_finding why);
-/* What the last request that acted was told. */
-void dac_link_remember(dac_link *l, uint8_t type, const uint8_t *payload, uint8_t length);
+/* dac_link_upload.c */
+
 /* A slice of the checks; behind the last the program is loaded and committed. */
 void dac_link_check_on(dac_link *l);
+
 /* What became of a program that waits. */
 void dac_link_settle(dac_link *l);
 

@@ -1,7 +1,7 @@
 /* Requests that are answered at once. */
 #include "dac_link_parts.h"
 
-enum { VERSION = 1, MOST_DATA = 240, NONCE = 16, PROGRAM_HASH = 32, LIMITS = 32, DEVICE = 56, STATUS = 76 };
+enum { VERSION = 1, MOST_DATA = 240, PROGRAM_HASH = 32, LIMITS = 32, DEVICE = 56, STATUS = 76 };
 enum { TAKES_TABLES = 1, TAKES_FOURIER = 2, HAS_KEY = 4, READS_BACK = 8, HAS_INTERLOCK = 16, NARROWS = 32 };
 enum { TWOS_COMPLEMENT = 64, LEFT_ALIGNED = 128 };
 enum { NO_PROGRAM, PARKED, PARKING, PLAYING };
@@ -91,26 +91,6 @@ dac_link_finding dac_link_status(const dac_link *l, dac_link_answer *a)
 {
     a->length = STATUS;
     put_status(l, a->payload);
-    return dac_link_fine();
-}
-
-/* Without a source of random numbers: nobody without the key knows the next, and none comes twice if no `boot` does. */
-dac_link_finding dac_link_challenge(dac_link *l, dac_link_answer *a)
-{
-    if (l->config->random != NULL) {
-        l->config->random(l->nonce);
-    } else {
-        uint8_t count[8];
-        dac_link_mac m;
-        dac_link_put(count, l->boot);
-        dac_link_put(count + 4, ++l->challenges);
-        dac_link_mac_begin(&m, NONCE, l->config->key, l->config->key_bytes);
-        dac_link_mac_add(&m, count, sizeof count);
-        dac_link_mac_end(&m, l->nonce);
-    }
-    l->challenged = true;
-    a->length = NONCE;
-    dac_link_copy(a->payload, l->nonce, NONCE);
     return dac_link_fine();
 }
 

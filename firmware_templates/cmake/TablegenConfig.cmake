@@ -66,6 +66,9 @@ function(tablegen_build scan)
   endforeach()
   set(sources ${files})
   list(FILTER sources INCLUDE REGEX "\\.c$")
+  if(NOT sources)
+    message(FATAL_ERROR "tablegen_build(${scan}): makes a library of C sources; add \"c\" to emit.formats")
+  endif()
 
   # The stamp is removed first: nothing looks built that an interrupted or failed tablegen has left.
   set(outdated "${stamp}")

@@ -40,7 +40,7 @@ tablegen_goals := $(if $(MAKECMDGOALS),$(filter-out $(TABLEGEN_IDLE_GOALS),$(MAK
 
 # What the manifest lists: a line "NAME.EXTENSION": "SHA-256" for each file.
 tablegen_listed = $(shell \
-    sed -n 's/^ *"\([A-Za-z0-9_]*\.[a-z]*\)": "[0-9a-f]\{64\}",*$$/\1/p' $(1)/manifest.json 2>/dev/null)
+    sed -n 's/^ *"\([A-Za-z0-9_-]*\.[A-Za-z0-9.]*\)": "[0-9a-f]\{64\}",*$$/\1/p' $(1)/manifest.json 2>/dev/null)
 
 .PHONY: tablegen-incomplete
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 from loader_bridge import Simulation, compile_loader
 
+from tablegen.device.dual_program import DualProgram
 from tablegen.device.registers import program_words
-from tablegen.device.sequencer import DualProgram
 from tablegen.emit.memory import memory_file
 from tablegen.fixedpoint.synthesis import sine_quarter
 from tablegen.link.frames import Frame, FrameReader

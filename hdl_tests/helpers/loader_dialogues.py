@@ -14,8 +14,8 @@ from link_talk import Talk
 from loader_bridge import BOOT_HASH
 from loader_device import LoaderDevice, without_lines
 
+from tablegen.device.dual_program import DualProgram
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS
-from tablegen.device.sequencer import DualProgram
 from tablegen.link import model_bank
 from tablegen.link.acceptance import Finding, first_objection
 from tablegen.link.frames import Frame, FrameReader

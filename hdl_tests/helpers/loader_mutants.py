@@ -13,14 +13,13 @@ _NOTHING = "setregion"  # that matters: a region is set before each use
 
 @dataclass(frozen=True)
 class Mutant:
-    """What is put in place of what in a source, and what that breaks; ``by`` finds it, ``quick`` in every run."""
+    """What is put in place of what in a source, and what that breaks; ``by`` finds it."""
 
     breaks: str
     source: str
     old: str
     new: str
     by: str
-    quick: bool = False
     also: tuple[str, str] | None = None  # the same in another place
 
     def words(self) -> list[int]:
@@ -45,18 +44,15 @@ TABLE, SEQUENCE = "A table, with everything that can go wrong on the way", "Sequ
 BEGIN, INTERLOCK = "BEGIN that is refused", "The interlock"
 
 MUTANTS = (
-    Mutant("the CRC of a frame is not checked", _FRAMES, "cmp4 [p] / jz good", "cmp4 [p] / jmp good", "random", True),
-    Mutant(
-        "the CRC of the image is not checked", _UPLOAD, "cmp4 info_crc / jz schedule", "jmp schedule", "uploads", True
-    ),
-    Mutant("the offset is ignored", _UPLOAD, "cmp4 received / jnz begun", f"cmp4 received / {_NOTHING}", TABLE, True),
+    Mutant("the CRC of a frame is not checked", _FRAMES, "cmp4 [p] / jz good", "cmp4 [p] / jmp good", "random"),
+    Mutant("the CRC of the image is not checked", _UPLOAD, "cmp4 info_crc / jz schedule", "jmp schedule", "uploads"),
+    Mutant("the offset is ignored", _UPLOAD, "cmp4 received / jnz begun", f"cmp4 received / {_NOTHING}", TABLE),
     Mutant(
         "the interlock is ignored",
         _UPLOAD,
         "complete: / ld1 IN_PERMIT / jz not_permitted",
         "complete:",
         INTERLOCK,
-        True,
         ("ld1 IN_PERMIT / jz not_permitted / ld #COMMIT", "ld #COMMIT"),
     ),
     Mutant(
@@ -65,7 +61,6 @@ MUTANTS = (
         "and #0xff / jz same",
         f"and #0xff / {_NOTHING}",
         SEQUENCE,
-        True,
     ),
     Mutant("a request that was overtaken acts", _REQUESTS, "cmp #129 / jc overtaken", "cmp #129", SEQUENCE),
     Mutant(
@@ -74,7 +69,6 @@ MUTANTS = (
         "ld4 t0 / cmp4 [p] / jnc no_codes",
         "ld4 t0 / add #1 / cmp4 [p] / jnc no_codes",
         "limits",
-        True,
     ),
     Mutant(
         "code_max may be one more",
@@ -90,7 +84,6 @@ MUTANTS = (
         "ld1 IN_WRITABLE / jz receive",
         "ld1 IN_WRITABLE / jnz receive",
         "random",
-        True,
     ),
     Mutant("any session will do", _REQUESTS, "cmp4 session / jnz no_session", "cmp4 session", "First words"),
     Mutant(

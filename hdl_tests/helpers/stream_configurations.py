@@ -7,12 +7,13 @@ import numpy as np
 from programs import random_dual
 from stream_scripts import random_play
 
-from tablegen.device.sequencer import DualProgram
+from tablegen.device.dual_program import DualProgram
 from tablegen.verification.bench import SequencerShape
 from tablegen.verification.placement import Placement
 from tablegen.verification.stream import Script
 
 SWAPS, SWAPS_SLOW = 10_000, 100_000
+FEW = ("bits_16", "bits_18_plain", "bits_24", "small_counters", "low_area", "power_up_codes")  # in every `make test`
 SMALL = SequencerShape(16, 1, 2, 16, 1, 2, 16)  # so that an upload takes few clocks
 
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from stream_scripts import codes, flag
 
-from tablegen.device.sequencer import DualProgram
+from tablegen.device.dual_program import DualProgram
 from tablegen.verification.stream import Words
 
 

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.random import Generator
 from programs import Kind, random_dual, random_fourier, rendered
 
+from tablegen.device.dual_program import DualProgram
 from tablegen.device.registers import PAGE_WORDS, program_words
 from tablegen.device.schedule import Window
-from tablegen.device.sequencer import DualProgram
 from tablegen.fixedpoint.synthesis import FourierWords
 from tablegen.verification.bench import SequencerShape
 from tablegen.verification.placement import Placement

@@ -3,9 +3,8 @@
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-from tablegen.api.samples import Samples, samples
 from tablegen.certificate.certificate import Certificate, broken_limits
 from tablegen.certificate.certificate import certify as certify_plan
 from tablegen.certificate.summary import notes, summary
@@ -15,9 +14,12 @@ from tablegen.emit.format import Format
 from tablegen.emit.formats import UnknownFormat, chosen
 from tablegen.emit.render import render, runtime_files
 from tablegen.emit.write import leftover_files, outdated_files, write_files
-from tablegen.link.prepare import PreparedScan
 from tablegen.planning.line_plan import Plan, make_plan
 from tablegen.problems import Problem, Rejected, Unphysical
+
+if TYPE_CHECKING:
+    from tablegen.api.samples import Samples
+    from tablegen.link.prepare import PreparedScan
 
 Source = str | Path | Setup
 
@@ -102,17 +104,19 @@ class Build:
         return self.plan.name
 
     @cached_property
-    def x(self) -> Samples:
+    def x(self) -> "Samples":
         """One line of x, a value a tick."""
-        return samples(self.plan, "x")
+        return self.samples("x")
 
     @cached_property
-    def y(self) -> Samples:
+    def y(self) -> "Samples":
         """One frame of y, a value a tick."""
-        return samples(self.plan, "y")
+        return self.samples("y")
 
-    def samples(self, axis: Literal["x", "y"], first: int = 0, stop: int | None = None) -> Samples:
+    def samples(self, axis: Literal["x", "y"], first: int = 0, stop: int | None = None) -> "Samples":
         """Ticks [first, stop) of the period of an axis: for frames that have too many of them."""
+        from tablegen.api.samples import samples
+
         return samples(self.plan, axis, first, stop)
 
     @cached_property
@@ -144,8 +148,10 @@ class Build:
         return notes(self.plan)
 
     @property
-    def prepared(self) -> PreparedScan:
+    def prepared(self) -> "PreparedScan":
         """What ``Device.upload`` sends: ``device.upload(scan.prepared.image("auto", device.info))``."""
+        from tablegen.link.prepare import PreparedScan
+
         return PreparedScan.of_plan(self.plan)
 
     def write(self, folder: str | Path) -> list[str]:
@@ -162,7 +168,7 @@ class Build:
 
     def leftovers(self, folder: str | Path) -> list[str]:
         """Files of a directory that look like a build's and are not of this one: ``write`` leaves them there."""
-        return leftover_files(Path(folder), self.files, self.outdated(folder))
+        return leftover_files(Path(folder), self.files)
 
     def __repr__(self) -> str:
         first, *_ = repr(self.plan).splitlines()

@@ -14,7 +14,7 @@ from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, Plan
 
 _POINTS = 401
-_WIDTH, _HEIGHT, _MARGIN = 340, 150, 34
+_WIDTH, _HEIGHT, _MARGIN = 400, 150, 40
 
 
 def build_html(plan: Plan, certificates: dict[str, Certificate]) -> str:
@@ -29,7 +29,7 @@ def build_html(plan: Plan, certificates: dict[str, Certificate]) -> str:
         volts = line.drive.v_offset + line.drive.v_amplitude * (line.series.value(t) - 0.5)
         parts.append("<div>")
         parts.append(_plot(f"{line.axis}: drive [V]", line, t, {"drive": volts}))
-        parts.append(_plot(f"{line.axis}: modelled position error [% of the line]", line, t, _errors(line, t)))
+        parts.append(_plot(f"{line.axis}: modelled error [% of the line]", line, t, _errors(line, t)))
         parts.append("</div>")
         rows = [*drive_lines(line), *certificate_lines(certificates[line.axis])]
         cells = "".join(f"<tr><td>{escape(name)}</td><td>{escape(value)}</td></tr>" for name, value in rows)
@@ -87,7 +87,8 @@ def _plot(title: str, line: LinePlan, t: Floats, curves: dict[str, Floats]) -> s
         for a, b in windows
     ]
     for value in (low, high):
-        parts.append(f'<text x="{_MARGIN - 4}" y="{y(value) + 3:.1f}" text-anchor="end">{value:.3g}</text>')
+        shown = f"{value:.3g}" if abs(value) > 1e-3 * (high - low) else "0"
+        parts.append(f'<text x="{_MARGIN - 4}" y="{y(value) + 3:.1f}" text-anchor="end">{shown}</text>')
     for at, (name, values_of) in enumerate(curves.items()):
         style = f'fill="none" stroke="{_STYLES[name]}" stroke-width="1.5"'
         runs = np.split(np.arange(len(t)), np.flatnonzero(np.diff(np.isfinite(values_of).astype(int))) + 1)
@@ -96,7 +97,8 @@ def _plot(title: str, line: LinePlan, t: Floats, curves: dict[str, Floats]) -> s
                 points = " ".join(f"{x(float(t[i])):.1f},{y(float(values_of[i])):.1f}" for i in run)
                 parts.append(f'<polyline points="{points}" {style}/>')
         if len(curves) > 1:
-            parts.append(f'<text x="{_WIDTH - 90}" y="{30 + 12 * at}" fill="{_STYLES[name][:7]}">{name}</text>')
+            right = _WIDTH - 8 - 76 * at
+            parts.append(f'<text x="{right}" y="12" text-anchor="end" fill="{_STYLES[name][:7]}">{name}</text>')
     period_s = 1.0 / float(line.rate)
     parts.append(f'<text x="{_MARGIN}" y="{_HEIGHT - 6}">0</text>')
     parts.append(f'<text x="{_WIDTH - 8}" y="{_HEIGHT - 6}" text-anchor="end">{period_s:.4g} s</text></svg>')

@@ -4,32 +4,54 @@ Commands import what they need when they run, so that ``--version`` and ``--help
 """
 
 import sys
+from importlib import import_module
 from io import TextIOWrapper
 
 import click
 
-from tablegen import __version__
-from tablegen.cli.build import build
-from tablegen.cli.calibrate import calibrate
-from tablegen.cli.check import check
 from tablegen.cli.common import Failure
-from tablegen.cli.control import clear, park, trigger
-from tablegen.cli.device_status import device_status
 from tablegen.cli.exit_status import ExitStatus
-from tablegen.cli.formats import formats
-from tablegen.cli.init import init
-from tablegen.cli.paths import paths
-from tablegen.cli.ports import ports
-from tablegen.cli.readback import readback
-from tablegen.cli.refine import refine
-from tablegen.cli.schema import schema
-from tablegen.cli.show import show
-from tablegen.cli.simulate import simulate
-from tablegen.cli.upload import upload
-from tablegen.cli.verify import verify
+from tablegen.version import __version__
+
+# Commands by name: the module in this folder, and the command in it.
+_COMMANDS = {
+    "build": ("build", "build"),
+    "check": ("check", "check"),
+    "show": ("show", "show"),
+    "calibrate": ("calibrate", "calibrate"),
+    "simulate": ("simulate", "simulate"),
+    "refine": ("refine", "refine"),
+    "verify": ("verify", "verify"),
+    "upload": ("upload", "upload"),
+    "status": ("device_status", "device_status"),
+    "readback": ("readback", "readback"),
+    "park": ("control", "park"),
+    "trigger": ("control", "trigger"),
+    "clear": ("control", "clear"),
+    "ports": ("ports", "ports"),
+    "init": ("init", "init"),
+    "formats": ("formats", "formats"),
+    "paths": ("paths", "paths"),
+    "schema": ("schema", "schema"),
+}
+
+
+class _Commands(click.Group):
+    """Commands are imported when they are asked for: a build is called often, and needs one of them."""
+
+    def list_commands(self, _context: click.Context) -> list[str]:
+        return sorted(_COMMANDS)
+
+    def get_command(self, _context: click.Context, name: str) -> click.Command | None:
+        if name not in _COMMANDS:
+            return None
+        module, command = _COMMANDS[name]
+        found: click.Command = getattr(import_module(f"tablegen.cli.{module}"), command)
+        return found
 
 
 @click.group(
+    cls=_Commands,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
     epilog="""\b
 First steps:
@@ -63,11 +85,6 @@ def cli() -> None:
 
     `tablegen COMMAND --help` explains each command.
     """
-
-
-instrument = (upload, device_status, readback, park, trigger, clear, ports)
-for command in (build, check, show, calibrate, simulate, refine, verify, *instrument, init, formats, paths, schema):
-    cli.add_command(command)
 
 
 def main() -> None:

@@ -12,6 +12,8 @@ from tablegen.cli.exit_status import ExitStatus
 if TYPE_CHECKING:
     from tablegen.api.build import Build
 
+_NAMES_SHOWN = 8
+
 
 @click.command(short_help="Write C, Verilog, tables and manifest of a scan.")
 @scan_argument
@@ -87,7 +89,8 @@ def build(
         if not found:
             return ExitStatus.OK
         click.echo("\n".join(found))
-        fail([f"{output} is stale; run: tablegen build {scan} -o {output}"], ExitStatus.STALE)
+        again = "".join(f" -f {name}" for name in formats)
+        fail([f"{output} is stale; run: tablegen build {scan} -o {output}{again}"], ExitStatus.STALE)
     if rule is not None:
         rule.note(built.setup.files, built.formats)
     changed = written(output, files, outdated)
@@ -101,8 +104,14 @@ def build(
         click.echo("\n".join(certificate_table(built.plan, built.certificates)))
         click.echo(f"\n{output}: {_state(built, changed)}")
         if outdated:
-            click.echo(f"{output}: removed files of an earlier build: {', '.join(outdated)}")
+            click.echo(f"{output}: removed files of an earlier build: {_few(outdated)}")
     return ExitStatus.OK
+
+
+def _few(names: list[str]) -> str:
+    """Names with commas between; of many the first ones."""
+    more = [f"and {len(names) - _NAMES_SHOWN} more"] if len(names) > _NAMES_SHOWN else []
+    return ", ".join([*names[:_NAMES_SHOWN], *more])
 
 
 def _leftover(path: Path) -> str:

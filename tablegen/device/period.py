@@ -5,7 +5,8 @@ from typing import Literal
 
 import numpy as np
 
-from tablegen.device.sequencer import DualProgram, pixel_starts
+from tablegen.device.dual_program import DualProgram
+from tablegen.device.sequencer import pixel_starts
 from tablegen.numerics.arrays import Bools, Ints
 
 

@@ -9,8 +9,8 @@ from enum import Enum, IntFlag
 
 import numpy as np
 
+from tablegen.device.dual_program import DualProgram
 from tablegen.device.schedule import Schedule, Window
-from tablegen.fixedpoint.program import Program
 from tablegen.numerics.arrays import Bools, Ints
 
 
@@ -28,15 +28,6 @@ class Fault(IntFlag):
     NONE = 0
     SLEW = 1  # the slew guard limited a step after the output had reached the waveform
     CLAMP = 2  # a code was clamped to [code_min, code_max]
-
-
-@dataclass(frozen=True, eq=False)
-class DualProgram:
-    """What a bank holds: both axes and the schedule they share."""
-
-    x: Program
-    y: Program
-    schedule: Schedule
 
 
 @dataclass(frozen=True, slots=True)

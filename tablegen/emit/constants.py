@@ -5,6 +5,9 @@ from tablegen.emit.content import Content
 from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.synthesis import FRACTION_BITS
 
+# Constants that may need more than 32 bits: languages that give constants a type give these a wide one in every build.
+WIDE = frozenset({"UPDATE_RATE_MILLIHZ", "PHASE_STEP", "OFFSET_WORD"})
+
 
 def scan_constants(content: Content) -> dict[str, int]:
     """All numbers of a build by their names without the scan's: those of the schedule, then X_... and Y_..."""
@@ -65,3 +68,8 @@ def axis_constants(program: Program, harmonics: int) -> dict[str, int]:
         "DAC_TWOS_COMPLEMENT": int(output.coding == "twos-complement"),
         "DAC_LEFT_ALIGNED": int(output.align == "left"),
     }
+
+
+def is_wide(name: str) -> bool:
+    """Whether a constant of this name, with X_ or Y_ before it or not, is of 64 bits; all others fit 32."""
+    return name.removeprefix("X_").removeprefix("Y_") in WIDE

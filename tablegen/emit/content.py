@@ -1,12 +1,14 @@
-"""What formats render: the integers of a build, from a plan or from a manifest, and words for its comments."""
+"""What formats render: the integers of a build, and words for its comments.
+
+``tablegen.emit.render`` makes it from a plan, ``tablegen.emit.stored`` from a manifest.
+"""
 
 from dataclasses import dataclass
 from typing import Literal
 
+from tablegen.device.dual_program import DualProgram
 from tablegen.device.schedule import Schedule
-from tablegen.device.sequencer import DualProgram
 from tablegen.fixedpoint.program import Program
-from tablegen.manifest.read import StoredBuild
 from tablegen.numerics.arrays import Ints
 
 
@@ -57,22 +59,3 @@ class Content:
     def sine_index_bits(self) -> int:
         """log2 of the longest interpolated table, whose sine renders all; 0 where no table is rendered."""
         return max(axis.program.index_bits for axis in self.axes)
-
-
-def stored_content(stored: StoredBuild) -> Content:
-    """The content of a build, from its manifest alone."""
-
-    def axis(name: Literal["x", "y"], program: Program) -> AxisContent:
-        found = getattr(stored.manifest.axes, name)
-        return AxisContent(name, program, found.fourier_words, found.output.v_zero, found.output.v_per_code)
-
-    name = stored.manifest.name
-    return Content(
-        name=name,
-        hash=stored.manifest.hash,
-        program=stored.program,
-        x=axis("x", stored.program.x),
-        y=axis("y", stored.program.y),
-        header_only=f"{name}.c" not in stored.manifest.files,
-        version=stored.manifest.tablegen,
-    )

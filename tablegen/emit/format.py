@@ -60,7 +60,7 @@ class Format(ABC):
             if difference := self._first_difference(found, right):
                 wrong.append(f"{name}: {difference}")
         count = len(wanted)
-        return [Comparison(self.name, f"{count} file{'s' if count != 1 else ''}", wrong)]
+        return [Comparison("files", f"{count} file{'s' if count != 1 else ''}", wrong)]
 
     def _first_difference(self, found: bytes, right: bytes) -> str | None:
         """Where a file and what the manifest makes of it differ first, but for the comment at the beginning."""

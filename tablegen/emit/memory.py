@@ -1,13 +1,54 @@
-"""Memory files for ``$readmemh``: one full-width two's complement word a line, in hexadecimal."""
+"""The tables of a build as memories: words of so many bits, and how files spell them."""
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from typing import Literal
+
+import numpy as np
 
 from tablegen.device.registers import program_words
 from tablegen.device.schedule import Schedule
+from tablegen.emit.content import Content
 from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.synthesis import WORD_BITS, sine_quarter
 from tablegen.numerics.arrays import Ints
+
+
+@dataclass(frozen=True, eq=False)
+class Memory:
+    """Words that a device holds in one memory; ``name`` is x, y, x_fourier, y_fourier, program or sine.
+
+    ``words`` are integers of ``bits`` bits, in two's complement but for the program's registers, which are unsigned.
+    """
+
+    name: str
+    words: list[int]
+    bits: int
+    what: str
+
+    @property
+    def word_bytes(self) -> int:
+        """Bytes of a word in files of bytes: 1, 2 or 4, the least that hold it."""
+        return 1 if self.bits <= 8 else 2 if self.bits <= 16 else 4
+
+    def hexadecimal(self) -> list[str]:
+        """Each word in two's complement of ``bits`` bits, in as many digits as these take."""
+        return memory_file(self.words, self.bits).decode("ascii").split()
+
+    def raw(self) -> bytes:
+        """Each word in ``word_bytes`` bytes, sign-extended, the least significant byte first."""
+        mask = (1 << 8 * self.word_bytes) - 1
+        return np.array([word & mask for word in self.words], dtype=f"<u{self.word_bytes}").tobytes()
+
+    def described(self, content: Content) -> str:
+        """A line for a comment: which words of which build these are."""
+        return f"{content.name}, {self.what}: {len(self.words)} words of {self.bits} bits; plan {content.hash}"
+
+
+def memories(content: Content) -> list[Memory]:
+    """All tables of a build: what its ``.mem`` files hold, in the same order."""
+    fourier = {axis.axis: axis.fourier_words for axis in content.axes}
+    return _memories(content.schedule, content.x.program, content.y.program, fourier)
 
 
 def memory_file(words: Ints | Iterable[int], bits: int) -> bytes:
@@ -25,12 +66,17 @@ def memory_files(
     last register of their axis, which is 0 here. The quarter sine is that of the longest interpolated table, and serves
     shorter ones too; where no table is interpolated there is none.
     """
-    files = {}
+    found = _memories(schedule, x, y, fourier)
+    return {f"{name}_{memory.name}.mem": memory_file(memory.words, memory.bits) for memory in found}
+
+
+def _memories(schedule: Schedule, x: Program, y: Program, fourier: Mapping[Literal["x", "y"], Ints]) -> list[Memory]:
+    found = []
     programs: tuple[tuple[Literal["x", "y"], Program], ...] = (("x", x), ("y", y))
     for axis, program in programs:
-        files[f"{name}_{axis}.mem"] = memory_file(program.words, program.bits)
-        files[f"{name}_{axis}_fourier.mem"] = memory_file(fourier[axis], WORD_BITS)
-    files[f"{name}_program.mem"] = memory_file(program_words(schedule, x, y), WORD_BITS)
+        found.append(Memory(axis, program.words.tolist(), program.bits, f"table of {axis}"))
+        found.append(Memory(f"{axis}_fourier", fourier[axis].tolist(), WORD_BITS, f"Fourier words of {axis}"))
+    found.append(Memory("program", program_words(schedule, x, y), WORD_BITS, "registers of the program"))
     if index_bits := max(x.index_bits, y.index_bits):
-        files[f"{name}_sine.mem"] = memory_file(sine_quarter(index_bits), WORD_BITS)
-    return files
+        found.append(Memory("sine", sine_quarter(index_bits).tolist(), WORD_BITS, "quarter sine"))
+    return found

@@ -1,18 +1,21 @@
 """A plan and its certificates to a map of file name to content; nothing touches the disk here."""
 
+import re
 from collections.abc import Sequence
 from functools import cache
 
-from tablegen import __version__
 from tablegen.certificate.certificate import Certificate
 from tablegen.certificate.summary import summary
 from tablegen.emit.content import AxisContent, Content
 from tablegen.emit.format import Format
-from tablegen.emit.formats import chosen
+from tablegen.emit.formats import UnknownFormat, chosen
 from tablegen.manifest.format import MANIFEST, content_hash
 from tablegen.manifest.record import plan_record
 from tablegen.manifest.write import manifest_file
 from tablegen.planning.line_plan import LinePlan, Plan
+from tablegen.version import __version__
+
+_FILE_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]*(\.[A-Za-z0-9]+)+")  # of plain files, which manifests can list
 
 
 def render(plan: Plan, certificates: dict[str, Certificate], formats: Sequence[str] | None = None) -> dict[str, bytes]:
@@ -28,8 +31,10 @@ def render(plan: Plan, certificates: dict[str, Certificate], formats: Sequence[s
     files: dict[str, bytes] = {}
     for each in wanted:
         for name, text in {**each.files(content), **runtime_files(each)}.items():
+            if not _FILE_NAME.fullmatch(name) or name == MANIFEST:
+                raise UnknownFormat(f"{each.name!r} writes {name!r}, which cannot be the name of one of its files")
             if files.setdefault(name, text) != text:
-                raise ValueError(f"two formats write {name}, {each.name} is the second")
+                raise UnknownFormat(f"{each.name!r} writes {name}, and so does another format, with other content")
     files[MANIFEST] = manifest_file(record, digest, [each.name for each in wanted], certificates, files)
     return files
 

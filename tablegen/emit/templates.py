@@ -11,7 +11,7 @@ _WORDS_PER_ROW = 10
 
 
 def template(
-    name: str, context: Mapping[str, Any], literal: Callable[[int], str], **filters: Callable[..., str]
+    name: str, context: Mapping[str, Any], literal: Callable[[int], str], **filters: Callable[..., object]
 ) -> bytes:
     """A template of ``firmware_templates/`` rendered; ``literal`` is the filter that spells an integer."""
     text: str = _environment(literal, tuple(filters.items())).get_template(name).render(context)
@@ -19,7 +19,7 @@ def template(
 
 
 def template_text(
-    text: str, context: Mapping[str, Any], literal: Callable[[int], str], **filters: Callable[..., str]
+    text: str, context: Mapping[str, Any], literal: Callable[[int], str], **filters: Callable[..., object]
 ) -> bytes:
     """The same for a template that is given as text."""
     rendered: str = _environment(literal, tuple(filters.items())).from_string(text).render(context)
@@ -27,7 +27,7 @@ def template_text(
 
 
 @cache
-def _environment(literal: Callable[[int], str], filters: tuple[tuple[str, Callable[..., str]], ...]) -> Any:
+def _environment(literal: Callable[[int], str], filters: tuple[tuple[str, Callable[..., object]], ...]) -> Any:
     from jinja2 import Environment, FileSystemLoader, StrictUndefined  # not needed to check what was rendered
 
     environment = Environment(
@@ -48,7 +48,7 @@ def comment_safe(text: str) -> str:
     return plain.replace("*/", "* /").replace("/*", "/ *").replace("?", ".").rstrip()  # ??/ is a backslash in C99
 
 
-def rows(words: Ints, literal: Callable[[int], str] = str) -> list[str]:
-    """Words as lines of text, ten a line, with commas between."""
-    values = [literal(word) for word in words.tolist()]
+def rows(words: Ints | list[str]) -> list[str]:
+    """Words as lines of text, ten a line, with commas between; those that are text already as they are."""
+    values = words if isinstance(words, list) else [str(word) for word in words.tolist()]
     return [", ".join(values[i : i + _WORDS_PER_ROW]) for i in range(0, len(values), _WORDS_PER_ROW)]

@@ -59,11 +59,17 @@ def outdated_files(folder: Path, files: Iterable[str]) -> list[str]:
 
     A file that somebody has edited since is not among them; ``leftover_files`` names it.
     """
+    files = set(files)
+    try:
+        if {path.name for path in folder.iterdir()} <= files:
+            return []
+    except OSError:
+        return []
     return sorted(name for name, digest in _listed(folder, files).items() if _digest(folder / name) == digest)
 
 
-def leftover_files(folder: Path, files: Iterable[str], outdated: Iterable[str]) -> list[str]:
-    """Files that look like a build's and are not of this one, nor ``outdated``: a glob such as ``dac_*.v`` takes them.
+def leftover_files(folder: Path, files: Iterable[str]) -> list[str]:
+    """Files that look like a build's and are not of this one, nor outdated: a glob such as ``dac_*.v`` takes them.
 
     They begin with ``dac_`` and have the suffix of a file of the build, or an earlier manifest lists them.
     """
@@ -73,8 +79,12 @@ def leftover_files(folder: Path, files: Iterable[str], outdated: Iterable[str]) 
         present = {path.name for path in folder.iterdir() if path.is_file()}
     except OSError:
         return []
+    if present <= files:
+        return []
+    listed = _listed(folder, files)
     alike = {name for name in present if name.startswith("dac_") and Path(name).suffix in suffixes}
-    return sorted((alike | (_listed(folder, files).keys() & present)) - files - set(outdated))
+    outdated = {name for name, digest in listed.items() if name in present and _digest(folder / name) == digest}
+    return sorted((alike | (listed.keys() & present)) - files - outdated)
 
 
 def _listed(folder: Path, files: Iterable[str]) -> dict[str, str]:
@@ -106,7 +116,7 @@ def _digest(path: Path) -> str | None:
 def _read(path: Path) -> bytes | None:
     try:
         return path.read_bytes()
-    except OSError:
+    except (OSError, ValueError):  # ValueError: no file can have such a name
         return None
 
 

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 
+from tablegen.device.dual_program import DualProgram
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS
 from tablegen.device.schedule import Schedule, Window
-from tablegen.device.sequencer import DualProgram
 from tablegen.link.acceptance import Playing, first_objection
 from tablegen.link.image import PROGRAM_BYTES, Contents, layout, make_image, take_apart
 from tablegen.link.messages import AxisLimits, DeviceInfo, DeviceState, ImageInfo, Reason, Upload

@@ -5,7 +5,8 @@ from typing import Protocol
 
 import numpy as np
 
-from tablegen.device.sequencer import DualProgram, Fault, Sequencer, Tick
+from tablegen.device.dual_program import DualProgram
+from tablegen.device.sequencer import Fault, Sequencer, Tick
 from tablegen.link.messages import DeviceState
 
 MAX_REQUESTS = 8  # requests that a sequencer in C queues until its next tick

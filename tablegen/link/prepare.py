@@ -6,8 +6,8 @@ from typing import Literal
 
 import numpy as np
 
+from tablegen.device.dual_program import DualProgram
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS
-from tablegen.device.sequencer import DualProgram
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.program import Program
 from tablegen.link.acceptance import first_objection

@@ -12,8 +12,8 @@ import numpy as np
 from msgspec import Meta, Struct
 
 from tablegen.config.schema import DEFAULT_FORMATS
+from tablegen.device.dual_program import DualProgram
 from tablegen.device.schedule import MAXIMUM_LINE_TICKS, Schedule, Window
-from tablegen.device.sequencer import DualProgram
 from tablegen.fixedpoint.interpolation import guard_bits
 from tablegen.fixedpoint.output import GAIN_BITS, UNIT_GAIN_BITS, Output
 from tablegen.fixedpoint.phase import MAXIMUM_TICKS, RationalPhase
@@ -243,9 +243,9 @@ class StoredBuild:
         return sorted(name for name in self.manifest.files if name.startswith("dac_") and name.endswith(suffixes))
 
 
-def read_build(folder: Path) -> StoredBuild:
-    """The build in a directory."""
-    path = folder / MANIFEST
+def read_build(folder: str | Path) -> StoredBuild:
+    """The build in a directory. Raises ``NotABuild`` for a manifest that is missing, damaged or cannot be played."""
+    path = Path(folder) / MANIFEST
     try:
         content = path.read_bytes()
     except OSError as error:

@@ -5,10 +5,10 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tablegen import __version__
 from tablegen.certificate.certificate import Certificate
 from tablegen.config.schema import DEFAULT_FORMATS
 from tablegen.manifest.record import certificate_record
+from tablegen.version import __version__
 
 
 def manifest_file(

@@ -11,8 +11,8 @@ from tablegen.compensation.drive import Drive, compensate
 from tablegen.compensation.dynamics import capped_inverse
 from tablegen.config.load import Setup
 from tablegen.config.schema import DEFAULT_FORMATS, BandLimit, FastAxis, Limits, SlowAxis
+from tablegen.device.dual_program import DualProgram
 from tablegen.device.schedule import Schedule
-from tablegen.device.sequencer import DualProgram
 from tablegen.fixedpoint.converter import Converter, fit_gain, make_output
 from tablegen.fixedpoint.phase import RationalPhase
 from tablegen.fixedpoint.program import Program

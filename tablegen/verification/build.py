@@ -5,13 +5,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from tablegen import __version__
-from tablegen.emit.content import stored_content
+from tablegen.emit.format import Comparison
 from tablegen.emit.formats import UnknownFormat, get
+from tablegen.emit.stored import stored_content
 from tablegen.manifest.read import NotABuild, StoredBuild, read_build
+from tablegen.problems import Unphysical
 from tablegen.verification.checks import Check
 from tablegen.verification.directory import some, wrong_files
 from tablegen.verification.session import BuildSession, needed_ticks
+from tablegen.version import __version__
 
 Progress = Callable[[str | Callable[[], str]], None]
 
@@ -44,14 +46,18 @@ class Target(Protocol):
         """Play the build in ``folder``, in the directory ``work``, and check what comes."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Report:
-    """What came of a verification."""
+    """What came of a verification: ``failures`` are empty if all is well."""
 
     name: str
     checks: list[Check]
     difference: str | None
     notes: list[str]
+
+    def __repr__(self) -> str:
+        failed = len(self.failures)
+        return f"<tablegen report {self.name!r}: {len(self.checks)} checks, {failed or 'none'} failed>"
 
     @property
     def failures(self) -> list[str]:
@@ -68,8 +74,8 @@ def verify_build(folder: Path, work: Path, target: Target, most_ticks: int, seed
     if target.format_name is not None and target.format_name not in stored.formats:
         formats = ", ".join(stored.formats)
         raise NotABuild(
-            f"{folder}: holds no {target.format_name}, its formats are {formats}; "
-            f"verify another --target, or build it with --format {target.format_name}"
+            f"{folder}: this build has the formats {formats}, and no {target.format_name}; "
+            f"verify it with another --target, or build it with --format {target.format_name}"
         )
     target.refuse(folder, stored)
     target.require()
@@ -105,6 +111,8 @@ def _format_checks(folder: Path, stored: StoredBuild, notes: list[str]) -> list[
         except UnknownFormat as error:
             notes.append(f"{error}; only the SHA-256 of its files was checked")
             continue
+        except Unphysical as error:  # no build has such a manifest
+            found = [Comparison("files", "0 files", [str(error)])]
         checks += [differing_check(f"{name} {one.subject}", "manifest", one.compared, one.wrong) for one in found]
     return checks
 

@@ -12,8 +12,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from tablegen.emit.content import stored_content
 from tablegen.emit.formats.c import arrays_file
+from tablegen.emit.stored import stored_content
 from tablegen.fixedpoint.output import Output
 from tablegen.manifest.read import NotABuild, StoredBuild
 from tablegen.verification import worker

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tablegen.device.dual_program import DualProgram
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS
-from tablegen.device.sequencer import DualProgram
 from tablegen.verification.placement import Placement
 from tablegen.verification.stream import FLAGS, PROGRAM, X_FOURIER, X_TABLE, Y_TABLE, Script
 

@@ -11,8 +11,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from tablegen.device.dual_program import DualProgram
 from tablegen.device.registers import program_words
-from tablegen.device.sequencer import DualProgram, Fault, Sequencer, Tick
+from tablegen.device.sequencer import Fault, Sequencer, Tick
 from tablegen.fixedpoint.synthesis import FourierWords
 from tablegen.numerics.arrays import Ints
 

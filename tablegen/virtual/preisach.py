@@ -19,7 +19,7 @@ _SATURATION_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
-class Memory:
+class TurningPoints:
     """Turning points that are not wiped out, from 0 on, lows and highs by turns, and the displacement at each, in nm.
 
     The last one is where the drive is now.
@@ -68,18 +68,18 @@ class Preisach:
         """E(high, low): nm between the drives ``low`` and ``high`` along the branch that turned at one of them."""
         return np.asarray(np.polynomial.polynomial.polyval2d(high, low, self.everett), dtype=np.float64)
 
-    def play(self, drive: Floats, memory: Memory | None = None) -> tuple[Floats, Memory]:
+    def play(self, drive: Floats, memory: TurningPoints | None = None) -> tuple[Floats, TurningPoints]:
         """Displacement in nm at each drive of a sequence, and what is remembered after it."""
         drive = np.asarray(drive, dtype=np.float64)
         if drive.size and max(-float(drive.min()), float(drive.max()) - 1.0) > _SATURATION_TOLERANCE:
             raise ValueError(f"a drive of {drive.min():g}..{drive.max():g} leaves 0..1, for which the operator is made")
         drive = np.clip(drive, 0.0, 1.0)
-        memory = memory or Memory()
+        memory = memory or TurningPoints()
         turning, reached = list(memory.drives), list(memory.displacements)
         out = np.empty_like(drive)
         for first, stop in _monotonic(np.concatenate(([turning[-1]], drive))):
             self._sweep(drive[first:stop], out[first:stop], turning, reached)
-        return out, Memory(tuple(turning), tuple(reached))
+        return out, TurningPoints(tuple(turning), tuple(reached))
 
     def settled(self, drive: Floats) -> Floats:
         """Displacement in nm over one period of a periodic drive: one period has wiped out what it can."""

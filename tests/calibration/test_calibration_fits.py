@@ -5,6 +5,7 @@ from math import isnan, sqrt
 import numpy as np
 import pytest
 from calibrating import CASES, DRIVES, FREQUENCIES, OFFSETS, RESPONSE, V_MAX, actual, apparent, distances, trials
+from sets import LONG_TEST
 
 from tablegen.calibration.estimate import Estimate
 from tablegen.calibration.frequency import fit_frequency
@@ -26,6 +27,7 @@ def test_exact_data_give_exact_parameters(kind: str) -> None:
         assert estimate.standard_error <= 1e-6 * abs(truth), name
 
 
+@pytest.mark.rest
 @pytest.mark.parametrize("kind", CASES)
 def test_standard_errors_are_neither_too_small_nor_too_large(kind: str) -> None:
     """Within three standard deviations of the share; parameters of one fit, which hang together, count as two."""
@@ -39,8 +41,8 @@ def test_standard_errors_are_neither_too_small_nor_too_large(kind: str) -> None:
     assert np.mean(found) == pytest.approx(0.0, abs=0.3), "biased"
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", CASES)
+@pytest.mark.rest
+@pytest.mark.parametrize("kind", [pytest.param(each, marks=LONG_TEST if each == "images" else ()) for each in CASES])
 def test_the_truth_lies_within_two_errors_in_95_of_100(kind: str) -> None:
     """Of 1,000 trials a share of 95.45 % is measured to 0.66 %: three times of that are allowed. Images take longer."""
     count = 300 if kind == "images" else 1000

@@ -14,6 +14,8 @@ from tablegen.calibration.images import Pair, fit_images
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 
+pytestmark = pytest.mark.common
+
 FULL = [0.037, 0.37, 0.080, 0.48]  # beta and u_peak of the scanner's branches at full scale
 SMALL = {"pixels": 128, "lines": 96}
 

@@ -392,6 +392,7 @@ def test_the_page_shows_what_is_printed(tmp_path: Path, monkeypatch: pytest.Monk
     assert run(*shown[1].split()).out == shown[2]
 
 
+@pytest.mark.common
 def test_the_measured_table_is_whole_and_within_chance() -> None:
     """A row a parameter; the shares are those of 1,000 trials, whose standard deviation is 0.66 %."""
     rows = re.findall(r"^\| (\w+) \| `([\w.]+)` \| [^|]+\|[^|]+\|[^|]+\| ([\d.]+) % \|$", PAGE, re.MULTILINE)

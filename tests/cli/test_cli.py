@@ -364,6 +364,7 @@ def on_a_terminal(*arguments: str | Path) -> str:
     return shown.decode("utf-8").replace("\r\n", "\n")
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("command", ["show", "build", "check"])
 def test_a_terminal_gets_what_a_pipe_gets_apart_from_colour(scan: Path, command: str) -> None:
     extra = ("-o", scan.parent / "out") if command == "build" else ()
@@ -540,6 +541,7 @@ def interrupted(event: str, count: int, *arguments: str | Path) -> subprocess.Co
 LONG = edited(SCAN, "timing.lines = 20000", "x.size_nm = 201.0", "- [limits]")
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(
     ("event", "count"),
     [
@@ -572,6 +574,7 @@ def test_an_interruption_before_writing_leaves_the_build_that_was_there(scan: Pa
     assert stamps(out) == when
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(
     ("event", "count"), [("tempfile.mkstemp", 1), ("tempfile.mkstemp", 5), ("os.rename", 1), ("os.rename", 4)]
 )

@@ -15,6 +15,8 @@ from PIL import Image as Pillow
 
 from tablegen.numerics.arrays import Floats
 
+pytestmark = pytest.mark.common
+
 V = 100.0
 
 

@@ -50,6 +50,7 @@ def page_rows(scan: Scan) -> list[list[str]]:
     return [rows[0], rows[3]]
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("scan", SCANS, ids=lambda scan: scan.name)
 def test_what_is_to_be_reached_is_reached(scan: Scan) -> None:
     """0.1 % residual and 1 % scaling error in both directions, in three rounds, from emitted 16-bit integers."""

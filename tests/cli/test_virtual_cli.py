@@ -26,6 +26,7 @@ def truth(folder: Path, *edits: str) -> Path:
     return path
 
 
+@pytest.mark.common
 def test_text_and_data_say_the_same(tmp_path: Path) -> None:
     scan = write_pair(tmp_path, SHORT)
     shown, plain = run("simulate", scan), run("simulate", scan, "--json")
@@ -54,6 +55,7 @@ def test_text_and_data_say_the_same(tmp_path: Path) -> None:
     assert not rows
 
 
+@pytest.mark.common
 def test_a_calibration_makes_the_scan_straighter(tmp_path: Path) -> None:
     """x at the example's 200 nm: the example's file is another scanner's, of the same kind."""
     data = json.loads(run("simulate", write_pair(tmp_path, SHORT), "--json").out)
@@ -64,6 +66,7 @@ def test_a_calibration_makes_the_scan_straighter(tmp_path: Path) -> None:
     assert abs(calibrated["size_error_percent"]) < 1.0 < abs(given["size_error_percent"])
 
 
+@pytest.mark.common
 def test_noise_and_seed_are_those_of_the_calibration(tmp_path: Path) -> None:
     scan = write_pair(tmp_path, SHORT)
     first, again, other, loud = (
@@ -76,12 +79,14 @@ def test_noise_and_seed_are_those_of_the_calibration(tmp_path: Path) -> None:
         assert changed["calibrated"] != first["calibrated"]
 
 
+@pytest.mark.common
 def test_without_a_calibration(tmp_path: Path) -> None:
     data = json.loads(run("simulate", write_pair(tmp_path, SHORT), "--json", "--no-calibration").out)
     assert "given" in data
     assert "calibrated" not in data
 
 
+@pytest.mark.common
 def test_a_calibration_needs_scipy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "scipy", None)
     scan = write_pair(tmp_path, SHORT)
@@ -92,6 +97,7 @@ def test_a_calibration_needs_scipy(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert run("simulate", scan, "--no-calibration").status == 0
 
 
+@pytest.mark.common
 def test_a_line_and_a_frame_as_csv(tmp_path: Path) -> None:
     scan = write_pair(tmp_path, SHORT)
     assert run("simulate", scan, "--csv", tmp_path / "out" / "ticks.csv").status == 0
@@ -111,12 +117,14 @@ def test_a_line_and_a_frame_as_csv(tmp_path: Path) -> None:
         assert np.ptp(moved) == pytest.approx(190.0, rel=0.05)  # its turns are rounded
 
 
+@pytest.mark.common
 def test_a_figure(tmp_path: Path) -> None:
     scan = write_pair(tmp_path, SHORT)
     assert run("simulate", scan, "--plot", tmp_path / "figure.png").status == 0
     assert (tmp_path / "figure.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
 
 
+@pytest.mark.common
 def test_wrong_use(tmp_path: Path) -> None:
     scan = write_pair(tmp_path, SHORT)
     for arguments, why in (
@@ -129,6 +137,7 @@ def test_wrong_use(tmp_path: Path) -> None:
     assert not (tmp_path / "figure.pdf").exists()
 
 
+@pytest.mark.common
 def test_a_figure_needs_matplotlib(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     outcome = run("simulate", write_pair(tmp_path, SHORT), "--plot", tmp_path / "figure.png")
@@ -137,6 +146,7 @@ def test_a_figure_needs_matplotlib(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert not (tmp_path / "figure.png").exists()
 
 
+@pytest.mark.common
 def test_an_uncalibrated_scanner_is_a_triangle(tmp_path: Path) -> None:
     scanner = edited(SCANNER, "- [x.hysteresis]", "- [[x.hysteresis.branches]]", "- [y.hysteresis]")
     scanner = edited(scanner, "- [[y.hysteresis.branches]]")
@@ -147,6 +157,7 @@ def test_an_uncalibrated_scanner_is_a_triangle(tmp_path: Path) -> None:
     assert list(data["calibrated"]["models"]) == ["triangle", "sinusoidal", "harmonic"]
 
 
+@pytest.mark.common
 def test_a_calibrated_scan_that_cannot_be_played_leaves_the_given_one(tmp_path: Path) -> None:
     """98 V for k as given; the virtual scanner goes less far a volt than this file says, and takes more than 100 V."""
     scanner = edited(SCANNER, "x.size.k_nm_per_v = 15.0", "x.size.beta = 0.0")
@@ -158,6 +169,7 @@ def test_a_calibrated_scan_that_cannot_be_played_leaves_the_given_one(tmp_path: 
     assert "x.size_nm" in data["calibrated"]["rejected"]["harmonic"]
 
 
+@pytest.mark.common
 def test_another_truth(tmp_path: Path) -> None:
     """Without hysteresis, creep or resonance the triangle is straight, and compensation makes it worse."""
     scan = write_pair(tmp_path, SHORT)
@@ -175,6 +187,7 @@ def test_another_truth(tmp_path: Path) -> None:
     assert shaped["residual_peak_percent"] == pytest.approx(2.08, abs=0.1)  # (22) at 0.2 of full scale
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(
     ("edit", "key", "why"),
     [
@@ -198,6 +211,7 @@ def test_faults_of_a_truth_file(tmp_path: Path, edit: str, key: str, why: str) -
     assert outcome.err.startswith(f"{path}:")
 
 
+@pytest.mark.common
 def test_density_is_a_triangle_of_numbers(tmp_path: Path) -> None:
     text = 'name = "a"\nv_max = 1\n' + "".join(
         f"[{axis}.hysteresis]\nreversible_nm = [1]\ndensity_nm = [[1, 2], [3, 4]]\n" for axis in "xy"
@@ -207,6 +221,7 @@ def test_density_is_a_triangle_of_numbers(tmp_path: Path) -> None:
         load_truth(tmp_path / "truth.toml")
 
 
+@pytest.mark.common
 def test_what_cannot_be_played_is_said(tmp_path: Path) -> None:
     missing = run("simulate", write_pair(tmp_path, SHORT), "--scanner-truth", tmp_path / "none.toml")
     assert missing.status == ExitStatus.WRONG_INPUT
@@ -218,6 +233,7 @@ def test_what_cannot_be_played_is_said(tmp_path: Path) -> None:
     assert "x.size_nm" in wrong.err
 
 
+@pytest.mark.common
 def test_a_model_that_is_rejected_leaves_the_others(tmp_path: Path) -> None:
     """A u_peak outside the poles of (20) rejects the harmonic model alone."""
     branch = "forward = { beta_max = 0.037, rho = 4.0, u_peak = 0.1 }"

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 
 from tablegen.config.schema import Scan, Scanner
 
-pytestmark = pytest.mark.filterwarnings("error")  # numpy says so where it makes an inf or a nan
+pytestmark = [pytest.mark.filterwarnings("error"), pytest.mark.common]  # numpy says so where it makes an inf or a nan
 STEADY = settings(derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow], print_blob=False)
 SMALL = (
     "timing.lines = 12",

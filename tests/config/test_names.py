@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from building import run
+from sets import by_tool
 
 from tablegen.config.names import why_not_a_name
 
@@ -107,12 +108,12 @@ COMPILERS: dict[str, tuple[list[str], str, Callable[[list[str]], str]]] = {
 # C23 is younger than the compilers that are asked.
 VOUCHED = [
     ("gcc", "C"),
-    ("clang", "C"),
-    ("g++", "C++"),
-    ("g++20", "C++20"),
+    pytest.param("clang", "C", marks=pytest.mark.common),
+    pytest.param("g++", "C++", marks=pytest.mark.common),
+    pytest.param("g++20", "C++20", marks=pytest.mark.common),
     ("iverilog-2005", "Verilog"),
     ("iverilog-2012", "SystemVerilog"),
-    ("ghdl", "VHDL"),
+    pytest.param("ghdl", "VHDL", marks=pytest.mark.rest),
 ]
 # Words of the property language that GHDL reserves only inside properties.
 TAKEN_BY_GHDL = {"assume_guarantee", "fairness", "strong"}
@@ -144,7 +145,7 @@ def test_a_compiler_vouches_for_the_keywords(compiler: str, language: str, tmp_p
     assert taken == (TAKEN_BY_GHDL if compiler == "ghdl" else set())
 
 
-@pytest.mark.parametrize("compiler", COMPILERS)
+@pytest.mark.parametrize("compiler", by_tool(COMPILERS))
 def test_good_names_are_accepted_by_the_compiler(compiler: str, tmp_path: Path) -> None:
     """By themselves, and as the prefix of what is emitted."""
     assert [name for name in GOOD_NAMES if why_not_a_name(name)] == []
@@ -159,7 +160,7 @@ def test_what_is_no_identifier_is_refused(name: str) -> None:
     assert why_not_a_name(name)
 
 
-@pytest.mark.parametrize("compiler", COMPILERS)
+@pytest.mark.parametrize("compiler", by_tool(COMPILERS))
 def test_the_compiler_refuses_a_bad_shape(compiler: str, tmp_path: Path) -> None:
     """Negative control of the good names."""
     assert not compiles(compiler, ["1a"], tmp_path)

@@ -328,6 +328,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("toml")
 
 
+@pytest.mark.common
 @STEADY
 @given(documents())
 def test_every_key_is_found_on_its_line_and_nothing_else(folder: Path, document: tuple[str, dict[str, int]]) -> None:
@@ -336,6 +337,7 @@ def test_every_key_is_found_on_its_line_and_nothing_else(folder: Path, document:
     assert located(folder, text) == lines
 
 
+@pytest.mark.common
 @settings(STEADY, max_examples=100)
 @given(documents())
 def test_line_ends_of_windows_change_nothing(folder: Path, document: tuple[str, dict[str, int]]) -> None:
@@ -343,6 +345,7 @@ def test_line_ends_of_windows_change_nothing(folder: Path, document: tuple[str, 
     assert located(folder, text.replace("\n", "\r\n")) == lines
 
 
+@pytest.mark.common
 @settings(STEADY, max_examples=100)
 @given(documents(), st.data())
 def test_a_syntax_error_is_reported_on_its_line(
@@ -354,6 +357,7 @@ def test_a_syntax_error_is_reported_on_its_line(
     assert refused(folder, f"{text}\n{wrong}\nlast = 1\n").startswith(f"scan.toml:{line}: not TOML: ")
 
 
+@pytest.mark.common
 @settings(STEADY, max_examples=100)
 @given(documents(), st.sampled_from((b"\xff", b"\xc3(", b"\xed\xa0\x80", b"\xf8\x88")))
 def test_a_byte_that_is_not_utf8_is_reported_on_its_line(

@@ -6,8 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from variants import plan_of
 
+from tablegen.device.dual_program import DualProgram
 from tablegen.device.schedule import Window
-from tablegen.device.sequencer import DualProgram, Fault, Sequencer, SequencerState, Tick, pixel_starts, play_line
+from tablegen.device.sequencer import Fault, Sequencer, SequencerState, Tick, pixel_starts, play_line
 
 SMALL = {
     "timing.lines": "6",
@@ -33,7 +34,7 @@ def programs(tmp_path_factory: pytest.TempPathFactory) -> list[DualProgram]:
         {"x.size_nm": "350.0", "timing.settle_lines": "0"},
     ]
     resonance = {"x.resonance.frequency_hz": "400e3"}
-    return [DualProgram.of(plan_of(folder, SMALL | edit, resonance)) for edit in edits]
+    return [plan_of(folder, SMALL | edit, resonance).program for edit in edits]
 
 
 def run(sequencer: Sequencer, ticks: int) -> list[Tick]:

@@ -113,11 +113,3 @@ def test_the_configuration_page_is_the_schema() -> None:
     finally:
         sys.path.pop(0)
     assert (REPOSITORY / "docs" / "configuration.md").read_text(encoding="utf-8") == page()
-
-
-@pytest.mark.parametrize(
-    "page", sorted([REPOSITORY / "README.md", *(REPOSITORY / "docs").glob("*.md")]), ids=lambda p: p.name
-)
-def test_links_lead_somewhere(page: Path) -> None:
-    for target in re.findall(r"\[[^\]\n]+\]\(([^)#\s]+\.[a-z]+)\)", page.read_text(encoding="utf-8")):
-        assert (page.parent / target).exists(), target

@@ -9,6 +9,8 @@ from types import ModuleType
 import pytest
 from building import REPOSITORY
 
+pytestmark = pytest.mark.rest
+
 PAGE = REPOSITORY / "docs" / "instructions.md"
 
 

@@ -21,6 +21,7 @@ def link() -> ModuleType:
     return module
 
 
+@pytest.mark.common
 def test_the_line_is_used(link: ModuleType) -> None:
     """In virtual time: the same on every machine."""
     scan, other = link.example()
@@ -31,6 +32,7 @@ def test_the_line_is_used(link: ModuleType) -> None:
     assert 8 * link.rate(scan, words, 115200, 0.001).wire_bytes <= slow.wire_bytes
 
 
+@pytest.mark.rest
 def test_a_scan_of_fourier_words_is_soon_in_force(link: ModuleType, tmp_path: Path) -> None:
     scan, other = link.example()
     part, image = link.PARTS[0], other.image("fourier")

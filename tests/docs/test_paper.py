@@ -24,6 +24,8 @@ import make_paper
 from paper import figure_3, figure_5_growth, figure_5_laws, figure_6, laws, measured, page
 from paper.rows import Printed, Row, Source, about, between, exact, exactly, faults, limits
 
+pytestmark = pytest.mark.common
+
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
 PAGE = REPOSITORY / "docs" / "paper" / "README.md"
 

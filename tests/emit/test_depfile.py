@@ -10,8 +10,8 @@ from building import run as run_tool
 from editing import SCAN, SCANNER, edited, run, write_pair
 from installing import python
 
+from tablegen.api import build as module
 from tablegen.config.schema import DEFAULT_FORMATS
-from tablegen.emit import render as module
 from tablegen.emit.depfile import deciding_files, depfile
 from tablegen.resources import resource_folder
 
@@ -94,6 +94,7 @@ def test_make_reads_every_name_as_it_is(tmp_path: Path, name: str) -> None:
         assert makes(tmp_path, target, prerequisite)
 
 
+@pytest.mark.common
 def test_ninja_reads_every_name_as_it_is(tmp_path: Path) -> None:
     (tmp_path / "d").mkdir()
     for name in NAMES:
@@ -143,6 +144,7 @@ def test_the_target_is_what_is_asked_for(scan: Path) -> None:
     assert names(file)[0] == "stamp"
 
 
+@pytest.mark.common
 def test_nothing_else_is_read(measured: Path, installed: Path) -> None:
     """Held against the interpreter, which tells what it opens: of the user's folder, of the templates, and modules."""
     folder = measured.parent
@@ -157,12 +159,13 @@ def test_nothing_else_is_read(measured: Path, installed: Path) -> None:
     templates = {name for name in opened if Path(name).is_relative_to(package / "firmware_templates")}
     assert {name for name in templates if not name.endswith(".pyc")} <= set(listed)
     assert len([name for name in templates if name.endswith((".j2", ".c", ".v"))]) > 20
-    outside = (package / "cli", package / "examples", package / "firmware_templates")
+    outside = tuple(package / name for name in ("api", "cli", "examples", "firmware_templates"))
     deciding = [name for name in modules if not any(Path(name).is_relative_to(folder) for folder in outside)]
     assert len(deciding) > 20
     assert set(deciding) <= set(listed)
 
 
+@pytest.mark.common
 def test_of_an_installation_the_record_is_named_which_has_the_version(installed: Path) -> None:
     code = "from tablegen.emit.depfile import deciding_files; print(*deciding_files(['c']), sep='\\n')"
     listed = python(installed.parent, "-c", code, path=installed).splitlines()
@@ -173,12 +176,21 @@ def test_of_an_installation_the_record_is_named_which_has_the_version(installed:
 def test_what_builds_do_not_read_is_not_named() -> None:
     folders = {path.parent.name for path in deciding_files(DEFAULT_FORMATS)}
     assert {"c", "verilog", "config", "emit", "fixedpoint"} <= folders
-    assert (
-        not {"make", "cmake", "calibration", "cli", "link", "verification", "virtual", "examples", "__pycache__"}
-        & folders
-    )
+    others = {
+        "api",
+        "calibration",
+        "cli",
+        "link",
+        "verification",
+        "virtual",
+        "examples",
+        "make",
+        "cmake",
+        "__pycache__",
+    }
+    assert not others & folders
     assert "read.py" not in {path.name for path in deciding_files(DEFAULT_FORMATS) if path.parent.name == "manifest"}
-    assert resource_folder("firmware_templates") / "c" / "tables.h.j2" in deciding_files()
+    assert resource_folder("firmware_templates") / "c" / "tables.h.j2" in deciding_files(DEFAULT_FORMATS)
 
 
 # When it is there

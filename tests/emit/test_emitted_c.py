@@ -12,6 +12,7 @@ import mpmath
 import numpy as np
 import pytest
 from building import NAME, REPOSITORY, VARIANTS, Build, Variant, build, build_stressed, constants, run, run_clean
+from sets import by_tool, common
 
 from tablegen.device.sequencer import play_line
 from tablegen.numerics.arrays import Ints
@@ -31,7 +32,7 @@ DIALECTS = {
 STRESS = [(8, 131071), (16, -131072), (21, 131071), (24, -131072), (24, 131071)]
 
 
-@pytest.fixture(scope="module", params=VARIANTS)
+@pytest.fixture(scope="module", params=common(("example", "header_only", "direct_steps"), VARIANTS))
 def built(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Build:
     return build(tmp_path_factory.mktemp("variant"), VARIANTS[request.param])
 
@@ -73,13 +74,13 @@ def two_units(built: Build) -> list[Path]:
     return [first, second, *sources(built)]
 
 
-@pytest.mark.parametrize("dialect", DIALECTS)
+@pytest.mark.parametrize("dialect", by_tool(DIALECTS))
 def test_compiles_without_a_warning(built: Build, dialect: str) -> None:
     run_clean([*DIALECTS[dialect], *WARNINGS, "-fsyntax-only", f"-I{built.folder}", PLAYER, *two_units(built)])
 
 
 @pytest.mark.parametrize("name", ["example", "header_only"])
-@pytest.mark.parametrize("dialect", DIALECTS)
+@pytest.mark.parametrize("dialect", by_tool(DIALECTS))
 def test_two_units_that_include_the_header_link(tmp_path: Path, name: str, dialect: str) -> None:
     built = build(tmp_path, VARIANTS[name])
     program = built.folder / "units"
@@ -145,6 +146,7 @@ def test_player_equals_the_model_over_a_whole_frame_and_into_the_next(built: Bui
     assert np.array_equal(played(compile_player(built, ["gcc", "-std=c99", "-O1"]), lines), model(built, lines))
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(("bits", "gain_word"), STRESS)
 @pytest.mark.parametrize("compiler", [["gcc", "-std=c99"], ["clang", "-std=c11"]], ids=["gcc", "clang"])
 def test_player_is_defined_at_the_ends_of_the_arithmetic(
@@ -159,6 +161,7 @@ def test_player_is_defined_at_the_ends_of_the_arithmetic(
     assert np.array_equal(played(compile_player(stressed, [*compiler, *SANITIZERS]), lines), expected)
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("name", ["example", "direct_steps", "left_aligned", "bits_24", "prime_line"])
 @pytest.mark.parametrize("dialect", ["gcc-c++17", "clang-c99"])
 def test_player_is_defined_and_the_same_in_other_dialects(tmp_path: Path, name: str, dialect: str) -> None:
@@ -167,6 +170,7 @@ def test_player_is_defined_and_the_same_in_other_dialects(tmp_path: Path, name: 
     assert np.array_equal(played(program, 4), model(built, 4))
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("options", [["-O0"], ["-O3"], ["-Os"], ["-O3", "-march=native"]], ids=" ".join)
 def test_player_does_not_depend_on_optimisation(tmp_path: Path, options: list[str]) -> None:
     built = build(tmp_path, VARIANTS["bits_18"])
@@ -224,6 +228,7 @@ def header_only(tmp_path_factory: pytest.TempPathFactory) -> Build:
     return build(tmp_path_factory.mktemp("damaged"), VARIANTS["header_only"])
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("damage", DAMAGES)
 def test_a_damaged_header_does_not_compile(header_only: Build, tmp_path: Path, damage: str) -> None:
     """Negative controls of the static asserts: each is named by every compiler in every dialect."""
@@ -241,7 +246,8 @@ def test_a_damaged_header_does_not_compile(header_only: Build, tmp_path: Path, d
 HOSTILE = ["*/ int broken; /*", "two\nlines", "back\\slash\\", "trigraph ??/", "/* /* */ */", "\u00b5-Scanner \u202e"]
 
 
-@pytest.mark.parametrize("dialect", DIALECTS)
+@pytest.mark.rest
+@pytest.mark.parametrize("dialect", by_tool(DIALECTS))
 @pytest.mark.parametrize("name", HOSTILE, ids=ascii)
 def test_no_scanner_s_name_leaves_its_comment(tmp_path: Path, name: str, dialect: str) -> None:
     """The name of a scanner is free text, and the only free text that reaches an emitted file."""

@@ -16,6 +16,8 @@ import numpy as np
 import pytest
 from building import EXAMPLE, REMOVED, REPOSITORY, VARIANTS, Variant, write_variant
 
+pytestmark = pytest.mark.common
+
 # Builds several scans in one process, each beside its file, and tells which vector units numpy may use.
 DRIVER = """
 import sys

@@ -29,6 +29,21 @@ HELPERS = REPOSITORY / "tests" / "helpers"
 BENCHES = REPOSITORY / "hdl_tests" / "benches"
 EXAMPLE = REPOSITORY / "examples" / "annexin_200nm.toml"
 NAME = "annexin_200nm"
+# Debian's packages of tools that are not called as these are.
+PACKAGES = {
+    "arm-none-eabi-gcc": "gcc-arm-none-eabi",
+    "arm-none-eabi-g++": "gcc-arm-none-eabi",
+    "avr-gcc": "gcc-avr",
+    "avr-g++": "gcc-avr",
+    "clang++": "clang",
+    "gcov": "gcc",
+    "mips-linux-gnu-gcc": "gcc-mips-linux-gnu",
+    "ninja": "ninja-build",
+    "nm": "binutils",
+    "qemu-mips": "qemu-user",
+    "vvp": "iverilog",
+    "yosys-smtbmc": "yosys",
+}
 REMOVED = object()  # as a value: the key is taken out
 
 Changes = Mapping[str, object]
@@ -97,6 +112,9 @@ VARIANTS: dict[str, Variant] = {
     ),
     "low_corner": Variant({"x.offset_v": 11.0, "x.size_nm": 190.0, "y.park_v": 0.0, "timing.lines": 40}),
 }
+
+# In every `make check`, of what is quick.
+FEW = ("example", "bits_24", "direct_steps", "turn_0.7", "left_aligned", "header_only")
 
 
 def stressed(plan: Plan, bits: int, gain_word: int) -> Plan:
@@ -262,13 +280,18 @@ def fourier_words(axis: Mapping[str, Any]) -> list[int]:
     return words
 
 
+def tool(name: str) -> str:
+    """The path of a tool; one that is not installed fails the test by its name, with what installs it."""
+    found = shutil.which(name)
+    assert found is not None, f"{name} is not installed; `.ci/system-packages {PACKAGES.get(name, name)}` installs it"
+    return found
+
+
 def run(
     command: Sequence[str | Path], folder: Path | None = None, environment: Mapping[str, str] | None = None
 ) -> subprocess.CompletedProcess[str]:
-    """Run a tool, whatever its exit status; a tool that is not installed fails the test by name."""
-    tool = shutil.which(str(command[0]))
-    assert tool is not None, f"{command[0]} is not installed; `.ci/system-packages {command[0]}` installs it"
-    arguments = [tool, *map(str, command[1:])]
+    """Run a tool, whatever its exit status."""
+    arguments = [tool(str(command[0])), *map(str, command[1:])]
     return subprocess.run(arguments, cwd=folder, env=environment, capture_output=True, text=True, check=False)
 
 

@@ -9,9 +9,9 @@ import numpy as np
 from c_library import LOADED, Device, Library, converter_of
 from programs import random_dual
 
+from tablegen.device.dual_program import DualProgram
 from tablegen.device.schedule import Schedule
 from tablegen.device.schedule import Window as Lines
-from tablegen.device.sequencer import DualProgram
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.phase import RationalPhase
 from tablegen.fixedpoint.program import Program

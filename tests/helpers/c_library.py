@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from building import run_clean
 
-from tablegen.device.sequencer import DualProgram, Fault, Sequencer, Tick
+from tablegen.device.dual_program import DualProgram
+from tablegen.device.sequencer import Fault, Sequencer, Tick
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.program import Program
 from tablegen.numerics.arrays import Ints

@@ -10,9 +10,9 @@ from c_devices import Libraries, device_for, flat, playing
 from c_library import LOADED, Device, Library, Twin, same
 from c_scripts import wave_program
 
+from tablegen.device.dual_program import DualProgram
 from tablegen.device.schedule import Schedule
 from tablegen.device.schedule import Window as Lines
-from tablegen.device.sequencer import DualProgram
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.phase import RationalPhase
 from tablegen.fixedpoint.program import Program

@@ -14,8 +14,8 @@ from programs import random_dual, random_fourier, random_schedule, rendered
 from stream_configurations import CONFIGURATIONS, SMALL
 from stream_scripts import play, random_requests, swaps_at_every_tick, sweep
 
+from tablegen.device.dual_program import DualProgram
 from tablegen.device.schedule import Schedule
-from tablegen.device.sequencer import DualProgram
 from tablegen.fixedpoint.interpolation import guard_bits
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.phase import RationalPhase

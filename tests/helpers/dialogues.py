@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 from typing import Any, Protocol
 
-from tablegen.device.sequencer import DualProgram
+from tablegen.device.dual_program import DualProgram
 from tablegen.link.frames import FrameReader
 from tablegen.link.image import take_apart
 from tablegen.link.messages import DeviceInfo

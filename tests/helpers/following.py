@@ -3,7 +3,8 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from tablegen.device.sequencer import DualProgram, Sequencer, Tick
+from tablegen.device.dual_program import DualProgram
+from tablegen.device.sequencer import Sequencer, Tick
 from tablegen.fixedpoint.program import Program
 from tablegen.planning.line_plan import Plan
 from tablegen.verification.stream import FLAGS

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tablegen.device.sequencer import DualProgram, LineTicks, Sequencer, Tick, play_line
+from tablegen.device.dual_program import DualProgram
+from tablegen.device.sequencer import LineTicks, Sequencer, Tick, play_line
 from tablegen.numerics.arrays import Ints
 from tablegen.verification.stream import FLAGS
 
@@ -190,7 +191,8 @@ class LineCheck:
         for name, program in self._offered.items():
             for codes in self._ramp(program, parked):
                 yield name, self._started(program, codes)
-        for codes in self._ramp(before, self._codes):  # committed after the trigger, before its first tick
+        # Committed between a trigger and its first tick, a tick after a park at the earliest.
+        for codes in self._ramp(before, self._codes)[: -1 if self._play is not None else None]:
             for name, program in self._offered.items():
                 yield name, self._swapped(before, program, codes)
 

@@ -18,7 +18,7 @@ from building import REPOSITORY
 from c_library import OPTIONS, Converter, CProgram, Library, compile_library, converter_of
 from link_talk import Talk
 
-from tablegen.device.sequencer import DualProgram
+from tablegen.device.dual_program import DualProgram
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.synthesis import sine_periods
 from tablegen.link.image import make_image

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.random import Generator
 from programs import Kind, random_dual, random_fourier, rendered
 
+from tablegen.device.dual_program import DualProgram
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS, SCAN_WORDS
-from tablegen.device.sequencer import DualProgram
 from tablegen.link.image import PROGRAM_BYTES, ProgramImage, make_image
 from tablegen.link.messages import AxisLimits
 from tablegen.numerics.arrays import Ints

@@ -114,6 +114,7 @@ def judge_all(folder: Path, mutants: list[Mutant]) -> Iterator[tuple[Mutant, str
 
 FRAME, IMAGE, CHECK, LINK = "dac_link_frame.c", "dac_link_image.c", "dac_link_check.c", "dac_link.c"
 UPLOAD, REQUESTS, MAC, PARTS = "dac_link_upload.c", "dac_link_requests.c", "dac_link_mac.c", "dac_link_parts.h"
+KEY = "dac_link_key.c"
 MUTANTS = [
     Mutant("the CRC of a frame is not checked", FRAME, " && r->crc == WHOLE;", ";"),
     Mutant("a distance may lead past the end", FRAME, "r->left == 0 && r->length", "r->length"),
@@ -172,11 +173,11 @@ MUTANTS = [
         "differ |= (unsigned)(a[i] ^ b[i]);",
         "differ |= (unsigned)(a[i] ^ b[i]) & 0x7Fu;",
     ),
-    Mutant("a tag is not looked at", LINK, "return dac_link_same(right, tag, DAC_LINK_TAG);", "return true;"),
-    Mutant("the tag does not cover the nonce", LINK, "    dac_link_mac_add(&m, nonce, sizeof l->nonce);\n", ""),
+    Mutant("a tag is not looked at", KEY, "return dac_link_same(right, tag, DAC_LINK_TAG);", "return true;"),
+    Mutant("the tag does not cover the nonce", KEY, "    dac_link_mac_add(&m, nonce, sizeof l->nonce);\n", ""),
     Mutant(
         "the tag does not cover the image",
-        LINK,
+        KEY,
         "    if (digest != NULL)\n        dac_link_mac_add",
         "    if (false)\n        dac_link_mac_add",
     ),
@@ -184,8 +185,8 @@ MUTANTS = [
     Mutant("a COMMIT needs no challenge", CHECK, "return l->commit_challenged && ", "return "),
     Mutant("a COMMIT leaves the nonce", UPLOAD, "    l->challenged = false;\n", ""),
     Mutant("a number refused by key is used", UPLOAD, "        l->last = l->before_commit;\n", ""),
-    Mutant("the same challenge each time", REQUESTS, "++l->challenges", "l->challenges"),
-    Mutant("the same challenges after each start", REQUESTS, "dac_link_put(count, l->boot)", "dac_link_put(count, 0)"),
+    Mutant("the same challenge each time", KEY, "++l->challenges", "l->challenges"),
+    Mutant("the same challenges after each start", KEY, "dac_link_put(count, l->boot)", "dac_link_put(count, 0)"),
     Mutant("BLAKE2s does not know its last block", MAC, "compress(m, UINT32_MAX);", "compress(m, 0);"),
     Mutant("BLAKE2s does not count", MAC, "    v[12] ^= m->count;", "    v[12] ^= 0;"),
     Mutant(

@@ -6,8 +6,8 @@ from fractions import Fraction
 import numpy as np
 from numpy.random import Generator
 
+from tablegen.device.dual_program import DualProgram
 from tablegen.device.schedule import Schedule, Window
-from tablegen.device.sequencer import DualProgram
 from tablegen.fixedpoint.interpolation import guard_bits
 from tablegen.fixedpoint.output import UNIT_GAIN_BITS, Output
 from tablegen.fixedpoint.phase import RationalPhase

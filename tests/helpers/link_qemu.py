@@ -1,7 +1,6 @@
 """Reference firmware in QEMU with its link on a TCP port or a pseudo-terminal, and the lines that it played."""
 
 import re
-import shutil
 import socket
 import subprocess
 import threading
@@ -10,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
 
+from building import tool
 from limits import PATIENCE_S
 from line_log import PlayedLine
 
@@ -21,8 +21,6 @@ class LinkMachine:
     """A board whose link is at ``url``, for pyserial: a socket, or a pseudo-terminal. Its log is read all the time."""
 
     def __init__(self, machine: str, executable: Path, pty: bool = False) -> None:
-        tool = shutil.which("qemu-system-arm")
-        assert tool is not None, "qemu-system-arm is not installed; `.ci/system-packages qemu-system-arm` installs it"
         self._text = b""
         self._lock = threading.Lock()
         log = socket.create_server(("127.0.0.1", 0))
@@ -33,7 +31,7 @@ class LinkMachine:
         self._monitor = socket.create_connection(monitor.getsockname())
         way = "pty,id=u0" if pty else f"socket,id=u0,fd={link.fileno()},server=on,wait=off,nodelay=on"
         # Time is what instructions take, 8 ns each.
-        command = [tool, "-M", machine, "-icount", "shift=3", "-nodefaults", "-display", "none"]
+        command = [tool("qemu-system-arm"), "-M", machine, "-icount", "shift=3", "-nodefaults", "-display", "none"]
         command += ["-chardev", way, "-serial", "chardev:u0"]
         command += ["-chardev", f"socket,id=m0,fd={monitor.fileno()},server=on,wait=on", "-mon", "chardev=m0"]
         command += ["-chardev", f"socket,id=u1,fd={log.fileno()},server=on,wait=on,nodelay=on", "-serial", "chardev:u1"]

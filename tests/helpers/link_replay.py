@@ -1,12 +1,11 @@
 """The same device on other processors and by other compilers: what was written down of one is done with another."""
 
-import shutil
 import subprocess
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from building import run_clean
+from building import run_clean, tool
 from limits import ENDED, within
 from link_device import HERE, LINES, HostDevice
 from link_random import KEY, Dialogue
@@ -67,9 +66,7 @@ def replay(program: Path, what: Replay, emulator: str | None = None) -> subproce
     """Do again what was done; status ``ENDED`` where it hangs."""
     command = [str(program)]
     if emulator is not None:
-        tool = shutil.which(emulator)
-        assert tool is not None, f"{emulator} is not installed"
-        command = [tool, *command]
+        command = [tool(emulator), *command]
     command = within(_REPLAY_S, command)
     return subprocess.run(command, input=what.notes, capture_output=True, text=True, check=False)
 

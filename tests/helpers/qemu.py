@@ -1,13 +1,13 @@
 """Firmware in QEMU, its two serial lines as sockets."""
 
 import select
-import shutil
 import socket
 import subprocess
 import time
 from pathlib import Path
 from types import TracebackType
 
+from building import tool
 from limits import PATIENCE_S
 
 
@@ -15,14 +15,23 @@ class Machine:
     """A board that runs an executable: lines to and from its console, and the lines of its log."""
 
     def __init__(self, machine: str, executable: Path) -> None:
-        tool = shutil.which("qemu-system-arm")
-        assert tool is not None, "qemu-system-arm is not installed; `.ci/system-packages qemu-system-arm` installs it"
         # The sockets listen, and are connected to, before QEMU starts, which waits for both: nothing is lost.
         listening = [socket.create_server(("127.0.0.1", 0)) for _ in range(2)]
         self._sockets = [socket.create_connection(one.getsockname()) for one in listening]
         self._received = [b"", b""]
         # Time is what instructions take, 8 ns each, so that a busy machine of ours makes no underrun.
-        command = [tool, "-M", machine, "-icount", "shift=3", "-nodefaults", "-display", "none", "-monitor", "none"]
+        command = [
+            tool("qemu-system-arm"),
+            "-M",
+            machine,
+            "-icount",
+            "shift=3",
+            "-nodefaults",
+            "-display",
+            "none",
+            "-monitor",
+            "none",
+        ]
         for number, one in enumerate(listening):
             options = f"socket,id=u{number},fd={one.fileno()},server=on,wait=on,nodelay=on"
             command += ["-chardev", options, "-serial", f"chardev:u{number}"]

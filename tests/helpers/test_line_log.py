@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from line_log import LineCheck, PlayedLine, WrongLine
 from link_programs import make_scan
 
-from tablegen.device.sequencer import DualProgram, Tick
+from tablegen.device.dual_program import DualProgram
+from tablegen.device.sequencer import Tick
 from tablegen.link.messages import DeviceState
 from tablegen.link.players import LinePlayer, SequencerPlayer
 from tablegen.verification.stream import FLAGS

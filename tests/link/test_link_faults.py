@@ -23,6 +23,8 @@ from tablegen.link.model import ModelDevice
 from tablegen.link.players import LinePlayer
 from tablegen.resources import c_link, c_runtime
 
+pytestmark = pytest.mark.common
+
 UPLOADS = 4  # of a trial
 _KEY = bytes(range(20))
 _FLIPS = Chances(flip=0.003)
@@ -54,7 +56,7 @@ def test_mixed_faults(part: int) -> None:
     assert len(faults) >= 9
 
 
-@pytest.mark.slow
+@pytest.mark.rest
 @pytest.mark.parametrize("part", range(10))
 def test_a_thousand_uploads(part: int) -> None:
     outcomes, faults = _try(range(100 + 25 * part, 125 + 25 * part), MIXED)

@@ -17,6 +17,8 @@ from tablegen.link.errors import LinkError, NotPlaying, Refused
 from tablegen.link.messages import DeviceState, Reason
 from tablegen.link.upload import Uploader
 
+pytestmark = pytest.mark.common
+
 Result = TypeVar("Result")
 SCANS = [make_scan(seed, ticks=300, lines=20, index_bits=(8, 7)) for seed in range(2, 6)]
 TABLES = {scan.digest: scan.image(False).data for scan in SCANS}

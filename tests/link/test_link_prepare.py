@@ -98,6 +98,7 @@ def test_a_direct_table_has_no_fourier_words(tmp_path: Path) -> None:
 # What would be refused
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("variant", sorted(VARIANTS))
 def test_every_variant_fits_the_device_that_is_built_for_it(tmp_path: Path, variant: str) -> None:
     scan = PreparedScan.of_build(build(tmp_path, VARIANTS[variant]).folder)

@@ -17,7 +17,9 @@ import mpmath
 import numpy as np
 import numpy.typing as npt
 import pytest
-from building import EXAMPLE, VARIANTS, Build, Variant, build, changed, to_toml
+from building import EXAMPLE, FEW, VARIANTS, Build, Variant, build, changed, to_toml
+from manifest_integers import floor_shift, played_codes
+from sets import quick
 
 from tablegen.config.load import load
 from tablegen.emit.formats import chosen
@@ -77,7 +79,10 @@ REQUIRED: Json = {
 }
 
 
-@pytest.fixture(scope="module", params=VARIANTS)
+@pytest.fixture(
+    scope="module",
+    params=quick(FEW, VARIANTS),
+)
 def built(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Build:
     return build(tmp_path_factory.mktemp("variant"), VARIANTS[request.param])
 
@@ -121,32 +126,6 @@ def strict_json(content: bytes) -> Json:
 
     found: Json = json.loads(content, parse_constant=refuse, object_pairs_hook=unique)
     return found
-
-
-def floor_shift(value: int, bits: int) -> int:
-    """round(value / 2^bits), ties up, by division instead of a shift."""
-    doubled: int = 2 * value + 2**bits
-    return doubled // (1 << (bits + 1))
-
-
-def played_codes(axis: Json) -> list[int]:
-    """Every code of a period, in plain Python integers, from the manifest alone."""
-    table, output, line = axis["table"], axis["output"], axis["line"]
-    words, guard = table["words"], table["guard_bits"]
-    period = line["ticks"] // line["hold_ticks"]
-    assert period * line["hold_ticks"] == line["ticks"]
-    codes = []
-    for k in range(period):
-        if table["mode"] == "direct":
-            sample = words[k] * 2**guard
-        else:
-            # floor(k 2^32 / period) in words of the table, with 15 bits of fraction.
-            place = k * 2**32 // period * len(words) // 2**17
-            here, there = words[place // 2**15], words[(place // 2**15 + 1) % len(words)]
-            sample = here * 2**guard + floor_shift((there - here) * (place % 2**15), 15 - guard)
-        code = floor_shift(output["gain_word"] * sample + output["offset_word"], output["gain_q"])
-        codes.append(min(max(code, output["code_min"]), output["code_max"]))
-    return [code for code in codes for _ in range(line["hold_ticks"])]
 
 
 def asked_codes(axis: Json, scan: Mapping[str, Any]) -> npt.NDArray[np.float64]:

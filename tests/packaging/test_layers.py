@@ -13,7 +13,7 @@ import tablegen
 PACKAGE = Path(tablegen.__file__).parent
 # From the lowest to the highest; a module imports from its own layer and from those before it.
 LAYERS = (
-    "problems interruption resources installation",
+    "version problems interruption resources installation",
     "numerics",
     "config",
     "compensation",
@@ -148,9 +148,20 @@ def test_the_independent_side_loads_no_calculation(module: str) -> None:
 
 def test_the_calculation_would_be_seen() -> None:
     assert loaded_by("import tablegen.planning.line_plan") >= CALCULATION - {"jinja2"}
-    assert "jinja2" in loaded_by("import tablegen.emit.render")
+    assert "jinja2" in loaded_by("from tablegen.emit.templates import template_text\ntemplate_text('', {}, str)")
 
 
 @pytest.mark.parametrize("module", ["tablegen", "tablegen.cli", "tablegen.cli.device_status", "tablegen.link.device"])
 def test_what_answers_at_once_loads_no_numpy(module: str) -> None:
     assert "numpy" not in loaded_by(f"import {module}")
+
+
+def test_a_class_name_stands_for_one_thing() -> None:
+    """In the package, and the more so beside each other in one file's imports."""
+    homes: dict[str, list[str]] = {}
+    for name, path in modules().items():
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.ClassDef):
+                homes.setdefault(node.name, []).append(name)
+    assert {name: where for name, where in homes.items() if len(where) > 1} == {}
+    assert len(homes) > 100

@@ -66,6 +66,7 @@ def test_the_help_teaches_each_option_with_two_lines() -> None:
     assert len(examples) == 2 * len(OPTIONS)
 
 
+@pytest.mark.common
 def test_a_wheel_names_its_own_files(installed: Path, tmp_path: Path) -> None:
     found = paths(python(tmp_path, "-m", "tablegen", "paths", path=installed))
     hold(found)
@@ -77,6 +78,7 @@ def test_an_editable_installation_names_the_tree(tmp_path: Path) -> None:
     assert paths(python(tmp_path, "-m", "tablegen", "paths")) == paths(run("paths").out)
 
 
+@pytest.mark.common
 def test_a_path_comes_out_as_it_is(installed: Path, tmp_path: Path) -> None:
     """Whatever the terminal could show: other programs read it."""
     link = tmp_path / "m\u00fcller's packages"

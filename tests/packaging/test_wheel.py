@@ -8,6 +8,8 @@ import pytest
 from building import EXAMPLE, REPOSITORY
 from installing import python
 
+pytestmark = pytest.mark.common
+
 
 def shipped_files() -> set[str]:
     """What the tree says should be inside: all modules, and what lies beside them and is no module."""

@@ -165,6 +165,7 @@ def test_what_is_printed_and_recorded(tmp_path: Path, plain: Plan, refined: Plan
     assert np.max(np.abs(stored.manifest.axes.x.asked(k) - refined.x.codes(0, 1250))) < 1.0
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("target", ["verilog", "c"])
 def test_such_a_build_verifies(target: str, tmp_path: Path) -> None:
     path = write_pair(tmp_path, edited(SCAN, "timing.lines = 6", *at("x")))

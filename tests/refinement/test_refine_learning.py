@@ -78,6 +78,7 @@ def history(line: LinePlan, ratio: np.ndarray, disturbance: FourierSeries, round
     return found
 
 
+@pytest.mark.common
 @given(st.floats(0.3, 2.7), st.floats(-0.2, 0.2), st.integers(0, 99))
 @settings(max_examples=8, deadline=None)
 def test_inside_the_bound_it_converges(line: LinePlan, gain: float, phase: float, seed: int) -> None:
@@ -93,6 +94,7 @@ def test_inside_the_bound_it_converges(line: LinePlan, gain: float, phase: float
     assert found[-1] < found[0] * max(left**8, 0.02)
 
 
+@pytest.mark.common
 @given(st.booleans(), st.floats(1.35, 1.8), st.integers(0, 99))
 @settings(max_examples=8, deadline=None)
 def test_outside_the_bound_it_does_not(line: LinePlan, by_gain: bool, left: float, seed: int) -> None:
@@ -114,6 +116,7 @@ def test_the_error_that_a_round_leaves_is_the_bounds(line: LinePlan) -> None:
         assert found[1] / found[0] == pytest.approx(abs(1.0 - GAIN * gain), abs=0.02)
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("turn", [0.5, 0.7, 0.95])
 @pytest.mark.parametrize("both", [True, False])
 def test_the_coupled_loop_is_no_worse_than_its_harmonics(tmp_path: Path, turn: float, both: bool) -> None:

@@ -15,6 +15,8 @@ from c_scripts import IN_C, LONG, LONG_PERIODS, everything, long_periods, long_p
 from tablegen.resources import c_runtime
 from tablegen.verification.bench import SequencerShape
 
+pytestmark = pytest.mark.common
+
 AXIS = next(path for path in c_runtime() if path.name == "dac_axis.c")
 SEQUENCER = next(path for path in c_runtime() if path.name == "dac_sequencer.c")
 RUN = 16  # ticks with one check

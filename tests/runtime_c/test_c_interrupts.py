@@ -10,12 +10,15 @@ from c_mutants import Mutant, runtime_with
 from following import Differs, Follower
 from programs import random_dual
 
-from tablegen.device.sequencer import DualProgram, Sequencer
+from tablegen.device.dual_program import DualProgram
+from tablegen.device.sequencer import Sequencer
 from tablegen.fixedpoint.program import Program
 from tablegen.resources import c_runtime
 from tablegen.verification.bench import SequencerShape
 from tablegen.verification.emulate import TRAP, Processor, compile_bare
 from tablegen.verification.stream import pack
+
+pytestmark = pytest.mark.rest
 
 SHAPE = SequencerShape(16, 1, 5, 16, 1, 4, 16)
 PRODUCER = ("dac_sequencer_load", "dac_sequencer_commit", "dac_sequencer_withdraw", "dac_sequencer_trigger")

@@ -13,13 +13,15 @@ from link_images import damaged, random_image, random_limits
 from link_programs import make_scan
 from link_talk import Talk, is_answer
 
-from tablegen.device.sequencer import DualProgram
+from tablegen.device.dual_program import DualProgram
 from tablegen.link.acceptance import Playing, first_objection
 from tablegen.link.frames import Frame
 from tablegen.link.image import ProgramImage, make_image, take_apart
 from tablegen.link.messages import REFUSAL, AxisLimits, Reason, Refusal, Request
 from tablegen.numerics.arrays import Ints
 from tablegen.verification.bench import SequencerShape
+
+pytestmark = pytest.mark.common
 
 SHAPES = {
     "16 bits": SequencerShape(16, 1, 5, 16, 1, 4, 16),

@@ -4,22 +4,25 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import test_c_link
 import test_c_link_acceptance
 import test_c_link_parts as parts
 from c_coverage import COVERAGE, coverage
 from dialogues import dialogues
 from link_device import HostDevice
 from link_replay import compile_replay, random_replay, replay, replay_of
-from test_c_link import SHAPES, test_golden_dialogues
 
 from tablegen.resources import c_link
+
+pytestmark = pytest.mark.common
 
 # A program that passes every check and is not loaded all the same; a source of random numbers, which no notes have.
 UNREACHABLE = ("DAC_LINK_REFUSED, (uint32_t)loaded", "l->config->random(l->nonce)")
 
 
 def test_every_line_was_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    replays = [random_replay(SHAPES["16 bits"], 1, keyed=True), random_replay(SHAPES["direct"], 2)]
+    shapes = test_c_link.SHAPES
+    replays = [random_replay(shapes["16 bits"], 1, keyed=True), random_replay(shapes["direct"], 2)]
     devices: list[HostDevice] = []
     made = HostDevice.__init__
 
@@ -30,7 +33,7 @@ def test_every_line_was_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 
     monkeypatch.setattr(HostDevice, "__init__", noted)
     for dialogue in dialogues():
-        test_golden_dialogues(dialogue)
+        test_c_link.test_golden_dialogues(dialogue)
     for check in (
         parts.test_what_the_ring_has_no_room_for_is_counted_and_recovered_from,
         parts.test_an_abort_withdraws_a_program_that_is_checked,
@@ -41,7 +44,7 @@ def test_every_line_was_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     ):
         check()
     for state in test_c_link_acceptance.STATES:
-        test_c_link_acceptance.compare(SHAPES["16 bits"], state, 100, 77)
+        test_c_link_acceptance.compare(shapes["16 bits"], state, 100, 77)
     replays += [replay_of(device, b"") for device in devices]
     for number, slices in enumerate((64, 5)):
         program = compile_replay(tmp_path / f"replay_{number}", 16, options=(*COVERAGE, f"-DDAC_LINK_SLICE={slices}"))

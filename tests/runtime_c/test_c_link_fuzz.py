@@ -11,6 +11,8 @@ from link_mutants import MUTANTS, Mutant
 
 from tablegen.resources import c_link, c_runtime
 
+pytestmark = pytest.mark.rest
+
 FUZZ = Path(__file__).parent / "fuzz"
 CORPUS = FUZZ / "corpus"
 CORPUS_S = 300  # of CPU time; it takes ten
@@ -52,13 +54,8 @@ def test_the_corpus_finds_nothing(tmp_path: Path) -> None:
     assert "DONE" in done.stderr
 
 
-@pytest.mark.slow
+@pytest.mark.rest
 @pytest.mark.parametrize("name", sorted(FOUND))
 def test_the_corpus_finds_what_is_broken(name: str, tmp_path: Path) -> None:
     (mutant,) = (each for each in MUTANTS if each.breaks == name)
-    assert replay(tmp_path, mutant).returncode != 0
-
-
-def test_the_corpus_finds_an_upload_into_tables_that_play(tmp_path: Path) -> None:
-    (mutant,) = (each for each in MUTANTS if each.breaks == "every upload goes into the same tables")
     assert replay(tmp_path, mutant).returncode != 0

@@ -18,6 +18,8 @@ from tablegen.resources import c_link, c_runtime
 from tablegen.verification.bench import SequencerShape
 from tablegen.verification.emulate import TRAP, Processor, compile_bare
 
+pytestmark = pytest.mark.rest
+
 SHAPE = SequencerShape(16, 1, 5, 16, 1, 4, 16)
 RING = 512
 MEMORY = REPOSITORY / "examples" / "firmware" / "memory.c"
@@ -134,6 +136,6 @@ def test_an_answer_that_leaves_before_it_is_sealed_is_found(tmp_path: Path) -> N
     """A negative control."""
     old = "    l->out[1] = a->type;\n"
     new = "    l->out_length = (uint16_t)(a->length + 12);\n    l->out_at = 0;\n    l->sending = 1;\n" + old
-    landings = Landings(tmp_path, *conversation(images()), {"dac_link.c": (old, new)})
+    landings = Landings(tmp_path, *conversation(images()), {"dac_link_answer.c": (old, new)})
     with pytest.raises(AssertionError):
         hold(landings.play(0, 0.01))

@@ -7,6 +7,8 @@ from link_replay import Replay, compile_replay, differs, random_replay
 
 from tablegen.verification.bench import SequencerShape
 
+pytestmark = pytest.mark.rest
+
 SANITIZED = ("-std=c99", "-O1", "-g", "-fsanitize=undefined,address", "-fno-sanitize-recover=all")
 WAYS = {
     "gcc": (("gcc",), SANITIZED),

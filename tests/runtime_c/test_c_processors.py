@@ -22,6 +22,8 @@ from tablegen.verification.emulate import CortexMBench, Processor, compile_bare
 from tablegen.verification.simulate import SimulationFailed
 from tablegen.verification.stream import Script, compare
 
+pytestmark = pytest.mark.rest
+
 CORTEX_M = ("cortex-m0plus", "cortex-m3", "cortex-m4", "cortex-m7")
 SHAPE = SequencerShape(16, 1, 5, 16, 1, 4, 16)
 SHAPES = (SHAPE, SequencerShape(24, 1, 3, 8, 0, 4, 24))  # so many bits that tables and words are kept in 16, and in 32

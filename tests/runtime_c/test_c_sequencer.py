@@ -31,7 +31,8 @@ from c_scripts import (
     long_play,
     renderings,
 )
-from stream_configurations import SWAPS, SWAPS_SLOW, random_swaps
+from sets import LONG_TEST, common
+from stream_configurations import FEW, SWAPS, SWAPS_SLOW, random_swaps
 from stream_laws import follow_their_programs
 from stream_scripts import FAULTS, flag, in_any_order, occurrences
 
@@ -57,7 +58,8 @@ def everywhere(benches: Benches, script: Script, shape: SequencerShape, fourier:
 # Random programs back to back.
 
 
-@pytest.mark.parametrize("name", IN_C)
+@pytest.mark.common
+@pytest.mark.parametrize("name", common(FEW, IN_C))
 def test_random_programs(name: str, benches: Benches) -> None:
     configuration = IN_C[name]
     capture = everywhere(benches, configuration.script(name), configuration.shape)
@@ -67,6 +69,7 @@ def test_random_programs(name: str, benches: Benches) -> None:
         assert all(seen[name] for name in (*FLAGS, *FAULTS[:2])), seen
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("name", LONG)
 def test_long_lines(name: str, benches: Benches) -> None:
     script = long_play(name, 60_000)
@@ -75,6 +78,7 @@ def test_long_lines(name: str, benches: Benches) -> None:
     assert script.swaps > 8
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(
     "shape",
     [
@@ -87,6 +91,7 @@ def test_everything_that_a_host_may_ask(shape: SequencerShape, benches: Benches)
     everywhere(benches, everything(shape, 1), shape)
 
 
+@pytest.mark.common
 def test_lines_are_stopped_and_started_anywhere(benches: Benches) -> None:
     shape, script = LONG["bits_16"][0], Script()
     script.tick_every(1)
@@ -95,12 +100,14 @@ def test_lines_are_stopped_and_started_anywhere(benches: Benches) -> None:
     everywhere(benches, script, shape)
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("lines", [3640, 3641])
 def test_the_longest_periods(lines: int, benches: Benches) -> None:
     """Around 2^32 / 18 ticks, where the fast path ends."""
     everywhere(benches, long_periods(1 << 16, lines), LONG_PERIODS)
 
 
+@pytest.mark.common
 def test_words_can_be_written_in_any_order(benches: Benches) -> None:
     shape, rng, script = SequencerShape(16, 1, 3, 16, 0, 3, 16), np.random.default_rng(3), Script()
     script.tick_every(1)
@@ -117,6 +124,7 @@ def test_words_can_be_written_in_any_order(benches: Benches) -> None:
 # Swaps.
 
 
+@pytest.mark.common
 def test_a_swap_is_requested_at_every_tick(benches: Benches) -> None:
     shape = LONG["bits_16"][0]
     script = every_tick(shape)
@@ -126,7 +134,8 @@ def test_a_swap_is_requested_at_every_tick(benches: Benches) -> None:
     assert np.all(flag(capture, "line")[swapped])
 
 
-@pytest.mark.parametrize("swaps", [SWAPS, pytest.param(SWAPS_SLOW, marks=pytest.mark.slow)])
+@pytest.mark.rest
+@pytest.mark.parametrize("swaps", [SWAPS, pytest.param(SWAPS_SLOW, marks=LONG_TEST)])
 def test_no_line_mixes_programs(swaps: int, benches: Benches) -> None:
     rng = np.random.default_rng(swaps)
     for _ in range(0, swaps, SWAPS):
@@ -136,6 +145,7 @@ def test_no_line_mixes_programs(swaps: int, benches: Benches) -> None:
         follow_their_programs(capture, programs)
 
 
+@pytest.mark.common
 def test_tables_are_rendered_while_a_program_plays(benches: Benches) -> None:
     shape = SequencerShape(16, 1, 4, 16, 1, 3, 14)
     script = renderings(shape, 40, HARMONICS)
@@ -156,6 +166,7 @@ def test_functions(check: Check, libraries: Libraries) -> None:
     check(libraries)
 
 
+@pytest.mark.rest
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
 def test_functions_with_sanitizers(compiler: str, tmp_path: Path) -> None:
     """Tables are allocated with just the words that they need, so that a word too many is found."""
@@ -176,7 +187,7 @@ def test_functions_with_sanitizers(compiler: str, tmp_path: Path) -> None:
 # What a build emits.
 
 
-@pytest.mark.parametrize("name", VARIANTS)
+@pytest.mark.parametrize("name", common(("short_frame", "direct_steps"), VARIANTS))
 def test_a_build_s_header_plays_a_frame_a_swap_and_parks(name: str, tmp_path: Path) -> None:
     """The words that the converter gets, by ``DAC_PROGRAM`` and ``DAC_CONVERTER`` of the emitted header."""
     built = build(tmp_path, VARIANTS[name])

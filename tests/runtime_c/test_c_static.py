@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from building import run, run_clean
+from sets import by_tool, quick
 
 from tablegen.resources import c_link, c_runtime
 
@@ -49,12 +50,13 @@ ANALYSERS = {
 }
 
 
-@pytest.mark.parametrize("choice", CHOICES)
-@pytest.mark.parametrize("compiler", COMPILERS)
+@pytest.mark.parametrize("choice", quick(QUICK, CHOICES))
+@pytest.mark.parametrize("compiler", by_tool(COMPILERS))
 def test_no_warnings(compiler: str, choice: str, tmp_path: Path) -> None:
     run_clean([*COMPILERS[compiler], "-O2", *WARNINGS, *CHOICES[choice], "-c", *SOURCES], tmp_path)
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("compiler", ["g++", "clang++"])
 def test_the_header_is_cplusplus(compiler: str, tmp_path: Path) -> None:
     """Included from C++17 it has C linkage, and its program is an initialiser."""
@@ -72,6 +74,7 @@ def test_the_header_is_cplusplus(compiler: str, tmp_path: Path) -> None:
 
 
 # clang's takes its time.
+@pytest.mark.rest
 @pytest.mark.parametrize(
     ("analyser", "choice"), [each for each in product(ANALYSERS, CHOICES) if each[0] != "clang" or each[1] in QUICK]
 )
@@ -81,6 +84,7 @@ def test_analysers_find_nothing(analyser: str, choice: str) -> None:
         run_clean([*ANALYSERS[analyser], *definitions, source])
 
 
+@pytest.mark.rest
 @pytest.mark.parametrize("analyser", ANALYSERS)
 def test_analysers_find_a_fault(analyser: str, tmp_path: Path) -> None:
     source = tmp_path / "faulty.c"
@@ -96,7 +100,7 @@ def declared(*headers: str) -> set[str]:
 
 
 @pytest.mark.parametrize("options", [["-O0"], ["-O2"], ["-Os"], ["-O2", *CHOICES["wide"]]], ids=" ".join)
-@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+@pytest.mark.parametrize("compiler", by_tool(["gcc", "clang"]))
 def test_symbols(compiler: str, options: list[str], tmp_path: Path) -> None:
     """Exported is what headers declare, asked for are their own functions, memcpy and memset; no variables."""
     run_clean([compiler, "-std=c99", "-ffreestanding", "-fno-pic", *options, "-c", *SOURCES], tmp_path)
@@ -121,6 +125,7 @@ def test_public_names_have_the_prefix_of_the_sequencer() -> None:
     assert all(name.startswith("dac_link_") for name in declared(*link))
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("header", ["dac_link.h", "dac_link_parts.h"])
 def test_headers_of_the_link_stand_alone(header: str, tmp_path: Path) -> None:
     """As C, and what an application includes as C++."""

@@ -9,6 +9,7 @@ import pytest
 from c_library import Library, compile_library
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from sets import by_tool
 
 from tablegen.fixedpoint.synthesis import FourierWords, sine_periods, synthesize
 from tablegen.numerics.arrays import Ints
@@ -56,7 +57,7 @@ class Renderer:
         return np.frombuffer(raw[size:-size], self.library.word).astype(np.int64) if done else None
 
 
-@pytest.fixture(scope="module", params=BUILDS)
+@pytest.fixture(scope="module", params=by_tool(BUILDS))
 def renderers(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> dict[int, Renderer]:
     """By the bits of a word in memory."""
     compiler, more = BUILDS[request.param]

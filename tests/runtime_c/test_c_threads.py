@@ -4,14 +4,15 @@ from pathlib import Path
 
 import pytest
 from c_threads import compile_threads, play
+from sets import by_tool
 
 from tablegen.resources import c_runtime
 
 PROGRAMS = 8_000
 
 
-@pytest.mark.parametrize("sanitized", [False, True], ids=["plain", "tsan"])
-@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+@pytest.mark.parametrize("sanitized", [False, pytest.param(True, marks=pytest.mark.rest)], ids=["plain", "tsan"])
+@pytest.mark.parametrize("compiler", by_tool(["gcc", "clang"]))
 def test_every_line_is_of_one_program(compiler: str, sanitized: bool, tmp_path: Path) -> None:
     program = compile_threads(tmp_path, compiler, sanitized, options=() if sanitized else ("-O2",))
     done = play(program, PROGRAMS, 1)
@@ -21,6 +22,7 @@ def test_every_line_is_of_one_program(compiler: str, sanitized: bool, tmp_path: 
     assert lines > 0
 
 
+@pytest.mark.rest
 @pytest.mark.parametrize(
     ("old", "new"),
     [

@@ -21,6 +21,8 @@ from tablegen.config.load import load
 from tablegen.planning.line_plan import Plan, make_plan
 from tablegen.verification.stream import FLAGS
 
+pytestmark = pytest.mark.rest
+
 FIRMWARE = REPOSITORY / "examples" / "firmware"
 SHORT = {**VARIANTS["short_frame"].scan, "limits": REMOVED}  # which coarse converters break
 PLAYED: dict[str, Variant] = {

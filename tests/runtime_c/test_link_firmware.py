@@ -28,6 +28,8 @@ from tablegen.link.errors import LinkError, NotPlaying, Refused
 from tablegen.link.prepare import PreparedScan
 from tablegen.planning.line_plan import make_plan
 
+pytestmark = pytest.mark.rest
+
 SCAN = {
     **VARIANTS["short_frame"].scan,
     "limits": REMOVED,
@@ -113,8 +115,8 @@ def _play(machine: LinkMachine, check: LineCheck, digest: str) -> None:
     [
         (Pl011Board, False),
         (CmsdkBoard, True),
-        pytest.param(Pl011Board, True, marks=pytest.mark.slow),
-        pytest.param(CmsdkBoard, False, marks=pytest.mark.slow),
+        pytest.param(Pl011Board, True, marks=pytest.mark.rest),
+        pytest.param(CmsdkBoard, False, marks=pytest.mark.rest),
     ],
 )
 def test_the_command_line_and_firmware_in_qemu(build_for: Callable[[Board], Built], board: Board, pty: bool) -> None:
@@ -133,7 +135,7 @@ def test_the_command_line_and_firmware_in_qemu(build_for: Callable[[Board], Buil
     assert sorted(check.taken.values()) == sorted([LineCheck.BOOT, *(scan.digest for scan in built.scans)])
 
 
-@pytest.mark.parametrize("board", [Pl011Board, pytest.param(CmsdkBoard, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("board", [Pl011Board, pytest.param(CmsdkBoard, marks=pytest.mark.rest)])
 def test_the_command_line_and_qemu_with_faults_in_between(build_for: Callable[[Board], Built], board: Board) -> None:
     """Each command ends well, or says why not; what plays is always a whole scan."""
     built = build_for(board)
@@ -245,8 +247,8 @@ _SPOILT = replace(MIXED, reset=0.0)
     [
         (CmsdkBoard, Chances()),
         (Pl011Board, _SPOILT),
-        pytest.param(Pl011Board, Chances(), marks=pytest.mark.slow),
-        pytest.param(CmsdkBoard, _SPOILT, marks=pytest.mark.slow),
+        pytest.param(Pl011Board, Chances(), marks=pytest.mark.rest),
+        pytest.param(CmsdkBoard, _SPOILT, marks=pytest.mark.rest),
     ],
     ids=["clean", "faults", "clean", "faults"],
 )

@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 from building import NAME, VARIANTS, Build, Variant, build
 from editing import Outcome, run
+from sets import quick
 from verifying import (
     check_first_difference,
     check_interruption,
@@ -82,7 +83,7 @@ def flip(path: Path, line: int, bit: int) -> None:
 # What is right
 
 
-@pytest.mark.parametrize("name", MODES)
+@pytest.mark.parametrize("name", quick(["example"], MODES))
 def test_a_build_verifies(name: str, tmp_path: Path) -> None:
     """Both modes of tables, steps, all widths of words and codes, turns."""
     built = build(tmp_path, VARIANTS[name])
@@ -94,6 +95,7 @@ def test_a_build_verifies(name: str, tmp_path: Path) -> None:
     assert not list(built.folder.glob("*.vvp")), "nothing is written into the build"
 
 
+@pytest.mark.common
 def test_a_whole_frame_verifies(short: Build) -> None:
     """Codes of all of a line and of a frame, frames that follow, a swap in mid-frame; by any seed."""
     for seed in (1, 2):
@@ -112,6 +114,7 @@ def test_a_whole_frame_verifies(short: Build) -> None:
             assert float(found[2]) == pytest.approx(promised, abs=0.001)
 
 
+@pytest.mark.common
 def test_verilator_finds_the_same(folder: Path) -> None:
     """A wrong rounding, at the same first tick, and nothing else."""
     edit(folder / "dac_interpolator.v", "1'b1} + step", "1'b0} + step")
@@ -122,6 +125,7 @@ def test_verilator_finds_the_same(folder: Path) -> None:
     assert verdicts(outcome) == verdicts(on_icarus)
 
 
+@pytest.mark.common
 def test_what_was_not_played_is_said(short: Build) -> None:
     outcome = verify(short.folder)
     assert outcome.status == 0
@@ -136,6 +140,7 @@ def test_what_was_not_played_is_said(short: Build) -> None:
 # What is wrong in the directory
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(("axis", "at", "bit"), [("x", 70, 6), ("x", 250, 15), ("y", 100, 8)])
 def test_a_flipped_bit_of_a_table_is_found_at_its_first_tick(folder: Path, axis: str, at: int, bit: int) -> None:
     """A bit of the word of that tick."""
@@ -154,6 +159,7 @@ def test_a_flipped_bit_of_a_table_is_found_at_its_first_tick(folder: Path, axis:
     assert f"expected {heard.wanted}, got {heard.got}" in outcome.err
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(
     ("register", "bit", "fails"),
     [
@@ -171,6 +177,7 @@ def test_a_flipped_bit_of_the_program_is_found(folder: Path, register: int, bit:
     assert "first difference: tick " in outcome.err
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("suffix", ["sine.mem", "x_fourier.mem", "y_fourier.mem"])
 def test_a_flipped_bit_of_what_is_not_played_is_found_by_its_hash(folder: Path, suffix: str) -> None:
     flip(folder / f"{NAME}_{suffix}", 3, 0)
@@ -183,6 +190,7 @@ def test_a_flipped_bit_of_what_is_not_played_is_found_by_its_hash(folder: Path, 
     assert "first difference" not in outcome.err
 
 
+@pytest.mark.common
 def test_an_edited_constant_is_found(folder: Path) -> None:
     edit(folder / f"{NAME}.vh", f"{NAME.upper()}_PIXELS = 32'sd50;", f"{NAME.upper()}_PIXELS = 32'sd51;")
     edit(folder / f"{NAME}.vh", f'{NAME.upper()}_X_TABLE_FILE = "{NAME}_x.mem";', f'{NAME.upper()}_X_TABLE_FILE = "";')
@@ -193,6 +201,7 @@ def test_an_edited_constant_is_found(folder: Path) -> None:
     assert f"{NAME}.vh: {NAME.upper()}_X_TABLE_FILE is '', it is '{NAME}_x.mem' in the manifest" in outcome.err
 
 
+@pytest.mark.common
 def test_a_constant_that_is_missing_or_new_is_found(folder: Path) -> None:
     edit(folder / f"{NAME}.vh", f"localparam signed [31:0] {NAME.upper()}_SETTLE_LINES", "localparam OTHER")
     outcome = verify(folder)
@@ -200,16 +209,18 @@ def test_a_constant_that_is_missing_or_new_is_found(folder: Path) -> None:
     assert f"{NAME}.vh: OTHER is not in the manifest" in outcome.err
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("variant", ["direct", "direct_steps", "bits_24", "left_aligned", "inverting"])
 def test_the_header_of_other_builds_is_read_right(variant: str, tmp_path: Path) -> None:
     """Also where no table is interpolated, and where numbers are negative or have 64 bits; nothing is simulated."""
-    from tablegen.emit.content import stored_content
     from tablegen.emit.formats.verilog import wrong_constants
+    from tablegen.emit.stored import stored_content
 
     built = build(tmp_path, VARIANTS[variant])
     assert wrong_constants(built.folder, stored_content(read_build(built.folder)))[1] == []
 
 
+@pytest.mark.common
 def test_an_edited_runtime_is_played_and_found(folder: Path) -> None:
     """Rounding down in place of to the nearest: one code too low here and there, told with tick, expected and got."""
     edit(folder / "dac_interpolator.v", "1'b1} + step", "1'b0} + step")
@@ -222,6 +233,7 @@ def test_an_edited_runtime_is_played_and_found(folder: Path) -> None:
     assert 0 < max(abs(int(a) - int(b)) for a, b in zip(*codes, strict=True)) <= 1
 
 
+@pytest.mark.common
 def test_a_runtime_that_does_not_compile_is_told_by_its_log(folder: Path) -> None:
     edit(folder / "dac_slew.v", "endmodule", "endmodul")
     outcome = verify(folder)
@@ -231,6 +243,7 @@ def test_a_runtime_that_does_not_compile_is_told_by_its_log(folder: Path) -> Non
     assert "syntax error" in outcome.err
 
 
+@pytest.mark.common
 def test_samples_that_never_come_are_found(folder: Path) -> None:
     edit(folder / "dac_verdict.v", "strobe <= tick;", "strobe <= 1'b0;")
     outcome = verify(folder)
@@ -240,6 +253,7 @@ def test_samples_that_never_come_are_found(folder: Path) -> None:
     assert "ticks are lost or too many" in outcome.err
 
 
+@pytest.mark.common
 def test_unknown_codes_are_found(folder: Path) -> None:
     """A register without a power-up value, in a simulator that knows what that means."""
     text = (folder / "dac_interpolator.v").read_text("ascii")
@@ -249,6 +263,7 @@ def test_unknown_codes_are_found(folder: Path) -> None:
     assert "got       undefined" in outcome.err
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(
     ("name", "also"),
     [(f"{NAME}.h", None), ("dac_spi.v", "dac_spi.v is missing"), (f"{NAME}_x.mem", f"{NAME}_x.mem is missing")],
@@ -263,6 +278,7 @@ def test_a_missing_file_is_named(folder: Path, name: str, also: str | None) -> N
     assert also is None or f"simulation: {also}" in outcome.err
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(
     ("content", "why"),
     [
@@ -278,6 +294,7 @@ def test_a_memory_that_cannot_be_read_is_named(folder: Path, content: bytes, why
     assert f"simulation: {NAME}_y.mem {why}" in outcome.err
 
 
+@pytest.mark.common
 def test_all_that_is_wrong_is_told_at_once(folder: Path) -> None:
     (folder / f"{NAME}.h").unlink()
     edit(folder / f"{NAME}.vh", f"{NAME.upper()}_PIXELS = 32'sd50;", f"{NAME.upper()}_PIXELS = 32'sd51;")
@@ -291,6 +308,7 @@ def test_all_that_is_wrong_is_told_at_once(folder: Path) -> None:
 # What is wrong in the manifest
 
 
+@pytest.mark.common
 def test_codes_beyond_the_certificate_are_found(folder: Path) -> None:
     """Negative control of the float reference: a promise that is a little too good, and a waveform that is shifted."""
     promised = json.loads((folder / "manifest.json").read_bytes())["axes"]["x"]["certificate"]["max_error_lsb"]
@@ -302,6 +320,7 @@ def test_codes_beyond_the_certificate_are_found(folder: Path) -> None:
     )
 
 
+@pytest.mark.common
 def test_a_manifest_that_was_edited_is_found(folder: Path) -> None:
     axis = json.loads((folder / "manifest.json").read_bytes())["axes"]["y"]
     edit_manifest(folder, "axes", "y", "fourier", "a0", value=axis["fourier"]["a0"] + 1e-4)
@@ -336,6 +355,7 @@ def test_a_directory_without_a_manifest_is_wrong_input(folder: Path, content: by
     assert outcome.err.startswith(f"{folder}/manifest.json: {why}")
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(
     ("path", "value", "why"),
     [
@@ -362,6 +382,7 @@ def test_a_damaged_manifest_is_wrong_input(folder: Path, path: tuple[str | int, 
     assert why in outcome.err
 
 
+@pytest.mark.common
 def test_a_build_of_another_version_is_noted(folder: Path) -> None:
     edit_manifest(folder, "tablegen", value="0.0.7")
     outcome = verify(folder)
@@ -369,6 +390,7 @@ def test_a_build_of_another_version_is_noted(folder: Path) -> None:
     assert "note: built by tablegen 0.0.7, verified by " in outcome.out
 
 
+@pytest.mark.common
 def test_a_table_that_no_sequencer_can_address_is_wrong_input(tmp_path: Path) -> None:
     outcome = verify(with_a_long_table(tmp_path, 40))
     assert outcome.status == 2
@@ -378,6 +400,7 @@ def test_a_table_that_no_sequencer_can_address_is_wrong_input(tmp_path: Path) ->
 # Reports
 
 
+@pytest.mark.common
 def test_junit_has_a_case_a_check(short: Build, tmp_path: Path) -> None:
     report = tmp_path / "reports" / "verify.xml"
     outcome = verify(short.folder, "--junit", report)
@@ -388,6 +411,7 @@ def test_junit_has_a_case_a_check(short: Build, tmp_path: Path) -> None:
     assert told.failed == set()
 
 
+@pytest.mark.common
 def test_junit_tells_failures(folder: Path, tmp_path: Path) -> None:
     edit(folder / "dac_interpolator.v", "1'b1} + step", "1'b0} + step  /* <&]]> */")
     report = tmp_path / "verify.xml"
@@ -400,6 +424,7 @@ def test_junit_tells_failures(folder: Path, tmp_path: Path) -> None:
     assert re.search(r"the first at tick \d+ \(line \d+, tick \d+ of it\): expected \d+, got \d+$", str(model.text))
 
 
+@pytest.mark.common
 def test_junit_that_cannot_be_written_is_status_4(short: Build, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     outcome = verify(short.folder, "--junit", tmp_path / "file" / "x.xml")
@@ -408,11 +433,13 @@ def test_junit_that_cannot_be_written_is_status_4(short: Build, tmp_path: Path) 
     assert outcome.messages == [f"{tmp_path}/file/x.xml: File exists"]
 
 
+@pytest.mark.common
 def test_what_is_simulated_is_kept_on_request(short: Build, tmp_path: Path) -> None:
     assert verify(short.folder, "--keep", tmp_path / "kept").status == 0
     assert {"script.hex", "capture.hex", "rtl", "icarus"} <= {path.name for path in (tmp_path / "kept").iterdir()}
 
 
+@pytest.mark.common
 def test_memories_are_what_a_build_writes(short: Build) -> None:
     """The reader of memory files against their writer, signed words included."""
     from tablegen.verification.directory import memory_words
@@ -440,6 +467,7 @@ def test_missing_cocotb_is_status_6_with_its_remedy(short: Build) -> None:
     assert done.stderr == "cocotb is not installed: pip install 'piezo-tablegen[hdl]'\n"
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("begun", ["job.json", "capture.hex"])
 def test_an_interruption_leaves_nothing_behind(tmp_path: Path, number: signal.Signals, begun: str) -> None:
@@ -448,6 +476,7 @@ def test_an_interruption_leaves_nothing_behind(tmp_path: Path, number: signal.Si
     check_interruption(built.folder, tmp_path / "temporary", number, begun, "--ticks", "40000")
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interruption_waits_until_there_is_a_process_to_end(tmp_path: Path, number: signal.Signals) -> None:
     """One that comes while the worker is being started, and would have left it to play for nobody."""
@@ -455,6 +484,7 @@ def test_an_interruption_waits_until_there_is_a_process_to_end(tmp_path: Path, n
     check_interruption(built.folder, tmp_path / "temporary", number, "icarus", "--ticks", "40000", within_popen=True)
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(
     ("arguments", "late"),
     [
@@ -483,6 +513,7 @@ def test_every_way_of_placing_the_sequencer(tmp_path: Path, arguments: list[str]
     )
 
 
+@pytest.mark.common
 def test_direct_tables_are_not_rendered(tmp_path: Path) -> None:
     built = build(tmp_path / "out", VARIANTS["direct_steps"])
     outcome = verify(built.folder, "--fourier")

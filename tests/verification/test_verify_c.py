@@ -16,6 +16,7 @@ from building import NAME, VARIANTS, Build, Variant, build
 from editing import Outcome, run
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from sets import common
 from verifying import (
     check_first_difference,
     check_interruption,
@@ -31,8 +32,8 @@ from verifying import (
     with_a_long_table,
 )
 
-from tablegen.emit.content import stored_content
 from tablegen.emit.formats.c import arrays_file, wrong_arrays, wrong_constants
+from tablegen.emit.stored import stored_content
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.program import Program
 from tablegen.manifest.read import StoredBuild, read_build
@@ -107,7 +108,7 @@ def substitute(path: Path, pattern: str, new: str) -> None:
 # What is right
 
 
-@pytest.mark.parametrize("name", VARIANTS)
+@pytest.mark.parametrize("name", common(["short_frame"], VARIANTS))
 def test_a_whole_frame_of_every_build_verifies(name: str, tmp_path: Path) -> None:
     """Every mode, width, coding and alignment, header-only builds, with arrays of 16 and of 32 bits."""
     built = build(tmp_path, VARIANTS[name])
@@ -127,12 +128,14 @@ def test_a_whole_frame_of_every_build_verifies(name: str, tmp_path: Path) -> Non
     assert sorted(path.name for path in built.folder.iterdir()) == sorted(built.files), "nothing is written into it"
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("variant", [WIDE, TWOS], ids=["32-bit words", "24-bit words"])
 def test_words_that_are_wider_than_their_codes(variant: Variant, tmp_path: Path) -> None:
     outcome = verify(build(tmp_path, variant).folder)
     assert outcome.status == 0, outcome.err
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("seed", range(2, 6))
 def test_every_seed_verifies(short: Build, seed: int) -> None:
     outcome = verify(short.folder, "--seed", seed)
@@ -160,6 +163,7 @@ def benches(short: Build, tmp_path_factory: pytest.TempPathFactory) -> Benches:
     return Benches(stored, step, fill)
 
 
+@pytest.mark.common
 @settings(deadline=None, max_examples=40)
 @given(st.integers(0, 1 << 32), st.integers(1000, 6000))
 def test_sessions_of_any_seed_and_length_equal_the_model(benches: Benches, seed: int, ticks: int) -> None:
@@ -177,6 +181,7 @@ def test_sessions_of_any_seed_and_length_equal_the_model(benches: Benches, seed:
         assert played.counts == [*session.script.counts, 0, 0]
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("variant", ["short_frame", "bits_8", "bits_24", "longest_table", "mixed"])
 def test_tables_that_are_rendered_verify(variant: str, tmp_path: Path) -> None:
     """dac_synthesize makes the words that were emitted; a direct table is played as it is."""
@@ -185,6 +190,7 @@ def test_tables_that_are_rendered_verify(variant: str, tmp_path: Path) -> None:
     assert outcome.status == 0, outcome.err
 
 
+@pytest.mark.common
 def test_what_is_rendered_comes_from_the_fourier_words(folder: Path) -> None:
     """And what is not comes from the table: a damage of either plays with the one, and not with the other."""
     put_word(folder, "x_fourier", 1, lambda word: word ^ 1 << 27)
@@ -198,12 +204,14 @@ def differs(outcome: Outcome) -> set[str]:
     return {subject for subject, against in failed(outcome) if against == "integer model" and subject in "xy"}
 
 
+@pytest.mark.common
 def test_direct_tables_are_not_rendered(tmp_path: Path) -> None:
     outcome = verify(build(tmp_path / "out", VARIANTS["direct_steps"]).folder, "--fourier")
     assert outcome.status == 2
     assert "both tables are direct" in outcome.err
 
 
+@pytest.mark.common
 def test_what_was_not_played_is_said(short: Build) -> None:
     outcome = verify(short.folder, "--ticks", 2000)
     assert outcome.status == 0
@@ -243,6 +251,7 @@ def defined(folder: Path) -> list[str]:
     return re.findall(rf"^#define {CAPITAL}_(\w+) .", text, re.MULTILINE)
 
 
+@pytest.mark.common
 def test_every_constant_is_held_against_the_manifest(short: Build, tmp_path: Path) -> None:
     """One by one, with what it is and what it is in the manifest; nothing is compiled."""
     content = stored_content(read_build(short.folder))
@@ -257,6 +266,7 @@ def test_every_constant_is_held_against_the_manifest(short: Build, tmp_path: Pat
         ]
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("variant", ["direct_steps", "bits_24", "left_aligned", "inverting", "header_only", "example"])
 def test_headers_and_arrays_of_other_builds_are_read_right(variant: str, tmp_path: Path) -> None:
     """Also where no table is interpolated, where numbers have 64 bits, and where arrays stand in the header."""
@@ -289,6 +299,7 @@ PLAYED = [
 ]
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(("constant", "change", "fails"), PLAYED, ids=[row[0] for row in PLAYED])
 def test_a_damaged_constant_is_played_and_found(
     folder: Path, constant: str, change: Callable[[int], int], fails: tuple[str, str] | None
@@ -307,6 +318,7 @@ def test_a_damaged_constant_is_played_and_found(
         assert "first difference: tick " in outcome.err
 
 
+@pytest.mark.common
 def test_a_constant_that_is_missing_or_new_is_found(folder: Path) -> None:
     edit(folder / f"{NAME}.h", f"#define {CAPITAL}_SETTLE_LINES ", f"#define {CAPITAL}_OTHER ")
     outcome = verify(folder)
@@ -315,6 +327,7 @@ def test_a_constant_that_is_missing_or_new_is_found(folder: Path) -> None:
     assert f"{CAPITAL}_SETTLE_LINES" in outcome.err.split("program: ")[1], "and by the compiler"
 
 
+@pytest.mark.common
 def test_the_hash_in_the_header_is_held_against_the_manifest(folder: Path, short: Build) -> None:
     digest = short.manifest["hash"]
     edit(folder / f"{NAME}.h", f'"{digest}"', f'"{digest[::-1]}"')
@@ -326,6 +339,7 @@ def test_the_hash_in_the_header_is_held_against_the_manifest(folder: Path, short
 # What is wrong in the arrays
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(("axis", "at", "bit"), [("x", 70, 6), ("x", 250, 14), ("y", 100, 8)])
 def test_a_damaged_table_is_found_at_its_first_tick(folder: Path, axis: str, at: int, bit: int) -> None:
     program: Program = getattr(read_build(folder).program, axis)
@@ -341,6 +355,7 @@ def test_a_damaged_table_is_found_at_its_first_tick(folder: Path, axis: str, at:
     check_first_difference(outcome, axis, heard, 331)
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("array", ["x_fourier", "y_fourier", "sine"])
 def test_a_damaged_array_that_is_not_played_is_found(folder: Path, array: str) -> None:
     old, new = put_word(folder, array, 3, lambda value: value + 1)
@@ -349,6 +364,7 @@ def test_a_damaged_array_that_is_not_played_is_found(folder: Path, array: str) -
     assert f"{NAME}.c: {NAME}_{array}[3] is {new}, it is {old} in the manifest" in outcome.err
 
 
+@pytest.mark.common
 def test_an_array_of_another_length_or_name_or_content_is_found(folder: Path) -> None:
     path = folder / f"{NAME}.c"
     substitute(path, rf"({NAME}_x_table\[\] = {{\n    )-?\d+, ", r"\1")
@@ -402,6 +418,7 @@ def coded(tmp_path_factory: pytest.TempPathFactory) -> Build:
     return build(tmp_path_factory.mktemp("coded"), Variant(scan))
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(
     ("file", "pattern", "new", "fails"), [row[1:] for row in MUTANTS], ids=[row[0] for row in MUTANTS]
 )
@@ -419,6 +436,7 @@ def test_an_edited_runtime_is_played_and_found(
         assert failed(outcome) == {FILES, FILL}, "what only fills do wrong"
 
 
+@pytest.mark.common
 def test_a_rounding_is_told_with_its_first_tick(folder: Path) -> None:
     """One code too low here and there, with tick, expected and got."""
     substitute(folder / "dac_axis.h", r"\(dac_wide\)1 << \(14u - \(?guard\)?\)", "(dac_wide)0")
@@ -428,6 +446,7 @@ def test_a_rounding_is_told_with_its_first_tick(folder: Path) -> None:
     assert 0 < max(abs(int(a) - int(b)) for a, b in zip(*codes, strict=True)) <= 1
 
 
+@pytest.mark.common
 def test_a_runtime_that_does_not_compile_is_told_by_the_compiler(folder: Path) -> None:
     path = folder / "dac_program.c"
     path.write_text(path.read_text("ascii") + '#error "spoilt"\n', "ascii")
@@ -436,6 +455,7 @@ def test_a_runtime_that_does_not_compile_is_told_by_the_compiler(folder: Path) -
     assert re.search(r"dac_program.c:\d+:\d+: error: #error \"spoilt\"", outcome.err.split("program: ")[1])
 
 
+@pytest.mark.common
 def test_a_runtime_that_crashes_is_a_failed_check(folder: Path) -> None:
     substitute(folder / "dac_sequencer.c", r"(void dac_sequencer_step\(.*\)\n{\n)", r"\1    __builtin_trap();\n")
     outcome = verify(folder)
@@ -450,6 +470,7 @@ def endless(folder: Path) -> None:
     )
 
 
+@pytest.mark.common
 def test_a_runtime_that_does_not_end_is_ended(folder: Path, tmp_path: Path) -> None:
     endless(folder)
     sources = sorted(folder.glob("dac_*.[ch]"))
@@ -460,6 +481,7 @@ def test_a_runtime_that_does_not_end_is_ended(folder: Path, tmp_path: Path) -> N
         bench.run(f"{0:016x}\n{0:016x}\n{script.text()}", timeout=1.0)
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(
     ("name", "played"),
     [
@@ -480,18 +502,21 @@ def test_a_missing_file_is_named(folder: Path, name: str, played: bool) -> None:
     assert played or f"program: {name} is missing" in outcome.err
 
 
+@pytest.mark.common
 def test_a_build_without_the_runtime_is_told(folder: Path, short: Build) -> None:
     files = {name: digest for name, digest in short.manifest["files"].items() if not re.match(r"dac_.*\.[ch]", name)}
     edit_manifest(folder, "files", value=files)
     assert "program: the build holds no dac_*.c" in verify(folder).err
 
 
+@pytest.mark.common
 def test_codes_beyond_the_certificate_are_found(folder: Path, short: Build) -> None:
     promised = short.manifest["axes"]["x"]["certificate"]["max_error_lsb"]
     edit_manifest(folder, "axes", "x", "certificate", "max_error_lsb", value=promised - 0.001)
     assert failed(verify(folder)) == {("x", "float waveform")}
 
 
+@pytest.mark.common
 def test_a_table_that_no_runtime_takes_is_wrong_input(tmp_path: Path) -> None:
     outcome = verify(with_a_long_table(tmp_path, 70))
     assert outcome.status == 2
@@ -501,6 +526,7 @@ def test_a_table_that_no_runtime_takes_is_wrong_input(tmp_path: Path) -> None:
 # Reports, options, tools, interruptions
 
 
+@pytest.mark.common
 def test_junit_has_a_case_a_check(folder: Path, tmp_path: Path) -> None:
     define(folder, "PIXELS", lambda value: value - 1)
     outcome = verify(folder, "--junit", tmp_path / "verify.xml")
@@ -511,6 +537,7 @@ def test_junit_has_a_case_a_check(folder: Path, tmp_path: Path) -> None:
     assert told.counts == (str(CHECKS), str(len(told.failed)), "0")
 
 
+@pytest.mark.common
 def test_what_is_played_is_kept_on_request(short: Build, tmp_path: Path) -> None:
     assert verify(short.folder, "--keep", tmp_path / "kept").status == 0
     kept = {path.name for path in (tmp_path / "kept").iterdir()}
@@ -526,6 +553,7 @@ def test_options_of_verilog_are_refused(short: Build, target: str, option: tuple
     assert f"{option[0]} is for Verilog; --target {target} has no choice of it" in outcome.err
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("compiler", ["no-such-cc", "no-such-cc -m32", "'unbalanced"])
 def test_a_missing_compiler_is_status_6_with_its_remedy(short: Build, compiler: str) -> None:
     done = command(short.folder, "--target", "c", CC=compiler)
@@ -533,6 +561,7 @@ def test_a_missing_compiler_is_status_6_with_its_remedy(short: Build, compiler: 
     assert done.stderr == f"{compiler.split(' ')[0]} is not installed: apt-get install gcc, or set CC\n"
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
 def test_the_compiler_and_its_options_are_the_environments(short: Build, compiler: str) -> None:
     """Sanitizers have nothing to say either; an option that no compiler knows shows that options arrive."""
@@ -544,22 +573,26 @@ def test_the_compiler_and_its_options_are_the_environments(short: Build, compile
     assert "no-such-option" in done.stderr
 
 
+@pytest.mark.common
 def test_options_that_cannot_be_read_are_a_failed_check(short: Build) -> None:
     done = command(short.folder, "--target", "c", CFLAGS="-DX='")
     assert done.returncode == 5
     assert "program: CFLAGS cannot be read: No closing quotation" in done.stderr
 
 
+@pytest.mark.common
 def test_those_options_are_not_for_a_cortex_m4(short: Build) -> None:
     done = command(short.folder, "--target", "cortex-m", CFLAGS="-fsanitize=address")
     assert (done.returncode, done.stderr) == (0, "")
 
 
+@pytest.mark.common
 def test_nothing_of_cocotb_is_needed(short: Build) -> None:
     done = command_without(["cocotb", "cocotb_tools"], short.folder, "--target", "c")
     assert (done.returncode, done.stderr) == (0, "")
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize(("begun", "within_popen"), [("job.json", False), ("step/stream_bench", False), ("step", True)])
 def test_an_interruption_leaves_nothing_behind(
@@ -574,6 +607,7 @@ def test_an_interruption_leaves_nothing_behind(
 # On an emulated Cortex-M4
 
 
+@pytest.mark.rest
 @pytest.mark.parametrize("name", ["example", "bits_18", "bits_24", "direct_steps", "left_aligned", "short_frame"])
 def test_a_build_verifies_on_a_cortex_m4(name: str, tmp_path: Path) -> None:
     """Whole frames as well; both sizes of words, and tables that are played as they are."""
@@ -584,11 +618,13 @@ def test_a_build_verifies_on_a_cortex_m4(name: str, tmp_path: Path) -> None:
     assert "note:" not in outcome.out
 
 
+@pytest.mark.rest
 def test_tables_are_rendered_on_a_cortex_m4(short: Build) -> None:
     outcome = verify(short.folder, "--fourier", target="cortex-m")
     assert outcome.status == 0, outcome.err
 
 
+@pytest.mark.rest
 def test_both_targets_find_the_same(folder: Path) -> None:
     """The same checks, the same first tick, expected and got."""
     put_word(folder, "y_table", 100, lambda word: word ^ 1 << 9)
@@ -598,6 +634,7 @@ def test_both_targets_find_the_same(folder: Path) -> None:
     assert differing(emulated) == differing(here)
 
 
+@pytest.mark.rest
 def test_what_is_refused_on_a_cortex_m4_is_told(folder: Path) -> None:
     define(folder, "X_GAIN_Q", lambda value: value + 1)
     outcome = verify(folder, target="cortex-m")
@@ -605,6 +642,7 @@ def test_what_is_refused_on_a_cortex_m4_is_told(folder: Path) -> None:
     assert "program: refused: load: DAC_BAD_OUTPUT" in outcome.err
 
 
+@pytest.mark.rest
 @pytest.mark.parametrize(("number", "begun"), [(signal.SIGINT, "step/stream_bench.elf"), (signal.SIGTERM, "step")])
 def test_an_interruption_ends_the_emulation(folder: Path, tmp_path: Path, number: signal.Signals, begun: str) -> None:
     endless(folder)

@@ -20,6 +20,8 @@ from tablegen.virtual.parameters import load_truth
 from tablegen.virtual.scanner import VirtualAxis, VirtualScanner
 from tablegen.virtual.simulation import with_model
 
+pytestmark = pytest.mark.common
+
 SCANNER = VirtualScanner.of(load_truth())
 
 

@@ -15,6 +15,8 @@ from tablegen.virtual.parameters import load_truth
 from tablegen.virtual.scanner import VirtualAxis, VirtualScanner
 from tablegen.virtual.sensor import Sensor
 
+pytestmark = pytest.mark.common
+
 OFFSET, RATE = 50.0, 1.0
 GRATING, LATTICE = grating(50.0), hexagonal(50.0)
 

@@ -72,6 +72,7 @@ def test_models_leave_what_they_left_in_the_paper() -> None:
         assert branch.scaling_peak_to_peak == pytest.approx(15.0, abs=3.0)
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(("axis", "targets", "rate_hz"), [(X, X_TARGETS, 100.0), (Y, Y_TARGETS, 1.0)], ids=["x", "y"])
 def test_apparent_sizes_over_offset(axis: VirtualAxis, targets: Targets, rate_hz: float) -> None:
     """Figure 2: +25 % at 93 V and -8 % at 7 V, and equation (1) between them to 1.2 %."""
@@ -92,6 +93,7 @@ def test_sizes_over_voltage(axis: VirtualAxis, targets: Targets, rate_hz: float)
     assert found["actual_nm"] == pytest.approx(wanted, rel=0.006)
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(("axis", "targets", "rate_hz"), [(X, X_TARGETS, 100.0), (Y, Y_TARGETS, 1.0)], ids=["x", "y"])
 def test_one_factor_serves_all_sizes(axis: VirtualAxis, targets: Targets, rate_hz: float) -> None:
     """What (1) is good for: m times the drive of the middle makes the same scan elsewhere, large or small, to 1.3 %."""
@@ -129,6 +131,7 @@ def test_resonance() -> None:
     assert -180.0 < np.interp(50e3, f, found["phase_deg"]) < -85.0
 
 
+@pytest.mark.common
 def test_identification_gives_the_parameters_in_the_package() -> None:
     """Of what they do, not of their digits: the last ones differ between processors."""
     assert _spread(identify(X_TARGETS).hysteresis, X.hysteresis) < 1e-3

@@ -50,6 +50,7 @@ def test_closed_form_is_the_integral(model: str, turn: float) -> None:
     assert np.max(np.abs(series.b + 2 * c[1:].imag)) < 1e-12
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(("turn", "n"), [(0.5, 1), (0.05, 10), (0.3, 5), (0.7, 3), (0.95, 10), (0.999, 100)])
 def test_closed_form_against_mpmath(turn: float, n: int) -> None:
     """Arbitrary precision, at and near the removable singularities n = 1/(2 turn) and n = 1/(2 (1 - turn))."""

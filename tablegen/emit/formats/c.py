@@ -110,7 +110,7 @@ def wrong_arrays(folder: Path, content: Content) -> tuple[int, list[str]]:
 
 def _context(content: Content) -> dict[str, Any]:
     """What the templates see."""
-    bits, index_bits = max(axis.program.bits for axis in content.axes), content.sine_index_bits
+    bits, sine = max(axis.program.bits for axis in content.axes), _sine(content)
     return {
         "version": content.version,
         "name": content.name,
@@ -124,7 +124,7 @@ def _context(content: Content) -> dict[str, Any]:
         "least_gain": signed_limits(GAIN_BITS)[0],
         "greatest_gain": signed_limits(GAIN_BITS)[1],
         "word_type": "int16_t" if bits <= 16 else "int32_t",  # the type of both tables: the runtime is compiled for one
-        "sine": {"constants": _sine_constants(content), "rows": rows(sine_periods(index_bits))} if index_bits else None,
+        "sine": {"constants": _sine_constants(content, sine), "rows": rows(sine)} if len(sine) else None,
         "axes": [_axis(content, axis) for axis in content.axes],
     }
 
@@ -143,15 +143,23 @@ def _axis(content: Content, axis: AxisContent) -> dict[str, Any]:
     }
 
 
-def _sine_constants(content: Content) -> dict[str, int]:
-    """Constants of the sine from which tables are computed; none where no table is."""
+def _sine(content: Content) -> Ints:
+    """The sine from which a device renders tables; empty where no table is interpolated."""
     bits = content.sine_index_bits
-    return {"SINE_INDEX_BITS": bits, "SINE_LENGTH": len(sine_periods(bits))} if bits else {}
+    return sine_periods(bits) if bits else np.zeros(0, dtype=np.int64)
+
+
+def _sine_constants(content: Content, sine: Ints) -> dict[str, int]:
+    return {"SINE_INDEX_BITS": content.sine_index_bits, "SINE_LENGTH": len(sine)} if len(sine) else {}
 
 
 def _constants(content: Content) -> dict[str, int | str]:
     """Every constant of the header: numbers, and the hash."""
-    own: dict[str, int | str] = {"HASH": content.hash, **scan_constants(content), **_sine_constants(content)}
+    own: dict[str, int | str] = {
+        "HASH": content.hash,
+        **scan_constants(content),
+        **_sine_constants(content, _sine(content)),
+    }
     return {f"{content.name.upper()}_{key}": value for key, value in own.items()}
 
 
@@ -162,7 +170,7 @@ def _arrays(content: Content) -> dict[str, Ints]:
         arrays[f"{axis.axis}_table"] = np.asarray(axis.program.words)
         arrays[f"{axis.axis}_fourier"] = axis.fourier_words
     if content.sine_index_bits:
-        arrays["sine"] = sine_periods(content.sine_index_bits)
+        arrays["sine"] = _sine(content)
     return {f"{content.name}_{key}": words for key, words in arrays.items()}
 
 

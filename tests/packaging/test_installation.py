@@ -119,7 +119,7 @@ def test_what_answers_at_once_loads_no_metadata() -> None:
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "False\n"
 
 
-# The version stands in tablegen/__init__.py; what cannot read it there is held against it.
+# The version stands in tablegen/version.py; what cannot read it there is held against it.
 
 
 def test_the_version_is_the_same_everywhere() -> None:

@@ -1,0 +1,68 @@
+"""WAV of one frame: x left, y right, a sample a tick; for sound cards, and for whatever plays or shows them."""
+
+import struct
+
+import numpy as np
+
+from tablegen.emit.content import AxisContent, Content
+from tablegen.emit.format import Format
+from tablegen.emit.waveforms import require_short_frame
+from tablegen.numerics.arrays import Ints
+from tablegen.problems import Unphysical
+
+_PCM = 1
+_CHANNELS = 2
+
+
+class Wav(Format):
+    """``NAME.wav``: PCM of 16 bits for converters of up to 16 bits, of 32 bits above."""
+
+    name = "wav"
+    purpose = "WAV of one frame, x left and y right, at the update rate; 16-bit samples, 32-bit above 16 dac.bits"
+    file_names = "NAME.wav"
+
+    def files(self, content: Content) -> dict[str, bytes]:
+        """One file."""
+        require_short_frame(content)
+        bits = 16 if max(axis.program.output.dac_bits for axis in content.axes) <= 16 else 32
+        rate = _rate(content, bits // 8 * _CHANNELS)
+        x, y = (_samples(content, axis, bits) for axis in content.axes)
+        return {f"{content.name}.wav": _file(np.column_stack([x, y]), rate, bits)}
+
+
+FORMAT = Wav()
+
+
+def _rate(content: Content, frame_bytes: int) -> int:
+    """The update rate in Hz, which a WAV file has as a whole number of 32 bits, with the bytes of a second as well."""
+    rate = content.schedule.update_rate_hz
+    if rate.denominator != 1:
+        raise Unphysical(
+            f"the update rate is {float(rate)!r} Hz, and the sample rate of a WAV file a whole number of Hz; "
+            f"a dac.update_rate_hz of {round(rate)} would fit"
+        )
+    most = ((1 << 32) - 1) // frame_bytes
+    if rate > most:
+        raise Unphysical(
+            f"the update rate is {rate.numerator} Hz, and the sample rate of a WAV file of {frame_bytes} bytes a tick "
+            f"at most {most} Hz; choose another format, such as npz"
+        )
+    return rate.numerator
+
+
+def _samples(content: Content, axis: AxisContent, bits: int) -> Ints:
+    """Samples of a frame: full scale of the converter is full scale of the sample, and code 2^(dac_bits - 1) is 0."""
+    period = axis.program.ticks
+    codes = axis.program.codes(np.arange(period, dtype=np.int64))
+    whole = np.tile(codes, content.schedule.frame_ticks // period)
+    output = axis.program.output
+    return (whole - (1 << (output.dac_bits - 1))) << (bits - output.dac_bits)
+
+
+def _file(samples: Ints, rate: int, bits: int) -> bytes:
+    """Samples of shape (ticks, 2) with the header of RIFF."""
+    data = samples.astype(f"<i{bits // 8}").tobytes()
+    frame_bytes = bits // 8 * _CHANNELS
+    layout = struct.pack("<HHIIHH", _PCM, _CHANNELS, rate, rate * frame_bytes, frame_bytes, bits)
+    chunks = b"fmt " + struct.pack("<I", len(layout)) + layout + b"data" + struct.pack("<I", len(data)) + data
+    return b"RIFF" + struct.pack("<I", 4 + len(chunks)) + b"WAVE" + chunks

@@ -1,0 +1,58 @@
+"""One period of both axes as files of samples have it: time, volts, codes and markers, a value a tick."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from tablegen.device.period import period_of
+from tablegen.emit.content import Content
+from tablegen.numerics.arrays import Bools, Floats, Ints
+from tablegen.problems import Unphysical
+
+MOST_TICKS = 1 << 22
+
+
+@dataclass(frozen=True, eq=False)
+class Waveform:
+    """A line of x or a frame of y. All arrays have the shape (ticks,).
+
+    ``time_s`` begins with the period, in s; ``volts`` are those at the piezo that the codes make; ``codes`` are
+    straight binary, 0 .. 2^dac_bits - 1; ``markers`` are ``start``, ``line``, ``pixel``, ``backward`` and ``inside``.
+    """
+
+    axis: Literal["x", "y"]
+    time_s: Floats
+    volts: Floats
+    codes: Ints
+    markers: dict[str, Bools]
+
+
+def waveforms(content: Content) -> tuple[Waveform, Waveform]:
+    """A line of x and a frame of y. Raises ``Unphysical`` for a frame of more than 2^22 ticks."""
+    require_short_frame(content)
+    return _waveform(content, "x"), _waveform(content, "y")
+
+
+def require_short_frame(content: Content) -> None:
+    """Raise ``Unphysical`` for a frame that would make a file of hundreds of megabytes."""
+    ticks = content.schedule.frame_ticks
+    if ticks > MOST_TICKS:
+        raise Unphysical(
+            f"a frame of {ticks} ticks is {ticks - MOST_TICKS} ticks too long for a file of its samples, which has at "
+            f"most {MOST_TICKS}; a lower dac.update_rate_hz, fewer timing.lines or a higher timing.line_rate_hz "
+            "would fit, and formats of tables have no such limit"
+        )
+
+
+def _waveform(content: Content, name: Literal["x", "y"]) -> Waveform:
+    axis, period, rate = getattr(content, name), period_of(content.program, name), content.schedule.update_rate_hz
+    names = ("start", "line", "pixel", "backward", "inside")
+    return Waveform(
+        axis=name,
+        # Integers of Python, since ticks times the denominator may exceed 64 bits; each quotient is rounded once.
+        time_s=np.array([k * rate.denominator / rate.numerator for k in range(len(period.codes))], dtype=np.float64),
+        volts=axis.v_zero + axis.v_per_code * period.codes.astype(np.float64),
+        codes=period.codes,
+        markers={marker: getattr(period, marker) for marker in names},
+    )

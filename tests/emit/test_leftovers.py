@@ -1,0 +1,146 @@
+"""What a build no longer makes: removed if an earlier manifest lists it as it stands there, reported otherwise."""
+
+import json
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import pytest
+from building import NAME
+from editing import SCAN, edited, run, write_pair
+
+from tablegen.emit.write import leftover_files, outdated_files
+
+
+@pytest.fixture
+def built(tmp_path: Path) -> Path:
+    """A build of C and Verilog in ``out``, beside its scan."""
+    assert run("build", write_pair(tmp_path), "-o", tmp_path / "out", "-q").status == 0
+    return tmp_path / "out"
+
+
+def edit_manifest(folder: Path, **files: Any) -> None:
+    """Let the manifest list more files."""
+    manifest = json.loads((folder / "manifest.json").read_bytes())
+    manifest["files"] |= files
+    (folder / "manifest.json").write_text(json.dumps(manifest), "ascii")
+
+
+def listed(folder: Path) -> set[str]:
+    found: set[str] = set(json.loads((folder / "manifest.json").read_bytes())["files"])
+    return found
+
+
+def test_files_of_a_format_that_is_no_longer_chosen_are_removed(built: Path) -> None:
+    before = {path.name for path in built.iterdir()}
+    checked = run("build", built.parent / "scan.toml", "-o", built, "-f", "c", "--check")
+    assert checked.status == 1
+    assert f"{built / 'dac_axis.v'}: an earlier build made it, this one does not" in checked.out
+    assert {path.name for path in built.iterdir()} == before  # --check writes nothing
+    assert f"run: tablegen build {built.parent / 'scan.toml'} -o {built} -f c\n" in checked.err
+    outcome = run("build", built.parent / "scan.toml", "-o", built, "-f", "c")
+    assert outcome.status == 0
+    after = {path.name for path in built.iterdir()}
+    assert after == listed(built) | {"manifest.json"}
+    assert {Path(name).suffix for name in before - after} == {".v", ".vh", ".mem"}
+    assert "removed what an earlier build had made: annexin_200nm.vh, " in outcome.out
+    assert run("build", built.parent / "scan.toml", "-o", built, "-f", "c", "--check").status == 0
+
+
+def test_files_of_another_name_are_removed(built: Path) -> None:
+    scan = write_pair(built.parent, edited(SCAN, 'name = "other"'))
+    assert run("build", scan, "-o", built).status == 0
+    assert not any(path.name.startswith(NAME) for path in built.iterdir())
+    assert (built / "other.h").exists()
+
+
+def test_a_scan_that_becomes_header_only_loses_its_c_file(built: Path) -> None:
+    scan = write_pair(built.parent, edited(SCAN, "+ [emit]\nheader_only = true"))
+    assert run("build", scan, "-o", built).status == 0
+    assert not (built / f"{NAME}.c").exists()
+
+
+def test_a_module_of_an_older_runtime_is_removed(built: Path) -> None:
+    (built / "dac_old.v").write_bytes(b"module dac_old; endmodule\n")
+    edit_manifest(built, **{"dac_old.v": sha256(b"module dac_old; endmodule\n").hexdigest()})
+    outcome = run("build", built.parent / "scan.toml", "-o", built)
+    assert outcome.status == 0
+    assert "removed what an earlier build had made: dac_old.v" in outcome.out
+    assert not (built / "dac_old.v").exists()
+
+
+def test_a_module_that_no_manifest_lists_is_reported(built: Path) -> None:
+    (built / "dac_old.v").write_bytes(b"module dac_old; endmodule\n")
+    told = f"{built / 'dac_old.v'}: is no file of this build, and dac_*.v matches it; remove it"
+    checked = run("build", built.parent / "scan.toml", "-o", built, "--check")
+    assert checked.status == 1
+    assert told in checked.out
+    outcome = run("build", built.parent / "scan.toml", "-o", built)
+    assert outcome.status == 0
+    assert outcome.messages == [f"note: {told}"]
+    assert (built / "dac_old.v").exists()
+
+
+def test_a_file_that_was_edited_is_reported_and_stays(built: Path) -> None:
+    (built / f"{NAME}.vh").write_text("// mine\n", "ascii")
+    outcome = run("build", built.parent / "scan.toml", "-o", built, "-f", "c")
+    assert outcome.status == 0
+    told = f"note: {built / NAME}.vh: an earlier build made it, and it was edited since; remove it"
+    assert outcome.messages == [told]
+    assert (built / f"{NAME}.vh").read_text("ascii") == "// mine\n"
+
+
+def test_files_of_somebody_else_are_neither_removed_nor_reported(built: Path) -> None:
+    for name in ("main.c", "README", "mine.vh", "dac_notes.txt"):
+        (built / name).write_text("mine\n", "ascii")
+    assert outdated_files(built, listed(built)) == []
+    assert leftover_files(built, listed(built)) == []
+    assert run("build", built.parent / "scan.toml", "-o", built, "--check").status == 0
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "../precious.h",
+        "sub/precious.h",
+        "/precious.h",
+        "..",
+        ".",
+        "",
+        ".precious",
+        "sub",
+        "a\0b",
+        "\ud800",
+        "x" * 5000,
+    ],
+)
+def test_a_hostile_manifest_removes_nothing(built: Path, name: str) -> None:
+    content = b"precious\n"
+    (built / "sub").mkdir()
+    for place in (built.parent / "precious.h", built / "sub" / "precious.h", built / ".precious"):
+        place.write_bytes(content)
+    edit_manifest(built, **{name: sha256(content).hexdigest()})
+    before = set(built.parent.rglob("*"))
+    outcome = run("build", built.parent / "scan.toml", "-o", built)
+    assert outcome.status == 0
+    assert set(built.parent.rglob("*")) == before
+    assert name not in listed(built)
+
+
+@pytest.mark.parametrize("content", ["", "[]", "{", "3", '{"files": 3}', '{"files": {"a.h": 3}}', "[" * 100_000])
+def test_a_damaged_manifest_lists_nothing(built: Path, content: str) -> None:
+    (built / "manifest.json").write_text(content, "ascii")
+    (built / "a.h").write_text("mine\n", "ascii")
+    assert outdated_files(built, []) == []
+    assert run("build", built.parent / "scan.toml", "-o", built).status == 0
+    assert (built / "a.h").exists()
+
+
+def test_a_link_is_removed_and_not_what_it_leads_to(built: Path) -> None:
+    content = b"precious\n"
+    (built.parent / "precious.h").write_bytes(content)
+    (built / "old.h").symlink_to(built.parent / "precious.h")
+    edit_manifest(built, **{"old.h": sha256(content).hexdigest()})
+    assert run("build", built.parent / "scan.toml", "-o", built).status == 0
+    assert not (built / "old.h").is_symlink()
+    assert (built.parent / "precious.h").read_bytes() == content

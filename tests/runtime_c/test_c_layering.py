@@ -1,0 +1,84 @@
+"""No circles in the C runtime: neither do files call each other in a circle, nor do they include each other in one."""
+
+import re
+from collections.abc import Iterable, Mapping
+from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
+
+import pytest
+from building import run_clean
+
+from tablegen.resources import c_link, c_runtime
+
+EVERYTHING = [*c_runtime(), *c_link()]
+Graph = Mapping[str, set[str]]
+# What these compile makes other calls.
+CHOICES = {"default": [], "small": ["-DDAC_SMALL=1"], "no_long_multiplication": ["-DDAC_LONG_MULTIPLY=0"]}
+
+
+def circle(graph: Graph) -> list[str]:
+    """One of a graph, its first name once more at its end; empty if there is none."""
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        return list(error.args[1])
+    return []
+
+
+def calls(paths: Iterable[Path], folder: Path, *options: str) -> Graph:
+    """Of each .c the others that define what it asks for, as the compiler has them: what nobody defines is left out."""
+    sources = [path for path in paths if path.suffix == ".c"]
+    run_clean(["cc", "-std=c99", "-O0", *options, "-c", *sources], folder)
+    defined, wanted = {}, {}
+    for source in sources:
+        symbols = [line.split()[-2:] for line in run_clean(["nm", folder / f"{source.stem}.o"]).splitlines()]
+        defined.update({name: source.name for kind, name in symbols if kind.isupper() and kind != "U"})
+        wanted[source.name] = [name for kind, name in symbols if kind == "U"]
+    return {file: {defined[name] for name in names if name in defined} for file, names in wanted.items()}
+
+
+def includes(paths: Iterable[Path]) -> Graph:
+    """Of each file what it includes by a name in quotation marks."""
+    pattern = re.compile(r'^[ \t]*#[ \t]*include[ \t]*"([^"]+)"', re.MULTILINE)
+    return {path.name: set(pattern.findall(path.read_text("utf-8"))) for path in paths}
+
+
+@pytest.mark.parametrize("choice", CHOICES)
+def test_files_do_not_call_each_other_in_a_circle(choice: str, tmp_path: Path) -> None:
+    found = calls(EVERYTHING, tmp_path, *CHOICES[choice])
+    assert circle(found) == []
+    assert found["dac_link.c"] >= {"dac_link_upload.c", "dac_link_answer.c", "dac_sequencer.c"}
+    assert found["dac_link_upload.c"] >= {"dac_link_check.c", "dac_link_answer.c"}
+    assert found["dac_link_frame.c"] == set()
+
+
+def test_files_do_not_include_each_other_in_a_circle() -> None:
+    found = includes(EVERYTHING)
+    assert circle(found) == []
+    assert found["dac_link_parts.h"] == {"dac_link.h"}
+    assert set().union(*found.values()) == {path.name for path in EVERYTHING if path.suffix == ".h"}
+
+
+def test_a_circle_of_calls_is_found(tmp_path: Path) -> None:
+    """The control: three files, of which the last calls the first; then without that call."""
+    paths = [tmp_path / name for name in ("top.c", "middle.c", "bottom.c")]
+    paths[0].write_text("int middle(void);\nint top(void);\nint top(void)\n{\n    return middle();\n}\n")
+    paths[1].write_text("int bottom(void);\nint middle(void);\nint middle(void)\n{\n    return bottom();\n}\n")
+    paths[2].write_text("int top(void);\nint bottom(void);\nint bottom(void)\n{\n    return top();\n}\n")
+    assert set(circle(calls(paths, tmp_path))) == {"top.c", "middle.c", "bottom.c"}
+    paths[2].write_text("int bottom(void);\nint bottom(void)\n{\n    return 0;\n}\n")
+    found = calls(paths, tmp_path)
+    assert found == {"top.c": {"middle.c"}, "middle.c": {"bottom.c"}, "bottom.c": set()}
+    assert circle(found) == []
+
+
+def test_a_circle_of_includes_is_found(tmp_path: Path) -> None:
+    """The control; a header that includes itself is one as well."""
+    one, other = tmp_path / "one.h", tmp_path / "other.h"
+    one.write_text('#include <stdint.h>\n#include "other.h"\n')
+    other.write_text('  # include "one.h"\n')
+    assert set(circle(includes([one, other]))) == {"one.h", "other.h"}
+    other.write_text('#include "other.h"\n')
+    assert set(circle(includes([one, other]))) == {"other.h"}
+    other.write_text("#include <one.h>\n")
+    assert circle(includes([one, other])) == []
