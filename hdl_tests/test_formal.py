@@ -109,6 +109,7 @@ def _proven_by_sat(proof: Proof, folder: Path, modules: Mapping[str, str] | None
     return proven
 
 
+@pytest.mark.timeout(86_400)  # of 16 bits it takes two minutes
 @pytest.mark.parametrize("name", WIDER)
 def test_holds_for_ever_by_sat(name: str, tmp_path: Path) -> None:
     assert _proven_by_sat(WIDER[name], tmp_path)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from building import BENCHES, Variant, write_variant
 from programs import random_dual
-from sets import common, quick
+from sets import LONG_TEST, common, quick
 from spi_monitor import Converter, Wires, receive, updates
 from stream_configurations import (
     CONFIGURATIONS,
@@ -309,7 +309,7 @@ def test_a_swap_is_requested_at_every_tick_and_taken_at_line_starts(pace: int, t
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize("swaps", [SWAPS, pytest.param(SWAPS_SLOW, marks=pytest.mark.long)])
+@pytest.mark.parametrize("swaps", [SWAPS, pytest.param(SWAPS_SLOW, marks=LONG_TEST)])
 def test_no_line_mixes_programs_and_no_step_is_above_the_limit(swaps: int, small_on_verilator: SequencerBench) -> None:
     rng = np.random.default_rng(swaps)
     samples = 0

@@ -75,7 +75,7 @@ def _remarks(fit: ImageFit) -> list[str]:
         )
     if fit.widened > 3.0:
         found.append(
-            f"a part of what is left is no noise but what the model does not describe; standard errors were "
+            f"the rest is not only noise, but also what the model does not describe; standard errors were "
             f"widened by {fit.widened:.3g}; a --window that is not that of the images does that too"
         )
     if fit.pixels_a_period < _MIN_PIXELS_PER_PERIOD:

@@ -171,7 +171,7 @@ def test_samples_far_off_are_counted() -> None:
     [
         (lambda t: replace(t, drive_v=np.full_like(t.drive_v, 5.0)), "the drive does not move"),
         (lambda t: replace(t, displacement_nm=np.zeros_like(t.time_s)), "the displacement does not move"),
-        (lambda t: replace(t, drive_v=50.0 + t.time_s), "the drive makes no whole sweep up and one down"),
+        (lambda t: replace(t, drive_v=50.0 + t.time_s), "the drive has no complete sweep up and down"),
         (lambda t: replace(t, time_s=t.time_s[::-1]), "time does not ascend after"),
         (lambda t: replace(t, drive_v=t.drive_v + 30.0), "a drive of 30..130 V is outside the driver's 0..100 V"),
         (lambda t: Trace("", t.time_s[:20], t.drive_v[:20], t.displacement_nm[:20]), "20 samples are no trace"),
@@ -188,7 +188,9 @@ def test_traces_that_do_not_suffice(change: object, why: str) -> None:
 
 
 def test_fewer_periods_than_are_to_settle() -> None:
-    with pytest.raises(Unphysical, match=r"100 V: 3.3 periods are recorded, and 3 to settle leave no whole one"):
+    with pytest.raises(
+        Unphysical, match=r"100 V: 3.3 periods are recorded, which leaves no whole period after 3 to settle"
+    ):
         fit_hysteresis([Scanner().trace(100.0)], V_MAX, settle_periods=3)
 
 

@@ -83,7 +83,7 @@ def test_grey_that_is_stored_as_colour(tmp_path: Path) -> None:
     values = np.round(STEPS / 60000.0 * 255.0)
     path = put(tmp_path, "a.png", coloured(values, values))
     assert np.array_equal(read_image(path).heights, values)
-    assert "is in colour, which is no height" in why(put(tmp_path, "b.png", coloured(values, 255.0 - values)))
+    assert "is in colour, not heights" in why(put(tmp_path, "b.png", coloured(values, 255.0 - values)))
 
 
 def coloured(red: Floats, others: Floats) -> bytes:
@@ -127,18 +127,18 @@ def test_channels_by_title_and_by_number(tmp_path: Path) -> None:
     [
         ("a.npy", b"", "is empty"),
         ("a.jpg", b"x", ".jpg is not one of .npy, .tif, .tiff, .png, .gwy, .txt"),
-        ("a", b"x", "no ending is none of"),
-        ("a.npy", npy(HEIGHTS)[:-9], "is no whole .npy file of numbers"),
-        ("a.npy", b"\x93NUMPY\x01\x00\xff\xff" + b"{" * 100, "is no whole .npy file of numbers"),
+        ("a", b"x", "no ending is not one of"),
+        ("a.npy", npy(HEIGHTS)[:-9], "is not a complete .npy file of numbers"),
+        ("a.npy", b"\x93NUMPY\x01\x00\xff\xff" + b"{" * 100, "is not a complete .npy file of numbers"),
         ("a.npy", npy(HEIGHTS.reshape(-1)), "has the shape 1920; rows x columns are needed"),
         ("a.npy", npy(HEIGHTS[:20]), "has 20 x 48 pixels; at least 32 x 32"),
         ("a.npy", npy(np.where(HEIGHTS > 4.9, np.nan, HEIGHTS)), "pixels are not finite; crop or interpolate them"),
         ("a.npy", npy(np.full((40, 48), 7.0)), "all pixels are 7; was another channel saved?"),
-        ("a.png", png(STEPS)[:-30], "is no whole PNG file"),
-        ("a.png", b"GIF89a" + bytes(100), "is no whole PNG file"),
-        ("a.png", png(STEPS).replace(b"IDAT", b"JDAT"), "is no whole PNG file"),
-        ("a.tif", b"II*\x00" + bytes(3), "is no TIFF file that can be read"),
-        ("a.tif", b"hello" * 20, "is no TIFF file that can be read"),
+        ("a.png", png(STEPS)[:-30], "is not a complete PNG file"),
+        ("a.png", b"GIF89a" + bytes(100), "is not a complete PNG file"),
+        ("a.png", png(STEPS).replace(b"IDAT", b"JDAT"), "is not a complete PNG file"),
+        ("a.tif", b"II*\x00" + bytes(3), "is not a readable TIFF file"),
+        ("a.tif", b"hello" * 20, "is not a readable TIFF file"),
         ("a.gwy", b"hello" * 20, "does not begin as a Gwyddion file does"),
         ("a.gwy", b"GWYP" + b"GwyContainer\0" + struct.pack("<I", 0), "contains no image"),
         ("a.gwy", b"GWYP" + b"GwyContainer\0" + struct.pack("<I", 99), "ends in the middle of an object"),
@@ -162,7 +162,7 @@ def test_a_folder_is_no_file(tmp_path: Path) -> None:
 
 def test_objects_in_a_npy_file_are_never_made(tmp_path: Path) -> None:
     np.save(tmp_path / "a.npy", np.array([[object()] * 40] * 40), allow_pickle=True)
-    assert "is no whole .npy file of numbers" in why(tmp_path / "a.npy")
+    assert "is not a complete .npy file of numbers" in why(tmp_path / "a.npy")
 
 
 @given(st.data())

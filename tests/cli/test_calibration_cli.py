@@ -287,7 +287,7 @@ def test_an_outlier_is_named_by_its_line(lab: Path) -> None:
     path = write_csv(lab / "size.csv", drive_v=DRIVES, actual_nm=sizes)
     path.write_text("# Monday\n" + path.read_text("utf-8"), "utf-8")
     outcome = run("calibrate", "size", "--axis", "x", "size.csv", "--v-max", "100")
-    assert "outlier: size.csv:6: far from what the other points say; kept." in outcome.out
+    assert "outlier: size.csv:6: far from the other points, but used." in outcome.out
 
 
 @pytest.mark.parametrize(
@@ -311,7 +311,7 @@ def test_an_outlier_is_named_by_its_line(lab: Path) -> None:
         (("size", "--axis", "x", "offset.csv", "--v-max", "100"), 2, "drive_v is missing"),
         (("hysteresis", "--axis", "x", "--v-max", "100"), 2, "Missing argument 'DATA.CSV...'"),
         (("hysteresis", "--axis", "x", "trace30.csv", "--v-max", "100", "--delay-s", "x"), 2, "seconds, or fit"),
-        (("frequency", "--axis", "x", "frequency.csv", "--from-hz", "1e6"), 2, "no row lies from 1e+06 to inf Hz"),
+        (("frequency", "--axis", "x", "frequency.csv", "--from-hz", "1e6"), 2, "no row is between 1e+06 and inf Hz"),
         (("frequency", "--axis", "x", "frequency.csv", "--to-hz", "1"), 2, "one frequency does not determine alpha"),
     ],
 )

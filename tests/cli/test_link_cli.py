@@ -61,7 +61,7 @@ def test_an_upload_says_what_came_of_it(bench: Bench, folder: Path, scan: Prepar
     assert (first.status, first.err) == (0, "")
     name = f"annexin_200nm {scan.digest[:12]}"
     lines = first.out.splitlines()
-    assert lines[0] == f"{name} in force, generation 2, after line 0 of the old scan"
+    assert lines[0] == f"{name} is active, generation 2, after line 0 of the old scan"
     assert lines[1].startswith(f"{len(scan.image('fourier').data)} bytes as Fourier words in 0.")
     assert lines[1].endswith(" kB/s)")
     assert lines[2:] == ["the device is parked; start the scan with `tablegen trigger`"]
@@ -69,7 +69,7 @@ def test_an_upload_says_what_came_of_it(bench: Bench, folder: Path, scan: Prepar
     again = bench.run("upload", folder)
     assert again.out == f"{name} is already active, generation 2: nothing sent (--force sends it again)\n"
     forced = bench.run("upload", folder, "--force", "--as", "table", "--baud", "460800")
-    assert forced.out.startswith(f"{name} in force, generation 3")
+    assert forced.out.startswith(f"{name} is active, generation 3")
     assert f"{len(scan.image('table').data)} bytes as tables in " in forced.out
     assert bench.asked == [*[("virtual", 115200)] * 3, ("virtual", 460800)]
 
@@ -108,14 +108,14 @@ def test_a_dry_run_without_a_port_tells_sizes_and_times(folder: Path, scan: Prep
 def test_a_dry_run_with_a_port_asks_and_sends_nothing(bench: Bench, folder: Path, info: DeviceInfo) -> None:
     outcome = bench.run("upload", folder, "--dry-run")
     assert outcome.status == 0
-    assert outcome.out.splitlines()[-1].startswith("the device would take it: ")
+    assert outcome.out.splitlines()[-1].startswith("the device would accept the scan: ")
     assert bench.device.status().received == 0
     assert bench.device.status().hash.hex() == BOOT.digest
     bench.device.permits = False
     assert "its interlock is open" in bench.run("upload", folder, "--dry-run").out
     bench.device.permits = True
     bench.run("upload", folder)
-    assert bench.run("upload", folder, "--dry-run").out.splitlines()[-1] == "the device has it in force already"
+    assert bench.run("upload", folder, "--dry-run").out.splitlines()[-1] == "the scan is already active on the device"
     small = Bench(model(replace(info, image_bytes=500)))
     outcome = small.run("upload", folder, "--dry-run")
     assert (outcome.status, outcome.err.count("\n")) == (9, 1)
@@ -126,7 +126,7 @@ def test_a_direct_table_is_said_to_have_no_fourier_form(tmp_path: Path) -> None:
     direct = build(tmp_path, Variant({"x.table": {"mode": "direct", "bits": 16}, "timing.lines": 40})).folder
     outcome = run("upload", direct, "--dry-run")
     assert outcome.status == 0
-    assert "fourier   none: x: a direct table cannot be rendered" in outcome.out
+    assert "fourier   none: x: a direct table cannot be computed" in outcome.out
     with patch("tablegen.link.device.open_port", Bench(model()).open):
         outcome = run("upload", direct, "--as", "fourier", "--port", "virtual")
     assert (outcome.status, outcome.out) == (9, "")
@@ -143,7 +143,7 @@ def test_status_in_words(bench: Bench, folder: Path, scan: PreparedScan) -> None
     assert rows["scan"] == f"{BOOT.digest[:12]}, generation 1"
     assert rows["upload"] == "none in progress"
     assert rows["faults"] == "none"
-    assert rows["device"].startswith("500000 ticks a second, takes tables and Fourier words of 64 harmonics")
+    assert rows["device"].startswith("500000 ticks/s, accepts tables and Fourier words of 64 harmonics")
     assert rows["x"].startswith("2^11 words of 16 bits, codes 0..65535 of 16 bits, steps to 2621")
     assert "interlock" not in rows
     bench.run("upload", folder)
@@ -160,10 +160,10 @@ def test_status_of_a_device_that_waits_for_much(info: DeviceInfo) -> None:
     bench.device.player.faults, bench.device.player.fault_counts = 5, (3, 0, 1, 0)  # type: ignore[misc]
     rows = dict(line.split(maxsplit=1) for line in bench.run("status").out.splitlines())
     assert rows["state"] == "no scan yet; send one with `tablegen upload`"
-    assert rows["scan"] == "not known by its hash, generation 0"
+    assert rows["scan"] == "hash unknown, generation 0"
     assert rows["faults"] == "slew 3, overrun 1; clear with `tablegen clear`"
     assert rows["interlock"] == "open: no upload can become active"
-    assert "rate not known" in rows["device"]
+    assert "rate unknown" in rows["device"]
     assert rows["device"].endswith("has a key")
 
 
@@ -181,11 +181,11 @@ def test_status_in_json(bench: Bench) -> None:
 def test_trigger_and_park(bench: Bench, folder: Path) -> None:
     bench.run("upload", folder)
     assert bench.run("trigger").out == "plays until it is parked\n"
-    assert bench.run("trigger").out.startswith("plays already, line ")
+    assert bench.run("trigger").out.startswith("already playing, line ")
     counted = bench.run("trigger", "--frames", "2")
     assert (counted.status, counted.out) == (9, "")
     assert "`tablegen park --wait` first" in counted.err
-    assert bench.run("park").out == "on its way to park\n"
+    assert bench.run("park").out == "ramping to the park codes\n"
     assert bench.run("park", "--wait").out == "parked\n"
     assert bench.run("trigger", "--frames", "2").out == "plays 2 frames\n"
     assert bench.run("park", "--wait", "--timeout", "5").out == "parked\n"
@@ -195,7 +195,7 @@ def test_trigger_and_park(bench: Bench, folder: Path) -> None:
         (0, "triggered; 1 frame over, or the scan did not start: see `tablegen status`\n"),
         (0, "plays 1 frame\n"),
     ]
-    assert bench.run("clear").out == "faults forgotten\n"
+    assert bench.run("clear").out == "faults cleared\n"
 
 
 def test_trigger_without_a_scan_or_a_clock(info: DeviceInfo) -> None:
@@ -204,7 +204,7 @@ def test_trigger_without_a_scan_or_a_clock(info: DeviceInfo) -> None:
     assert "has no scan yet" in empty.err
     stopped = Bench(model(info), tick_hz=0).run("trigger")
     assert stopped.status == 9
-    assert "it does not play" in stopped.err
+    assert "the device does not play" in stopped.err
 
 
 def test_park_that_does_not_come_about(bench: Bench) -> None:
@@ -218,14 +218,14 @@ def test_park_that_does_not_come_about(bench: Bench) -> None:
 def test_readback_compares_and_saves(bench: Bench, folder: Path, scan: PreparedScan, tmp_path: Path) -> None:
     outcome = bench.run("readback", folder)
     assert (outcome.status, outcome.out) == (9, ""), "the scan came with the firmware"
-    assert "there is nothing that could be read" in outcome.err
+    assert "there is nothing to read" in outcome.err
     bench.run("upload", folder)
     size = len(scan.image("table").data)
     shown = bench.run("readback", folder, "-o", tmp_path / "playing.bin")
     assert (shown.status, shown.err) == (0, "")
     assert shown.out.splitlines() == [
         f"{tmp_path / 'playing.bin'}: {size} bytes",
-        f"the device plays annexin_200nm {scan.digest[:12]}: {size} bytes, all the same",
+        f"the device plays annexin_200nm {scan.digest[:12]}: {size} bytes, all equal",
     ]
     assert (tmp_path / "playing.bin").read_bytes() == scan.image("table").data
 
@@ -249,7 +249,8 @@ def test_readback_says_the_first_difference(bench: Bench, folder: Path, scan: Pr
     outcome = bench.run("readback", folder)
     assert (outcome.status, outcome.out) == (5, "")
     assert outcome.err == (
-        f"the device does not play annexin_200nm: x: table word 100 (byte 392) is {word ^ 1}, not {word} (and 1 more)\n"
+        "the device plays a different scan than annexin_200nm: "
+        f"x: table word 100 (byte 392) is {word ^ 1}, not {word} (and 1 more)\n"
     )
 
 

@@ -126,7 +126,7 @@ def test_the_trigger_and_the_drive_agree(folder: Path) -> None:
     assert triggered.status == 0, triggered.err
     one, other = json.loads(with_drive.out), json.loads(triggered.out)
     assert other["layer"]["a"][:3] == pytest.approx(one["layer"]["a"][:3], abs=5e-5)
-    assert "without drive_v nothing says" in other["remarks"][-1]
+    assert "without drive_v it is not checked" in other["remarks"][-1]
     slow = record(folder, clock=2e-3, without=("drive_v",))
     fitted = refining(folder, slow, "--triggered", "--period-s", "0.01002", "--json")
     assert json.loads(fitted.out)["measured"]["residual_rms_percent"] == pytest.approx(
@@ -149,7 +149,7 @@ def test_a_sensor_that_is_late_or_turned(folder: Path) -> None:
     assert measured[2] == pytest.approx(measured[0], rel=0.1)
     turned = json.loads(refining(folder, record(folder, flip=-1.0), "--json").out)
     assert turned["layer"]["b"][:3] == pytest.approx(right["layer"]["b"][:3], abs=2e-5)
-    assert any("its sign was turned" in remark for remark in turned["remarks"])
+    assert any("its sign was inverted" in remark for remark in turned["remarks"])
 
 
 def test_a_trace_that_is_worse_is_not_learnt_from(folder: Path) -> None:
@@ -230,7 +230,7 @@ def test_a_trigger_where_the_line_turns(folder: Path) -> None:
     """Nothing tells it from a sensor that counts the other way; it is said."""
     trace = record(folder, clock=0.0, without=("drive_v",))
     late = refining(folder, trace, "--triggered", "--delay-s", "0.005")
-    assert "its sign was turned; if the sensor counts upwards, time 0 is where the line turns" in late.out
+    assert "its sign was inverted; if the sensor counts upwards, time 0 is where the line turns" in late.out
     assert "its sign" not in refining(folder, trace, "--triggered").out
 
 

@@ -1485,6 +1485,7 @@ REMEDIES = [
 ]
 
 
+@pytest.mark.common
 @pytest.mark.parametrize(("wrong", "advice", "remedy"), REMEDIES, ids=lambda value: str(value)[:60])
 def test_what_a_message_advises_helps(here: Path, wrong: tuple[str, ...], advice: str, remedy: tuple[str, ...]) -> None:
     scan = edited(SCAN, *wrong, "- [limits]")

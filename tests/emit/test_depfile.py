@@ -269,10 +269,10 @@ def test_a_file_that_is_no_depfile_is_kept(scan: Path) -> None:
     """Nothing that a slip names is removed."""
     link = scan.parent / "link.d"
     link.symlink_to(scan)
-    for file, why in ((scan, "is the scan"), (link, "is no regular file")):
+    for file, why in ((scan, "is the scan file"), (link, "is not a regular file")):
         outcome = run("build", scan, "-o", scan.parent / "out", "--depfile", file)
         assert (outcome.status, outcome.out) == (2, "")
-        assert outcome.messages == [f"{file}: {why}; --depfile needs a file of its own"]
+        assert outcome.messages == [f"{file}: {why}; --depfile needs its own file"]
     assert scan.read_text("utf-8") == SCAN
     assert link.is_symlink()
     assert not (scan.parent / "out").exists()

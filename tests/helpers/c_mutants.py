@@ -31,7 +31,7 @@ from tablegen.verification.stream import Script, compare
 HERE = Path(__file__).parent
 OPTIONS = ("-std=c99", "-O1", "-DDAC_WAIT=0")  # as many runs as can be
 CHECKS = {"checks": (), "checks small": ("-DDAC_SMALL=1",), "checks split": ("-DDAC_LONG_MULTIPLY=0",)}
-PLAY_S, CHECK_S, THREADS_S = 20, 120, 120  # of CPU time: what does not hang takes a second of it, two, and three
+PLAY_S, CHECK_S = 20, 120  # of CPU time: what does not hang takes a second of it, and two
 _PROGRAMS = 3000  # between two threads
 
 
@@ -84,7 +84,7 @@ def judge(mutant: Mutant | None, folder: Path, where: str = "") -> Verdict:
         for seed in range(1, 4):
             done = play_threads(compile_threads(folder, "gcc", True, runtime), _PROGRAMS, seed)
             if done.returncode:
-                return Verdict(True, "a race" if done.returncode == 66 else done.stderr.strip())
+                return Verdict(True, {66: "a race", ENDED: "hangs"}.get(done.returncode, done.stderr.strip()))
         return Verdict(False, "")
     if where in CHECKS:
         options = (*OPTIONS, *CHECKS[where])

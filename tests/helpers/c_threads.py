@@ -6,9 +6,11 @@ from pathlib import Path
 from subprocess import CompletedProcess, run
 
 from building import run_clean
+from limits import within
 
 from tablegen.resources import c_runtime
 
+_PLAY_S = 300  # of CPU time; it takes five
 HERE = Path(__file__).parent
 # Accesses to volatile words are calls, to c_fences.c.
 DISTINGUISH = {
@@ -39,6 +41,7 @@ def compile_threads(
 
 
 def play(program: Path, programs: int, seed: int) -> CompletedProcess[str]:
-    """Run it; a race is an exit status of 66, as are too many of them."""
+    """Run it; a race is an exit status of 66, as are too many of them, and ``ENDED`` tells that it hangs."""
     environment = {**os.environ, "TSAN_OPTIONS": "halt_on_error=1 exitcode=66"}
-    return run([program, str(programs), str(seed)], env=environment, capture_output=True, text=True, check=False)
+    command = within(_PLAY_S, [program, str(programs), str(seed)])
+    return run(command, env=environment, capture_output=True, text=True, check=False)

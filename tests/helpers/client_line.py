@@ -121,7 +121,7 @@ class VirtualLine:
 
     def _check(self) -> None:
         if not self.there:
-            raise LinkLost("the virtual port: the port has gone")
+            raise LinkLost("the virtual port: the port disappeared")
 
     def _advance(self, end: float) -> None:
         """To the next thing that happens, at most to ``end``."""

@@ -179,4 +179,4 @@ class Port:
 
     def _check(self) -> None:
         if not self._line.is_open(self):
-            raise LinkLost("the virtual port has gone")
+            raise LinkLost("the virtual port disappeared")

@@ -5,7 +5,8 @@ from typing import Any
 
 import pytest
 
-_COMMON = ("clang", "g++", "gcc-c++")  # beginnings of names of tools
+LONG_TEST = (pytest.mark.long, pytest.mark.timeout(86_400))
+_COMMON = ("clang", "g++", "gcc-c++", "gcc-c11", "gcc-c99-32", "gcc_")  # beginnings of names of tools and dialects
 _REST = ("cppcheck", "ghdl", "zig")
 
 

@@ -110,7 +110,7 @@ def test_without_an_opener_a_lost_port_is_the_end() -> None:
     line = VirtualLine(model())
     device = Device(line, random=Random(1))
     line.there = False
-    with pytest.raises(LinkLost, match="the port has gone"):
+    with pytest.raises(LinkLost, match="the port disappeared"):
         device.park()
 
 
@@ -191,7 +191,7 @@ def test_two_hosts_get_an_error_that_says_so() -> None:
             return [Frame(Request.HELLO, 9, 12345, b"\1").encode(), piece] if stolen else [piece]
 
         line.spoil_out = steal
-        with pytest.raises(LinkLost, match="another program talks to the device"):
+        with pytest.raises(LinkLost, match="another program uses the device"):
             device.status()
         line.spoil_out = lambda piece: [piece]
         assert device.status().state == DeviceState.PARKED

@@ -87,7 +87,7 @@ def test_automatic_is_the_smaller_form_that_the_device_takes(scan: PreparedScan,
 def test_a_direct_table_has_no_fourier_words(tmp_path: Path) -> None:
     direct = PreparedScan.of_build(build(tmp_path, VARIANTS["direct"]).folder)
     assert direct.image("auto").data == direct.image("table").data
-    with pytest.raises(Unsuitable, match="x: a direct table cannot be rendered"):
+    with pytest.raises(Unsuitable, match="x: a direct table cannot be computed"):
         direct.image("fourier")
     mixed = Variant({"x.table": {"mode": "direct", "bits": 16}, "timing.lines": 40})
     both = PreparedScan.of_build(build(tmp_path / "mixed", mixed).folder)
@@ -172,7 +172,7 @@ WRONG = {
         lambda info: replace(info, update_rate_hz=250000),
         "table",
         [
-            "built for 500000 ticks a second; the device makes 250000: each line would take 2 times as long; set "
+            "built for 500000 ticks a second; the device runs at 250000: each line would take 2 times as long; set "
             "dac.update_rate_hz, or allow it with --any-rate"
         ],
     ),

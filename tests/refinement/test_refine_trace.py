@@ -172,7 +172,7 @@ def test_too_little_of_a_displacement() -> None:
     turns = np.arange(200) / 100
     with pytest.raises(Unphysical, match="does not move"):
         fit_displacement(turns, np.ones(200), 8)
-    with pytest.raises(Unphysical, match="2 periods are recorded, and 2 to settle leave no whole one"):
+    with pytest.raises(Unphysical, match="2 periods are recorded, which leaves no whole period after 2 to settle"):
         fit_displacement(turns, turns, 8, settle_periods=2)
     uneven = np.concatenate([np.linspace(0.0, 0.2, 150), [1.1]])
     with pytest.raises(Unphysical, match="do not determine"):

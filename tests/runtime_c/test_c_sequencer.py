@@ -31,7 +31,7 @@ from c_scripts import (
     long_play,
     renderings,
 )
-from sets import common
+from sets import LONG_TEST, common
 from stream_configurations import FEW, SWAPS, SWAPS_SLOW, random_swaps
 from stream_laws import follow_their_programs
 from stream_scripts import FAULTS, flag, in_any_order, occurrences
@@ -135,7 +135,7 @@ def test_a_swap_is_requested_at_every_tick(benches: Benches) -> None:
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize("swaps", [SWAPS, pytest.param(SWAPS_SLOW, marks=pytest.mark.long)])
+@pytest.mark.parametrize("swaps", [SWAPS, pytest.param(SWAPS_SLOW, marks=LONG_TEST)])
 def test_no_line_mixes_programs(swaps: int, benches: Benches) -> None:
     rng = np.random.default_rng(swaps)
     for _ in range(0, swaps, SWAPS):
@@ -187,7 +187,7 @@ def test_functions_with_sanitizers(compiler: str, tmp_path: Path) -> None:
 # What a build emits.
 
 
-@pytest.mark.parametrize("name", common(("example", "direct_steps"), VARIANTS))
+@pytest.mark.parametrize("name", common(("short_frame", "direct_steps"), VARIANTS))
 def test_a_build_s_header_plays_a_frame_a_swap_and_parks(name: str, tmp_path: Path) -> None:
     """The words that the converter gets, by ``DAC_PROGRAM`` and ``DAC_CONVERTER`` of the emitted header."""
     built = build(tmp_path, VARIANTS[name])

@@ -127,7 +127,7 @@ def test_the_command_line_and_firmware_in_qemu(build_for: Callable[[Board], Buil
         assert built.boot.digest[:8] in _works("status", *port)
         _works("trigger", *port)
         for form, file, scan in zip(("table", "fourier"), built.files, built.scans, strict=True):
-            assert "in force" in _works("upload", file, *port, "--as", form, *_PATIENT)
+            assert "is active" in _works("upload", file, *port, "--as", form, *_PATIENT)
             _play(machine, check, scan.digest)
         _works("readback", built.files[1], *port, *_PATIENT)
         _works("park", *port, "--wait", *_PATIENT)

@@ -58,12 +58,12 @@ def provide(folder: Path, monkeypatch: pytest.MonkeyPatch, package: str, entry: 
 def test_an_unknown_name_is_told_with_those_that_there_are() -> None:
     with pytest.raises(UnknownFormat) as caught:
         get("verilgo")
-    assert str(caught.value) == f"'verilgo' is no format; there are {', '.join(names())}"
+    assert str(caught.value) == f"'verilgo' is not a format; formats are {', '.join(names())}"
 
 
 @pytest.mark.parametrize("name", ["", ".", "..", "../c", "__init__", "c.py", "C", "intel_hex"])
 def test_a_name_is_no_path_and_no_module(name: str) -> None:
-    with pytest.raises(UnknownFormat, match="is no format"):
+    with pytest.raises(UnknownFormat, match="is not a format"):
         get(name)
 
 
@@ -77,7 +77,7 @@ def test_an_unknown_name_in_a_scan_file_has_its_line(tmp_path: Path) -> None:
     line = len(scan.read_text("utf-8").splitlines())
     assert outcome.status == 2
     assert outcome.messages == [
-        f"{scan}:{line}: emit.formats: 'rust' is no format; there are {', '.join(names())}",
+        f"{scan}:{line}: emit.formats: 'rust' is not a format; formats are {', '.join(names())}",
     ]
     assert not (tmp_path / "out").exists()
 
@@ -86,7 +86,7 @@ def test_an_unknown_name_on_the_command_line_has_none(tmp_path: Path) -> None:
     outcome = run("build", write_pair(tmp_path), "-o", tmp_path / "out", "-f", "rust")
     assert outcome.status == 2
     (told,) = outcome.messages
-    assert told.startswith("formats: 'rust' is no format; there are ")
+    assert told.startswith("formats: 'rust' is not a format; formats are ")
     assert not (tmp_path / "out").exists()
 
 
@@ -205,8 +205,8 @@ def test_one_that_is_gone_is_verified_by_its_hashes(tmp_path: Path, monkeypatch:
     formats.get.cache_clear()
     outcome = run("verify", "--target", "files", tmp_path / "out")
     assert outcome.status == 0
-    assert "'words' is no format" in outcome.out
-    assert "its files were held against their SHA-256 alone" in outcome.out
+    assert "'words' is not a format" in outcome.out
+    assert "only the SHA-256 of its files was checked" in outcome.out
 
 
 @pytest.mark.parametrize(
