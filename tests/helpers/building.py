@@ -41,6 +41,7 @@ PACKAGES = {
     "ninja": "ninja-build",
     "nm": "binutils",
     "qemu-mips": "qemu-user",
+    "srec_cat": "srecord",
     "vvp": "iverilog",
     "yosys-smtbmc": "yosys",
 }
