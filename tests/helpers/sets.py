@@ -6,7 +6,8 @@ from typing import Any
 import pytest
 
 LONG_TEST = (pytest.mark.long, pytest.mark.timeout(86_400))
-_COMMON = ("clang", "g++", "gcc-c++", "gcc-c11", "gcc-c99-32", "gcc_", "ghdl")  # beginnings of names of tools and dialects
+# Beginnings of names of tools and dialects.
+_COMMON = ("clang", "g++", "gcc-c++", "gcc-c11", "gcc-c99-32", "gcc_", "ghdl")
 _REST = ("cppcheck", "zig")
 
 
