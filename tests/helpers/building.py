@@ -42,7 +42,6 @@ PACKAGES = {
     "srec_cat": "srecord",
     "nm": "binutils",
     "qemu-mips": "qemu-user",
-    "srec_cat": "srecord",
     "vvp": "iverilog",
     "yosys-smtbmc": "yosys",
 }
