@@ -113,7 +113,7 @@ VOUCHED = [
     pytest.param("g++20", "C++20", marks=pytest.mark.common),
     ("iverilog-2005", "Verilog"),
     ("iverilog-2012", "SystemVerilog"),
-    pytest.param("ghdl", "VHDL", marks=pytest.mark.rest),
+    pytest.param("ghdl", "VHDL", marks=pytest.mark.common),
 ]
 # Words of the property language that GHDL reserves only inside properties.
 TAKEN_BY_GHDL = {"assume_guarantee", "fairness", "strong"}

@@ -6,8 +6,9 @@ from typing import Any
 import pytest
 
 LONG_TEST = (pytest.mark.long, pytest.mark.timeout(86_400))
-_COMMON = ("clang", "g++", "gcc-c++", "gcc-c11", "gcc-c99-32", "gcc_")  # beginnings of names of tools and dialects
-_REST = ("cppcheck", "ghdl", "zig")
+# Beginnings of names of tools and dialects.
+_COMMON = ("clang", "g++", "gcc-c++", "gcc-c11", "gcc-c99-32", "gcc_", "ghdl")
+_REST = ("cppcheck", "zig")
 
 
 def by_tool(names: Iterable[str]) -> list[Any]:
