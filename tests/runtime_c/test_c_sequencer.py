@@ -70,7 +70,7 @@ def test_random_programs(name: str, benches: Benches) -> None:
 
 
 @pytest.mark.common
-@pytest.mark.parametrize("name", LONG)
+@pytest.mark.parametrize("name", common(("bits_16", "bits_24", "direct"), LONG))
 def test_long_lines(name: str, benches: Benches) -> None:
     script = long_play(name, 60_000)
     capture = everywhere(benches, script, LONG[name][0])

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from building import run, run_clean
-from sets import by_tool, quick
+from sets import by_tool, common
 
 from tablegen.resources import c_link, c_runtime
 
@@ -50,7 +50,7 @@ ANALYSERS = {
 }
 
 
-@pytest.mark.parametrize("choice", quick(QUICK, CHOICES))
+@pytest.mark.parametrize("choice", common(QUICK, CHOICES))
 @pytest.mark.parametrize("compiler", by_tool(COMPILERS))
 def test_no_warnings(compiler: str, choice: str, tmp_path: Path) -> None:
     run_clean([*COMPILERS[compiler], "-O2", *WARNINGS, *CHOICES[choice], "-c", *SOURCES], tmp_path)
