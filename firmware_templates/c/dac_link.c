@@ -1,4 +1,4 @@
-/* Bytes from the line, and what every request has to pass: docs/protocol.md. */
+/* Receives bytes from the line, and makes the checks that are common to all requests: docs/protocol.md. */
 #include "dac_link.h"
 
 #include "dac_axis.h"
@@ -6,7 +6,7 @@
 
 enum { VERSION = 1, MOST_READ = 240, LIMITS = 32 };
 #define MOST_FRAMES (UINT32_C(1) << 31)
-#define BLOCK (DAC_LINK_RING / 128) /* bytes of the ring that are given back at once */
+#define BLOCK (DAC_LINK_RING / 128) /* bytes of the ring that are freed at once */
 
 #if DAC_LINK_RING < 512 || DAC_LINK_RING > 32768 || (DAC_LINK_RING & (DAC_LINK_RING - 1)) != 0
 #error "DAC_LINK_RING is a power of two, 512..32768"
@@ -110,7 +110,7 @@ static dac_link_finding check_payload(const dac_link *l, uint8_t request, const 
     return good ? dac_link_fine() : dac_link_because(DAC_LINK_PAYLOAD, 0);
 }
 
-/* Of a request that acts, but for COMMIT, whose tag covers the image. The challenge is used up, right or wrong. */
+/* Checks the tag of a request that acts, except COMMIT, whose tag covers the image. Uses up the challenge, right or wrong. */
 static bool good_tag(dac_link *l, const uint8_t *frame, uint8_t length)
 {
     const uint8_t bytes = (uint8_t)(DAC_LINK_HEADER + plain_bytes(frame[0], length));
@@ -159,7 +159,7 @@ static dac_link_finding obey(dac_link *l, uint8_t request, const uint8_t *payloa
     }
 }
 
-/* What a request has to pass before anybody looks at what it wants; *again: it was answered before. */
+/* The checks that are common to all requests; *again: the request was answered before. */
 static dac_link_finding admit(dac_link *l, const uint8_t *frame, uint8_t length, bool acts, bool *again)
 {
     const uint8_t request = frame[0], seq = frame[1];
@@ -228,7 +228,7 @@ bool dac_link_work(dac_link *l)
         dac_link_settle(l);
     if (l->upload == DAC_LINK_CHECKING)
         dac_link_check_on(l);
-    /* While an answer leaves, what comes stays in the ring: each finds its place. */
+    /* While an answer is sent, received bytes stay in the ring, so that there is room for each answer. */
     if (!l->sending && (l->commit_due || l->aborts_due)) {
         dac_link_send_late(l);
     } else if (!l->sending) {

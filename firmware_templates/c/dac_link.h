@@ -1,7 +1,7 @@
-/* The device's end of the serial protocol (docs/protocol.md): new programs for a sequencer that goes on playing.
+/* The device side of the serial protocol (docs/protocol.md): loads new programs while the sequencer plays.
  *
- * C99, static, no heap, no C library. All is in one dac_link that the application owns, and in the tables that its
- * configuration names:
+ * C99, static, no heap, no C library. All memory is in one dac_link, which the application owns, and in the tables
+ * that its configuration names:
  *
  *     static dac_link link;
  *     dac_sequencer_init(&sequencer, &config.x.converter, &config.y.converter);
@@ -14,7 +14,7 @@
  *     }
  *
  * WHO MAY CALL WHAT. The link is a producer of its sequencer: dac_link_work() belongs where dac_sequencer_commit()
- * does. The application may arm, trigger and park there as well; programs, after the first, are the link's alone.
+ * does. The application may arm, trigger and park there as well; only the link loads programs after the first.
  * dac_link_receive() may interrupt everything but itself, and so may dac_link_transmit(). Nothing disables interrupts.
  */
 #ifndef DAC_LINK_H
@@ -29,71 +29,71 @@ extern "C" {
 #endif
 
 #ifndef DAC_LINK_RING
-#define DAC_LINK_RING 2048 /* bytes that wait for dac_link_work(): a power of two, 512..32768; 256 a frame */
+#define DAC_LINK_RING 2048 /* bytes received but not processed yet: a power of two, 512..32768; a frame takes 256 */
 #endif
 #ifndef DAC_LINK_SLICE
-#define DAC_LINK_SLICE 64 /* words, or bytes of the line, that dac_link_work() looks at in a call */
+#define DAC_LINK_SLICE 64 /* words, or received bytes, that one call of dac_link_work() processes */
 #endif
 
-#define DAC_LINK_ABORTS 8 /* as many as wait for a tick */
+#define DAC_LINK_ABORTS 8 /* ABORTs that can wait for a tick */
 
-/* Beyond these no program may go: straight binary codes, codes a tick, codes at a change of programs. */
+/* Limits of every program: straight binary codes, codes per tick, codes at a change of programs. */
 typedef struct {
     uint32_t code_min, code_max, max_step, max_jump;
 } dac_link_limits;
 
-/* What there is of an axis. */
+/* The resources of an axis. */
 typedef struct {
     dac_converter converter;
     dac_link_limits limits;
-    uint8_t word_bits;  /* of a table word, 8..24; more than 16 need DAC_TABLE_STORAGE_BITS 32 */
+    uint8_t word_bits;  /* bits of a table word, 8..24; more than 16 need DAC_TABLE_STORAGE_BITS 32 */
     uint8_t index_bits; /* a table has up to 2^index_bits words, 3..16 */
-    dac_word *table[2]; /* so many words each; one is written while the other one plays */
+    dac_word *table[2]; /* 2^index_bits words each; one is written while the other one plays */
     int32_t *fourier;   /* 2 harmonics + 1 words */
 } dac_link_axis;
 
 typedef struct {
     dac_link_axis x, y;
-    uint16_t harmonics;       /* most of an axis, up to 4096; 0: tables alone */
+    uint16_t harmonics;       /* maximum per axis, up to 4096; 0: tables only */
     uint8_t sine_index_bits;  /* at least the index_bits of both axes */
-    const int32_t *sine;      /* NAME_sine, as dac_synthesize() wants it */
-    uint32_t update_rate_hz;  /* 0: not known */
-    uint8_t window;           /* frames that may be on the way; 0: as many as the ring has room for */
+    const int32_t *sine;      /* NAME_sine, for dac_synthesize() */
+    uint32_t update_rate_hz;  /* 0: unknown */
+    uint8_t window;           /* frames that the host may send without an answer; 0: as many as the ring holds */
     uint8_t key_bytes;        /* 16..32, or 0: no key */
     const uint8_t *key;
-    const uint8_t *hash;      /* 32 bytes, of the program that comes with the firmware, or NULL: not known */
-    bool (*permits)(void);    /* the interlock, or NULL: there is none */
-    void (*random)(uint8_t bytes[16]); /* for challenges, or NULL: they come from key and boot count */
+    const uint8_t *hash;      /* 32 bytes: hash of the program in the firmware, or NULL: unknown */
+    bool (*permits)(void);    /* the interlock, or NULL: no interlock */
+    void (*random)(uint8_t bytes[16]); /* source of challenges, or NULL: they are derived from key and boot count */
 } dac_link_config;
 
-/* From here on to the functions: private, and here only so that the application can place it. */
+/* Private, down to the functions. It is declared here so that the application can allocate it. */
 
-/* An image: what BEGIN said of it, and its program words. Its tables are where the configuration says. */
+/* An image: the announcement of BEGIN, and the program words. The tables are in the memory of the configuration. */
 typedef struct {
     uint8_t info[48];
     uint8_t program[192];
 } dac_link_image;
 
-/* A place in an image. */
+/* A position in an image. */
 typedef struct {
     uint8_t part;  /* 0 program words, 1 x, 2 y, 3 behind them */
-    uint8_t byte;  /* of the word */
-    uint32_t word; /* of the part */
-    uint32_t held; /* the bytes of a word that are there already */
+    uint8_t byte;  /* byte of the word */
+    uint32_t word; /* word of the part */
+    uint32_t held; /* the bytes of a word that were received already */
 } dac_link_place;
 
-/* What stands in an image for an axis. */
+/* The content of an image for an axis. */
 typedef struct {
-    uint32_t words; /* that were sent: of the table, or Fourier words */
-    uint8_t bytes;  /* of each */
+    uint32_t words; /* number of words: table words, or Fourier words */
+    uint8_t bytes;  /* bytes per word */
     uint16_t harmonics; /* 0: a table */
 } dac_link_part;
 
-/* What is said to a request that acts; its answer, if it has one yet. */
+/* The last request that acts, and its answer, if it has one. */
 typedef struct {
     bool known; /* there is such a request */
     uint8_t request, seq;
-    uint8_t type, length; /* of the answer; type 0: not yet */
+    uint8_t type, length; /* type and length of the answer; type 0: no answer yet */
     uint8_t payload[32];
 } dac_link_memory;
 
@@ -101,7 +101,7 @@ typedef struct {
 typedef struct {
     uint8_t stage, axis;
     uint32_t at;               /* word, or advance */
-    uint32_t phase, remainder; /* of the advance */
+    uint32_t phase, remainder; /* phase and remainder of the advance */
     int32_t first, before;     /* codes */
     uint32_t steepest, rise;   /* of a table */
     int32_t lowest, highest;   /* words of the table of y that plays */
@@ -114,7 +114,7 @@ typedef struct {
     const dac_link_config *config;
     dac_sequencer *sequencer;
     uint32_t boot, bad_frames;
-    dac_link_limits x_limits, y_limits; /* in force */
+    dac_link_limits x_limits, y_limits; /* the active limits */
 
     /* session */
     bool opened;
@@ -123,20 +123,20 @@ typedef struct {
 
     /* upload */
     uint8_t upload;        /* as STATUS has it */
-    uint8_t idle, playing; /* of the two images and tables */
+    uint8_t idle, playing; /* which of the two images and tables */
     bool uploaded;         /* the program that plays came by the link */
     uint32_t received;
-    uint32_t taken_generation, taken_line; /* when it came into force */
+    uint32_t taken_generation, taken_line; /* when the program became active */
     dac_link_place place;
     dac_link_part x_part, y_part;
     dac_link_image image[2];
 
-    /* a COMMIT at work, and ABORTs that wait with it */
+    /* a COMMIT in progress, and ABORTs that wait with it */
     bool committing, commit_is_last, commit_due, abort_is_last, aborts_due;
     uint8_t commit_seq, commit_type, commit_length, commit_payload[8];
     uint8_t aborts, aborts_said, abort_seq[DAC_LINK_ABORTS];
     uint32_t commit_session, abort_session[DAC_LINK_ABORTS], abort_generation;
-    uint32_t swaps, line; /* before the one that waits */
+    uint32_t swaps, line; /* before the committed program */
     dac_link_check check;
 
     /* key */
@@ -146,11 +146,11 @@ typedef struct {
     dac_link_mac digest;
 
     dac_link_reader reader;
-    /* what leaves: dac_link_work() fills it, dac_link_transmit() empties it */
+    /* output: dac_link_work() fills it, dac_link_transmit() empties it */
     volatile uint8_t sending;
     uint16_t out_at, out_length;
     uint8_t out[256];
-    /* what comes: dac_link_receive() writes head and lost, dac_link_work() freed */
+    /* input: dac_link_receive() writes head and lost, dac_link_work() writes freed */
     volatile uint8_t freed;
     volatile uint16_t head;
     volatile uint32_t lost;
@@ -158,17 +158,17 @@ typedef struct {
     volatile uint8_t ring[DAC_LINK_RING];
 } dac_link;
 
-/* After dac_sequencer_init(), and before the interrupt of the UART is enabled. `boot` should be another one at each
- * start. The program of the firmware is loaded and committed by the application. */
+/* Call it after dac_sequencer_init(), and before the interrupt of the UART is enabled. `boot` should differ from start to
+ * start. The application loads and commits the program of the firmware. */
 void dac_link_init(dac_link *l, const dac_link_config *config, dac_sequencer *sequencer, uint32_t boot);
 
-/* A byte from the line: interrupt. False: there was no room, and it is lost and counted. */
+/* Takes a received byte; called by the interrupt. False: the buffer was full; the byte is lost and counted. */
 bool dac_link_receive(dac_link *l, uint8_t byte);
 
-/* From the main loop, again and again: a bounded piece of what is to be done. True if there may be more. */
+/* Does a bounded piece of work; the main loop calls it repeatedly. Returns true if there may be more to do. */
 bool dac_link_work(dac_link *l);
 
-/* The next byte for the line, or -1: main loop, or the interrupt of a UART that can take one. */
+/* Returns the next byte to send, or -1. Called by the main loop, or by the interrupt of a UART that is ready to send. */
 int dac_link_transmit(dac_link *l);
 
 #ifdef __cplusplus

@@ -1,4 +1,4 @@
-/* Answers: what a refusal says, what is said again, and how all of it leaves. */
+/* Answers: refusals, repeated answers, and how they are sent. */
 #include "dac_axis.h"
 #include "dac_link_parts.h"
 
@@ -25,7 +25,7 @@ void dac_link_recall(const dac_link *l, dac_link_answer *a)
     dac_link_copy(a->payload, l->last.payload, a->length);
 }
 
-/* The line. `out` is dac_link_transmit()'s while `sending` is set, and else the main loop's. */
+/* Output. `out` belongs to dac_link_transmit() while `sending` is set, otherwise to the main loop. */
 
 void dac_link_send(dac_link *l, const dac_link_answer *a)
 {

@@ -1,4 +1,4 @@
-/* What a device looks at before it takes a program, in slices. tablegen/link/acceptance.py is the same for hosts. */
+/* The checks of a program before it is loaded, in slices. tablegen/link/acceptance.py has the same for hosts. */
 #include "dac_axis.h"
 #include "dac_link_parts.h"
 
@@ -12,7 +12,7 @@ struct output {
     uint32_t length;
     unsigned guard, gain_q;
     int32_t gain, code_min, code_max, park_code;
-    int64_t offset; /* and half an LSB */
+    int64_t offset; /* offset plus half an LSB */
 };
 
 static const dac_link_finding nothing = {DAC_LINK_NO_REASON, 0};
@@ -42,7 +42,7 @@ static struct output output_of(const dac_link *l, unsigned axis)
     return o;
 }
 
-/* Of the program that plays, from its bank: the consumer reads that too, and nobody writes it. */
+/* Reads the active program from its bank: the consumer reads it too, and nobody writes it. */
 static struct output playing_of(const dac_link *l, unsigned axis)
 {
     const dac_bank *const bank = &l->sequencer->bank[l->sequencer->playing];
@@ -109,7 +109,7 @@ static bool good_period(const dac_link_image *image, unsigned axis)
     const uint32_t lines = dac_link_program_word(image, 0, DAC_LINK_FRAME_LINES);
     const bool steps = dac_link_program_word(image, 0, DAC_LINK_Y_STEPS) != 0;
     const uint32_t wanted = axis == 0 ? ticks : steps ? lines : ticks * lines;
-    uint32_t step = UINT32_MAX / wanted, remainder = UINT32_MAX % wanted + 1; /* of 2^32 */
+    uint32_t step = UINT32_MAX / wanted, remainder = UINT32_MAX % wanted + 1; /* quotient and remainder of 2^32 */
 
     if (remainder == wanted) {
         step++;
@@ -191,7 +191,7 @@ static dac_link_finding check_fourier(dac_link *l, unsigned axis, bool *done)
     return *done && c->sum >= UINT64_C(1) << 32 ? finding(DAC_LINK_FOURIER, axis, 0) : nothing;
 }
 
-/* All at once: what dac_synthesize() has begun it ends. It refuses nothing that check_fourier() lets pass. */
+/* Not in slices: dac_synthesize() computes a whole table. It accepts all that check_fourier() accepts. */
 static void render(const dac_link *l, unsigned axis)
 {
     const dac_link_axis *const here = dac_link_axis_of(l, axis);
@@ -273,7 +273,7 @@ static dac_link_finding check_advances(dac_link *l, unsigned axis, uint32_t adva
     return *done && distance(c->first, c->before) > max_step ? finding(DAC_LINK_SLEW, axis, advances - 1) : nothing;
 }
 
-/* Of a longer period the steepest segment. */
+/* For a longer period: the steepest segment. */
 static dac_link_finding check_segments(dac_link *l, unsigned axis, uint32_t advances, bool *done)
 {
     const struct output o = output_of(l, axis);
@@ -343,7 +343,7 @@ static dac_link_finding check_jump(dac_link *l, bool *done)
          : jump[1] > l->y_limits.max_jump ? finding(DAC_LINK_JUMP, 1, 0) : nothing;
 }
 
-/* What memory holds, and not what came by the line. */
+/* Checks the content of the memory, not the received bytes. */
 static dac_link_finding check_crc(dac_link *l, bool *done)
 {
     dac_link_check *const c = &l->check;

@@ -1,11 +1,11 @@
 /* COBS and CRC-32. */
 #include "dac_link_frame.h"
 
-#define WHOLE UINT32_C(0xDEBB20E3) /* a CRC that goes on over itself ends here */
+#define WHOLE UINT32_C(0xDEBB20E3) /* the result of a CRC over data and its own CRC */
 
 uint32_t dac_link_crc(uint32_t crc, uint8_t byte)
 {
-    /* By four bits: a table of 256 words would be a good part of the memory of a small processor. */
+    /* Four bits at a time: a table of 256 words would take much of the memory of a small processor. */
     static const uint32_t by_four[16] = {
         UINT32_C(0x00000000), UINT32_C(0x1DB71064), UINT32_C(0x3B6E20C8), UINT32_C(0x26D930AC),
         UINT32_C(0x76DC4190), UINT32_C(0x6B6B51F4), UINT32_C(0x4DB26158), UINT32_C(0x5005713C),

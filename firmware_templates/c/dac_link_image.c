@@ -34,7 +34,7 @@ static dac_link_part table_of(const dac_link_image *image, unsigned axis)
     return part;
 }
 
-/* The program words are complete: what follows them? */
+/* The program words are complete: computes what follows them. */
 static dac_link_finding lay_out(dac_link *l)
 {
     const dac_link_image *const image = &l->image[l->idle];
@@ -57,7 +57,7 @@ static dac_link_finding lay_out(dac_link *l)
                                                               : dac_link_because(DAC_LINK_LENGTH, bytes);
 }
 
-/* On to the next byte, of parts of these sizes. */
+/* Advances to the next byte, for parts of these sizes. */
 static void next(dac_link_place *at, const dac_link_part *x, const dac_link_part *y)
 {
     static const dac_link_part program = {DAC_LINK_PROGRAM, 1, 0};
@@ -71,7 +71,7 @@ static void next(dac_link_place *at, const dac_link_part *x, const dac_link_part
         return;
     at->word = 0;
     at->part++;
-    if (at->part == 1 && x->words == 0) /* no program plays that, but an image may say so */
+    if (at->part == 1 && x->words == 0) /* no valid program has this, but an image may */
         at->part++;
     if (at->part == 2 && y->words == 0)
         at->part++;
@@ -147,7 +147,7 @@ uint8_t dac_link_read_back(const dac_link *l, uint32_t offset, uint8_t *bytes, u
         if (at.part != 0)
             word = (uint32_t)dac_link_axis_of(l, at.part - 1u)->table[l->playing][at.word];
         else if (at.word >= 64 && at.word % 64 / 4 == DAC_LINK_ORDER)
-            word = 0; /* what plays is a table, wherever it came from */
+            word = 0; /* the active program plays a table, even if Fourier words were sent */
         else
             word = image->program[at.word];
         bytes[done] = (uint8_t)(word >> shift);

@@ -8,7 +8,7 @@ typedef struct {
     uint32_t chain[8];
     uint32_t count; /* bytes that were compressed */
     uint8_t used;   /* bytes in the block */
-    uint8_t size;   /* of the result */
+    uint8_t size;   /* bytes of the result */
     uint8_t block[64];
 } dac_link_mac;
 

@@ -1,4 +1,4 @@
-/* Private to the link: what is asked and answered, the key, an image in memory, and its checks. */
+/* Private to the link: requests and answers, the key, an image in memory, and its checks. */
 #ifndef DAC_LINK_PARTS_H
 #define DAC_LINK_PARTS_H
 
@@ -53,8 +53,8 @@ typedef struct {
     uint32_t session;
     uint8_t *payload; /* up to 244 bytes */
 } dac_link_answer;
-#define DAC_LINK_SILENT 0 /* in place of its type: it comes later */
-#define DAC_LINK_TAG 16   /* bytes */
+#define DAC_LINK_SILENT 0 /* in place of the type: the answer comes later */
+#define DAC_LINK_TAG 16   /* bytes of a tag */
 
 static inline dac_link_finding dac_link_because(uint8_t reason, uint32_t detail)
 {
@@ -73,7 +73,7 @@ static inline void dac_link_copy(uint8_t *to, const uint8_t *from, unsigned coun
         to[i] = from[i];
 }
 
-/* All bytes are looked at, always: how long it takes tells nothing. */
+/* Always compares all bytes, so that the time does not depend on them. */
 static inline bool dac_link_same(const uint8_t *a, const uint8_t *b, unsigned count)
 {
     unsigned differ = 0;
@@ -82,10 +82,10 @@ static inline bool dac_link_same(const uint8_t *a, const uint8_t *b, unsigned co
     return differ == 0;
 }
 
-/* Upload, as STATUS has it. */
+/* The values of `upload` in STATUS. */
 enum { DAC_LINK_NONE, DAC_LINK_RECEIVING, DAC_LINK_CHECKING, DAC_LINK_WAITING };
 
-/* What BEGIN says of an image. */
+/* The announcement of an image in BEGIN. */
 enum { DAC_LINK_HASH = 0, DAC_LINK_BYTES = 32, DAC_LINK_IMAGE_CRC = 36, DAC_LINK_SHAPES = 40 };
 #define DAC_LINK_PROGRAM 192 /* bytes of the program words */
 
@@ -122,11 +122,11 @@ static inline const uint8_t *dac_link_shape(const dac_link_image *image, unsigne
 
 void dac_link_refuse(dac_link_answer *a, uint8_t request, dac_link_finding why);
 
-/* What the last request that acted was told; and that again, if it comes again. */
+/* Stores the answer to a request that acts, and repeats it if the request is repeated. */
 void dac_link_remember(dac_link *l, uint8_t type, const uint8_t *payload, uint8_t length);
 void dac_link_recall(const dac_link *l, dac_link_answer *a);
 
-/* Onto the line, when nothing else is leaving. */
+/* Sends an answer; nothing else may be in transmission. */
 void dac_link_send(dac_link *l, const dac_link_answer *a);
 
 /* Answers that had to wait, one a call: there is one if commit_due or aborts_due. */
@@ -140,10 +140,10 @@ bool dac_link_tagged(const dac_link *l, const uint8_t *nonce, const uint8_t *req
 
 /* dac_link_image.c */
 
-/* Words of a table. */
+/* Number of words of a table. */
 uint32_t dac_link_table_words(const dac_link_image *image, unsigned axis);
 
-/* Most bytes of an image. */
+/* Maximum bytes of an image. */
 uint32_t dac_link_most_bytes(const dac_link_config *config);
 
 /* The next byte of the upload goes to its place. What is found is found once the program words are complete. */
@@ -179,7 +179,7 @@ dac_link_finding dac_link_set_limits(dac_link *l, const uint8_t *payload, uint8_
 /* A slice of the checks; behind the last the program is loaded and committed. */
 void dac_link_check_on(dac_link *l);
 
-/* What became of a program that waits. */
+/* Finds out whether a committed program was taken. */
 void dac_link_settle(dac_link *l);
 
 #endif

@@ -6,7 +6,7 @@ enum { TAKES_TABLES = 1, TAKES_FOURIER = 2, HAS_KEY = 4, READS_BACK = 8, HAS_INT
 enum { TWOS_COMPLEMENT = 64, LEFT_ALIGNED = 128 };
 enum { NO_PROGRAM, PARKED, PARKING, PLAYING };
 
-/* What is told of the device. */
+/* The description of the device. */
 
 static void put_limits(uint8_t *at, const dac_link_limits *limits)
 {
@@ -49,7 +49,7 @@ static void put_device(const dac_link *l, uint8_t *at)
 static void put_status(const dac_link *l, uint8_t *at)
 {
     const dac_status s = dac_sequencer_status(l->sequencer);
-    /* A swap that was not looked at yet has come into force all the same. */
+    /* A program may have become active before dac_link_work() has seen it. */
     const bool swapped = l->upload == DAC_LINK_WAITING && s.swaps != l->swaps;
     const bool uploaded = swapped || l->uploaded;
     const uint8_t upload = swapped ? (uint8_t)DAC_LINK_NONE : l->upload;

@@ -98,7 +98,7 @@ dac_link_finding dac_link_commit(dac_link *l, const uint8_t *payload, uint8_t le
     return dac_link_fine();
 }
 
-/* The COMMIT at work has an answer; the upload stays or is forgotten. */
+/* The COMMIT in progress has an answer; the upload is kept or discarded. */
 static void conclude(dac_link *l, uint8_t upload, uint8_t type, const uint8_t *payload, uint8_t length)
 {
     l->upload = upload;
@@ -164,7 +164,7 @@ static void say_aborted(dac_link *l, uint32_t generation)
     l->abort_is_last = false;
 }
 
-/* What became of a program that waits. */
+/* Finds out whether a committed program was taken. */
 void dac_link_settle(dac_link *l)
 {
     const dac_status status = dac_sequencer_status(l->sequencer);

@@ -12,7 +12,7 @@
 #   build/scan_HEADERS     NAME.h, dac_*.h; compile with -Ibuild/scan
 #   build/scan_VERILOG     dac_*.v
 #   build/scan_MEMORY      the .mem files
-#   build/scan_FILES       all of them, NAME.vh and manifest.json too
+#   build/scan_FILES       all files of the build, NAME.vh, manifest.json and those of other formats too
 #
 # Paths are relative to where make runs. They cannot have spaces, since make cannot.
 #

@@ -46,13 +46,13 @@ def samples(plan: Plan, axis: Literal["x", "y"], first: int = 0, stop: int | Non
     A slow frame has many ticks: 8 bytes a tick for each number, so give ``stop`` where it has 10^8. Raises
     ``ValueError`` for ticks outside of the period.
     """
-    line, rate = (plan.x if axis == "x" else plan.y), plan.schedule.update_rate_hz
+    line = plan.x if axis == "x" else plan.y
     period = period_of(plan.program, axis, first, stop)
     ticks, hold = period.ticks, line.program.hold
     asked = line.series.value((ticks // hold) / line.program.phase.ticks)
     return Samples(
         axis=axis,
-        time_s=ticks * rate.denominator / rate.numerator,
+        time_s=plan.schedule.seconds(ticks),
         volts=line.converter.v_zero + line.converter.v_per_code * period.codes.astype(np.float64),
         asked_volts=line.drive.v_offset + line.drive.v_amplitude * (np.asarray(asked) - 0.5),
         codes=period.codes,

@@ -9,7 +9,7 @@ from tablegen.calibration.estimate import Curve, Estimate
 from tablegen.compensation.hysteresis import HIGHEST_PEAK, LOWEST_PEAK
 from tablegen.numerics.arrays import Floats
 
-BINS = 20  # of a branch: the baseline of the scaling error
+BINS = 20  # intervals per branch, the baseline of the scaling error
 WINDOW = slice(2, 18)  # x = 0.1 .. 0.9
 
 
@@ -63,7 +63,7 @@ def peak(shape: Floats) -> tuple[float, float]:
 
 
 def measured_branch(shape: Floats, covariance: Floats) -> MeasuredBranch:
-    """Of (xi, xi gamma) and their covariance."""
+    """The branch that belongs to (xi, xi gamma) and their covariance."""
     beta, u_peak = peak(shape)
     step = 1e-6 * max(float(np.max(np.abs(shape))), 1e-3)
     steps = step * np.eye(2)

@@ -12,7 +12,7 @@ from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 
 _MIN_SCATTER = 1e-7
-_LARGEST_ALPHA = 0.5  # the schema's
+_LARGEST_ALPHA = 0.5  # as in the schema
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -146,7 +146,7 @@ def _remarks(fit: TraceFit) -> list[str]:
 
 
 def _curves(branches: Sequence[TurnFit], v_max: float) -> list[Curve]:
-    """Of each turn the residual at the largest amplitude, figure 5a, and its growth, figure 5k."""
+    """For each turn: the residual at the largest amplitude, figure 5a, and its growth, figure 5k."""
     curves: list[Curve] = []
     line = np.linspace(0.0, 1.0, 101)
     for branch in branches:

@@ -16,11 +16,11 @@ from tablegen.compensation.hysteresis import BranchShape
 from tablegen.numerics.arrays import Bools, Floats
 from tablegen.problems import Unphysical
 
-_MIN_EXPLAINED_VARIANCE = 0.03  # of the variance
-_ARITHMETIC_ERROR = 1e-7  # of the line: what arithmetic may leave
-_MAX_MISFIT_PERCENT = 3.0  # of the line, that the model may leave
+_MIN_EXPLAINED_VARIANCE = 0.03  # share of the variance
+_ARITHMETIC_ERROR = 1e-7  # share of the line that rounding may leave
+_MAX_MISFIT_PERCENT = 3.0  # percent of the line that the model may leave
 _MAX_XI_ERROR = 0.05  # largest standard error of xi
-_MISFIT_SIGNIFICANCE = 1e-3  # that noise alone would be taken for misfit
+_MISFIT_SIGNIFICANCE = 1e-3  # probability that noise alone is taken for misfit
 _MIN_SIGNED_BETA = 0.004  # least |beta| that is a sign
 
 
@@ -145,7 +145,7 @@ def _loud_rows(state: FitState) -> tuple[int, ...]:
 
 
 def _noise(state: FitState) -> float:
-    """Of neighbouring pixels, rms."""
+    """Noise of a pixel, rms, from the differences of neighbouring pixels."""
     left = np.concatenate(state.left)
     return float(np.sqrt(np.mean(np.diff(left, axis=1) ** 2) / 2.0))
 
@@ -153,7 +153,7 @@ def _noise(state: FitState) -> float:
 def _covariance(
     model: PeriodicModel, state: FitState, free: Bools, misfit: float, clean: list[Floats]
 ) -> tuple[Floats, float]:
-    """Of all parameters, 0 for those that are not free; and by how much it was widened.
+    """The covariance of all parameters, 0 for those that are not free; and the factor by which it was widened.
 
     From what each line says by itself, so that noise may have any spectrum along the line. It is widened where
     neighbouring lines say the same, and by ``misfit``; ``clean`` are the images that are left without that.

@@ -13,16 +13,16 @@ from tablegen.numerics.arrays import Bools, Floats, Ints
 from tablegen.problems import Unphysical
 
 _MIN_PIXELS = 32  # along and across
-_ROW_POLYNOMIAL_ORDER = 3  # of the rows' polynomial: drift, and the slow axis with its own hysteresis
+_ROW_POLYNOMIAL_ORDER = 3  # order of the polynomial over rows: drift, and hysteresis of the slow axis
 _MAX_SPOTS = 14
-_MAX_SPOT_INDEX = {1: 12, 2: 3}  # whole numbers of a spot, by bases
+_MAX_SPOT_INDEX = {1: 12, 2: 3}  # largest index of a spot, by number of bases
 _MIN_SPOT_ERRORS = 6.0  # standard errors of an amplitude
-_MIN_SPOT_AMPLITUDE = 0.003  # of the strongest
+_MIN_SPOT_AMPLITUDE = 0.003  # share of the strongest amplitude
 _MAX_LINE_POWER = 100.0  # times the usual power of a line
-_FLAT, _MANY_FLAT = 1e-9, 0.02  # of the largest power of a line; of all lines
-_MAX_DELAY = 0.1  # of the line
+_FLAT, _MANY_FLAT = 1e-9, 0.02  # share of the largest power of a line; share of all lines
+_MAX_DELAY = 0.1  # share of the line
 _MIN_TRACKED_PERIODS = 8.0  # periods
-_PHASE_TOLERANCE = 0.01  # of a period, rms
+_PHASE_TOLERANCE = 0.01  # periods, rms
 _MIN_MISFIT_RATIO = 1.5  # how much worse another count of periods has to be
 _ALIASING_HINT = " (periods finer than two pixels look like that too)"
 

@@ -13,7 +13,7 @@ from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 
 _NORMAL_AT_2_SIGMA = 0.9772498680518208  # the normal distribution's at 2: what two standard errors cover, on one side
-_SINGULAR_VALUE_LIMIT = 1e-10  # of the largest singular value; what finite differences leave of a zero is below it
+_SINGULAR_VALUE_LIMIT = 1e-10  # relative to the largest; finite differences leave less than this of a zero
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Solution:
 
     @property
     def variance(self) -> float:
-        """Of the residuals; nan where there are no more points than parameters."""
+        """Variance of the residuals; nan where there are no more points than parameters."""
         return float(self.residuals @ self.residuals) / self.freedom if self.freedom > 0 else nan
 
     def estimate(self, name: str) -> Estimate:

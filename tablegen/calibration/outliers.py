@@ -32,7 +32,7 @@ def outliers(jacobian: Floats, residuals: Floats, least: float) -> tuple[int, ..
 def _studentised(jacobian: Floats, residuals: Floats, least: float) -> Floats:
     orthogonal, _ = np.linalg.qr(jacobian)
     left = residuals - orthogonal @ (orthogonal.T @ residuals)
-    share = np.clip(1.0 - np.sum(orthogonal**2, axis=1), 1e-9, 1.0)  # of its own error that a point keeps
+    share = np.clip(1.0 - np.sum(orthogonal**2, axis=1), 1e-9, 1.0)  # share of its own error that a point keeps
     freedom = len(left) - jacobian.shape[1]
     without = (float(left @ left) - left**2 / share) / (freedom - 1)
     spread = np.sqrt(np.maximum(without, least**2))

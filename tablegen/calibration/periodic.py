@@ -22,7 +22,7 @@ from tablegen.problems import Unphysical
 
 Complexes = npt.NDArray[np.complex128]
 
-LAG, BASES = 4, 5  # of the parameters; before them xi and xi gamma, forward and backward
+LAG, BASES = 4, 5  # indices of parameters; xi and xi gamma, forward and backward, come before them
 _COLUMN_TERMS = 5  # 1, x, and x by xi and xi gamma; the time within the line
 _MIN_BRANCH_SLOPE = 0.05  # least du/dtau of a branch that is tried
 _ROW_PARABOLA_TERMS = 3  # terms of a row's parabola
@@ -50,7 +50,7 @@ class Geometry:
 
     @cached_property
     def y(self) -> Floats:
-        """Of each row, -1/2..1/2."""
+        """Position of each row, -1/2..1/2."""
         return (np.arange(self.rows) + 0.5) / self.rows - 0.5
 
     @cached_property
@@ -71,7 +71,7 @@ class Geometry:
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """Of one direction: the position at each column, its derivatives by xi and xi gamma, the time in the line.
+    """One direction: the position at each column, its derivatives by xi and xi gamma, the time in the line.
 
     ``steep`` is dx/du.
     """
@@ -309,7 +309,7 @@ def _products(
 
 
 def _scores(coefficients: Complexes, laid_out: tuple[Complexes, Complexes, tuple[Ints, Ints]], left: Floats) -> Floats:
-    """Of each row, what is left times each parameter's derivative, summed: (rows, parameters)."""
+    """For each row, the residual times each parameter's derivative, summed: (rows, parameters)."""
     row, column, (at, across) = laid_out
     found: Floats = np.real(coefficients @ ((column @ left.T)[across] * row[at])).T
     return found

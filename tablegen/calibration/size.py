@@ -12,10 +12,10 @@ from tablegen.config.figures import at_most
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 
-TYPICAL_THRESHOLD = 0.5  # the paper's
+TYPICAL_THRESHOLD = 0.5  # as in the paper
 _NAMES = ("k_nm_per_v", "beta", "v_threshold")
 _MIN_SCATTER = 1e-7
-_STEP_SCALES = (0.5, 2.0, 0.25)  # of k relative to its start, and of the others as they are
+_STEP_SCALES = (0.5, 2.0, 0.25)  # k relative to its start; the others absolute
 _LEAST_BETA, _LARGEST_BETA = -0.49, 100.0
 
 
@@ -120,7 +120,7 @@ class _SizeModel:
         return self._base / (float(x[0]) * self._v_max)
 
     def solve(self, threshold: float | None, start: tuple[float, float, float] | None = None) -> Solution:
-        """Of k and beta at a threshold, or of all three from a start."""
+        """Fit k and beta at a threshold, or all three from a start."""
         k, beta, begin = start or (self._start_k, 0.5, threshold or TYPICAL_THRESHOLD)
         fixed = [] if threshold is None else [threshold]
         count = 3 - len(fixed)

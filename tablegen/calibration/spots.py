@@ -20,10 +20,10 @@ _MIN_SEARCHED_PERIODS = 1.4  # periods; what is slower goes with the parabola of
 _MAX_XI = 0.13  # |xi|: a tenth of the scan, and what a skew peak adds
 _MAX_XI_GAMMA = 0.2  # |xi gamma|
 _COARSE_STEP = 0.02
-_FINE_STEP_PERIODS = 0.25  # of a period, between neighbours of the search
+_FINE_STEP_PERIODS = 0.25  # periods between neighbours of the search
 _MAX_PERIODS_PER_COLUMN = 0.33  # periods a column, where a branch may compress them by a third
-_MIN_SECOND_AMPLITUDE = 0.1  # of the strongest amplitude
-_MIN_SIDE_DISTANCE = 0.12  # of the frame: over it another wave of the same q, of another s, averages out
+_MIN_SECOND_AMPLITUDE = 0.1  # share of the strongest amplitude
+_MIN_SIDE_DISTANCE = 0.12  # share of the frame: over it another wave of the same q, of another s, averages out
 _MIN_SPOT_POWER = 25.0  # times the mean power: what white noise does not reach
 
 
@@ -56,7 +56,7 @@ def strongest(geometry: Geometry, heights: Floats) -> Spot:
         power = np.abs(np.fft.rfft2(weight * straight)) ** 2
         first = int(np.ceil(_MIN_SEARCHED_PERIODS * span))
         power[:, :first] = 0.0
-        # Of the waves of a lattice the one along x says most; the harmonics of a grating fall faster than 1 / q.
+        # The wave of a lattice along x is the most significant; the harmonics of a grating fall faster than 1 / q.
         row, column = divmod(int(np.argmax(power * np.arange(power.shape[1]))), power.shape[1])
         if power[row, column] * column > best[0]:
             best = (float(power[row, column]) * column, row, column, float(xi), span)

@@ -13,7 +13,7 @@ from tablegen.compensation.hysteresis import BranchShape
 from tablegen.numerics.arrays import Bools, Floats
 from tablegen.problems import Unphysical
 
-_MIN_SAMPLES_PER_PERIOD = 40  # a period
+_MIN_SAMPLES_PER_PERIOD = 40  # samples per period
 _REVERSED_BRANCH_RESIDUAL = 1e3  # the residual of a branch that runs backwards
 
 
@@ -120,7 +120,7 @@ class _TraceModel:
         return u, tau, rising, np.where(rising, tau, 1.0 - tau)
 
     def expected(self, x: Floats) -> Floats:
-        """Of the normalised displacement, with drift."""
+        """The modelled normalised displacement, with drift."""
         _, _, _, position = self.position(x)
         return float(x[4]) + float(x[5]) * position + self.drift @ x[6 : 6 + self.drift.shape[1]]
 
@@ -131,7 +131,7 @@ class _TraceModel:
         return self.expected(x) - self.measured
 
     def jacobian(self, x: Floats) -> Floats:
-        """Of ``residuals``: tau moves by -(du/dparameter) / (du/dtau)."""
+        """Derivatives of ``residuals``: tau moves by -(du/dparameter) / (du/dtau)."""
         columns, steep = self._shape_columns(x)
         if self.fits_delay:
             columns.append(-steep * self._by_delay(x))

@@ -18,8 +18,8 @@ from tablegen.planning.line_plan import LinePlan
 from tablegen.waveform.sampler import Sampler
 from tablegen.waveform.series import FourierSeries
 
-CHORD = 0.05  # of the line, about one lattice constant of the paper's images
-_POINTS_PER_HARMONIC = 16  # over the window, for analytic slopes
+CHORD = 0.05  # share of the line, about one lattice constant of the paper's images
+_POINTS_PER_HARMONIC = 16  # points per harmonic over the window, for analytic slopes
 _MAX_SPECTRUM_TICKS = 1 << 22  # longest period whose spectrum is taken
 
 
@@ -139,7 +139,7 @@ def scaling_error(line: LinePlan, played: EmittedPeriod, side: str, branch: Bran
 
 
 def _slopes_and_value(line: LinePlan, times: Floats) -> tuple[Floats, Floats, Floats]:
-    """Of the target its slope, of what the piezo sees of it the slope and the value; all without the layer."""
+    """The slope of the target, and slope and value of what the piezo sees of it; all without the layer."""
     reached = _reached(line)
     target_slope = line.target.value(times, 1)
     reached_slope = target_slope if reached is line.target else reached.value(times, 1)

@@ -7,7 +7,7 @@ import numpy as np
 from tablegen.certificate.certificate import Certificate
 from tablegen.planning.line_plan import LinePlan, Plan
 
-_GRID = 32  # points a period of the highest harmonic
+_GRID = 32  # points per period of the highest harmonic
 
 
 def drive_lines(line: LinePlan) -> list[tuple[str, str]]:

@@ -38,7 +38,7 @@ class Common:
 
 
 def shared_options(command: F) -> F:
-    """Those options, as ``common``."""
+    """Add the options that all calibrations share, as ``common``."""
     options = [
         click.option("--axis", type=click.Choice(("x", "y")), required=True, help="The axis that was measured."),
         click.option(
@@ -166,7 +166,7 @@ def in_file(common: Common, kind: str, key: str) -> float | None:
 
 
 def size_law(common: Common, v_max: float, size_v: float) -> "SizeLaw":
-    """That of the scanner file, for images of ``size_v`` volts; the rest of the file may be incomplete."""
+    """The size law of the scanner file, for images of ``size_v`` volts; the rest of the file may be incomplete."""
     from tablegen.compensation.size import SizeLaw
     from tablegen.config.decode import decode
     from tablegen.config.schema import Scanner

@@ -91,7 +91,7 @@ def _read_key(path: Path) -> bytes:
         key = binascii.unhexlify("".join(path.read_text("ascii").split()))
     except OSError as error:
         fail([f"{path}: cannot be read: {error.strerror or error}"], ExitStatus.WRONG_INPUT)
-    except ValueError:  # what is no ASCII as well
+    except ValueError:  # also raised for text that is not ASCII
         fail([f"{path}: the file must contain 32 to 64 hexadecimal digits and nothing else"], ExitStatus.WRONG_INPUT)
     if len(key) not in _KEY_BYTES:
         fail([f"{path}: the key has {len(key)} bytes; 16 to 32 are needed"], ExitStatus.WRONG_INPUT)

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from difflib import unified_diff
 from pathlib import Path
 
-_MAX_LINES = 12  # of each file: enough to see what changed, not a table of words
+_MAX_LINES = 12  # lines of each file: enough to see what changed, without whole tables
 _WIDTH = 120
 
 

@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from tablegen.link.prepare import Form, PreparedScan
     from tablegen.link.upload import UploadResult
 
-_HASH_DIGITS = 12  # of a hash, for people
+_HASH_DIGITS = 12  # digits of a hash in messages
 _BEGIN_AND_COMMIT_BYTES = 60 + 16  # bytes of BEGIN and COMMIT on the wire
-_DATA_OVERHEAD_BYTES = 16  # what a DATA has beside its bytes
+_DATA_OVERHEAD_BYTES = 16  # bytes of a DATA frame beside its payload
 _BITS_PER_BYTE = 10
 
 

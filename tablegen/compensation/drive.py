@@ -18,7 +18,7 @@ from tablegen.problems import Problems, Unphysical
 # A calibration serves turning points this far beyond the calibrated ones: the paper sees no major difference
 # between 0.5 and 0.7 except at large sizes, and 10 % to 25 % between 0.7 and 0.9.
 TURN_REACH = 0.1
-FULL_SCALE_TOLERANCE = 0.02  # by which a measured full scale may differ from v_max
+FULL_SCALE_TOLERANCE = 0.02  # relative difference allowed between a measured full scale and v_max
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +153,7 @@ def compensate(setup: Setup, axis: str, rate_hz: float, problems: Problems) -> D
 
 
 def outside_driver(volts: float, v_max: float) -> str:
-    """That a voltage is outside the driver's range, and by how much."""
+    """Say that a voltage is outside the driver's range, and by how much."""
     by = max(-volts, volts - v_max)
     return f"{volts:.6g} V is outside the driver's 0..{v_max:g} V, by {by:.4g} V"
 

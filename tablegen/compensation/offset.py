@@ -9,8 +9,8 @@ from tablegen.numerics.arrays import tree_sum
 from tablegen.numerics.linear import Cholesky
 from tablegen.problems import Unphysical
 
-_MIN_SPAN = 1e-3  # of p, which runs from -1 to 1; a parabola through points closer than that is noise
-_SIMPSON_PANELS = 1024  # of Simpson's rule; the integrand is smooth and the error below 1e-13
+_MIN_SPAN = 1e-3  # span of p, which runs from -1 to 1; a parabola through points closer than that is noise
+_SIMPSON_PANELS = 1024  # panels of Simpson's rule; the integrand is smooth and the error below 1e-13
 
 
 @dataclass(frozen=True, slots=True)

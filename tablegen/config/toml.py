@@ -13,7 +13,7 @@ from tablegen.problems import Document, Problem, Rejected
 _BARE_KEY = frozenset("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_")
 _ESCAPES = {"b": "\b", "t": "\t", "n": "\n", "f": "\f", "r": "\r", '"': '"', "\\": "\\"}
 _MAXIMUM_BYTES = 4 << 20
-_MAXIMUM_DIGITS = 4300  # of a decimal number: what Python converts
+_MAXIMUM_DIGITS = 4300  # digits of a decimal number that Python converts
 
 
 def read_toml(path: Path, name: str) -> tuple[dict[str, Any], Document]:
@@ -23,7 +23,7 @@ def read_toml(path: Path, name: str) -> tuple[dict[str, Any], Document]:
     """
     try:
         with path.open("rb") as file:
-            content = file.read(_MAXIMUM_BYTES + 1)  # and no more: it may be a device without end
+            content = file.read(_MAXIMUM_BYTES + 1)  # no more: the path may be an endless device
         if len(content) > _MAXIMUM_BYTES:
             why = f"above {_MAXIMUM_BYTES} bytes, more than any configuration has"
             raise Rejected([Problem(name, 0, "", why)])

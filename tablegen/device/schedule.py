@@ -4,7 +4,12 @@ from dataclasses import dataclass
 from fractions import Fraction
 from math import floor
 
+import numpy as np
+
+from tablegen.numerics.arrays import Floats, Ints
+
 MAXIMUM_LINE_TICKS = 1 << 24
+_EXACT = 1 << 53  # integers below it are floats as they are
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +68,13 @@ class Schedule:
     def frame_rate(self) -> Fraction:
         """Frames per second, exactly."""
         return self.line_rate / self.lines
+
+    def seconds(self, ticks: Ints) -> Floats:
+        """When ticks happen, in s from tick 0: the nearest float to the exact quotient."""
+        rate = self.update_rate_hz
+        if rate.numerator < _EXACT and int(np.max(ticks, initial=0)) * rate.denominator < _EXACT:
+            return ticks * rate.denominator / rate.numerator
+        return np.array([k * rate.denominator / rate.numerator for k in ticks.tolist()], dtype=np.float64)
 
     @property
     def pixel_ticks(self) -> Fraction:

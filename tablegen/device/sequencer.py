@@ -26,8 +26,8 @@ class Fault(IntFlag):
     """Sticky faults; cleared only on request."""
 
     NONE = 0
-    SLEW = 1  # the slew guard held a code back although the output had caught up with its program
-    CLAMP = 2  # a code had to be held inside [code_min, code_max]
+    SLEW = 1  # the slew guard limited a step after the output had reached the waveform
+    CLAMP = 2  # a code was clamped to [code_min, code_max]
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,7 +19,7 @@ def scan_constants(content: Content) -> dict[str, int]:
 
 
 def sequence_constants(schedule: Schedule) -> dict[str, int]:
-    """Those of the scan; ticks, lines and pixels."""
+    """Constants of the scan: ticks, lines and pixels."""
     return {
         "UPDATE_RATE_MILLIHZ": schedule.update_rate_millihz,
         "LINE_TICKS": schedule.ticks,
@@ -40,7 +40,7 @@ def sequence_constants(schedule: Schedule) -> dict[str, int]:
 
 
 def axis_constants(program: Program, harmonics: int) -> dict[str, int]:
-    """Those of an axis, whose table comes from so many harmonics."""
+    """Constants of an axis, whose table comes from so many harmonics."""
     output = program.output
     return {
         "TABLE_LENGTH": len(program.words),

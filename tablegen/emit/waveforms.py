@@ -46,12 +46,11 @@ def require_short_frame(content: Content) -> None:
 
 
 def _waveform(content: Content, name: Literal["x", "y"]) -> Waveform:
-    axis, period, rate = getattr(content, name), period_of(content.program, name), content.schedule.update_rate_hz
+    axis, period = getattr(content, name), period_of(content.program, name)
     names = ("start", "line", "pixel", "backward", "inside")
     return Waveform(
         axis=name,
-        # Integers of Python, since ticks times the denominator may exceed 64 bits; each quotient is rounded once.
-        time_s=np.array([k * rate.denominator / rate.numerator for k in range(len(period.codes))], dtype=np.float64),
+        time_s=content.schedule.seconds(period.ticks),
         volts=axis.v_zero + axis.v_per_code * period.codes.astype(np.float64),
         codes=period.codes,
         markers={marker: getattr(period, marker) for marker in names},

@@ -9,7 +9,7 @@ from tablegen.fixedpoint.phase import PHASE_BITS
 from tablegen.fixedpoint.program import Program
 from tablegen.numerics.arrays import Ints, merged
 
-_MIN_TICKS_PER_RUN = 4  # a run, on average, for runs to be cheaper than ticks
+_MIN_TICKS_PER_RUN = 4  # average ticks per run from which runs are cheaper than ticks
 
 
 @dataclass(frozen=True, eq=False)

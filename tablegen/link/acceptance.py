@@ -32,7 +32,7 @@ class Playing:
     running: bool
 
 
-Finding = tuple[Reason, int]  # and its detail
+Finding = tuple[Reason, int]  # a reason and its detail
 
 
 def first_objection(contents: Contents, x: AxisLimits, y: AxisLimits, playing: Playing | None) -> Finding | None:

@@ -28,9 +28,9 @@ from tablegen.link.upload import ProgressCall, Uploader, UploadResult
 if TYPE_CHECKING:
     from tablegen.link.image import ProgramImage
 
-TIMEOUT_S = 5.0  # of a request
-_UPLOAD_MARGIN_S = 15.0  # beside what an upload takes on the line
-_UPLOAD_TIME_FACTOR = 4.0  # what an upload takes on the line
+TIMEOUT_S = 5.0  # timeout of a request
+_UPLOAD_MARGIN_S = 15.0  # margin on top of the transfer time of an upload
+_UPLOAD_TIME_FACTOR = 4.0  # factor on the transfer time of an upload
 _POLL_S = 0.05
 _HELLO_FRESH_S = 0.25  # a HELLO so young need not be repeated: an upload sees for itself what is not so any more
 _MAX_READINGS = 3
@@ -122,7 +122,7 @@ class Device:
     ) -> UploadResult:
         """Put a new scan into the instrument, which goes on with the old one until a line of the new one starts.
 
-        ``progress`` is called with the bytes that the device has, and with all. A scan that is in force already is not
+        ``progress`` is called with the bytes that the device has, and with all. A scan that is already active is not
         sent, unless ``force``. ``timeout_s`` bounds everything (default: ``upload_time_s``). ``limits`` make refusals
         say more. What a device would refuse, ``tablegen.link.prepare.check`` says before.
 
@@ -198,17 +198,17 @@ class Device:
         return int.from_bytes(self._act(Request.ABORT, plain=True)[:4], "little")
 
     def limits(self) -> Limits:
-        """The limits in force, of x and of y."""
+        """The active limits of x and y."""
         size = 2 * AxisLimits.LAYOUT.size
         try:
             return _limits(self._session.ask(Request.LIMITS, b"", size, self._until(None)))
         except Refused as refusal:
             if refusal.reason != Reason.TYPE:
                 raise
-            return self.info.x_limits, self.info.y_limits  # it has no others
+            return self.info.x_limits, self.info.y_limits  # the device has no other limits
 
     def narrow(self, x: AxisLimits, y: AxisLimits) -> Limits:
-        """Narrow the limits until the device's next start, or until this is called again; returns those in force then.
+        """Narrow the limits until the device's next start, or until this is called again; returns the active limits.
 
         They are cut to those of the device's build.
 

@@ -7,13 +7,13 @@ from tablegen.link.frames import OVERHEAD, Frame, FrameReader
 from tablegen.link.messages import ANSWER, REFUSAL, Refusal, Request
 from tablegen.link.transport import Transport, byte_s
 
-LATENCY_S = 0.016  # of a USB bridge, which passes on what has come 60 times a second
+LATENCY_S = 0.016  # latency of a USB bridge, which forwards bytes 60 times a second
 _DEVICE_DELAY_S = 0.02  # a device has other things to do
 _LATENESS_MARGIN = 1.5
-_FRAME_END = b"\0"  # in front of a frame it ends what noise has begun
-_LATENESS_DECAY = 0.8  # with each answer
+_FRAME_END = b"\0"  # in front of a frame, it ends a frame that noise began
+_LATENESS_DECAY = 0.8  # factor per answer
 _MAX_LATENESS_S = 0.25  # more is a stall, which says nothing of the next answer
-_ANSWERED_AT_LINE_START = (Request.COMMIT, Request.ABORT)  # and tell nothing of the way
+_ANSWERED_AT_LINE_START = (Request.COMMIT, Request.ABORT)  # their answers tell nothing about the latency
 
 
 @dataclass(slots=True)

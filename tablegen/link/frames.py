@@ -9,7 +9,7 @@ _CRC = struct.Struct("<I")
 MAXIMUM_FRAME = 254  # before COBS, so that it adds one byte and never two
 MINIMUM_FRAME = _HEADER.size + _CRC.size
 MAXIMUM_PAYLOAD = MAXIMUM_FRAME - MINIMUM_FRAME
-OVERHEAD = MINIMUM_FRAME + 2  # what a frame takes on the wire beside its payload
+OVERHEAD = MINIMUM_FRAME + 2  # bytes of a frame on the wire beside its payload
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,7 @@ from tablegen.numerics.arrays import Ints
 
 PROGRAM_WORDS = 3 * PAGE_WORDS
 PROGRAM_BYTES = 4 * PROGRAM_WORDS
-FOURIER_BYTES = 4  # a word
+FOURIER_BYTES = 4  # bytes per Fourier word
 _HARMONICS_WORD = AXIS_WORDS.index("harmonics")
 
 

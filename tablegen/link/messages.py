@@ -6,7 +6,7 @@ from enum import IntEnum, IntFlag
 from typing import ClassVar, Self
 
 VERSION = 1
-DATA_BYTES = 240  # at most in a DATA
+DATA_BYTES = 240  # maximum payload of DATA
 TAG_BYTES = 16
 NONCE_BYTES = 16
 HASH_BYTES = 32
@@ -94,7 +94,7 @@ class Upload(IntEnum):
     WAITING = 3
 
 
-PERMITS = 1  # of Status.flags
+PERMITS = 1  # bit of Status.flags
 
 
 class _Struct:
@@ -133,7 +133,7 @@ class AxisShape(_Struct):
 
     @property
     def word_bytes(self) -> int:
-        """Of a table word in an image."""
+        """Bytes of a table word in an image."""
         return 2 if self.word_bits <= 16 else 3
 
 

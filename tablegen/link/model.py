@@ -43,7 +43,7 @@ _MAX_FRAMES = 1 << 31
 
 @dataclass
 class _Remembered:
-    """The last request that acts; ``answer`` is None while it is at work."""
+    """The last request that acts; ``answer`` is None while it is in progress."""
 
     seq: int
     type: int
@@ -75,7 +75,7 @@ class ModelDevice:
 
     ``key``: 16 to 32 bytes, with the feature KEY. ``staged``: the image is kept, as in Verilog, and not its tables.
     ``checking``: ticks that the checks take. ``nonces`` makes those of CHALLENGE, by default from key and boot.
-    ``most_frames``: of an ARM. ``permits`` is the interlock, ``memory`` the image in hand, which a COMMIT checks.
+    ``most_frames`` limits ARM. ``permits`` is the interlock, ``memory`` the image being uploaded, which COMMIT checks.
     """
 
     def __init__(
@@ -140,7 +140,7 @@ class ModelDevice:
 
     @property
     def memory(self) -> bytearray:
-        """The image in hand, as the memory has it; empty without one."""
+        """The image of the upload in progress, from the memory; empty without one."""
         return bytearray() if self._bank.held is None else self._bank.held.data
 
     def receive(self, data: bytes) -> None:

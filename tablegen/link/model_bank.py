@@ -1,4 +1,4 @@
-"""The memory of a device as docs/protocol.md has it: the upload in hand, its checks, and what plays by an upload."""
+"""The memory of a device as docs/protocol.md has it: the upload in progress, its checks, and what plays."""
 
 import struct
 import zlib
@@ -14,7 +14,7 @@ from tablegen.link.image import PROGRAM_BYTES, Contents, layout, make_image, tak
 from tablegen.link.messages import AxisLimits, DeviceInfo, DeviceState, ImageInfo, Reason, Upload
 from tablegen.link.players import Player
 
-_MIN_INDEX_BITS = 3  # bits, of an interpolated table
+_MIN_INDEX_BITS = 3  # least index bits of an interpolated table
 
 
 class RequestRefused(Exception):
@@ -27,7 +27,7 @@ class RequestRefused(Exception):
 
 @dataclass
 class Held:
-    """An upload in hand; ``announced`` is what BEGIN said."""
+    """An upload in progress; ``announced`` is what BEGIN said."""
 
     info: ImageInfo
     announced: bytes
@@ -66,7 +66,7 @@ def program_of(contents: Contents, update_rate_hz: int = 0) -> DualProgram:
 
 
 class Bank:
-    """``held`` is the upload in hand, ``taken`` the one that plays; ``limits`` are those in force.
+    """``held`` is the upload in progress, ``taken`` the one that plays; ``limits`` are the active ones.
 
     ``staged``: the image is kept, and not its tables.
     """

@@ -9,7 +9,7 @@ from tablegen.device.dual_program import DualProgram
 from tablegen.device.sequencer import Fault, Sequencer, Tick
 from tablegen.link.messages import DeviceState
 
-MAX_REQUESTS = 8  # that a sequencer in C keeps until its next tick
+MAX_REQUESTS = 8  # requests that a sequencer in C queues until its next tick
 
 
 class Player(Protocol):
@@ -21,7 +21,7 @@ class Player(Protocol):
 
     @property
     def line(self) -> int:
-        """Of the frame."""
+        """The line number within the frame."""
 
     @property
     def swapped_at(self) -> int:
@@ -29,11 +29,11 @@ class Player(Protocol):
 
     @property
     def state(self) -> DeviceState:
-        """Of the last tick."""
+        """The state after the last tick."""
 
     @property
     def playing(self) -> DualProgram | None:
-        """The program in force."""
+        """The active program."""
 
     @property
     def faults(self) -> int:
@@ -63,7 +63,7 @@ class Player(Protocol):
         """No more frames."""
 
     def clear(self) -> bool:
-        """Forget faults."""
+        """Clear the faults."""
 
     def advance(self, ticks: int) -> None:
         """Play so many ticks."""
@@ -140,12 +140,12 @@ class SequencerPlayer(_Queue):
 
     @property
     def line(self) -> int:
-        """Of the frame."""
+        """The line number within the frame."""
         return self.sequencer.line
 
     @property
     def state(self) -> DeviceState:
-        """Of the last tick."""
+        """The state after the last tick."""
         if self.swaps == 0:
             return DeviceState.NO_PROGRAM
         assert self._last is not None
@@ -159,7 +159,7 @@ class SequencerPlayer(_Queue):
 
     @property
     def playing(self) -> DualProgram | None:
-        """The program in force."""
+        """The active program."""
         return self.sequencer.playing
 
     @property
@@ -199,7 +199,7 @@ class SequencerPlayer(_Queue):
         return self._ask(self.sequencer.park)
 
     def clear(self) -> bool:
-        """Forget faults."""
+        """Clear the faults."""
         return self._ask(self.sequencer.clear_faults)
 
     def advance(self, ticks: int) -> None:
@@ -243,7 +243,7 @@ class LinePlayer(_Queue):
 
     @property
     def state(self) -> DeviceState:
-        """Of the last tick."""
+        """The state after the last tick."""
         if self.swaps == 0:
             return DeviceState.NO_PROGRAM
         return DeviceState.PLAYING if self._played else DeviceState.PARKING if self._parks_for else DeviceState.PARKED

@@ -22,7 +22,7 @@ from tablegen.numerics.arrays import Ints
 from tablegen.planning.line_plan import Plan
 
 Form = Literal["auto", "table", "fourier"]
-TWOS_COMPLEMENT, LEFT_ALIGNED = 64, 128  # of AxisShape.converter
+TWOS_COMPLEMENT, LEFT_ALIGNED = 64, 128  # bits of AxisShape.converter
 _RATE_TOLERANCE_HZ = 1.0  # a device tells its rate to the nearest whole one
 
 
@@ -82,7 +82,7 @@ class PreparedScan:
 
 
 def harmonics_of(image: bytes) -> tuple[int, int]:
-    """Of x and y; 0 where a table follows, or the image is too short to tell."""
+    """Harmonics of x and y; 0 where a table follows, or the image is too short to tell."""
     words = np.frombuffer(image.ljust(PROGRAM_BYTES, b"\0"), dtype="<u4", count=PROGRAM_BYTES // 4)
     x, y = (int(words[page * PAGE_WORDS + AXIS_WORDS.index("harmonics")]) for page in (1, 2))
     return x, y
@@ -102,7 +102,7 @@ def _rendered(axis: Program, words: Ints, info: DeviceInfo | None) -> bool:
 
 
 def check(scan: PreparedScan, image: ProgramImage, info: DeviceInfo, limits: Limits, any_rate: bool = False) -> None:
-    """Whether a device with these limits in force would take the image, as far as can be known without it.
+    """Whether a device with these active limits would accept the image, as far as can be known without it.
 
     Raises ``Unsuitable`` with everything that is found.
     """

@@ -11,7 +11,7 @@ from tablegen.link.session import LinkSession
 _REQUEST = struct.Struct("<IB")
 _OFFSET = struct.Struct("<I")
 _PROGRAM_BYTES = 192  # as tablegen.link.image has it, without numpy
-_WORD_BYTES = 4  # at most
+_WORD_BYTES = 4  # at most, bytes per word
 
 
 def read_back(session: LinkSession, deadline: float) -> bytes:
@@ -73,7 +73,7 @@ def _at_once(session: LinkSession, wanted: range, deadline: float) -> dict[int, 
                 at = waiting.pop(answer.seq)
                 if not answer.reason:
                     found[at] = _piece(answer.payload, at)
-                elif answer.reason != Reason.SESSION:  # `ask` begins another one
+                elif answer.reason != Reason.SESSION:  # `ask` begins a new session
                     raise refused(answer.kind, answer.reason, answer.detail, session.info)
     return found
 

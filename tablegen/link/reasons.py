@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 _AXES = "xy"
 Limits = tuple[AxisLimits, AxisLimits]
 
-# Of these `detail` is an axis, and where there is one 2 times the index of a word.
+# For these, `detail` is an axis, plus 2 times the index of a word where there is one.
 _AXIS_REASONS = {
     Reason.SHAPE: "its table is too long for the device, or its words have a different width; build for this device",
     Reason.PERIOD: "its period, phase step and remainder do not match; build it again",
@@ -62,7 +62,7 @@ def explain(
 ) -> str:
     """What a refusal means, and what to do.
 
-    ``info``, ``limits`` of x and y in force, and the ``contents`` of what was uploaded are used where they are given.
+    ``info``, the active ``limits`` of x and y, and the ``contents`` of what was uploaded are used where they are given.
     """
     if reason not in list(Reason):
         return f"reason {reason}, detail {detail}: this version of tablegen does not know it; update it"

@@ -20,9 +20,9 @@ from tablegen.link.reasons import refused
 from tablegen.link.transport import Opener, Transport
 
 HELLO_BYTES = DeviceInfo.LAYOUT.size + DeviceStatus.LAYOUT.size
-_MAX_TRIES = 12  # of a request, the wait doubling up to 8 times the first: seconds, at usual rates
+_MAX_TRIES = 12  # tries of a request, the wait doubling up to 8 times the first: seconds, at usual rates
 _MAX_DOUBLINGS = 3
-_MAX_RESTARTS = 4  # sessions or challenges that are begun anew for one request
+_MAX_RESTARTS = 4  # new sessions or challenges for one request
 _REOPEN_INTERVAL_S = 0.25
 
 
@@ -96,7 +96,7 @@ class LinkSession:
                 why = LinkLost(f"the link is lost: {error}")
 
     def _hello_patiently(self, deadline: float) -> None:
-        """Some devices start anew when their port is opened; to open it again would not help them."""
+        """Some devices restart when their port is opened; to open it again would not help them."""
         while True:
             try:
                 return self.hello(deadline)

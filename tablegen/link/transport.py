@@ -10,8 +10,8 @@ from tablegen.link.errors import LinkLost, NoPort, SerialMissing
 
 _POLL_S = 0.01  # pyserial's own wait; changing it for every read would configure the port again each time
 _WRITE_TIMEOUT_S = 5.0  # a port that takes nothing for so long has a cable without an end
-_MAX_READ_BYTES = 4096  # bytes of a read, so that a babbling line cannot hold it
-_BITS_PER_BYTE = 10  # of a byte on the wire: start, 8, stop
+_MAX_READ_BYTES = 4096  # bytes per read, so that a noisy line cannot block it
+_BITS_PER_BYTE = 10  # bits of a byte on the wire: start, 8, stop
 
 
 class Transport(Protocol):
@@ -102,7 +102,7 @@ class SerialTransport:
                 received += self._port.read(1)
         except Exception as error:
             if received:
-                return bytes(received)  # the next read says that it has gone
+                return bytes(received)  # the next read reports that the port disappeared
             raise self._lost(error) from None
 
     def close(self) -> None:

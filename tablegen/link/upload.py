@@ -19,15 +19,15 @@ if TYPE_CHECKING:
 _MIN_SILENCE_S = 3.0  # at least, and so many waits for one answer
 _SILENCE_WAITS = 16
 _MAX_DOUBLINGS = 3  # doublings of a wait in vain
-_POLL_S = (0.03, 0.25)  # between two STATUS while a COMMIT is at work: at first, and at most
+_POLL_S = (0.03, 0.25)  # between two STATUS while a COMMIT is in progress: first, and at most
 _BUSY_S = 0.05
-_MAX_RESTARTS = 4  # times that an upload is begun anew for the same reason
+_MAX_RESTARTS = 4  # restarts of an upload for the same reason
 _MAX_KEY_RESTARTS = 2
 _LAYOUT_REASONS = (Reason.SHAPE, Reason.LENGTH, Reason.HARMONICS)  # when the program words are complete
 _CRC = struct.Struct("<I")
 _COMMITTED = struct.Struct("<2I")
 
-ProgressCall = Callable[[int, int], None]  # bytes that the device has, of so many
+ProgressCall = Callable[[int, int], None]  # (bytes that the device has, all bytes)
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +65,7 @@ class _Anew(Exception):
 
 
 class Uploader:
-    """One upload in a session, until it is in force or cannot be."""
+    """One upload in a session, until it is active or has failed."""
 
     def __init__(
         self,
@@ -302,7 +302,7 @@ class Uploader:
 
     def _take_data(self, received: int, sent: _Sent) -> None:
         if not self._begun or received > len(self._image.data):
-            return  # it may be of what was in hand before
+            return  # it may belong to the upload before
         self._confirm(received)
         if received < sent.end and sent.round == self._round:
             self._go_back(self._confirmed)
@@ -349,7 +349,7 @@ class Uploader:
                 self._count(answer.reason, error)
                 self._begin_anew()
         elif sent.kind == Request.DATA and answer.reason in _LAYOUT_REASONS and not self._begun:
-            pass  # of what was in hand before
+            pass  # it belongs to the upload before
         else:
             raise error
 

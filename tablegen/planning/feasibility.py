@@ -21,7 +21,7 @@ DEFAULT_HARMONICS = 32
 MAXIMUM_HARMONICS = 512
 DEFAULT_LENGTH = 2048
 MAXIMUM_DIRECT_WORDS = 1 << 20
-ACCUMULATOR_LIMIT = 4  # of the synthesis, in units of the table's full scale
+ACCUMULATOR_LIMIT = 4  # limit of the synthesis, in units of the table's full scale
 
 
 class Feasibility:

@@ -15,18 +15,18 @@ from tablegen.problems import Problems
 from tablegen.waveform.series import FourierSeries
 
 # How far a scan may be from the one at which a layer was learnt: docs/refine.md has what it is worth at the edges.
-AMPLITUDE_REACH = 0.05  # relative
-OFFSET_REACH = 0.05  # of v_max
-RATE_REACH = 0.2  # relative
+AMPLITUDE_REACH = 0.05  # relative difference
+OFFSET_REACH = 0.05  # share of v_max
+RATE_REACH = 0.2  # relative difference
 TURN_REACH = 0.02
-WINDOW_REACH = 0.02  # of the line, beyond what was measured
+WINDOW_REACH = 0.02  # share of the line beyond the measured window
 
 
 def model_digest(setup: Setup, axis: str, drive: Drive) -> str:
     """What the layer lies over: 16 hexadecimal digits of hysteresis and dynamics as the scanner file has them."""
     scanner: ScannerAxis = getattr(setup.scanner, axis)
     below = [_given(msgspec.to_builtins(part)) for part in (scanner.hysteresis, scanner.resonance)]
-    if isinstance(drive.response, Measured):  # of the file that it names, what it says
+    if isinstance(drive.response, Measured):  # the content of the file that it names
         below += [drive.response.f_hz.tolist(), drive.response.gain.tolist(), drive.response.phase_turns.tolist()]
     plain = json.dumps(below, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
     return hashlib.sha256(plain.encode("ascii")).hexdigest()[:16]

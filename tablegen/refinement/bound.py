@@ -20,7 +20,7 @@ FREQUENCIES = (0.8, 1.0, 1.25)
 QUALITIES = (0.5, 1.0, 2.0)
 GAINS = (0.8, 1.0, 1.25)
 PHASES = (-1.0 / 18.0, 0.0, 1.0 / 18.0)  # periods: 20 degrees
-MAX_ERROR_LEFT = 0.9  # of the error, that a round may leave of a harmonic that is learnt
+MAX_ERROR_LEFT = 0.9  # share of the error of a learnt harmonic that a round may leave
 
 Complex = npt.NDArray[np.complex128]
 

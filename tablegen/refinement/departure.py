@@ -14,8 +14,8 @@ from tablegen.planning.line_plan import LinePlan
 from tablegen.problems import Unphysical
 from tablegen.refinement.displacement import Displacement
 
-_WINDOW_POINTS = 801  # over the window of a direction
-_MAX_DEPARTURE = 0.1  # of the line: no error of a model, but another scan or another phase
+_WINDOW_POINTS = 801  # points over the window of a direction
+_MAX_DEPARTURE = 0.1  # share of the line; more means another scan or another phase
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,12 +15,10 @@ from tablegen.waveform.window_fit import normal_equations
 
 DEFAULT_GAIN = 0.7
 DEFAULT_HARMONICS = 16
-DIGITS = 8  # of a coefficient in the scan file: a 24-bit converter has 7
-# Of the mean square acceleration: settles what the windows leave open, and costs nothing inside them.
+DIGITS = 8  # digits of a coefficient in the scan file: a 24-bit converter has 7
+# Weight of the mean square acceleration: it decides what the windows leave open, and costs nothing inside them.
 _SMOOTHNESS = 1e-9
-_AKAIKE_COST = (
-    4.0  # of the two figures of a harmonic, after Akaike: what a learnt one adds in noise, and in doubt of it
-)
+_AKAIKE_COST = 4.0  # cost of the two numbers of a harmonic, after Akaike: the noise that learning it adds
 
 
 @dataclass(frozen=True, eq=False)

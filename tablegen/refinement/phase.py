@@ -11,15 +11,15 @@ from tablegen.planning.line_plan import LinePlan
 from tablegen.problems import Unphysical
 from tablegen.waveform.series import FourierSeries
 
-MIN_SAMPLES_PER_PERIOD = 40  # a period
-_GRID_POINTS = 1 << 16  # points a period, between which the known waveform is linear
-_MAX_CLOCK_DIFFERENCE = 0.01  # by which the clocks of generator and recorder may differ
-_MAX_DRIVE_DIFFERENCE = 0.05  # by which the recorded drive may differ from the plan's, of its amplitude
+MIN_SAMPLES_PER_PERIOD = 40  # samples per period
+_GRID_POINTS = 1 << 16  # points per period, between which the known waveform is linear
+_MAX_CLOCK_DIFFERENCE = 0.01  # relative difference allowed between the clocks of generator and recorder
+_MAX_DRIVE_DIFFERENCE = 0.05  # difference allowed between recorded drive and plan, share of the amplitude
 _MAX_DRIVE_DEPARTURE = (
     0.005  # rms departure of the drive from the plan's waveform, of its amplitude, averaged over periods
 )
-_BINS_PER_PERIOD = 64  # a period, for that
-_MAX_LAYER_MISSING = 0.5  # of the layer
+_BINS_PER_PERIOD = 64  # bins per period for that
+_MAX_LAYER_MISSING = 0.5  # share of the layer
 
 
 @dataclass(frozen=True)
@@ -117,8 +117,8 @@ def _first_guess(series: FourierSeries, time_s: Floats, drive_v: Floats, nominal
         wave = np.exp(-2j * pi * turns[inside])
         basis = np.column_stack([np.ones(len(wave)), wave.real, wave.imag])
         c = np.linalg.lstsq(basis, drive_v[inside], rcond=None)[0]
-        angles.append(np.angle(c[1] + 1j * c[2]))  # of exp(2 pi i turns)
-    # Of cos(2 pi (turns + angle)): a clock that is off lets the angle grow.
+        angles.append(np.angle(c[1] + 1j * c[2]))  # angle of exp(2 pi i turns)
+    # The drive is cos(2 pi (turns + angle)): a clock that is off lets the angle grow.
     angle = np.unwrap(angles) / (2.0 * pi)
     growth = float(np.polyfit(np.arange(pieces) + 0.5, angle, 1)[0]) if pieces > 1 else 0.0
     period = nominal_s / (1.0 + growth)

@@ -18,8 +18,8 @@ from tablegen.refinement.displacement import Displacement, fit_displacement
 from tablegen.refinement.learning import DEFAULT_GAIN, DEFAULT_HARMONICS, Lesson, learn
 from tablegen.refinement.phase import Phase, phase_by_drive, phase_by_trigger
 
-_FINISHED_RATIO = 0.9  # of the residual: what is left is noise where a round would take less than the rest
-_SIZE_NOTE_LIMIT = 0.01  # of the line, beyond which the size is worth a remark
+_FINISHED_RATIO = 0.9  # share of the residual that a round would leave; above it the rest is noise
+_SIZE_NOTE_LIMIT = 0.01  # share of the line; a larger size error gets a remark
 
 
 @dataclass(frozen=True)

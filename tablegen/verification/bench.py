@@ -54,10 +54,10 @@ class BenchRun:
     samples: int
     mismatch: Mismatch | None
     faults_counted: bool  # the counters of the device are those of the model
-    refused: bool  # a write was, and none was meant to be; or the other way round
+    refused: bool  # a write was refused, and should not have been; or the other way round
     jitter: int
     latency: int
-    fault_counts: tuple[int, ...]  # of slew, clamp, overrun and underrun
+    fault_counts: tuple[int, ...]  # counts of slew, clamp, overrun and underrun
     capture: Words = field(repr=False, compare=False)
 
     @property

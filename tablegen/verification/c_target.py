@@ -35,9 +35,9 @@ from tablegen.verification.session import make_session
 from tablegen.verification.simulate import SimulationFailed
 from tablegen.verification.stream import Words, read_capture
 
-_MAX_TABLE_WORDS = 1 << 17  # of a direct table, as dac_sequencer_load() takes them
-_MAX_FILL_TICKS = 600  # ticks a call
-_MIN_TICKS_PER_SECOND = 5000  # a program that plays fewer does not end
+_MAX_TABLE_WORDS = 1 << 17  # words of a direct table that dac_sequencer_load() accepts
+_MAX_FILL_TICKS = 600  # ticks per call
+_MIN_TICKS_PER_SECOND = 5000  # a slower program is taken for hanging
 
 
 @dataclass(frozen=True)

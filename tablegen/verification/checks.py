@@ -180,7 +180,7 @@ def check_no_faults(capture: Capture, stored: StoredBuild) -> Check:
 
 
 def check_faults(capture: Capture, stored: StoredBuild, counted: list[int], counts: list[int]) -> Check:
-    """Those of a variation are the model's, tick for tick, and so are their ``counted`` numbers."""
+    """Faults of a variation equal the model's, tick for tick, and so do their ``counted`` numbers."""
     got, wanted = _part("faults", capture.got), _part("faults", capture.wanted)
     wrong = np.flatnonzero(got != wanted)
     failure = None

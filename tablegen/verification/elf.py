@@ -24,7 +24,7 @@ class Executable:
     entry: int
     segments: list[Segment]
     symbols: dict[str, int]
-    sizes: dict[str, int]  # of symbols, bytes
+    sizes: dict[str, int]  # sizes of symbols in bytes
 
 
 def read_executable(path: Path) -> Executable:

@@ -29,7 +29,7 @@ _RAM, _RAM_SIZE, _STACK = 0x20000000, 1 << 24, 1 << 16
 _FLASH, _FLASH_SIZE = 0x00010000, 1 << 24
 TRAP = _FLASH + _FLASH_SIZE - 16  # where a called function returns to: nothing else is there
 _STACK_PAINT = 0xA5
-_ARRAY_WORDS = 8192  # of the arrays of stream_bench_memory.c
+_ARRAY_WORDS = 8192  # words of the arrays in stream_bench_memory.c
 _SLICE_US = 500_000  # so that an interruption is seen
 
 

@@ -5,7 +5,7 @@ from typing import Literal
 
 from tablegen.fixedpoint.program import Program
 
-_SERIAL_CLOCKS = 41  # of a sample
+_SERIAL_CLOCKS = 41  # clocks per sample
 
 
 @dataclass(frozen=True)

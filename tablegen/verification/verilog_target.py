@@ -26,7 +26,7 @@ from tablegen.verification.stream import read_capture
 
 _CAPTURED_TICK_BYTES = 17  # bytes of a captured tick
 _SINE = "sine.mem"
-_MAX_TABLE_WORDS = 1 << 16  # of a table, as the sequencer addresses them
+_MAX_TABLE_WORDS = 1 << 16  # words of a table that the sequencer can address
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,9 @@ from tablegen.virtual.line_error import ideal_triangle
 from tablegen.virtual.scanner import VirtualAxis
 from tablegen.virtual.sensor import Sensor
 
-TICKS = 2000  # of a triangle whose size alone counts
-STEPS_PER_RING = 8  # of the generator, in a period of the resonance
-RUNG_OUT = 1e-2  # what is left of a step's ringing that is small beside the sensor's noise
+TICKS = 2000  # ticks of a triangle of which only the size is used
+STEPS_PER_RING = 8  # steps of the generator per period of the resonance
+RUNG_OUT = 1e-2  # share of a step's ringing that is small compared with the noise of the sensor
 MAX_TICKS = 1 << 21  # beyond it steps are so small that they ring nothing
 
 

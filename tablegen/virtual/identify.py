@@ -23,11 +23,11 @@ from tablegen.virtual.creep import logarithmic_creep
 from tablegen.virtual.preisach import Preisach
 
 DEGREE, REVERSIBLE, SENSITIVITY = 8, 2, 6  # degrees of the polynomials
-TICKS = 2000  # of a triangle
+TICKS = 2000  # ticks of a triangle
 SIZES = (0.07, 0.13, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 OFFSETS_V = (7.0, 20.0, 35.0, 50.0, 65.0, 80.0, 93.0)
 V_MAX = 100.0
-OFFSET_SIZE = 0.13  # of v_max, 200 nm in figure 2 of the paper
+OFFSET_SIZE = 0.13  # share of v_max, 200 nm in figure 2 of the paper
 LOSS = 0.03
 FASTEST_S, SLOWEST_S, PER_DECADE = 1e-6, 1e3, 2
 # Normalised sizes at middles away from that of the range, at which one m(p) and one size law shall serve.

@@ -11,8 +11,8 @@ from tablegen.numerics.arrays import Floats
 from tablegen.virtual.line_error import ideal_triangle
 from tablegen.virtual.scanner import VirtualAxis
 
-_TICKS = 16384  # of a line
-_STEEPNESS = 2.5  # of a bar's flanks; rounded as a tip rounds them
+_TICKS = 16384  # ticks per line
+_STEEPNESS = 2.5  # steepness of the flanks of a bar, rounded as by a tip
 _DUTY = 0.3
 
 Surface = Callable[[Floats, Floats], Floats]  # height at x and y in nm

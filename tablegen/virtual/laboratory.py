@@ -29,14 +29,14 @@ from tablegen.virtual.sensor import Sensor
 
 T = TypeVar("T")
 _AXES: tuple[Literal["x", "y"], ...] = ("x", "y")
-NOISE = 0.002  # rms of every reading, of the scan or of the value
+NOISE = 0.002  # rms noise of every reading, relative to the scan or to the value
 # Shares of v_max. Offsets stay away from the ends, as the paper advises.
 OFFSETS = (0.07, 0.285, 0.5, 0.715, 0.93)
 OFFSET_SIZE = 0.13
 SIZES = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 AMPLITUDES = (0.2, 0.4, 0.6, 0.8, 1.0)
 SMALL_IMAGE, LATTICE_NM, GRATING_NM = 0.2, 17.7, 50.0
-PERIODS, SAMPLES = 4, 1000  # of a trace, and a period
+PERIODS, SAMPLES = 4, 1000  # periods per trace, samples per period
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ import numpy as np
 from tablegen.certificate.line_errors import CHORD
 from tablegen.numerics.arrays import Floats
 
-POINTS = 1001  # over the whole line
+POINTS = 1001  # points over the whole line
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +44,7 @@ class BranchError:
 
     @property
     def scaling_peak_to_peak(self) -> float:
-        """Of the scaling error inside the window."""
+        """Peak to peak of the scaling error inside the window."""
         return float(np.max(self.scaling) - np.min(self.scaling))
 
     def _inside(self) -> np.typing.NDArray[np.bool_]:

@@ -72,7 +72,7 @@ class Modes:
         return (blocks @ kernel + carried).reshape(-1)[:ticks]
 
     def _held(self, tick_s: float) -> tuple[npt.NDArray[np.complex128], npt.NDArray[np.complex128]]:
-        """Of each term over a tick: the share by which its state changes, and the weight of the drive held."""
+        """For each term over a tick: the share by which its state changes, and the weight of the drive held."""
         p, r = np.array(self.poles, dtype=np.complex128), np.array(self.residues, dtype=np.complex128)
         change = np.expm1(p * tick_s)
         return change, r * change / p

@@ -16,7 +16,7 @@ from tablegen.virtual.parameters import Truth, sensitivity
 from tablegen.virtual.preisach import Preisach
 
 _STRAIGHT = Modes(1.0)
-_DRIVE_LEVELS = 2.0**36  # of the drive
+_DRIVE_LEVELS = 2.0**36  # levels of the drive
 
 
 @dataclass(frozen=True)

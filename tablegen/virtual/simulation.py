@@ -37,7 +37,7 @@ class AxisRun:
 
     @property
     def size_error_percent(self) -> float:
-        """Of the size in the image against what the scan file asks for."""
+        """Error of the size in the image against what the scan file asks for."""
         return 100.0 * (self.imaged.size_nm / self.nominal_nm - 1.0)
 
 

@@ -128,7 +128,7 @@ def _within_range(free: Floats, factor: Cholesky, harmonics: int) -> FourierSeri
     active: list[tuple[int, float]] = []  # grid point, level
     columns: dict[int, Floats] = {}
     c = free
-    swing = (0.0, 1.0)  # of the free fit, for the message
+    swing = (0.0, 1.0)  # range of the free fit, for the message
     for attempt in range(_MAX_RANGE_ROUNDS):
         w = _series(c, harmonics).on_grid(points)
         swing = swing if attempt else (float(np.min(w)), float(np.max(w)))

@@ -139,12 +139,12 @@ def test_status_in_words(bench: Bench, folder: Path, scan: PreparedScan) -> None
     shown = bench.run("status")
     assert (shown.status, shown.err) == (0, "")
     rows = dict(line.split(maxsplit=1) for line in shown.out.splitlines())
-    assert rows["state"].startswith("parked; `tablegen trigger`") or rows["state"] == "ramping to the park codes"
+    assert rows["state"].startswith("parked; start the scan with") or rows["state"] == "ramping to the park codes"
     assert rows["scan"] == f"{BOOT.digest[:12]}, generation 1"
     assert rows["upload"] == "none in progress"
     assert rows["faults"] == "none"
     assert rows["device"].startswith("500000 ticks/s, accepts tables and Fourier words of 64 harmonics")
-    assert rows["x"].startswith("2^11 words of 16 bits, codes 0..65535 of 16 bits, steps to 2621")
+    assert rows["x"].startswith("2^11 words of 16 bits, codes 0..65535 of 16 bits, steps up to 2621")
     assert "interlock" not in rows
     bench.run("upload", folder)
     bench.run("trigger")

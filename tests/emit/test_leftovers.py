@@ -35,7 +35,7 @@ def test_files_of_a_format_that_is_no_longer_chosen_are_removed(built: Path) -> 
     before = {path.name for path in built.iterdir()}
     checked = run("build", built.parent / "scan.toml", "-o", built, "-f", "c", "--check")
     assert checked.status == 1
-    assert f"{built / 'dac_axis.v'}: an earlier build made it, this one does not" in checked.out
+    assert f"{built / 'dac_axis.v'}: left over from an earlier build" in checked.out
     assert {path.name for path in built.iterdir()} == before  # --check writes nothing
     assert f"run: tablegen build {built.parent / 'scan.toml'} -o {built} -f c\n" in checked.err
     outcome = run("build", built.parent / "scan.toml", "-o", built, "-f", "c")
@@ -43,7 +43,7 @@ def test_files_of_a_format_that_is_no_longer_chosen_are_removed(built: Path) -> 
     after = {path.name for path in built.iterdir()}
     assert after == listed(built) | {"manifest.json"}
     assert {Path(name).suffix for name in before - after} == {".v", ".vh", ".mem"}
-    assert "removed what an earlier build had made: annexin_200nm.vh, " in outcome.out
+    assert "removed files of an earlier build: annexin_200nm.vh, " in outcome.out
     assert run("build", built.parent / "scan.toml", "-o", built, "-f", "c", "--check").status == 0
 
 
@@ -65,13 +65,13 @@ def test_a_module_of_an_older_runtime_is_removed(built: Path) -> None:
     edit_manifest(built, **{"dac_old.v": sha256(b"module dac_old; endmodule\n").hexdigest()})
     outcome = run("build", built.parent / "scan.toml", "-o", built)
     assert outcome.status == 0
-    assert "removed what an earlier build had made: dac_old.v" in outcome.out
+    assert "removed files of an earlier build: dac_old.v" in outcome.out
     assert not (built / "dac_old.v").exists()
 
 
 def test_a_module_that_no_manifest_lists_is_reported(built: Path) -> None:
     (built / "dac_old.v").write_bytes(b"module dac_old; endmodule\n")
-    told = f"{built / 'dac_old.v'}: is no file of this build, and dac_*.v matches it; remove it"
+    told = f"{built / 'dac_old.v'}: is not a file of this build but matches dac_*.v; remove it"
     checked = run("build", built.parent / "scan.toml", "-o", built, "--check")
     assert checked.status == 1
     assert told in checked.out
@@ -85,7 +85,7 @@ def test_a_file_that_was_edited_is_reported_and_stays(built: Path) -> None:
     (built / f"{NAME}.vh").write_text("// mine\n", "ascii")
     outcome = run("build", built.parent / "scan.toml", "-o", built, "-f", "c")
     assert outcome.status == 0
-    told = f"note: {built / NAME}.vh: an earlier build made it, and it was edited since; remove it"
+    told = f"note: {built / NAME}.vh: left over from an earlier build, and edited since; remove it"
     assert outcome.messages == [told]
     assert (built / f"{NAME}.vh").read_text("ascii") == "// mine\n"
 

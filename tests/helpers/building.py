@@ -39,9 +39,9 @@ PACKAGES = {
     "gcov": "gcc",
     "mips-linux-gnu-gcc": "gcc-mips-linux-gnu",
     "ninja": "ninja-build",
+    "srec_cat": "srecord",
     "nm": "binutils",
     "qemu-mips": "qemu-user",
-    "srec_cat": "srecord",
     "vvp": "iverilog",
     "yosys-smtbmc": "yosys",
 }

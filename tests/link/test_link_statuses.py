@@ -156,7 +156,7 @@ def test_status_10_link_lost_and_out_of_time(bench: Bench, folder: Path) -> None
     outcome = bench.run("upload", folder, "--timeout", "2", "--force")
     assert outcome.status == 10
     assert "has not reached the start of a line" in outcome.err
-    assert "(--timeout)" in outcome.err
+    assert "increase --timeout" in outcome.err
 
 
 @pytest.mark.parametrize(("after", "said"), [(0, "continues with its old scan"), (240, "to continue the upload")])

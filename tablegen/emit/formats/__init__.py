@@ -28,7 +28,7 @@ def names() -> list[str]:
 
 
 def own_names() -> list[str]:
-    """Those of tablegen."""
+    """The formats of tablegen."""
     return sorted(_own())
 
 

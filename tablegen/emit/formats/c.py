@@ -123,7 +123,7 @@ def _context(content: Content) -> dict[str, Any]:
         "phase_bits": PHASE_BITS,
         "least_gain": signed_limits(GAIN_BITS)[0],
         "greatest_gain": signed_limits(GAIN_BITS)[1],
-        "word_type": "int16_t" if bits <= 16 else "int32_t",  # of both tables: the runtime is compiled for one
+        "word_type": "int16_t" if bits <= 16 else "int32_t",  # the type of both tables: the runtime is compiled for one
         "sine": {"constants": _sine_constants(content, sine), "rows": rows(sine)} if len(sine) else None,
         "axes": [_axis(content, axis) for axis in content.axes],
     }

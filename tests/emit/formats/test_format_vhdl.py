@@ -88,7 +88,7 @@ def printed(built: Formatted, folder: Path, standard: str) -> dict[str, list[str
     return found
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize("standard", ["93", "08"])
 def test_ghdl_reads_the_numbers_of_the_manifest(built: Formatted, tmp_path: Path, standard: str) -> None:
     found, manifest = printed(built, tmp_path, standard), built.manifest

@@ -19,7 +19,7 @@ from tablegen.emit.waveforms import MOST_TICKS
 from tablegen.manifest.read import read_build
 from tablegen.problems import Unphysical
 
-OF_SAMPLES = ("csv", "npz", "wav")
+OF_SAMPLES = ("csv", "npz", "pwl", "wav")
 
 
 @pytest.fixture(scope="module")
