@@ -55,7 +55,7 @@ def fit_frequency(frequency_hz: Floats, gain: Floats, reference_hz: float | None
         remarks.append("the gain does not fall with frequency; alpha is set to 0")
         alpha = Estimate(0.0, alpha.standard_error)
     if alpha.value > _LARGEST_ALPHA:
-        raise Unphysical(f"alpha = {alpha.value:.3g} is no loss of some percent a decade; are these gains?")
+        raise Unphysical(f"alpha = {alpha.value:.3g} is not a loss of a few percent per decade; are these gains?")
     expected = solution.values[1] * scale * (1.0 - raw * decades)
     if solution.freedom == 0:
         remarks.append("two points fit exactly, so errors cannot be estimated; measure more frequencies")

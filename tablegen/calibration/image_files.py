@@ -76,7 +76,7 @@ def read_image(path: Path, channel: str | None = None) -> ScanImage:
     if bad:
         raise refuse(f"{what}{bad} pixels are not finite; crop or interpolate them")
     if not np.ptp(heights) > 0.0:
-        raise refuse(f"{what}all pixels are {heights.flat[0]:g}; was another channel saved?")
+        raise refuse(f"{what}all pixels are {heights.flat[0]:g}; was a different channel saved?")
     return ScanImage(name, Source(path.name, hashlib.sha256(content).hexdigest()[:16]), heights)
 
 

@@ -33,15 +33,15 @@ def prepared(
     """Levelled heights of unit variance."""
     if trace.shape != retrace.shape:
         sizes = " and ".join(f"{image.shape[0]} x {image.shape[1]}" for image in (trace, retrace))
-        raise Unphysical(f"trace and retrace have {sizes} pixels; both have to be of one scan")
+        raise Unphysical(f"trace and retrace have {sizes} pixels; both must be from one scan")
     if trace.ndim != 2 or min(trace.shape) < _MIN_PIXELS:
         raise Unphysical(f"{' x '.join(map(str, trace.shape))} pixels are too few; {_MIN_PIXELS} rows and columns do")
     if not 0.0 < turn < 1.0:
         raise Unphysical(f"a turn of {turn:g} is outside 0..1")
     if not (window[0] >= 0.0 and window[1] <= 1.0 and window[1] - window[0] >= 0.3):
-        raise Unphysical(f"a window of {window[0]:g}..{window[1]:g} is no large part of the sweep, 0..1")
+        raise Unphysical(f"a window of {window[0]:g}..{window[1]:g} is not a large part of the sweep, 0..1")
     if not abs(delay) <= _MAX_DELAY * trace.shape[1]:
-        raise Unphysical(f"a delay of {delay:g} pixels is no small part of a line of {trace.shape[1]}")
+        raise Unphysical(f"a delay of {delay:g} pixels is too large for a line of {trace.shape[1]}")
     if np.array_equal(trace, retrace) or np.array_equal(trace, retrace[:, ::-1]):
         raise Unphysical(
             "trace and retrace are the same image; both directions are needed, since the scanner file has a branch for "
@@ -51,7 +51,7 @@ def prepared(
     images = []
     for name, image in (("trace", trace), ("retrace", retrace)):
         if not np.all(np.isfinite(image)):
-            raise Unphysical(f"the {name} has {int(np.sum(~np.isfinite(image)))} pixels that are no number; crop it")
+            raise Unphysical(f"the {name} has {int(np.sum(~np.isfinite(image)))} pixels that are not numbers; crop it")
         image = image - np.mean(image)
         largest = float(np.max(np.abs(image)))
         level = np.asarray(geometry.levelled(image), dtype=np.float64)
@@ -82,7 +82,7 @@ def begin(geometry: Geometry, heights: list[Floats], mirrored: bool) -> tuple[Sp
     if turned.match > 1.5 * max(backward.match, 0.2 * forward.match):
         raise Unphysical(f"the retrace shows the trace's pattern only when it is mirrored; {advice}{_ALIASING_HINT}")
     if backward.match < 0.3 * forward.match:
-        raise Unphysical("the retrace does not show the trace's pattern; are they of one scan?")
+        raise Unphysical("the retrace does not show the trace's pattern; are they from one scan?")
     # A grating square to the lines looks the same mirrored; then the bend tells.
     signs = [peak(np.array([bend.xi, bend.xi_gamma]))[0] for bend in (forward, backward)]
     check_signs(signs[0], signs[1], 0.02, advice)
@@ -98,7 +98,7 @@ def check_signs(forward: float, backward: float, least: float, advice: str) -> N
     if forward > 0.0 and backward < -least:
         raise Unphysical(f"the retrace bends the wrong way, as one that is mirrored; {advice}{_ALIASING_HINT}")
     if forward < -least and backward > 0.0:
-        raise Unphysical("the trace bends the wrong way; is it mirrored? Left has to be where the trace begins")
+        raise Unphysical("the trace bends the wrong way; is it mirrored? The left end must be where the trace begins")
 
 
 def grown(

@@ -84,7 +84,7 @@ def _remarks(fit: ImageFit) -> list[str]:
         found.append(f"{100.0 * fit.explained:.0f} % of the contrast is periodic, the rest noise, debris or defects")
     if fit.strays:
         shown = ", ".join(str(i + 1) for i in fit.strays[:5]) + (", ..." if len(fit.strays) > 5 else "")
-        found.append(f"{len(fit.strays)} lines are unlike the others (row {shown}); they were kept")
+        found.append(f"{len(fit.strays)} lines differ from the others (row {shown}); they were kept")
     for name, side in (("forward", fit.forward), ("backward", fit.backward)):
         if side.u_peak.standard_error > 0.1:
             found.append(f"u_peak {name} is not determined by these images; scan more periods, or average")

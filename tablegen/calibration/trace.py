@@ -52,7 +52,9 @@ def fit_trace(
     Raises ``Unphysical``.
     """
     if len(time_s) < _MIN_SAMPLES_PER_PERIOD:
-        raise Unphysical(f"{len(time_s)} samples are no trace; at least {_MIN_SAMPLES_PER_PERIOD} a period are needed")
+        raise Unphysical(
+            f"{len(time_s)} samples are not enough for a trace; at least {_MIN_SAMPLES_PER_PERIOD} a period are needed"
+        )
     if not np.all(np.diff(time_s) > 0.0):
         at = int(np.argmin(np.diff(time_s) > 0.0))
         raise Unphysical(f"time does not ascend after {time_s[at]:g} s; give every trace its own file or trace number")

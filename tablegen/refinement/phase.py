@@ -92,7 +92,9 @@ def phase_by_drive(line: LinePlan, time_s: Floats, drive_v: Floats, delay_s: flo
 
 def _check_times(time_s: Floats, period_s: float) -> None:
     if len(time_s) < MIN_SAMPLES_PER_PERIOD:
-        raise Unphysical(f"{len(time_s)} samples are no trace; at least {MIN_SAMPLES_PER_PERIOD} a period are needed")
+        raise Unphysical(
+            f"{len(time_s)} samples are not enough for a trace; at least {MIN_SAMPLES_PER_PERIOD} a period are needed"
+        )
     if not np.all(np.diff(time_s) > 0.0):
         at = int(np.argmin(np.diff(time_s) > 0.0))
         raise Unphysical(f"time does not ascend after {time_s[at]:g} s; a file holds one trace")

@@ -76,7 +76,7 @@ def first_difference(capture: Capture, stored: StoredBuild) -> str | None:
     """The first tick at which anything differs, with all that was expected and got."""
     differs = np.flatnonzero(capture.got != capture.wanted)
     if not len(differs):
-        return f"{capture.lost} ticks are lost or too many, at the end of the capture" if capture.lost else None
+        return f"{capture.lost} ticks are missing or too many at the end of the capture" if capture.lost else None
     at = int(differs[0])
     wanted, got = _sample(capture.wanted[at]), _sample(capture.got[at])
     return f"{_where(capture, stored, at)}\n  expected  {wanted}\n  got       {got}"
@@ -113,7 +113,7 @@ def _model(capture: Capture, stored: StoredBuild, subject: str) -> Check:
             f"{_where(capture, stored, at)}: expected {expected}, got {'undefined' if undefined else found}"
         )
     elif capture.lost:
-        failure = f"{subject}: {capture.lost} ticks are lost or too many, at the end of the capture"
+        failure = f"{subject}: {capture.lost} ticks are missing or too many at the end of the capture"
     unit = "ticks" if subject == "markers" else "codes"
     return Check(subject, "integer model", f"{len(got)} {unit}", worst, "0", failure)
 
@@ -127,7 +127,7 @@ def _float(capture: Capture, stored: StoredBuild, axis: Literal["x", "y"], conte
     # Rounded down: a frame of which a tick was not played is not whole.
     compared = f"{len(at)} codes, {int(covered * 1000) / 10:g} % of the {name}"
     if not len(at):
-        why = f"{axis}: the output did not catch up with the waveform in {len(capture.got)} ticks; play more --ticks"
+        why = f"{axis}: the output did not reach the waveform within {len(capture.got)} ticks; play more --ticks"
         return Check(axis, "float waveform", "no code", "", f"{limit:.3f} LSB", why)
     error: Floats = _part(axis, capture.got)[at] - content.asked(k)
     largest = int(np.argmax(np.abs(error)))
@@ -235,7 +235,7 @@ def check_filled(capture: Capture, stored: StoredBuild, counted: list[int], coun
             f"{_where(capture, stored, at)}:\n  expected  {_sample(wanted[at])}\n  got       {_sample(got[at])}"
         )
     elif capture.lost:
-        failure = f"fill: {capture.lost} ticks are lost or too many, at the end of the capture"
+        failure = f"fill: {capture.lost} ticks are missing or too many at the end of the capture"
     elif counted != counts:
         failure = f"fill: faults expected are {_counts(counts)}; counted are {_counts(counted)}"
     return Check("fill", "integer model", f"{len(got)} ticks", f"{len(differs)} differ", "0", failure)

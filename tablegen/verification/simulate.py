@@ -170,5 +170,5 @@ def _tail(log: Path) -> str:
     try:
         lines = log.read_text("utf-8", "replace").splitlines()
     except OSError:
-        return "the simulator left no log"
+        return "the simulator wrote no log"
     return "\n".join([f"the simulation failed; the end of {log.name} is", *lines[-_MAX_LOG_LINES:]])

@@ -174,7 +174,10 @@ def test_samples_far_off_are_counted() -> None:
         (lambda t: replace(t, drive_v=50.0 + t.time_s), "the drive has no complete sweep up and down"),
         (lambda t: replace(t, time_s=t.time_s[::-1]), "time does not ascend after"),
         (lambda t: replace(t, drive_v=t.drive_v + 30.0), "a drive of 30..130 V is outside the driver's 0..100 V"),
-        (lambda t: Trace("", t.time_s[:20], t.drive_v[:20], t.displacement_nm[:20]), "20 samples are no trace"),
+        (
+            lambda t: Trace("", t.time_s[:20], t.drive_v[:20], t.displacement_nm[:20]),
+            "20 samples are not enough for a trace",
+        ),
         (
             lambda t: Trace("", t.time_s[::12], t.drive_v[::12], t.displacement_nm[::12]),
             "25.. samples a period are too few",

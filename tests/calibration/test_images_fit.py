@@ -275,7 +275,7 @@ def test_a_count_that_the_window_leaves_open_is_refused() -> None:
     [
         ({"retrace": np.zeros((256, 128))}, "trace and retrace have 256 x 256 and 256 x 128 pixels"),
         ({"trace": np.zeros((256, 20)), "retrace": np.zeros((256, 20))}, "256 x 20 pixels are too few"),
-        ({"trace": np.full((256, 256), np.nan)}, "the trace has 65536 pixels that are no number"),
+        ({"trace": np.full((256, 256), np.nan)}, "the trace has 65536 pixels that are not numbers"),
         ({"v_scan": 120.0}, "a scan of 120 V is outside the driver's 0..100 V"),
     ],
 )
@@ -287,10 +287,10 @@ def test_images_that_cannot_be_are_refused(changed: dict[str, object], said: str
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"window": (0.4, 0.6)}, "no large part"),
+        ({"window": (0.4, 0.6)}, "is not a large part"),
         ({"turn": 1.0}, "a turn of 1 is outside"),
-        ({"delay_pixels": np.nan}, "a delay of nan pixels is no small part of a line of 128"),
-        ({"delay_pixels": -125.0}, "a delay of -125 pixels is no small part"),
+        ({"delay_pixels": np.nan}, "a delay of nan pixels is too large for a line of 128"),
+        ({"delay_pixels": -125.0}, "a delay of -125 pixels is too large"),
     ],
 )
 def test_options_out_of_range_are_refused(options: dict[str, object], said: str) -> None:
@@ -316,6 +316,6 @@ def test_loud_lines_are_named() -> None:
     loud = images.trace.copy()
     loud[100:103] += 2.0 * np.random.default_rng(5).standard_normal((3, 256))
     fit = fit_images([replace(images, trace=loud)], V_MAX)
-    assert any("3 lines are unlike the others (row 101, 102, 103); they were kept" in text for text in fit.remarks)
+    assert any("3 lines differ from the others (row 101, 102, 103); they were kept" in text for text in fit.remarks)
     loud[100:103] *= 30.0
     assert "rows 101 to 103 have most of the trace's contrast; crop them" in refused(loud, images.retrace)

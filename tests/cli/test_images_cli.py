@@ -147,7 +147,7 @@ def test_a_mirrored_retrace_and_a_window(lab: Path) -> None:
         (["--pair", "120", "t100.npy", "r100.npy"], "a scan of 120 V is outside the driver's 0..100 V"),
         (["--pair", "100", "r100.npy", "t100.npy"], "r100.npy and t100.npy: both sweeps lead the drive"),
         (["--pair", "100", "t100.npy", "t60.npy"], "t100.npy and t60.npy:"),
-        (["--pair", "100", "t100.npy", "r100.npy", "--window", "0.5", "0.4"], "no large part of the sweep"),
+        (["--pair", "100", "t100.npy", "r100.npy", "--window", "0.5", "0.4"], "is not a large part of the sweep"),
     ],
 )
 def test_what_is_refused(words: list[str], said: str, lab: Path) -> None:

@@ -99,7 +99,7 @@ def test_a_drive_of_something_else_is_refused(line: LinePlan) -> None:
     assert "time does not ascend after 0.0499" in wrong(line, np.minimum(time, time[-2]), volts)
     assert "0.5 of a period of 0.01 s are recorded" in wrong(line, time[:100], volts[:100])
     assert "20 samples a period are too few" in wrong(line, time[::10], volts[::10])
-    assert "39 samples are no trace" in wrong(line, time[:39], volts[:39])
+    assert "39 samples are not enough for a trace" in wrong(line, time[:39], volts[:39])
 
 
 def test_a_trace_of_the_build_before_is_refused(line: LinePlan, tmp_path: Path) -> None:

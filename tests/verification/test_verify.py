@@ -250,7 +250,7 @@ def test_samples_that_never_come_are_found(folder: Path) -> None:
     assert outcome.status == 5
     models = {(subject, "integer model") for subject in ("x", "y", "markers")}
     assert {*models, ("timing", "constant delay")} <= failed(outcome)
-    assert "ticks are lost or too many" in outcome.err
+    assert "ticks are missing or too many" in outcome.err
 
 
 @pytest.mark.common
