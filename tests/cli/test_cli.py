@@ -323,6 +323,7 @@ def test_show_draws_in_braille_where_it_can_and_in_stars_elsewhere(scan: Path) -
     assert no_plot.splitlines()[:12] == rich_text.splitlines()[:12]
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1", "utf-8"])
 def test_a_name_that_the_terminal_cannot_show_is_no_failure(tmp_path: Path, encoding: str) -> None:
     scan = write_pair(tmp_path, SCAN, edited(SCANNER, "name = '\u03b2-scanner \U0001f52c'"))
