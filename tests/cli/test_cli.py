@@ -323,6 +323,7 @@ def test_show_draws_in_braille_where_it_can_and_in_stars_elsewhere(scan: Path) -
     assert no_plot.splitlines()[:12] == rich_text.splitlines()[:12]
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1", "utf-8"])
 def test_a_name_that_the_terminal_cannot_show_is_no_failure(tmp_path: Path, encoding: str) -> None:
     scan = write_pair(tmp_path, SCAN, edited(SCANNER, "name = '\u03b2-scanner \U0001f52c'"))
@@ -371,6 +372,7 @@ def test_a_terminal_gets_what_a_pipe_gets_apart_from_colour(scan: Path, command:
     run(command, scan, *extra)  # so that both builds below find everything up to date
     piped = tablegen(command, scan, *extra, PYTHONIOENCODING="utf-8").stdout.decode("utf-8")
     shown = on_a_terminal(command, scan, *extra)
+    shown = re.sub(r"\r[^\n]*\r", "", shown)  # what says on a busy machine that it takes its time
     assert re.sub(r"\x1b\[[0-9;]*m", "", shown) == piped
     assert ("\x1b[1m" in shown) == (command == "show")
 

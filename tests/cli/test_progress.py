@@ -5,6 +5,7 @@ import sys
 import threading
 
 import pytest
+from limits import PATIENCE_S
 
 from tablegen.cli import progress as module
 from tablegen.cli.progress import Progress
@@ -33,11 +34,11 @@ def test_long_work_is_named_and_the_line_goes_again(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(module, "_SHOW_AFTER_S", 0.01)
     with Progress() as progress:
         progress.now("shaping")
-        assert screen.written.wait(60)
+        assert screen.written.wait(PATIENCE_S)
         screen.written.clear()
         progress.now("measuring")
         while "measuring" not in screen.getvalue():
-            assert screen.written.wait(60)
+            assert screen.written.wait(PATIENCE_S)
             screen.written.clear()
     shown = screen.getvalue()
     assert shown.startswith("\rshaping (0 s)")
@@ -75,7 +76,7 @@ def test_a_failure_takes_the_line_away_too(monkeypatch: pytest.MonkeyPatch) -> N
     def interrupted() -> None:
         with Progress() as progress:
             progress.now("shaping")
-            assert screen.written.wait(60)
+            assert screen.written.wait(PATIENCE_S)
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):

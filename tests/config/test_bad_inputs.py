@@ -1551,6 +1551,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 STEADY = settings(derandomize=True, deadline=None, max_examples=60)
 
 
+@pytest.mark.common
 @STEADY
 @given(
     pixels=st.integers(2, 3000),
@@ -1574,6 +1575,7 @@ def test_the_line_rate_that_is_said_to_carry_the_pixels_does(
     assert "timing.pixels" not in refused(folder, scan)
 
 
+@pytest.mark.common
 @STEADY
 @given(slew=st.floats(1e2, 3e4), bits=st.integers(10, 24), size=st.floats(20.0, 600.0), rate=st.floats(50.0, 900.0))
 def test_the_line_rate_that_is_said_to_suit_the_amplifier_does(

@@ -141,6 +141,7 @@ def test_the_header_defines_what_the_manifest_knows_and_no_more(built: Build) ->
     assert {name for name in defined if "(" not in name} == {*c_constants(built.manifest), "HASH", "H"}
 
 
+@pytest.mark.common
 def test_player_equals_the_model_over_a_whole_frame_and_into_the_next(built: Build) -> None:
     lines = built.plan.schedule.lines + 2
     assert np.array_equal(played(compile_player(built, ["gcc", "-std=c99", "-O1"]), lines), model(built, lines))

@@ -41,6 +41,7 @@ def without(text: str, axis: str) -> list[str]:
     return [row for row in kept if row]
 
 
+@pytest.mark.common
 @given(
     st.lists(st.floats(-0.5, 0.5), min_size=1, max_size=40),
     st.sampled_from("xy"),

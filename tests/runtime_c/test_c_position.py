@@ -49,6 +49,7 @@ def test_ninety_six_bits_are_exact(library: Library, period: int, index_bits: in
 LONGEST_RUN = (1 << 32) // 18
 
 
+@pytest.mark.common
 @given(
     period=st.one_of(edges(LONGEST_RUN), edges(MOST_ADVANCES)), index_bits=st.integers(3, 10), seed=st.integers(0, 5),
     data=st.data(),

@@ -70,7 +70,7 @@ def test_random_programs(name: str, benches: Benches) -> None:
 
 
 @pytest.mark.common
-@pytest.mark.parametrize("name", LONG)
+@pytest.mark.parametrize("name", common(("bits_16", "bits_24", "direct"), LONG))
 def test_long_lines(name: str, benches: Benches) -> None:
     script = long_play(name, 60_000)
     capture = everywhere(benches, script, LONG[name][0])
@@ -187,6 +187,7 @@ def test_functions_with_sanitizers(compiler: str, tmp_path: Path) -> None:
 # What a build emits.
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("name", common(("short_frame", "direct_steps"), VARIANTS))
 def test_a_build_s_header_plays_a_frame_a_swap_and_parks(name: str, tmp_path: Path) -> None:
     """The words that the converter gets, by ``DAC_PROGRAM`` and ``DAC_CONVERTER`` of the emitted header."""

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from building import run, run_clean
-from sets import by_tool, quick
+from sets import by_tool, common
 
 from tablegen.resources import c_link, c_runtime
 
@@ -50,7 +50,7 @@ ANALYSERS = {
 }
 
 
-@pytest.mark.parametrize("choice", quick(QUICK, CHOICES))
+@pytest.mark.parametrize("choice", common(QUICK, CHOICES))
 @pytest.mark.parametrize("compiler", by_tool(COMPILERS))
 def test_no_warnings(compiler: str, choice: str, tmp_path: Path) -> None:
     run_clean([*COMPILERS[compiler], "-O2", *WARNINGS, *CHOICES[choice], "-c", *SOURCES], tmp_path)
@@ -99,6 +99,7 @@ def declared(*headers: str) -> set[str]:
     return set(re.findall(r"^(?!static|#)\w[\w ]*?[ *](dac_\w+)\([^;{]*\);", text, flags=re.MULTILINE))
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("options", [["-O0"], ["-O2"], ["-Os"], ["-O2", *CHOICES["wide"]]], ids=" ".join)
 @pytest.mark.parametrize("compiler", by_tool(["gcc", "clang"]))
 def test_symbols(compiler: str, options: list[str], tmp_path: Path) -> None:

@@ -488,8 +488,8 @@ def test_an_interruption_waits_until_there_is_a_process_to_end(tmp_path: Path, n
 @pytest.mark.parametrize(
     ("arguments", "late"),
     [
-        (["--axis", "blocks"], 24),
-        (["--axis", "serial"], 41),
+        pytest.param(["--axis", "blocks"], 24, marks=pytest.mark.rest),
+        pytest.param(["--axis", "serial"], 41, marks=pytest.mark.rest),
         (["--axis", "blocks", "--fourier"], 24),
         (["--axis", "serial", "--fourier"], 41),
         (["--fourier"], 36),
