@@ -4,6 +4,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Literal
 
+PACKAGE = Path(__file__).parent
+
 
 def resource_folder(name: Literal["examples", "firmware_templates"]) -> Path:
     """Where the example files, or the templates and the runtime, are installed."""

@@ -4,11 +4,11 @@ import os
 import re
 import sys
 from collections.abc import Iterable
-from importlib import import_module
 from pathlib import Path
 
 from tablegen.emit.formats import chosen, own_names
 from tablegen.installation import records
+from tablegen.resources import PACKAGE
 
 
 def depfile(target: str, prerequisites: Iterable[Path]) -> bytes:
@@ -38,13 +38,12 @@ def deciding_files(formats: Iterable[str]) -> list[Path]:
     record of the installation too, whose path has the version: package managers that give files the times of an
     archive would otherwise hide a change of version from make.
     """
-    package = Path(str(import_module("tablegen").__file__)).parent
     wanted = chosen(formats)
     names = {each.name for each in wanted}
-    others = {package / name for name in (*_OTHER_FOLDERS, *_OTHER_MODULES)}
-    others |= {package / "emit" / "formats" / f"{n.replace('-', '_')}.py" for n in own_names() if n not in names}
-    others.add(package / "firmware_templates")
-    modules = {path for path in package.rglob("*.py") if not others.intersection((path, *path.parents))}
+    others = {PACKAGE / name for name in (*_OTHER_FOLDERS, *_OTHER_MODULES)}
+    others |= {PACKAGE / "emit" / "formats" / f"{n.replace('-', '_')}.py" for n in own_names() if n not in names}
+    others.add(PACKAGE / "firmware_templates")
+    modules = {path for path in PACKAGE.rglob("*.py") if not others.intersection((path, *path.parents))}
     for each in wanted:
         modules |= {Path(str(sys.modules[type(each).__module__].__file__)), *each.sources()}
-    return sorted({*modules, *records(package.parent)})
+    return sorted({*modules, *records(PACKAGE.parent)})
