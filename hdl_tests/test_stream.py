@@ -551,9 +551,9 @@ def test_volts_at_the_piezo(name: str, tmp_path: Path) -> None:
     variant = _short(dac__bits=chip.bits, dac__coding=coding, x__table__bits=chip.bits, y__table__bits=chip.bits)
     plan = planned(tmp_path, variant)
     program = plan.program
-    capture = tmp_path / "capture.txt"
+    levels = tmp_path / "levels.txt"
     parameters = {
-        "CAPTURE": str(capture),
+        "LEVELS": str(levels),
         "WORD_BITS": chip.bits,
         "TWOS_COMPLEMENT": int(chip.twos_complement),
         "FRAME_BITS": chip.frame_bits,
@@ -573,7 +573,7 @@ def test_volts_at_the_piezo(name: str, tmp_path: Path) -> None:
     script.wait(200)
     played = equal(bench, script)
 
-    digits = np.frombuffer(bytes.fromhex(capture.read_text("ascii")), dtype=np.uint8)
+    digits = np.frombuffer(bytes.fromhex(levels.read_text("ascii")), dtype=np.uint8)
     sclk, mosi_x, mosi_y, cs_n, ldac_n = (digits >> bit & 1 for bit in range(5))
     playing = np.flatnonzero(flag(played.capture, "playing"))
     caught_up = 30

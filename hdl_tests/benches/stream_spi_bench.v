@@ -1,7 +1,7 @@
 // The stream bench with the wires of a converter behind it: every code through dac_coding and dac_spi, as it would be
 // sent.
 //
-// CAPTURE gets a hexadecimal digit a clock, the levels {ldac_n, cs_n, mosi_y, mosi_x, sclk} of two chips in parallel
+// LEVELS gets a hexadecimal digit a clock, the levels {ldac_n, cs_n, mosi_y, mosi_x, sclk} of two chips in parallel
 // in the order of two digits: {3'd0, ldac_n}, {cs_n, mosi_y, mosi_x, sclk}.
 
 `timescale 1ns / 1ps
@@ -10,7 +10,7 @@
 module stream_spi_bench #(
     parameter SCRIPT = "",
     parameter CAPTURE = "",
-    parameter CAPTURE = "",
+    parameter LEVELS = "",
     parameter DAC_BITS = 16,
     parameter X_INTERPOLATED = 1,
     parameter X_INDEX_BITS = 11,
@@ -50,13 +50,13 @@ module stream_spi_bench #(
         .missed(missed)
     );
 
-    integer capture;
-    initial capture = $fopen(CAPTURE, "w");
+    integer levels;
+    initial levels = $fopen(LEVELS, "w");
     always @(negedge bench.clock) begin
-        $fwrite(capture, "%h", {3'd0, ldac_n, cs_n, mosi_y, mosi_x, sclk});
+        $fwrite(levels, "%h", {3'd0, ldac_n, cs_n, mosi_y, mosi_x, sclk});
         if (missed) $display("ERROR: a sample was not sent");
     end
-    always @(posedge finished) $fclose(capture);
+    always @(posedge finished) $fclose(levels);
 endmodule
 
 `default_nettype wire

@@ -134,7 +134,7 @@ def test_what_was_not_played_is_said(short: Build) -> None:
     needed = re.fullmatch(r"note: not a whole frame of 2648 ticks was played; --ticks (\d+) plays one", notes[0])
     assert needed
     assert "note:" not in verify(short.folder, ticks=int(needed[1])).out
-    assert "note: no line ended in time for a swap in mid-frame; --ticks" in verify(short.folder, ticks=1000).out
+    assert "note: too few ticks for a program change within a frame; --ticks" in verify(short.folder, ticks=1000).out
 
 
 # What is wrong in the directory

@@ -155,7 +155,7 @@ def test_traces_keep_the_tip_velocity(example: Setup, monkeypatch: pytest.Monkey
 
     monkeypatch.setattr(laboratory, "sensor_trace", noted)
     calibrate(with_scan(example, size_v=40.0, rate_hz=80.0), SCANNER, amplitudes=(0.2, 0.4, 0.8))
-    assert taken[:3] == pytest.approx([(20.0, 80.0), (40.0, 80.0), (80.0, 40.0)])
+    assert np.array(taken[:3]) == pytest.approx(np.array([(20.0, 80.0), (40.0, 80.0), (80.0, 40.0)]))
 
 
 def test_noise_comes_from_the_seed(example: Setup) -> None:
