@@ -51,15 +51,8 @@ def golden(dialogue: dict[str, Any], loader: Loader, words: list[int]) -> None:
         hold(dialogue, LoaderDevice(simulation, info, MADE["boot"], TOLD))
 
 
-# The longest takes a minute of a core.
-DIALOGUES = [
-    pytest.param(each, id=each["name"], marks=pytest.mark.rest if each["name"].startswith("A table") else ())
-    for each in dialogues(*LACKS)
-]
-
-
 @pytest.mark.common
-@pytest.mark.parametrize("dialogue", DIALOGUES)
+@pytest.mark.parametrize("dialogue", dialogues(*LACKS), ids=lambda dialogue: dialogue["name"])
 def test_golden_dialogues(dialogue: dict[str, Any], loader: Loader) -> None:
     golden(dialogue, loader, [])
 
