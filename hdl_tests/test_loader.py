@@ -51,7 +51,7 @@ def golden(dialogue: dict[str, Any], loader: Loader, words: list[int]) -> None:
         hold(dialogue, LoaderDevice(simulation, info, MADE["boot"], TOLD))
 
 
-@pytest.mark.common
+@pytest.mark.rest
 @pytest.mark.parametrize("dialogue", dialogues(*LACKS), ids=lambda dialogue: dialogue["name"])
 def test_golden_dialogues(dialogue: dict[str, Any], loader: Loader) -> None:
     golden(dialogue, loader, [])
@@ -136,7 +136,7 @@ def bad_frames(simulation: Simulation) -> int:
     return DeviceStatus.unpack(answers[-1].payload).bad_frames
 
 
-@pytest.mark.common
+@pytest.mark.rest
 def test_golden_frames(loader: Loader) -> None:
     golden_frames(loader, [])
 
@@ -174,7 +174,7 @@ def upload(simulation: Simulation, talk: Talk, before_commit: Callable[[], None]
 # The line
 
 
-@pytest.mark.common
+@pytest.mark.rest
 def test_a_baud_rate_may_be_off_by_three_per_cent(loader: Loader) -> None:
     talk = Talk()
     with Simulation(loader.compiled) as simulation:
@@ -188,7 +188,7 @@ def test_a_baud_rate_may_be_off_by_three_per_cent(loader: Loader) -> None:
         assert simulation.talk(talk.hello()) == b"", "negative control: 10 % are too much"
 
 
-@pytest.mark.common
+@pytest.mark.rest
 def test_what_is_no_byte_spoils_at_most_a_frame(loader: Loader) -> None:
     talk = Talk()
     with Simulation(loader.compiled) as simulation:
@@ -201,7 +201,7 @@ def test_what_is_no_byte_spoils_at_most_a_frame(loader: Loader) -> None:
         assert [answer.type for answer in talk.answers(simulation.talk(inside))] == [Request.STATUS | 0x80]
 
 
-@pytest.mark.common
+@pytest.mark.rest
 def test_a_backlog_of_requests_is_answered(loader: Loader) -> None:
     """As many bytes as the ring holds, while the loader is still answering."""
     talk = Talk()
@@ -211,7 +211,7 @@ def test_a_backlog_of_requests_is_answered(loader: Loader) -> None:
         assert len(answers) == 6
 
 
-@pytest.mark.common
+@pytest.mark.rest
 def test_a_reset_forgets_session_and_upload_but_not_what_plays(loader: Loader) -> None:
     talk = Talk()
     with Simulation(loader.compiled) as simulation:

@@ -114,7 +114,7 @@ def test_a_whole_frame_verifies(short: Build) -> None:
             assert float(found[2]) == pytest.approx(promised, abs=0.001)
 
 
-@pytest.mark.common
+@pytest.mark.rest
 def test_verilator_finds_the_same(folder: Path) -> None:
     """A wrong rounding, at the same first tick, and nothing else."""
     edit(folder / "dac_interpolator.v", "1'b1} + step", "1'b0} + step")

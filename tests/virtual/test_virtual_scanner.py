@@ -131,7 +131,7 @@ def test_resonance() -> None:
     assert -180.0 < np.interp(50e3, f, found["phase_deg"]) < -85.0
 
 
-@pytest.mark.common
+@pytest.mark.rest
 def test_identification_gives_the_parameters_in_the_package() -> None:
     """Of what they do, not of their digits: the last ones differ between processors."""
     assert _spread(identify(X_TARGETS).hysteresis, X.hysteresis) < 1e-3
