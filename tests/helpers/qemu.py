@@ -80,6 +80,7 @@ class Machine:
         while b"\n" not in self._received[number]:
             ready, _, _ = select.select(self._sockets, [], [], max(until - time.monotonic(), 0))
             assert ready, "QEMU has nothing to say"
+            assert time.monotonic() < until, f"QEMU says nothing on line {number}, and much on the other"
             for one in ready:
                 part = one.recv(65536)
                 assert part, f"QEMU has ended: {self._process.communicate()[1].decode(errors='replace')}"

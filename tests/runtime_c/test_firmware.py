@@ -158,6 +158,33 @@ def test_firmware_in_qemu_plays_two_frames_and_swaps_in_the_middle(
     assert counts["faults"] == counts["slew"] == counts["clamp"] == counts["underrun"] == 0
 
 
+def test_a_line_that_is_too_long_keeps_its_end(tmp_path: Path) -> None:
+    """Whatever the main loop is slow: its queue drops characters, and the end of the line is none of them."""
+    source = tmp_path / "queue.c"
+    source.write_text(
+        """#include <stdio.h>
+#include "receive.h"
+int main(void)
+{
+    static receive_queue queue;
+    for (int i = 0; i < 300; i++)
+        received(&queue, 'x');
+    received(&queue, '\\n');
+    received(&queue, 'y');
+    int c, last = 0, count = 0;
+    for (; (c = receive(&queue)) >= 0; count++)
+        last = c;
+    printf("%d %d\\n", count, last);
+    return 0;
+}
+""",
+        "ascii",
+    )
+    program = tmp_path / "queue"
+    run_clean(["gcc", "-std=c99", "-Wall", "-Wextra", "-Werror", f"-I{FIRMWARE / 'cortex_m'}", source, "-o", program])
+    assert run_clean([program]).split() == ["256", str(ord("\n"))]
+
+
 def test_the_console_says_what_is_wrong(tmp_path: Path) -> None:
     executable, _ = firmware(tmp_path, "bits_16", "lm3s6965evb", "step")
     with Machine("lm3s6965evb", executable) as machine:
