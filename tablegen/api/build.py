@@ -163,8 +163,14 @@ class Build:
         return write_files(folder, self.files, self.outdated(folder))
 
     def outdated(self, folder: str | Path) -> list[str]:
-        """Files of a directory that an earlier build made and this one does not: ``write`` removes them."""
-        return outdated_files(Path(folder), self.files)
+        """Files of a directory that an earlier build made and this one does not: ``write`` removes them.
+
+        The input is never among them, whatever a manifest of somebody else lists.
+        """
+        read = {path.resolve() for path in self.setup.files}
+        return [
+            name for name in outdated_files(Path(folder), self.files) if (Path(folder) / name).resolve() not in read
+        ]
 
     def leftovers(self, folder: str | Path) -> list[str]:
         """Files of a directory that look like a build's and are not of this one: ``write`` leaves them there."""

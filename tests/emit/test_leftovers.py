@@ -144,3 +144,14 @@ def test_a_link_is_removed_and_not_what_it_leads_to(built: Path) -> None:
     assert run("build", built.parent / "scan.toml", "-o", built).status == 0
     assert not (built / "old.h").is_symlink()
     assert (built.parent / "precious.h").read_bytes() == content
+
+
+def test_the_input_is_never_removed(tmp_path: Path) -> None:
+    """A manifest of somebody else lists the scan and its scanner, with their digests, beside a file of its own."""
+    scan = write_pair(tmp_path)
+    assert run("build", scan, "-o", tmp_path, "-q").status == 0
+    (tmp_path / "old.mem").write_text("00", "ascii")
+    names = (scan.name, "scanner.toml", "old.mem")
+    edit_manifest(tmp_path, **{name: sha256((tmp_path / name).read_bytes()).hexdigest() for name in names})
+    assert run("build", scan, "-o", tmp_path, "-q").status == 0
+    assert [(tmp_path / name).exists() for name in names] == [True, True, False]
