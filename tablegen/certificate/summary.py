@@ -5,6 +5,7 @@ from fractions import Fraction
 import numpy as np
 
 from tablegen.certificate.certificate import Certificate
+from tablegen.certificate.excess import excess
 from tablegen.planning.line_plan import LinePlan, Plan
 
 _GRID = 32  # points per period of the highest harmonic
@@ -143,4 +144,7 @@ def summary(plan: Plan, certificates: dict[str, Certificate]) -> list[str]:
         lines += [f"  {label:<18}{value}" for label, value in drive_lines(line)]
         lines += [f"{line.axis} certificate"]
         lines += [f"  {label:<18}{value}" for label, value in certificate_lines(certificates[line.axis])]
+        found = excess(certificates[line.axis].scaling)
+        for i, text in enumerate([] if found is None else found.text(line.axis).split("; ")):
+            lines.append(f"  {'' if i else 'warning':<18}{text}")
     return lines
