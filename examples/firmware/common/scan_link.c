@@ -1,11 +1,11 @@
 /* The link of a build. It accepts tables as long as those of the build, and has the limits of that scan.
- * Options, with -D: LINK_X_INDEX_BITS and LINK_Y_INDEX_BITS for longer tables, LINK_HARMONICS, LINK_MAX_JUMP in codes,
- * LINK_KEY as the bytes of an array; DAC_LINK_RING.
+ * Options, with -D: LINK_X_INDEX_BITS and LINK_Y_INDEX_BITS for longer tables, LINK_HARMONICS (0: tables only), LINK_MAX_JUMP in
+ * codes, LINK_KEY as the bytes of an array; DAC_LINK_RING.
  */
 #include "scan_link.h"
 
-#include SCAN_HEADER
 #include "names.h"
+#include SCAN_HEADER
 
 /* A table that is not interpolated need not have 2^n words. */
 #define BITS_FOR(n) ((n) <= 8 ? 3 : (n) <= 16 ? 4 : (n) <= 32 ? 5 : (n) <= 64 ? 6 : (n) <= 128 ? 7 : (n) <= 256 ? 8 \
@@ -23,11 +23,11 @@
 #ifndef LINK_MAX_JUMP
 #define LINK_MAX_JUMP UINT32_C(0xFFFFFF)
 #endif
-#ifdef SCAN_SINE
+#if CONSTANT(_SINE_LENGTH) && LINK_HARMONICS
 #define SINE NAMED(_sine)
 #define SINE_BITS CONSTANT(_SINE_INDEX_BITS)
 #define HARMONICS LINK_HARMONICS
-#else /* a build without interpolated tables has no sine table, and cannot compute tables */
+#else /* a build without interpolated tables has no sine table, and cannot compute tables; nor can a small memory */
 #define SINE NULL
 #define SINE_BITS 0
 #define HARMONICS 0
