@@ -1,4 +1,4 @@
-"""Words that are wider or narrower in memory than the runtime was compiled for: refused, by the compiler or on loading."""
+"""Words of another width in memory than the runtime was compiled for: refused, by the compiler or on loading."""
 
 import ctypes
 from pathlib import Path
