@@ -16,9 +16,6 @@ $(eval $(call tablegen_build,$(SCAN),$(BUILD)/scan))
 
 SCAN_NAME := $(basename $(notdir $(filter-out $(BUILD)/scan/dac_%,$($(BUILD)/scan_HEADERS))))
 SCAN_UPPER := $(shell echo $(SCAN_NAME) | tr a-z A-Z)
-TABLE_BITS := $(shell grep -q 'const int32_t .*_table' $(BUILD)/scan/$(SCAN_NAME).h 2>/dev/null && echo 32 || echo 16)
-OUTPUT_BITS := $(shell awk '/_DAC_WORD_BITS / && $$3 > 16 {wide = 1} END {print wide ? 32 : 16}' \
-    $(BUILD)/scan/$(SCAN_NAME).h 2>/dev/null)
 
 vpath memory.c ..
 vpath %.c ../common
@@ -26,7 +23,7 @@ OBJECTS := $(patsubst %,$(BUILD)/%.o,$(OWN) $(OWN_$(CONTROL)) scan memory) $(pat
 COMPILE := $(CROSS) -std=c99 -mcpu=$(CPU) -mthumb -ffreestanding -ffunction-sections -fdata-sections \
     -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Werror -I$(BUILD)/scan -I. -I../common -MMD -MP \
     -DSCAN=$(SCAN_NAME) -DSCAN_UPPER=$(SCAN_UPPER) -DSCAN_HEADER='"$(SCAN_NAME).h"' \
-    -DDAC_TABLE_STORAGE_BITS=$(TABLE_BITS) -DDAC_OUTPUT_STORAGE_BITS=$(OUTPUT_BITS) \
+    $($(BUILD)/scan_CPPFLAGS) \
     -DUPDATE_RATE_HZ=$(UPDATE_RATE_HZ) -DBAUD=$(BAUD) $(if $(KEY),-DLINK_KEY=$(shell echo $(KEY) | sed 's/../0x&,/g')) \
     $(BOARD_FLAGS) $(CFLAGS)
 

@@ -77,7 +77,7 @@ bool dac_axis_step(dac_axis *axis, const dac_bank_axis *bank, bool *outside);
 bool dac_axis_approach(dac_axis *axis, const dac_bank_axis *bank, int32_t target);
 
 /* Writes the codes of up to `ticks` ticks to out[0], out[DAC_STRIDE].., not coded yet; returns how many were played. It ends before
- * ticks on which the clamp or the slew guard might have to act, or which need the table's last word: the caller plays these itself. */
+ * ticks on which the clamp or the slew guard might have to act: the caller plays these itself. The ticks are those of one period. */
 uint32_t dac_axis_run(dac_axis *axis, const dac_bank_axis *bank, dac_output *out, uint32_t ticks);
 
 /* Returns the position `ticks` ticks later; ticks below 2^24. */

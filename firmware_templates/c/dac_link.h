@@ -48,7 +48,8 @@ typedef struct {
     dac_link_limits limits;
     uint8_t word_bits;  /* bits of a table word, 8..24; more than 16 need DAC_TABLE_STORAGE_BITS 32 */
     uint8_t index_bits; /* a table has up to 2^index_bits words, 3..16 */
-    dac_word *table[2]; /* 2^index_bits words each; one is written while the other one plays */
+    uint32_t room;      /* words of memory of each table: DAC_TABLE_ROOM(index_bits) or more */
+    dac_word *table[2]; /* one is written while the other one plays */
     int32_t *fourier;   /* 2 harmonics + 1 words */
 } dac_link_axis;
 

@@ -30,8 +30,9 @@ static void furnish(dac_link_axis *axis, const dac_converter *converter, const u
     axis->limits.max_jump = limits[3];
     axis->word_bits = word_bits;
     axis->index_bits = index_bits;
+    axis->room = DAC_TABLE_ROOM(index_bits);
     for (unsigned i = 0; i < 2; i++)
-        axis->table[i] = place((size_t)1 << index_bits, sizeof(dac_word));
+        axis->table[i] = place(DAC_TABLE_ROOM(index_bits), sizeof(dac_word));
     axis->fourier = place(2u * harmonics + 1, sizeof(int32_t));
 }
 

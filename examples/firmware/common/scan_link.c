@@ -33,7 +33,7 @@
 #define HARMONICS 0
 #endif
 
-static dac_word x_tables[2][1 << LINK_X_INDEX_BITS], y_tables[2][1 << LINK_Y_INDEX_BITS];
+static dac_word x_tables[2][DAC_TABLE_ROOM(LINK_X_INDEX_BITS)], y_tables[2][DAC_TABLE_ROOM(LINK_Y_INDEX_BITS)];
 static int32_t x_fourier[2 * HARMONICS + 1], y_fourier[2 * HARMONICS + 1];
 static uint8_t hash[32];
 #ifdef LINK_KEY
@@ -48,7 +48,8 @@ static const uint8_t key[] = {LINK_KEY};
 #define AXIS(NAME, bits, tables, words)                                                                               \
     {                                                                                                                 \
         CONVERTER(CONSTANT(NAME)), {CONSTANT(NAME##_CODE_MIN), CONSTANT(NAME##_CODE_MAX),                             \
-        CONSTANT(NAME##_MAX_STEP), LINK_MAX_JUMP}, CONSTANT(NAME##_TABLE_BITS), bits, {tables[0], tables[1]}, words   \
+        CONSTANT(NAME##_MAX_STEP), LINK_MAX_JUMP}, CONSTANT(NAME##_TABLE_BITS), bits, DAC_TABLE_ROOM(bits),           \
+        {tables[0], tables[1]}, words                                                                                 \
     }
 
 static const dac_link_config config = {
