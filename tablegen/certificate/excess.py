@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 from tablegen.certificate.line_errors import ScalingError
-from tablegen.planning.line_plan import LinePlan
 
 LARGEST_PERCENT = 1.0  # the error that nobody is told of
+_NOTHING_PERCENT = 0.0005  # what rounds to 0: no hysteresis
 Cause = Literal["quantisation", "band limit", "model"]
 _CALLED: dict[Cause, str] = {"quantisation": "quantisation", "band limit": "the band limit", "model": "the model"}
 
@@ -48,7 +48,7 @@ class Excess:
             figure = f"{self.percent:.3g} %"
             if self.percent > LARGEST_PERCENT:
                 above.append(f"{LARGEST_PERCENT:g} %")
-            if self.percent > parts.uncompensated > 0.0:
+            if self.percent > parts.uncompensated >= _NOTHING_PERCENT:
                 above.append(f"the {parts.uncompensated:.3g} % of the uncompensated line")
         else:
             figure = f"{self.percent:+.3g} %"
@@ -60,17 +60,18 @@ class Excess:
         )
 
 
-def excess(line: LinePlan, scaling: Mapping[str, ScalingError]) -> Excess | None:
+def excess(scaling: Mapping[str, ScalingError]) -> Excess | None:
     """What should be said of the errors of one axis, by direction; None where nothing should.
 
     An uncompensated line is one to compare with only where the scanner file has a hysteresis to compensate.
     """
-    compensated = line.drive.model != "triangle"
     found = []
     for side, parts in scaling.items():
         error = max(parts.total, parts.band_limit)
-        limit = min(LARGEST_PERCENT, parts.uncompensated) if compensated else LARGEST_PERCENT
-        if error > limit > 0.0:
+        limit = LARGEST_PERCENT
+        if parts.uncompensated >= _NOTHING_PERCENT:
+            limit = min(limit, parts.uncompensated)
+        if error > limit:
             found.append(Excess("scaling error", side, error, limit, parts))
         if abs(parts.size) > LARGEST_PERCENT:
             found.append(Excess("size error", side, parts.size, LARGEST_PERCENT, parts))
@@ -78,4 +79,4 @@ def excess(line: LinePlan, scaling: Mapping[str, ScalingError]) -> Excess | None
 
 
 def _figure(percent: float) -> str:
-    return f"{percent:.3g}" if percent >= 1.0 else f"{percent:.3f}" if percent >= 0.0005 else "0"
+    return f"{percent:.3g}" if percent >= 1.0 else f"{percent:.3f}" if percent >= _NOTHING_PERCENT else "0"

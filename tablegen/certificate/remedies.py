@@ -86,7 +86,7 @@ def _trial(setup: Setup, line: LinePlan, change: Change) -> Remedy | None:
     scaling = scaling_errors(other)
     left = max(max(one.total, one.band_limit, abs(one.size)) for one in scaling.values())
     text = " with ".join(f"{key} = {_value(value)}" for key, value in change.items() if value is not None)
-    return Remedy(text, left, excess(other, scaling) is None)
+    return Remedy(text, left, excess(scaling) is None)
 
 
 def _value(value: object) -> str:

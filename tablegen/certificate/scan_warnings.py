@@ -35,7 +35,7 @@ def scan_warnings(setup: Setup, plan: Plan, certificates: Mapping[str, Certifica
 
 
 def _found(plan: Plan, certificates: Mapping[str, Certificate]) -> list[tuple[LinePlan, Excess]]:
-    every = [(line, excess(line, certificates[line.axis].scaling)) for line in plan.lines]
+    every = [(line, excess(certificates[line.axis].scaling)) for line in plan.lines]
     return [(line, found) for line, found in every if found is not None]
 
 

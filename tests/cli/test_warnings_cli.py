@@ -43,6 +43,15 @@ def test_build_check_and_show_warn_and_succeed(small: Path, tmp_path: Path) -> N
     assert (up_to_date.status, up_to_date.out, up_to_date.err) == (0, "", build.err)
 
 
+def test_the_block_in_the_emitted_files_says_it(small: Path, tmp_path: Path) -> None:
+    assert run("build", small, "-o", tmp_path / "build", "-q").status == 0
+    header = (tmp_path / "build" / "annexin_200nm.h").read_text("ascii")
+    assert header.count(" axis has a scaling error of 2.") == 2
+    assert header.count("the cause is quantisation (quantisation 2.") == 2
+    good = tablegen.build(write_pair(tmp_path, SCAN, SCANNER)).files["annexin_200nm.h"].decode("ascii")
+    assert "warning" not in good
+
+
 def test_strict_makes_them_errors(small: Path, tmp_path: Path) -> None:
     warnings = run("check", small).err
     for command in (("check", small), ("build", small, "-o", tmp_path / "build")):
