@@ -1,6 +1,12 @@
 /* One axis: the code of one tick, and the fast path for many ticks at once. */
 #include "dac_axis.h"
 
+bool dac_axis_serves(const dac_converter *c)
+{
+    return c->bits >= 8 && c->bits <= 24 && c->bits <= c->word_bits && c->word_bits <= DAC_OUTPUT_STORAGE_BITS
+        && c->power_up_code >= 0 && c->power_up_code < INT32_C(1) << c->bits;
+}
+
 bool dac_axis_approach(dac_axis *axis, const dac_bank_axis *bank, int32_t target)
 {
     const int32_t rise = target - axis->code, most = bank->max_step;

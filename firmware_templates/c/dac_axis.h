@@ -69,6 +69,9 @@ static inline dac_output dac_coded(const dac_axis *axis, int32_t code)
     return (dac_output)(((uint32_t)code ^ axis->flip) << axis->shift);
 }
 
+/* Whether a converter is one that the runtime can serve. */
+bool dac_axis_serves(const dac_converter *converter);
+
 /* One tick: moves the code towards the waveform, and advances the position. Returns whether the code has arrived; sets *outside
  * if the clamp acted. */
 bool dac_axis_step(dac_axis *axis, const dac_bank_axis *bank, bool *outside);

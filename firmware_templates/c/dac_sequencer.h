@@ -263,8 +263,9 @@ typedef struct {
  * Requests act in order before the next tick that is computed. Cost: less than 40 instructions. */
 
 /* Sets the power-up state: no program, not running, codes at the power-up codes of the converters. Call it before the
- * interrupt is enabled. */
-void dac_sequencer_init(dac_sequencer *s, const dac_converter *x, const dac_converter *y);
+ * interrupt is enabled. Returns false for converters that it cannot serve: bits outside 8..24 or above word_bits, word_bits
+ * above DAC_OUTPUT_STORAGE_BITS, a power_up_code of more bits. No program can be loaded then. */
+bool dac_sequencer_init(dac_sequencer *s, const dac_converter *x, const dac_converter *y);
 
 /* Returns whether the idle bank may be written: it holds no committed program, and no commit is queued. */
 bool dac_sequencer_writable(const dac_sequencer *s);
@@ -284,7 +285,8 @@ bool dac_sequencer_commit(dac_sequencer *s);
  * the program was taken before: it has then grown. */
 bool dac_sequencer_withdraw(dac_sequencer *s);
 
-/* Sets the number of frames that the next trigger starts, up to 2^31; 0: endless. A running scan keeps its own count. */
+/* Sets the number of frames that the next trigger starts, up to 2^31; 0: endless. Returns false for more. A running scan
+ * keeps its own count. */
 bool dac_sequencer_arm(dac_sequencer *s, uint32_t frames);
 
 /* Starts at line 0, if armed, not running, and a program is loaded. Otherwise does nothing. */

@@ -728,6 +728,8 @@ def _fourier() -> Iterator[Mutant]:
         ),
         ("the mean is lost", "    n0.a_cos += r->mean;\n", "", "checks"),
         ("words are half as high", "r.drop = 29 - bits", "r.drop = 30 - bits", "checks"),
+        ("the first word does not stand behind the last", "    table[r.length] = table[0];\n", "", "checks"),
+        ("a table without room is rendered", "room < DAC_TABLE_ROOM(index_bits) || ", "", "checks"),
     )
 
 

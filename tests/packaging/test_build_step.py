@@ -244,9 +244,9 @@ def test_what_uses_a_scan_is_compiled_for_its_widths(project: Project) -> None:
     does(project.build(), 0, {"main"})
     assert project.play().endswith(" 32\n")
     scan = project.scan.read_text("utf-8")
-    tables, dac = "bits = 18\n", "bits = 16\nword_bits = 24\n"
-    wide = scan.replace("[dac]\nbits = 16\n", f"[dac]\n{dac}").replace("\nbits = 16\n", f"\n{tables}")
-    assert wide.count(tables) == 2
+    wide = scan.replace("\nbits = 16\n", "\nbits = 18\n")
+    wide = wide.replace("[dac]\nbits = 18\n", "[dac]\nbits = 16\nword_bits = 24\n")
+    assert (wide.count("\nbits = 18\n"), wide.count("word_bits")) == (2, 1)
     project.write(project.scan, wide)
     does(project.build(), 1, BUILT)
     assert project.play().endswith(" 64\n")

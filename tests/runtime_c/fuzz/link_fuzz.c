@@ -10,6 +10,7 @@
  *     0x63, n              n times the main loop, and no more for the bytes that follow
  *     0x64                 the interlock changes
  *     0x65                 a reset
+ *     0x66, n              100 n milliseconds
  * Frames get their tags, so that a key keeps nobody from the states behind it.
  */
 #include <stdlib.h>
@@ -36,8 +37,9 @@ static dac_word x_tables[2][X_WORDS + 1], y_tables[2][Y_WORDS + 1];
 static int32_t x_words[2 * HARMONICS + 1], y_words[2 * HARMONICS + 1];
 static int32_t sine[5 * X_WORDS / 4];
 static const uint8_t key[16] = {1, 2, 3};
-static const uint8_t hash[32] = {9};
+static const uint8_t hash[32] = {9}, identity[4] = {4, 5, 6, 7};
 static bool permits;
+static uint32_t clock_ms;
 
 static dac_word boot_x[X_WORDS + 1], boot_y[Y_WORDS + 1];
 static dac_program boot;
@@ -47,6 +49,11 @@ static uint8_t fourier[DAC_LINK_PROGRAM + 8 * (2 * HARMONICS + 1)];
 static bool permitted(void)
 {
     return permits;
+}
+
+static uint32_t milliseconds(void)
+{
+    return clock_ms;
 }
 
 static dac_link_config config = {
@@ -59,6 +66,10 @@ static dac_link_config config = {
     .sine = sine,
     .key = key,
     .hash = hash,
+    .identity = identity,
+    .identity_bytes = sizeof identity,
+    .boot_persists = true,
+    .milliseconds = milliseconds,
 };
 
 /* A good program and its two images, made once. */
@@ -198,8 +209,9 @@ static void start(uint8_t options, uint32_t count)
 {
     config.key_bytes = options & WITH_KEY ? sizeof key : 0;
     config.permits = options & WITH_INTERLOCK ? permitted : NULL;
-    dac_sequencer_init(&sequencer, &config.x.converter, &config.y.converter);
-    dac_link_init(&link_, &config, &sequencer, count);
+    clock_ms = UINT32_MAX - 5000;
+    REQUIRE(dac_sequencer_init(&sequencer, &config.x.converter, &config.y.converter));
+    REQUIRE(dac_link_init(&link_, &config, &sequencer, count) == DAC_LINK_STARTED);
     memset(&watched, 0, sizeof watched);
     watched.x = watched.y = POWER_UP;
     permits = true;
@@ -357,6 +369,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         size--;
         if (command == 0x63) {
             work((unsigned)count);
+            continue;
+        }
+        if (command == 0x66) {
+            clock_ms += 100 * (uint32_t)count;
             continue;
         }
         count = count < size ? count : size;
