@@ -9,8 +9,8 @@
 #include SCAN_HEADER
 
 enum { X, Y };                                            /* state machines */
-enum { TICKS = 4 };                                       /* ticks computed at once: half a queue */
-enum { EMPTY = 3 << 24, FULL = 3 << 16, STALLED = 3 << 24 }; /* of both machines, in FSTAT and FDEBUG */
+enum { QUEUE = 8, TICKS = QUEUE / 2 };                    /* samples in a queue, and ticks computed at once */
+enum { EMPTY = 3 << 24, STALLED = 3 << 24 }; /* of both machines, in FSTAT and FDEBUG */
 enum { SYSTEM_HZ = 125000000 };                           /* DIVIDER * 34 of its cycles are a sample */
 enum { UART_TRANSMIT = 0, UART_RECEIVED = 1 };            /* pins */
 enum { X_DATA = 2, X_CLOCK = 3, X_SELECT = 4, Y_DATA = 5, Y_CLOCK = 6, Y_SELECT = 7 };
@@ -117,11 +117,11 @@ static void start_machine(unsigned machine, uint32_t data, uint32_t clock)
 static void core1_main(void)
 {
     static dac_output codes[2 * TICKS];
-    bool runs = false;
+    unsigned queued = 0; /* samples before the machines start; then no more */
 
     for (;;) {
         dac_sequencer_fill(&sequencer, codes, codes + 1, NULL, TICKS);
-        if (runs && (PIO0_FDEBUG & STALLED) != 0) { /* a machine found its queue empty */
+        if (queued == QUEUE && (PIO0_FDEBUG & STALLED) != 0) { /* a machine found its queue empty */
             dac_sequencer_report(&sequencer, DAC_FAULT_UNDERRUN);
             while ((PIO0_FSTAT & EMPTY) != EMPTY)
                 ;
@@ -129,17 +129,19 @@ static void core1_main(void)
             while ((PIO0_FDEBUG & STALLED) != STALLED)
                 ; /* until both have shifted out their last words and wait */
             PIO0_CTRL = 0;
-            runs = false;
+            queued = 0;
         }
         for (unsigned i = 0; i < 2 * TICKS; i++) {
             while ((PIO0_FSTAT & UINT32_C(1) << (16 + i % 2)) != 0)
                 ;
             PIO0_TXF(i % 2) = (uint32_t)codes[i] << 16;
         }
-        if (!runs && (PIO0_FSTAT & FULL) == FULL) {
-            PIO0_FDEBUG = STALLED;
-            PIO0_CTRL = 3u << 8 | 3u; /* dividers restarted, both on */
-            runs = true;
+        if (queued != QUEUE) {
+            queued += TICKS;
+            if (queued == QUEUE) {
+                PIO0_FDEBUG = STALLED;
+                PIO0_CTRL = 3u << 8 | 3u; /* dividers restarted, both on */
+            }
         }
     }
 }
