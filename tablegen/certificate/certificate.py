@@ -108,9 +108,10 @@ def _certify(line: LinePlan) -> Certificate:
     played, output = EmittedPeriod(line), line.program.output
     codes, lengths, ticks = played.runs.codes, played.runs.lengths, line.program.ticks
     mean, square = played.error_moments()
-    offset = float(output.offset_code)
-    code_mean = float(np.sum(lengths * (codes - offset))) / ticks
-    power = max(float(np.sum(lengths * (codes - offset - code_mean) ** 2)) / ticks, 1e-30)
+    levels = codes - float(output.offset_code)
+    levels -= float(np.sum(lengths * levels)) / ticks
+    levels *= levels
+    power = max(float(np.sum(lengths * levels)) / ticks, 1e-30)
     return Certificate(
         ticks=ticks,
         max_error_lsb=played.largest_error(),
