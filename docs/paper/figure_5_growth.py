@@ -34,14 +34,14 @@ def rows() -> list[Row]:
             "(22), forward, at full scale",
             limits("beta_max, 3.7 %", "%", 3.6999, 3.7001, 3),
             growth(1.0, FORWARD_GROWTH),
-            law,
+            Source.INPUT,
         ),
         Row(
             "sec. 9",
             "(22), backward, at full scale",
             limits("beta_max, 8 %", "%", 7.9999, 8.0001, 3),
             growth(1.0, BACKWARD_GROWTH),
-            law,
+            Source.INPUT,
         ),
         Row("sec. 9", "forward at 200 nm = 13 V, (22)", between("2", "3", "%"), growth(BASE_V, FORWARD_GROWTH), law),
         Row(

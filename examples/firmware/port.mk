@@ -1,6 +1,14 @@
-# What the ports have in common: SCAN is built into BUILD/scan, and OWN is compiled with it for CPU.
+# What all ports have in common: SCAN is built into BUILD/scan, and OWN is compiled with it and the link for CPU.
+#
+#     make SCAN=scan.toml BAUD=460800 CFLAGS=-O3 KEY=00112233..   KEY: of the link, 16 to 32 bytes in hexadecimal
+#
+# A port sets OWN, CPU, LINK (where everything goes) and BOARD_FLAGS before it includes this.
 CROSS ?= arm-none-eabi-gcc
 CFLAGS ?= -O2
+BAUD ?= 115200
+KEY ?=
+CONTROL ?= link
+OWN_link := control_link scan_link
 
 TABLEGEN ?= tablegen
 include $(or $(shell $(TABLEGEN) paths --make),$(error $(TABLEGEN) does not run: install piezo-tablegen, or give TABLEGEN=PATH))
@@ -8,14 +16,18 @@ $(eval $(call tablegen_build,$(SCAN),$(BUILD)/scan))
 
 SCAN_NAME := $(basename $(notdir $(filter-out $(BUILD)/scan/dac_%,$($(BUILD)/scan_HEADERS))))
 SCAN_UPPER := $(shell echo $(SCAN_NAME) | tr a-z A-Z)
-vpath memory.c ..
-OBJECTS := $(patsubst %,$(BUILD)/%.o,$(OWN) memory) $(patsubst %.c,%.o,$($(BUILD)/scan_SOURCES))
-COMPILE := $(CROSS) -std=c99 -mcpu=$(CPU) -mthumb -ffreestanding -ffunction-sections -fdata-sections \
-    -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Werror -I$(BUILD)/scan -I. -MMD -MP \
-    -DSCAN=$(SCAN_NAME) -DSCAN_UPPER=$(SCAN_UPPER) -DSCAN_HEADER='"$(SCAN_NAME).h"' \
-    -DUPDATE_RATE_HZ=$(UPDATE_RATE_HZ) $(CFLAGS)
 
-$(BUILD)/firmware.elf: $(OBJECTS)
+vpath memory.c ..
+vpath %.c ../common
+OBJECTS := $(patsubst %,$(BUILD)/%.o,$(OWN) $(OWN_$(CONTROL)) scan memory) $(patsubst %.c,%.o,$($(BUILD)/scan_SOURCES))
+COMPILE := $(CROSS) -std=c99 -mcpu=$(CPU) -mthumb -ffreestanding -ffunction-sections -fdata-sections \
+    -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Werror -I$(BUILD)/scan -I. -I../common -MMD -MP \
+    -DSCAN=$(SCAN_NAME) -DSCAN_UPPER=$(SCAN_UPPER) -DSCAN_HEADER='"$(SCAN_NAME).h"' \
+    $($(BUILD)/scan_CPPFLAGS) \
+    -DUPDATE_RATE_HZ=$(UPDATE_RATE_HZ) -DBAUD=$(BAUD) $(if $(KEY),-DLINK_KEY=$(shell echo $(KEY) | sed 's/../0x&,/g')) \
+    $(BOARD_FLAGS) $(CFLAGS)
+
+$(BUILD)/firmware.elf: $(OBJECTS) $(LINK_FILES)
 	$(CROSS) -mcpu=$(CPU) -mthumb -nostdlib -static -Wl,--gc-sections $(LINK) $(OBJECTS) -lgcc -o $@
 
 $(BUILD)/%.o: %.c
@@ -23,6 +35,15 @@ $(BUILD)/%.o: %.c
 
 $(BUILD)/scan/%.o: $(BUILD)/scan/%.c
 	$(COMPILE) -c $< -o $@
+
+# Objects are made again when they would be made otherwise.
+$(OBJECTS): $(BUILD)/command
+ifneq ($(file <$(BUILD)/command),$(COMPILE) $(OWN) $(CONTROL))
+.PHONY: $(BUILD)/command
+endif
+$(BUILD)/command:
+	@mkdir -p $(@D)
+	$(file >$@,$(COMPILE) $(OWN) $(CONTROL))@:
 
 -include $(OBJECTS:.o=.d)
 

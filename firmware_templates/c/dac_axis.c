@@ -1,6 +1,12 @@
 /* One axis: the code of one tick, and the fast path for many ticks at once. */
 #include "dac_axis.h"
 
+bool dac_axis_serves(const dac_converter *c)
+{
+    return c->bits >= 8 && c->bits <= 24 && c->bits <= c->word_bits && c->word_bits <= DAC_OUTPUT_STORAGE_BITS
+        && c->power_up_code >= 0 && c->power_up_code < INT32_C(1) << c->bits;
+}
+
 bool dac_axis_approach(dac_axis *axis, const dac_bank_axis *bank, int32_t target)
 {
     const int32_t rise = target - axis->code, most = bank->max_step;
@@ -12,7 +18,7 @@ bool dac_axis_step(dac_axis *axis, const dac_bank_axis *bank, bool *outside)
 {
     const uint32_t index = axis->at.high >> 15, fraction = axis->at.high & 0x7fffu; /* 0 in a direct table */
     const unsigned guard = DAC_GUARD(bank);
-    const int32_t here = bank->table[index], there = bank->table[index != bank->last ? index + 1 : 0];
+    const int32_t here = bank->table[index], there = bank->table[index + 1];
     const int32_t sample = dac_between(here, there, fraction, guard, DAC_HALF(guard));
     const int32_t code = (int32_t)(((int64_t)bank->gain * sample + bank->offset) >> bank->gain_q); /* 28 bits or fewer */
     const int32_t clamped = code < bank->code_min ? bank->code_min : code > bank->code_max ? bank->code_max : code;
@@ -129,11 +135,9 @@ uint32_t dac_axis_run(dac_axis *axis, const dac_bank_axis *bank, dac_output *out
 
     while (done < ticks) {
         const uint64_t at = ((uint64_t)axis->at.high << 32 | axis->at.low >> 32) + 1;
-        uint32_t most = ticks - done < bank->run_most ? ticks - done : bank->run_most, played;
+        const uint32_t most = ticks - done < bank->run_most ? ticks - done : bank->run_most;
+        const uint32_t played = play(axis, bank, at, step, out + done * DAC_STRIDE, most);
 
-        while (most != 0 && (at + (most - 1) * step) >> 47 >= bank->last)
-            most /= 2; /* the word after the last is the first: not here */
-        played = play(axis, bank, at, step, out + done * DAC_STRIDE, most);
         dac_axis_skip(axis, bank, played);
         done += played;
         if (played != most || most == 0)

@@ -69,6 +69,9 @@ static inline dac_output dac_coded(const dac_axis *axis, int32_t code)
     return (dac_output)(((uint32_t)code ^ axis->flip) << axis->shift);
 }
 
+/* Whether a converter is one that the runtime can serve. */
+bool dac_axis_serves(const dac_converter *converter);
+
 /* One tick: moves the code towards the waveform, and advances the position. Returns whether the code has arrived; sets *outside
  * if the clamp acted. */
 bool dac_axis_step(dac_axis *axis, const dac_bank_axis *bank, bool *outside);
@@ -77,7 +80,7 @@ bool dac_axis_step(dac_axis *axis, const dac_bank_axis *bank, bool *outside);
 bool dac_axis_approach(dac_axis *axis, const dac_bank_axis *bank, int32_t target);
 
 /* Writes the codes of up to `ticks` ticks to out[0], out[DAC_STRIDE].., not coded yet; returns how many were played. It ends before
- * ticks on which the clamp or the slew guard might have to act, or which need the table's last word: the caller plays these itself. */
+ * ticks on which the clamp or the slew guard might have to act: the caller plays these itself. The ticks are those of one period. */
 uint32_t dac_axis_run(dac_axis *axis, const dac_bank_axis *bank, dac_output *out, uint32_t ticks);
 
 /* Returns the position `ticks` ticks later; ticks below 2^24. */

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from tablegen.certificate.certificate import Certificate, broken_limits
 from tablegen.certificate.certificate import certify as certify_plan
+from tablegen.certificate.scan_warnings import brief_warnings, scan_warnings
 from tablegen.certificate.summary import notes, summary
 from tablegen.config.load import Setup, from_values
 from tablegen.config.load import load as load_files
@@ -147,6 +148,15 @@ class Build:
         """What to know before the image is trusted, in sentences."""
         return notes(self.plan)
 
+    @cached_property
+    def warnings(self) -> list[str]:
+        """Where the scan errs by more than 1 %, or by more than the uncompensated line; empty if it does nowhere.
+
+        Each names its key, the error, its cause (quantisation, band limit or model), and the remedies that were
+        planned and measured: only a scan with a warning takes this time.
+        """
+        return [str(warning) for warning in scan_warnings(self.setup, self.plan, self.certificates)]
+
     @property
     def prepared(self) -> "PreparedScan":
         """What ``Device.upload`` sends: ``device.upload(scan.prepared.image("auto", device.info))``."""
@@ -181,9 +191,9 @@ class Build:
         worst = max(self.certificates.values(), key=lambda one: one.scaling_error_percent)
         errors = f"error up to {worst.max_error_lsb:.3f} LSB, scaling error {worst.scaling_error_percent:.3g} %"
         head = first.replace("<tablegen plan", "<tablegen build")
-        return f"{head}\n  {errors} peak to peak\n  x: {self.plan.x.drive.v_amplitude:.6g} V, " + (
-            f"y: {self.plan.y.drive.v_amplitude:.6g} V; formats {', '.join(self.formats)}>"
-        )
+        volts = ", ".join(f"{line.axis}: {line.drive.v_amplitude:.6g} V" for line in self.plan.lines)
+        found = [f"  warning: {text}\n" for text in brief_warnings(self.plan, self.certificates)]
+        return f"{head}\n  {errors} peak to peak\n{''.join(found)}  {volts}; formats {', '.join(self.formats)}>"
 
     def _repr_html_(self) -> str:
         """Drive, error and certificate, for notebooks."""

@@ -6,6 +6,7 @@ from math import log10
 import numpy as np
 
 from tablegen.certificate.certificate import Certificate
+from tablegen.certificate.excess import excess
 from tablegen.compensation.hold import hold_inverse
 from tablegen.device.schedule import MAXIMUM_LINE_TICKS
 from tablegen.planning.line_plan import LinePlan, Plan
@@ -184,4 +185,7 @@ def summary(plan: Plan, certificates: dict[str, Certificate]) -> list[str]:
         lines += [f"  {label:<18}{value}" for label, value in drive_lines(line)]
         lines += [f"{line.axis} certificate"]
         lines += [f"  {label:<18}{value}" for label, value in certificate_lines(certificates[line.axis])]
+        found = excess(certificates[line.axis].scaling)
+        for i, text in enumerate([] if found is None else found.text(line.axis).split("; ")):
+            lines.append(f"  {'' if i else 'warning':<18}{text}")
     return lines

@@ -161,14 +161,7 @@ def _axis() -> Iterator[Mutant]:
         ("there is no guard downwards", "rise < -most ? -most : rise", "rise", "step"),
         ("the guard is one off downwards", "rise < -most ? -most", "rise < -most ? 1 - most", "step"),
         ("a code is always there", "return axis->code == target;", "return true;", "step"),
-        ("the last word goes on to the one behind it", "index != bank->last ? index + 1 : 0", "index + 1", "step"),
-        ("the word before the last goes on to the first", "index != bank->last ?", "index < bank->last - 1 ?", "step"),
-        (
-            "the last word is the end",
-            "index != bank->last ? index + 1 : 0",
-            "index != bank->last ? index + 1 : index",
-            "step",
-        ),
+        ("a step reads no next word", "bank->table[index + 1]", "bank->table[index]", "step"),
         ("nothing is held at code_min", "code < bank->code_min ? bank->code_min : code >", "code >", "step"),
         ("nothing is held at code_max", ": code > bank->code_max ? bank->code_max : code;", ": code;", "step"),
         (
@@ -228,16 +221,6 @@ def _axis() -> Iterator[Mutant]:
             "checks",
         ),
         ("runs move y while it is held", "step = bank->holds ? 0 : ", "step = "),
-        (
-            "a run meets the last word",
-            "(at + (most - 1) * step) >> 47 >= bank->last",
-            "(at + (most - 1) * step) >> 47 > bank->last",
-        ),
-        (
-            "a run's last tick meets the last word",
-            "(at + (most - 1) * step) >> 47",
-            "(at + (most - 1) * step - step / 2) >> 47",
-        ),
         ("the position does not follow a run", "        dac_axis_skip(axis, bank, played);\n", ""),
         (
             "runs are as long as one likes",
@@ -306,10 +289,17 @@ def _program() -> Iterator[Mutant]:
         ("backward is not looked at", "&& inside(&p->backward, p->line_ticks)", "", "checks"),
         ("up is not looked at", "inside(&p->up, p->frame_lines) && ", "", "checks"),
         ("down is not looked at", "&& inside(&p->down, p->frame_lines)", "", "checks"),
-        ("no table", "p->table == NULL || ", "", "checks"),
-        ("words of 7 bits", "p->bits < 8", "p->bits < 7", "checks"),
-        ("words of 25 bits", "p->bits > 24 || ", "", "checks"),
-        ("words that their storage does not hold", " || p->bits > DAC_TABLE_STORAGE_BITS", "", "checks"),
+        ("no table", "p->table != NULL && ", "", "checks"),
+        ("words of 7 bits", "p->bits >= 8", "p->bits >= 7", "checks"),
+        ("words of 25 bits", "p->bits <= 24 && ", "", "checks"),
+        (
+            "any word behind the last one",
+            "good_length(p) && p->table[p->length] == p->table[0]",
+            "good_length(p)",
+            "checks",
+        ),
+        ("words of another storage", "p->storage_bits == DAC_TABLE_STORAGE_BITS && ", "", "checks"),
+        ("words that their storage does not hold", " && p->bits <= DAC_TABLE_STORAGE_BITS", "", "checks"),
         ("a direct table of any length", "return p->length == p->phase_period && ", "return ", "checks"),
         ("a direct table that is too long", " && p->length <= UINT32_C(1) << 17", "", "checks"),
         ("4 words", "p->index_bits >= 3", "p->index_bits >= 2", "checks"),
@@ -380,8 +370,6 @@ def _program() -> Iterator[Mutant]:
         ),
         ("the fraction loses a bit", "power_divided(79u + p->index_bits", "power_divided(78u + p->index_bits", "step"),
         ("a direct table stands still", "{UINT32_C(1) << 15, 0}", "{0, 0}"),
-        ("the last word is one too far", "b->last = p->length - 1", "b->last = p->length", "step"),
-        ("the table ends early", "b->last = p->length - 1", "b->last = p->length - 2"),
         ("y is never held", "b->holds = p->hold_ticks != 1", "b->holds = 0"),
         ("wrong guard bits of wide words", "? 25u - p->bits : 4u", "? 24u - p->bits : 4u", "checks"),
         ("the code is rounded down", "+ ((int64_t)1 << (p->gain_q - 1))", "", "step"),
@@ -740,6 +728,8 @@ def _fourier() -> Iterator[Mutant]:
         ),
         ("the mean is lost", "    n0.a_cos += r->mean;\n", "", "checks"),
         ("words are half as high", "r.drop = 29 - bits", "r.drop = 30 - bits", "checks"),
+        ("the first word does not stand behind the last", "    table[r.length] = table[0];\n", "", "checks"),
+        ("a table without room is rendered", "room < DAC_TABLE_ROOM(index_bits) || ", "", "checks"),
     )
 
 

@@ -5,7 +5,7 @@
 #include "control.h"
 #include "player.h"
 
-enum { CLOCK_HZ = 12000000, BAUD = 115200 };
+enum { CLOCK_HZ = 12000000 };
 enum { RECEIVE_EMPTY = 1 << 4, TRANSMIT_FULL = 1 << 5 };         /* UARTFR */
 enum { RECEIVE_INTERRUPT = 1 << 4, RECEIVE_TIMEOUT = 1 << 6 };   /* UARTIM, UARTICR */
 

@@ -1,0 +1,120 @@
+"""The firmware of every port, from an upload by the client to the words at its converters, each of them the model's.
+
+RP2040 in rp2040js, STM32F4 under unicorn with a model of the peripherals that it touches, Arduino Mega in simavr. Time
+is virtual, and so is the serial line.
+"""
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from random import Random
+
+import pytest
+from building import REMOVED, REPOSITORY, VARIANTS, Variant, run_clean, tool, write_variant
+from converter_words import commit, follow_words, park, start
+from following import Differs
+from link_line import FarEnd, Line
+from pipe_board import PipeBoard
+from stm32_board import Stm32Board
+
+from tablegen.config.load import load
+from tablegen.link.device import Device
+from tablegen.link.prepare import PreparedScan
+from tablegen.planning.line_plan import make_plan
+from tablegen.verification.elf import read_executable
+
+pytestmark = pytest.mark.rest
+
+FIRMWARE = REPOSITORY / "examples" / "firmware"
+HELPERS = REPOSITORY / "tests" / "helpers"
+SMALL = {
+    **VARIANTS["short_frame"].scan,
+    "limits": REMOVED,
+    "timing": {"pixels": 50, "lines": 4, "line_rate_hz": 60.0, "ticks_per_line": 331},
+    "x.table.length": 256,
+    "y.table.length": 128,
+}
+
+
+def _scan(folder: Path, name: str, changes: dict[str, object]) -> tuple[Path, PreparedScan]:
+    file = write_variant(folder / name, Variant(changes))
+    return file, PreparedScan.of_plan(make_plan(load(file)))
+
+
+def _firmware(port: str, folder: Path, scan: Path, *more: str) -> Path:
+    target = folder / port
+    run_clean(
+        ["make", "-C", FIRMWARE / port, f"SCAN={scan}", f"BUILD={target}", f"TABLEGEN={sys.executable} -m tablegen",
+         *more]
+    )  # fmt: skip
+    return target / "firmware.elf"
+
+
+def _play(board: FarEnd, tick_hz: int, baud: int, scan: PreparedScan, form: str) -> None:
+    """The boot scan plays, another one is uploaded meanwhile, plays for more than a frame, and parks."""
+    line = Line(board, baud=baud, tick_hz=tick_hz)
+    frame = scan.program.schedule.frame_ticks / tick_hz
+    with Device(line.open, random=Random(8), sleep=line.sleep) as client:
+        client.arm()
+        client.trigger()
+        line.sleep(frame / 3)
+        client.upload(scan.image(form), timeout_s=20.0)
+        line.sleep(1.3 * frame)
+        status = client.status()
+        client.park()
+        line.sleep(0.1 * frame)
+    assert status.faults == 0
+    assert status.bad_frames == 0
+
+
+def _follow(words: list[tuple[int, int]], boot: PreparedScan, scan: PreparedScan) -> None:
+    heard = follow_words(words, [commit(boot.program), start(), commit(scan.program), park])
+    assert heard[3] - heard[2] > scan.program.schedule.frame_ticks
+    wrong = heard[2] + scan.program.schedule.ticks * 3
+    x, y = words[wrong]
+    with pytest.raises(Differs, match=f"tick {wrong}"):  # a negative control
+        follow_words([*words[:wrong], (x ^ 1, y), *words[wrong + 1 :]], [commit(boot.program), start(), commit(scan.program), park])
+
+
+@pytest.fixture(scope="module")
+def rp2040js(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """A folder in which node finds the emulator."""
+    folder = tmp_path_factory.mktemp("node")
+    (folder / "package.json").write_bytes((HELPERS / "rp2040" / "package.json").read_bytes())
+    subprocess.run(
+        [tool("npm"), "install", "--silent", "--no-audit", "--no-fund", "--no-package-lock", "--ignore-scripts"],
+        cwd=folder, check=True, stdin=subprocess.DEVNULL,
+    )  # fmt: skip
+    yield folder
+
+
+def test_rp2040(rp2040js: Path, tmp_path: Path) -> None:
+    """One core plays, the other one serves the link; words are what shifted out of the pins."""
+    divider, baud = 36, 460800
+    rate = 125_000_000 // 34 // divider
+    changes = {**SMALL, "dac.update_rate_hz": float(rate)}
+    changes["timing"] = {**changes["timing"], "line_rate_hz": rate / 331}
+    file, boot = _scan(tmp_path, "boot", changes)
+    _, scan = _scan(tmp_path, "scan", {**changes, "x.size_nm": 40.0})
+    image = tmp_path / "image.bin"
+    (segment,) = read_executable(_firmware("rp2040", tmp_path, file, f"BAUD={baud}", f"DIVIDER={divider}")).segments
+    image.write_bytes(segment.data)
+    with PipeBoard(["node", HELPERS / "rp2040" / "board.mjs", image, str(baud)], 34 * divider, rp2040js) as board:
+        _play(board, rate, baud, scan, "table")
+    assert (board.lost, board.apart) == (0, 0)
+    _follow(board.words, boot, scan)
+
+
+def test_stm32(tmp_path: Path) -> None:
+    """The DAC and the receiver by DMA; words are what DMA gave to the DAC."""
+    rate, baud = 200_000, 460800
+    changes = {**SMALL, "dac.bits": 12, "dac.update_rate_hz": float(rate)}
+    changes["timing"] = {**changes["timing"], "line_rate_hz": rate / 331}
+    file, boot = _scan(tmp_path, "boot", changes)
+    _, scan = _scan(tmp_path, "scan", {**changes, "x.size_nm": 40.0})
+    board = Stm32Board(_firmware("stm32", tmp_path, file, f"BAUD={baud}"))
+    board.tick(1)
+    _play(board, rate, baud, scan, "fourier")
+    _follow(board.words, boot, scan)
+    print(board.longest)
