@@ -74,7 +74,10 @@ def _follow(words: list[tuple[int, int]], boot: PreparedScan, scan: PreparedScan
     wrong = heard[2] + scan.program.schedule.ticks * 3
     x, y = words[wrong]
     with pytest.raises(Differs, match=f"tick {wrong}"):  # a negative control
-        follow_words([*words[:wrong], (x ^ 1, y), *words[wrong + 1 :]], [commit(boot.program), start(), commit(scan.program), park])
+        follow_words(
+            [*words[:wrong], (x ^ 1, y), *words[wrong + 1 :]],
+            [commit(boot.program), start(), commit(scan.program), park],
+        )
 
 
 @pytest.fixture(scope="module")
