@@ -18,10 +18,12 @@
 
 static const uint8_t SELECT = 10;  // CS of the converter
 static const uint8_t LATCH = 9;    // LDAC: both channels change when it falls
-#if defined(__AVR__)
-enum { HALF = 8 };  // ticks in half a buffer
+#if !defined(__AVR__)
+enum { HALF = 32 };  // ticks in half a buffer
+#elif LINKED
+enum { HALF = 8 };
 #else
-enum { HALF = 32 };
+enum { HALF = 4 };
 #endif
 
 dac_sequencer sequencer;
