@@ -10,7 +10,7 @@ static const dac_converter y_converter = DAC_CONVERTER(ANNEXIN_200NM_Y, 0);
 static dac_sequencer sequencer;
 static dac_output codes[2 * TICKS];
 static uint8_t markers[TICKS];
-static dac_word table[ANNEXIN_200NM_X_TABLE_LENGTH];
+static dac_word table[ANNEXIN_200NM_X_TABLE_LENGTH + 1];
 static volatile int32_t interpolated[TICKS];
 
 const uint32_t bytes[] = {sizeof(dac_sequencer), sizeof(dac_bank)};
@@ -53,8 +53,9 @@ void count_fill_markers(void)
 
 void count_synthesize(void)
 {
-    (void)dac_synthesize(table, ANNEXIN_200NM_X_INDEX_BITS, ANNEXIN_200NM_X_TABLE_BITS, annexin_200nm_x_fourier,
-                         ANNEXIN_200NM_X_HARMONICS, annexin_200nm_sine, ANNEXIN_200NM_SINE_INDEX_BITS);
+    (void)dac_synthesize(table, ANNEXIN_200NM_X_TABLE_LENGTH + 1, ANNEXIN_200NM_X_INDEX_BITS,
+                         ANNEXIN_200NM_X_TABLE_BITS, annexin_200nm_x_fourier, ANNEXIN_200NM_X_HARMONICS,
+                         annexin_200nm_sine, ANNEXIN_200NM_SINE_INDEX_BITS);
 }
 
 /* To compare with: linear interpolation and nothing else, as libraries for signal processing have it: a call a sample, 12 bits of

@@ -1,12 +1,12 @@
 # What all ports have in common: SCAN is built into BUILD/scan, and OWN is compiled with it and the link for CPU.
 #
-#     make SCAN=scan.toml BAUD=460800 CFLAGS=-O3 KEY=00112233..   KEY: of the link, 16 to 32 bytes in hexadecimal
+#     make SCAN=scan.toml BAUD=460800 CFLAGS=-O3
 #
-# A port sets OWN, CPU, LINK (where everything goes) and BOARD_FLAGS before it includes this.
+# A port sets OWN, CPU, LINK (where everything goes) and BOARD_FLAGS before it includes this, and PRIVATELY, which stands
+# in front of commands whose output others must not read.
 CROSS ?= arm-none-eabi-gcc
 CFLAGS ?= -O2
 BAUD ?= 115200
-KEY ?=
 CONTROL ?= link
 OWN_link := control_link scan_link
 
@@ -16,9 +16,6 @@ $(eval $(call tablegen_build,$(SCAN),$(BUILD)/scan))
 
 SCAN_NAME := $(basename $(notdir $(filter-out $(BUILD)/scan/dac_%,$($(BUILD)/scan_HEADERS))))
 SCAN_UPPER := $(shell echo $(SCAN_NAME) | tr a-z A-Z)
-TABLE_BITS := $(shell grep -q 'const int32_t .*_table' $(BUILD)/scan/$(SCAN_NAME).h 2>/dev/null && echo 32 || echo 16)
-OUTPUT_BITS := $(shell awk '/_DAC_WORD_BITS / && $$3 > 16 {wide = 1} END {print wide ? 32 : 16}' \
-    $(BUILD)/scan/$(SCAN_NAME).h 2>/dev/null)
 
 vpath memory.c ..
 vpath %.c ../common
@@ -26,15 +23,13 @@ OBJECTS := $(patsubst %,$(BUILD)/%.o,$(OWN) $(OWN_$(CONTROL)) scan memory) $(pat
 COMPILE := $(CROSS) -std=c99 -mcpu=$(CPU) -mthumb -ffreestanding -ffunction-sections -fdata-sections \
     -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Werror -I$(BUILD)/scan -I. -I../common -MMD -MP \
     -DSCAN=$(SCAN_NAME) -DSCAN_UPPER=$(SCAN_UPPER) -DSCAN_HEADER='"$(SCAN_NAME).h"' \
-    -DDAC_TABLE_STORAGE_BITS=$(TABLE_BITS) -DDAC_OUTPUT_STORAGE_BITS=$(OUTPUT_BITS) \
-    -DUPDATE_RATE_HZ=$(UPDATE_RATE_HZ) -DBAUD=$(BAUD) $(if $(KEY),-DLINK_KEY=$(shell echo $(KEY) | sed 's/../0x&,/g')) \
-    $(BOARD_FLAGS) $(CFLAGS)
+    $($(BUILD)/scan_CPPFLAGS) -DUPDATE_RATE_HZ=$(UPDATE_RATE_HZ) -DBAUD=$(BAUD) $(BOARD_FLAGS) $(CFLAGS)
 
 $(BUILD)/firmware.elf: $(OBJECTS) $(LINK_FILES)
-	$(CROSS) -mcpu=$(CPU) -mthumb -nostdlib -static -Wl,--gc-sections $(LINK) $(OBJECTS) -lgcc -o $@
+	$(PRIVATELY) $(CROSS) -mcpu=$(CPU) -mthumb -nostdlib -static -Wl,--gc-sections $(LINK) $(OBJECTS) -lgcc -o $@
 
 $(BUILD)/%.o: %.c
-	$(COMPILE) -c $< -o $@
+	$(PRIVATELY) $(COMPILE) -c $< -o $@
 
 $(BUILD)/scan/%.o: $(BUILD)/scan/%.c
 	$(COMPILE) -c $< -o $@

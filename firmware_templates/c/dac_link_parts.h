@@ -134,6 +134,12 @@ void dac_link_send_late(dac_link *l);
 
 /* dac_link_key.c */
 
+/* Whether a configuration has all that its key needs. */
+dac_link_started dac_link_judge_key(const dac_link_config *config);
+
+/* Forgets a challenge that is too old. */
+void dac_link_expire(dac_link *l);
+
 /* Whether a tag is that of a request under the key. `digest`: the 32 bytes of a COMMIT, or NULL. */
 bool dac_link_tagged(const dac_link *l, const uint8_t *nonce, const uint8_t *request, uint8_t bytes,
                      const uint8_t *digest, const uint8_t *tag);

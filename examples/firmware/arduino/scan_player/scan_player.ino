@@ -161,8 +161,7 @@ void setup()
     digitalWrite(LATCH, HIGH);
     SPI.begin();
     SPI.beginTransaction(SPISettings(20000000, MSBFIRST, SPI_MODE0));
-    dac_sequencer_init(&sequencer, &scan_x_converter, &scan_y_converter);
-    const bool good = start();
+    const bool good = dac_sequencer_init(&sequencer, &scan_x_converter, &scan_y_converter) && start();
     refill();
     start_timer();
 #if LINKED
