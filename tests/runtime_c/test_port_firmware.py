@@ -124,8 +124,8 @@ def test_rp2040(rp2040js: Path, tmp_path: Path) -> None:
 
 
 def test_rp2040_tells_underruns(rp2040js: Path, tmp_path: Path) -> None:
-    """A negative control: at twice the rate it holds words, says so, and no word is lost or wrong."""
-    board, rate, boot, _ = _rp2040(rp2040js, tmp_path, divider=18)
+    """A negative control: at five times the rate it holds words, says so, and no word is lost or wrong."""
+    board, rate, boot, _ = _rp2040(rp2040js, tmp_path, divider=7)
     with board:
         line = Line(board, baud=460800, tick_hz=rate)
         line.sleep(0.002)
@@ -253,7 +253,7 @@ def test_arduino_uno(sketch: Path, avr_board: Path, tmp_path: Path) -> None:
     assert board.transmit() == b"0\r\n"  # no faults
     heard = follow_words(board.words, [commit(scan.program), start(), park])
     assert heard[2] - heard[1] > 2 * scan.program.schedule.ticks
-    assert free > 40
+    assert free > 100
 
 
 def test_the_arduino_sketch_compiles_for_a_teensy(sketch: Path, tmp_path: Path) -> None:

@@ -23,7 +23,7 @@ enum { HALF = 32 };  // ticks in half a buffer
 #elif LINKED
 enum { HALF = 8 };
 #else
-enum { HALF = 4 };
+enum { HALF = 2 };
 #endif
 
 dac_sequencer sequencer;
@@ -68,7 +68,16 @@ static void refill()
     for (; reported != underruns; reported++)
         dac_sequencer_report(&sequencer, DAC_FAULT_UNDERRUN);
     while (!full[next]) {
+#if LINKED
         dac_sequencer_fill(&sequencer, codes[next], codes[next] + 1, NULL, HALF);
+#else
+        for (uint8_t i = 0; i < HALF; i++) {  // slower, but with less of the stack
+            dac_tick now;
+            dac_sequencer_step(&sequencer, &now);
+            codes[next][2 * i] = now.x;
+            codes[next][2 * i + 1] = now.y;
+        }
+#endif
         __asm__ volatile("" ::: "memory");  // write the samples before `full`
         full[next] = true;
         next ^= 1;
