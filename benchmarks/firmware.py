@@ -18,7 +18,7 @@ from tablegen.config.load import load
 from tablegen.emit.render import render
 from tablegen.planning.line_plan import make_plan
 from tablegen.resources import c_runtime
-from tablegen.verification.emulate import CORES, Processor, compile_bare
+from tablegen.verification.emulate import COMPILERS, CORES, Processor, compile_bare
 
 HERE = Path(__file__).parent
 EXAMPLE = HERE.parent / "examples" / "annexin_200nm.toml"
@@ -98,9 +98,10 @@ def _code(core: str, optimisation: str, folder: Path) -> dict[str, int]:
     for source in c_runtime():
         if source.suffix == ".c":
             target = folder / f"{source.stem}.o"
+            compiler = COMPILERS[CORES[core].architecture]
             options = [*CORES[core].options, "-std=c99", optimisation, "-ffreestanding"]
-            _run("arm-none-eabi-gcc", *options, "-c", str(source), "-o", str(target))
-            found[source.name] = int(_run("arm-none-eabi-size", str(target)).splitlines()[1].split()[0])
+            _run(compiler, *options, "-c", str(source), "-o", str(target))
+            found[source.name] = int(_run(compiler.replace("gcc", "size"), str(target)).splitlines()[1].split()[0])
     return found
 
 
