@@ -76,7 +76,7 @@ def _turn_rows() -> list[Row]:
         'with the turn. We read the paper\'s "increased to" as a change, because the paper sees no major difference'
     )
     return [
-        Row("5l", what.format("0.7"), about("10", "%"), _increase(0.7), Source.SIMULATED, decimals=2),
+        Row("5l", what.format("0.7"), about("10", "%"), _increase(0.7), Source.SIMULATED, why, decimals=2),
         Row("5l", what.format("0.9"), about("25", "%"), _increase(0.9), Source.SIMULATED, why, decimals=2),
     ]
 

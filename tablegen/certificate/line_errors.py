@@ -120,7 +120,8 @@ class EmittedPeriod:
         if self.runs.by_tick:
             return np.arange(first, stop)
         starts, lasts = (
-            ascending[slice(*np.searchsorted(ascending, (first, stop)))] for ascending in (self.runs.starts, self._lasts)
+            ascending[slice(*np.searchsorted(ascending, (first, stop)))]
+            for ascending in (self.runs.starts, self._lasts)
         )
         return merged(starts, lasts)
 

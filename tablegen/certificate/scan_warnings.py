@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 from tablegen.certificate.certificate import Certificate
 from tablegen.certificate.excess import Excess, excess
+from tablegen.certificate.matching import apart_warning
 from tablegen.config.load import Setup
 from tablegen.planning.line_plan import LinePlan, Plan
 from tablegen.problems import Problem
@@ -15,11 +16,17 @@ def brief_warnings(plan: Plan, certificates: Mapping[str, Certificate]) -> list[
 
 
 def scan_warnings(setup: Setup, plan: Plan, certificates: Mapping[str, Certificate]) -> list[Problem]:
-    """The same with remedies, each at the key that the cause stands at. Every remedy was planned and measured."""
+    """The same with remedies, each at the key that the cause stands at. Every remedy was planned and measured.
+
+    And what trace and retrace are apart by ticks alone, where that is more than a quarter of a pixel.
+    """
     warnings = []
     for line, found in _found(plan, certificates):
         why = f"{found.text(line.axis)}; {_share(line, found)}{_advice(setup, plan, line, found)}"
         warnings.append(setup.scan_file.problem(_key(setup, line, found), why))
+    if apart := apart_warning(plan):
+        given = setup.scan.timing.ticks_per_line is not None
+        warnings.append(setup.scan_file.problem(f"timing.{'ticks_per_line' if given else 'line_rate_hz'}", apart))
     return warnings
 
 

@@ -14,7 +14,8 @@ def check(scan: Path, strict: bool) -> None:
     """Check a scan file and its scanner file: syntax, physical limits, and the limits of the certificate.
 
     Prints nothing if both are correct. Otherwise it prints all errors to stderr, each as file:line: key: why. A
-    scaling error above 1 %, or above that of the uncompensated line, is a warning, with remedies that were tried.
+    scaling error above 1 %, or above that of the uncompensated line, is a warning, with remedies that were tried; so is
+    a pixel whose places in trace and retrace are more than a quarter of a pixel apart.
 
     \b
     Example:

@@ -303,7 +303,7 @@ def test_growth_and_rate_by_hand(row: Callable[[str, str], Row]) -> None:
     ("model", "figures"), [("triangle", ("5a, 5c", "5e")), ("sinusoidal", ("5d", "5f")), ("harmonic", ("5i", "5j"))]
 )
 def test_played_lines_by_hand(row: Callable[[str, str], Row], model: str, figures: tuple[str, str]) -> None:
-    """Residual and scaling error from displacements at ticks, without interpolation; the codes fill 16 bits."""
+    """Residual and scaling error from displacements in the middle of ticks; the codes fill 16 bits."""
     line = measured.full_scale(model)  # type: ignore[arg-type]
     codes, moved = line.drive.codes, line.displacement_nm
     assert np.issubdtype(codes.dtype, np.integer)
@@ -312,8 +312,8 @@ def test_played_lines_by_hand(row: Callable[[str, str], Row], model: str, figure
     y = (moved - moved.min()) / (moved.max() - moved.min())
     half = len(y) // 2
     name = model if model == "triangle" else f"{model} model"
-    for side, branch in (("forward", y[: half + 1]), ("backward", np.append(y[half:], y[0])[::-1])):
-        x = np.arange(half + 1) / half
+    for side, branch in (("forward", y[:half]), ("backward", y[half:][::-1])):
+        x = (np.arange(half) + 0.5) / half
         inside = (x >= 0.1) & (x <= 0.9)
         residual = float(np.max(np.abs((branch - x)[inside])))
         chord = half // 20
