@@ -43,6 +43,7 @@ static uint8_t hash[32];
 #ifdef LINK_KEY
 static const uint8_t key[] = {LINK_KEY};
 static const char device[] = LINK_DEVICE; /* no other instrument with this key has it; on hardware better a serial number */
+typedef char link_device_has_4_to_32_characters[sizeof device - 1 >= 4 && sizeof device - 1 <= 32 ? 1 : -1];
 #endif
 
 #define AXIS(NAME, bits, tables, words)                                                                               \
