@@ -1,13 +1,13 @@
 """From a scan file, or from values, to a plan, its certificate, its arrays and its files."""
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from tablegen.certificate.certificate import Certificate, broken_limits
 from tablegen.certificate.certificate import certify as certify_plan
-from tablegen.certificate.scan_warnings import brief_warnings, scan_warnings
+from tablegen.certificate.scan_warnings import brief_warnings, limit_advice, scan_warnings
 from tablegen.certificate.summary import notes, summary
 from tablegen.config.load import Setup, from_values
 from tablegen.config.load import load as load_files
@@ -77,7 +77,7 @@ def build(
     wanted = _formats(setup, made, formats)
     progress("measuring every tick of a line and a frame")
     certificates = certify_plan(made)
-    if broken := broken_limits(made, certificates, setup.scan_file):
+    if broken := broken_limits(made, certificates, setup.scan_file, partial(limit_advice, setup, made, certificates)):
         raise BrokenLimit(broken)
     built = Build(setup, made, certificates, [each.name for each in wanted], formats is not None)
     if out is not None:

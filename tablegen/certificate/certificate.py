@@ -1,5 +1,6 @@
 """What a build promises, measured on every emitted integer of one whole period of each axis, and the limits on it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import log10, sqrt
 
@@ -56,8 +57,16 @@ def certify(plan: Plan) -> dict[str, Certificate]:
     return {line.axis: _certify(line) for line in plan.lines}
 
 
-def broken_limits(plan: Plan, certificates: dict[str, Certificate], file: Document) -> list[Problem]:
-    """The limits of the configuration that a certificate exceeds, each with a remedy."""
+def broken_limits(
+    plan: Plan,
+    certificates: dict[str, Certificate],
+    file: Document,
+    advise: Callable[[str], str] = lambda _: "",
+) -> list[Problem]:
+    """The limits of the configuration that a certificate exceeds, each with a remedy.
+
+    ``advise`` adds to a scaling error of an axis ("x" or "y") what was tried against it.
+    """
     problems = []
     for axis, certificate in certificates.items():
         if certificate.largest_step > certificate.max_step:
@@ -78,7 +87,7 @@ def broken_limits(plan: Plan, certificates: dict[str, Certificate], file: Docume
             what = f"scaling error of {worst:.4g} %" if worst > limit else f"size error of {size:+.4g} %"
             parts = max(certificate.scaling.values(), key=lambda error: max(error.total, error.band_limit))
             remedy = _remedy(plan.x if axis == "x" else plan.y, parts)
-            why = f"the {axis} axis has a {what}, above {limit:g} %; {remedy}"
+            why = "; ".join(filter(None, (f"the {axis} axis has a {what}, above {limit:g} %", remedy, advise(axis))))
             problems.append(file.problem("limits.max_scaling_error_percent", why))
     return problems
 

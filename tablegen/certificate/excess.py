@@ -60,21 +60,22 @@ class Excess:
         )
 
 
-def excess(scaling: Mapping[str, ScalingError]) -> Excess | None:
+def excess(scaling: Mapping[str, ScalingError], most: float | None = None) -> Excess | None:
     """What should be said of the errors of one axis, by direction; None where nothing should.
 
-    An uncompensated line is one to compare with only where the scanner file has a hysteresis to compensate.
+    An uncompensated line is one to compare with only where the scanner file has a hysteresis to compensate. With
+    ``most``, a limit of the scan file in percent, that alone counts.
     """
     found = []
     for side, parts in scaling.items():
         error = max(parts.total, parts.band_limit)
-        limit = LARGEST_PERCENT
-        if parts.uncompensated >= _NOTHING_PERCENT:
+        limit = size_limit = LARGEST_PERCENT if most is None else most
+        if most is None and parts.uncompensated >= _NOTHING_PERCENT:
             limit = min(limit, parts.uncompensated)
         if error > limit:
             found.append(Excess("scaling error", side, error, limit, parts))
-        if abs(parts.size) > LARGEST_PERCENT:
-            found.append(Excess("size error", side, parts.size, LARGEST_PERCENT, parts))
+        if abs(parts.size) > size_limit:
+            found.append(Excess("size error", side, parts.size, size_limit, parts))
     return max(found, key=lambda one: one.times, default=None)
 
 

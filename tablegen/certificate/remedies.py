@@ -14,6 +14,7 @@ from msgspec import structs
 
 from tablegen.certificate.certificate import scaling_errors
 from tablegen.certificate.excess import Cause, Excess, excess
+from tablegen.certificate.line_errors import EmittedPeriod
 from tablegen.config.figures import at_least, at_most
 from tablegen.config.load import Setup
 from tablegen.config.schema import FastAxis
@@ -34,27 +35,37 @@ Change = Mapping[str, Any]  # keys of the scan file to their values; None takes 
 
 @dataclass(frozen=True)
 class Remedy:
-    """A change that was tried, what it leaves in percent, and whether that is enough."""
+    """A change that was tried, what it leaves in percent, whether that is low enough, and whether all limits hold."""
 
     text: str
     percent: float
-    enough: bool
+    low: bool
+    within_limits: bool
+
+    @property
+    def enough(self) -> bool:
+        """Whether it can be taken."""
+        return self.low and self.within_limits
+
+    def __str__(self) -> str:
+        also = "" if self.within_limits else ", with an error above limits.max_error_lsb"
+        return f"{self.text} leaves {self.percent:.3g} %{also}"
 
 
-def tried(setup: Setup, plan: Plan, line: LinePlan, found: Excess) -> list[Remedy]:
+def tried(setup: Setup, plan: Plan, line: LinePlan, found: Excess, most: float | None = None) -> list[Remedy]:
     """The remedies of one axis that were planned and measured, a key each: the first value that is enough, or the best.
 
-    ``found`` is what the axis exceeds. Where a change of the scan alone is enough, no other is looked for; of the
-    hardware, both converter and amplifier are. A change that no plan can be made of is left out.
+    ``found`` is what the axis exceeds, ``most`` as in ``excess``. Where a change of the scan alone is enough, no other
+    is looked for; of the hardware, both converter and amplifier are. A change that no plan can be made of is left out.
     """
     remedies = []
     for changes in _WAYS[found.cause](setup, plan, line, found):
         best: Remedy | None = None
         for change in changes:
-            one = _trial(setup, line, change)
-            if one is not None and (best is None or (one.enough, -one.percent) > (best.enough, -best.percent)):
+            one = _trial(setup, plan, line, change, most)
+            if one is not None and (best is None or one.percent < best.percent):
                 best = one
-            if best is not None and best.enough:
+            if best is not None and best.low:
                 break
         if best is not None:
             remedies.append(best)
@@ -76,17 +87,25 @@ def changed(setup: Setup, change: Change) -> Setup:
     return replace(setup, scan=scan)
 
 
-def _trial(setup: Setup, line: LinePlan, change: Change) -> Remedy | None:
+def _trial(setup: Setup, plan: Plan, line: LinePlan, change: Change, most: float | None) -> Remedy | None:
     """Plan and measure one change; None where it cannot be planned."""
     try:
-        plan = make_plan(changed(setup, change))
+        other = make_plan(changed(setup, change))
     except Rejected:
         return None
-    other = plan.x if line.axis == "x" else plan.y
-    scaling = scaling_errors(other)
+    scaling = scaling_errors(other.x if line.axis == "x" else other.y)
     left = max(max(one.total, one.band_limit, abs(one.size)) for one in scaling.values())
     text = " with ".join(f"{key} = {_value(value)}" for key, value in change.items() if value is not None)
-    return Remedy(text, left, excess(scaling) is None)
+    return Remedy(text, left, excess(scaling, most) is None, _keeps_the_error(plan, other))
+
+
+def _keeps_the_error(plan: Plan, other: Plan) -> bool:
+    """Whether no axis comes above ``limits.max_error_lsb`` that was not: a finer code is a smaller LSB."""
+    limit = plan.limits.max_error_lsb
+    return limit is None or all(
+        EmittedPeriod(new).largest_error() <= limit or EmittedPeriod(old).largest_error() > limit
+        for old, new in zip(plan.lines, other.lines, strict=True)
+    )
 
 
 def _value(value: object) -> str:

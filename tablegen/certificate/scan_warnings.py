@@ -22,23 +22,33 @@ def scan_warnings(setup: Setup, plan: Plan, certificates: Mapping[str, Certifica
     """
     warnings = []
     for line, found in _found(plan, certificates):
-        from tablegen.certificate.remedies import tried  # only a scan that needs them pays for them
-
-        remedies = tried(setup, plan, line, found)
-        good = [f"{one.text} leaves {one.percent:.3g} %" for one in remedies if one.enough]
-        best = min(remedies, key=lambda one: one.percent, default=None)
-        if good:
-            advice = f"tried: {'; or '.join(good)}"
-        elif best is not None and best.percent < 0.9 * abs(found.percent):
-            advice = f"no remedy that was tried is enough; the best, {best.text}, leaves {best.percent:.3g} %"
-        else:
-            advice = "no remedy that was tried helps; scan more"
-        why = f"{found.text(line.axis)}; {_share(line, found)}{advice}"
+        why = f"{found.text(line.axis)}; {_share(line, found)}{_advice(setup, plan, line, found)}"
         warnings.append(setup.scan_file.problem(_key(setup, line, found), why))
     if apart := apart_warning(plan):
         given = setup.scan.timing.ticks_per_line is not None
         warnings.append(setup.scan_file.problem(f"timing.{'ticks_per_line' if given else 'line_rate_hz'}", apart))
     return warnings
+
+
+def limit_advice(setup: Setup, plan: Plan, certificates: Mapping[str, Certificate], axis: str) -> str:
+    """Remedies that were tried for an axis above ``limits.max_scaling_error_percent``, in words."""
+    line = plan.x if axis == "x" else plan.y
+    most = plan.limits.max_scaling_error_percent
+    found = excess(certificates[axis].scaling, most)
+    return "" if found is None else _advice(setup, plan, line, found, most)
+
+
+def _advice(setup: Setup, plan: Plan, line: LinePlan, found: Excess, most: float | None = None) -> str:
+    from tablegen.certificate.remedies import tried  # only a scan that needs them pays for them
+
+    remedies = tried(setup, plan, line, found, most)
+    good = [str(one) for one in remedies if one.enough]
+    best = min(remedies, key=lambda one: one.percent, default=None)
+    if good:
+        return f"tried: {'; or '.join(good)}"
+    if best is not None and best.percent < 0.9 * abs(found.percent):
+        return f"no remedy that was tried is enough; the best: {best}"
+    return "no remedy that was tried helps"
 
 
 def _found(plan: Plan, certificates: Mapping[str, Certificate]) -> list[tuple[LinePlan, Excess]]:

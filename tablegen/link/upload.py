@@ -175,10 +175,10 @@ class Uploader:
                 self._send(Request.BEGIN, self._image.info.pack())
             elif not self._begun and not self._pipelined:
                 return
-            elif self._digest and self._nonce is None and not self._on_way(Request.CHALLENGE):
-                self._send(Request.CHALLENGE, b"")
             elif self._next < size:
                 self._send_data()
+            elif self._digest and self._nonce is None and not self._on_way(Request.CHALLENGE):
+                self._send(Request.CHALLENGE, b"")  # only now: it expires
             elif self._commit is None and (self._nonce is not None or not self._digest):
                 self._send_commit()
             elif self._poll_at and now >= self._poll_at and not self._on_way(Request.STATUS):

@@ -129,7 +129,7 @@ def test_the_small_scan_is_worse_than_none_and_says_so(tmp_path: Path) -> None:
 def test_two_causes_at_once_name_the_best_that_was_tried(tmp_path: Path) -> None:
     edits = {"dac.bits": "8", "x.band_limit.harmonics": "2"}
     text = warned(setup_of(tmp_path, {**FREE, **edits}))[0]
-    found = re.search(r"no remedy that was tried is enough; the best, (\S+) = (\d+), leaves (\S+) %$", text)
+    found = re.search(r"no remedy that was tried is enough; the best: (\S+) = (\d+) leaves (\S+) %$", text)
     assert found
     assert found[1] == "x.band_limit.harmonics"
     line = make_plan(setup_of(tmp_path, {**FREE, **edits, found[1]: found[2]})).x

@@ -61,9 +61,26 @@ def test_strict_makes_them_errors(small: Path, tmp_path: Path) -> None:
 
 
 def test_a_limit_that_is_exceeded_is_an_error_before_any_warning(tmp_path: Path) -> None:
-    found = run("check", write_pair(tmp_path, edited(SCAN, "x.size_nm = 20.0")))
+    """With remedies that were tried against that limit: each, written into the file, is accepted."""
+    edits = ("x.size_nm = 20.0", "y.size_nm = 20.0", "timing.lines = 40")
+    found = run("check", write_pair(tmp_path, edited(SCAN, *edits)))
     assert found.status == 3
     assert "warning" not in found.err
+    for axis, message in zip("xy", found.messages, strict=True):
+        assert f"the {axis} axis has a scaling error of " in message
+        for advice in message.split("; tried: ")[1].split("; or "):
+            changes = advice.rpartition(" leaves ")[0].split(" with ")
+            again = run("check", write_pair(tmp_path, edited(SCAN, *edits, *changes)))
+            assert f"the {axis} axis" not in again.err, advice
+
+
+def test_a_remedy_that_breaks_another_limit_says_so(tmp_path: Path) -> None:
+    """More bits of the converter make its LSB small beside the words of y's table, and y's drive takes the range."""
+    found = run("check", write_pair(tmp_path, edited(SCAN, "x.size_nm = 20.0")))
+    assert found.status == 3
+    said = "no remedy that was tried is enough; the best: dac.bits = 19 leaves 0."
+    assert said in found.err
+    assert found.err.endswith(" %, with an error above limits.max_error_lsb\n")
 
 
 def test_a_build_in_python_has_them(small: Path) -> None:

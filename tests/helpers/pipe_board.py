@@ -1,6 +1,6 @@
 """An emulated board behind a pipe: bytes to its UART and back, and the words at its converters, in its own time.
 
-Its program reads lines "CYCLES BYTES" and answers "SENT WORDS LOST APART", all but the numbers in
+Its program reads lines "CYCLES BYTES" and answers "SENT WORDS COUNTS..", all but the numbers in
 hexadecimal; see ``rp2040/board.mjs`` and ``avr_board.c``. It is the far end of a ``link_line.Line``, so that time is virtual.
 """
 
@@ -15,12 +15,12 @@ from building import tool
 class PipeBoard:
     """A running board. ``words`` are the pairs at the converters of x and y so far.
 
-    ``lost`` bytes overran its UART; ``apart`` words left at another time than those of the other axis.
+    ``counts`` are those that its program adds to each answer, the last ones.
     """
 
     def __init__(self, command: Sequence[str | Path], cycles_per_tick: int, folder: Path | None = None) -> None:
         self.words: list[tuple[int, int]] = []
-        self.lost = self.apart = 0
+        self.counts: list[int] = []
         self._cycles = cycles_per_tick
         self._waiting = b""
         self._sent = b""
@@ -57,14 +57,14 @@ class PipeBoard:
         stdin.flush()
         self._waiting = b""
         answer = stdout.readline().split()
-        assert len(answer) == 4, f"the board has ended: {answer}"
-        sent, words, lost, apart = answer
+        assert len(answer) > 2, f"the board has ended: {answer}"
+        sent, words, *counts = answer
         if sent != b"-":
             self._sent += bytes.fromhex(sent.decode())
         if words != b"-":
             codes = [int(words[at : at + 4], 16) for at in range(0, len(words), 4)]
             self.words += zip(codes[::2], codes[1::2], strict=True)
-        self.lost, self.apart = int(lost), int(apart)
+        self.counts = [int(count) for count in counts]
 
     def reboot(self) -> None:
         """There is no reset in this emulation."""

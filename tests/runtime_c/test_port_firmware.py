@@ -4,6 +4,8 @@ RP2040 in rp2040js, STM32F4 under unicorn with a model of the peripherals that i
 is virtual, and so is the serial line.
 """
 
+import shlex
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -11,7 +13,7 @@ from pathlib import Path
 from random import Random
 
 import pytest
-from building import REMOVED, REPOSITORY, VARIANTS, Variant, run_clean, tool, write_variant
+from building import EXAMPLE, REMOVED, REPOSITORY, VARIANTS, Variant, run, run_clean, tool, write_variant
 from converter_words import commit, follow_words, park, start
 from following import Differs
 from link_line import FarEnd, Line
@@ -26,6 +28,7 @@ from tablegen.verification.elf import read_executable
 
 pytestmark = pytest.mark.rest
 
+AVR_HZ = 16_000_000
 FIRMWARE = REPOSITORY / "examples" / "firmware"
 HELPERS = REPOSITORY / "tests" / "helpers"
 SMALL = {
@@ -55,6 +58,7 @@ def _play(board: FarEnd, tick_hz: int, baud: int, scan: PreparedScan, form: str)
     """The boot scan plays, another one is uploaded meanwhile, plays for more than a frame, and parks."""
     line = Line(board, baud=baud, tick_hz=tick_hz)
     frame = scan.program.schedule.frame_ticks / tick_hz
+    line.sleep(0.02)  # what comes before the UART is on is lost
     with Device(line.open, random=Random(8), sleep=line.sleep) as client:
         client.arm()
         client.trigger()
@@ -105,7 +109,8 @@ def test_rp2040(rp2040js: Path, tmp_path: Path) -> None:
     image.write_bytes(segment.data)
     with PipeBoard(["node", HELPERS / "rp2040" / "board.mjs", image, str(baud)], 34 * divider, rp2040js) as board:
         _play(board, rate, baud, scan, "table")
-    assert (board.lost, board.apart) == (0, 0)
+    lost, apart = board.counts
+    assert (lost, apart) == (0, 0)
     _follow(board.words, boot, scan)
 
 
@@ -121,3 +126,87 @@ def test_stm32(tmp_path: Path) -> None:
     _play(board, rate, baud, scan, "fourier")
     _follow(board.words, boot, scan)
     print(board.longest)
+
+
+# Arduino: the recipe of the README, with Arduino's builder, core and libraries.
+
+ARDUINO = FIRMWARE / "arduino"
+_SHARE = Path("/usr/share/arduino")
+_BUILDER = (
+    "arduino-builder", "-compile", "-hardware", "/usr/share/arduino-builder", "-hardware", _SHARE / "hardware", "-tools",
+    _SHARE / "hardware", "-warnings", "all",
+    # Debian's core 1.8.7 takes DECIMAL_DIG from a header in which Debian's avr-gcc 5.4 has it for C alone.
+    "-prefs", "compiler.cpp.extra_flags=-DDECIMAL_DIG=__DECIMAL_DIG__",
+)  # fmt: skip
+
+
+def _recipe() -> list[str]:
+    """The commands that the README gives up to the IDE."""
+    text = (ARDUINO / "README.md").read_text("utf-8").split("Arduino IDE")[0]
+    return [line.strip() for line in text.splitlines() if line.startswith("    ")]
+
+
+@pytest.fixture(scope="module")
+def sketch(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of the sketch after the recipe."""
+    examples = tmp_path_factory.mktemp("recipe") / "examples"
+    shutil.copytree(REPOSITORY / "examples", examples, ignore=shutil.ignore_patterns("build", "__pycache__"))
+    folder = examples / "firmware" / "arduino"
+    for command in _recipe():
+        assert command.startswith(("tablegen ", "cp "))
+        whole = command.replace("tablegen", f"{shlex.quote(sys.executable)} -m tablegen", 1)
+        subprocess.run(whole, shell=True, cwd=folder, check=True, stdout=subprocess.DEVNULL)
+    return folder / "scan_player"
+
+
+def _compiled(sketch: Path, board: str, folder: Path) -> Path:
+    """The sketch as the IDE compiles it; no warning is of ours."""
+    out = folder / board.split(":")[0]
+    out.mkdir()
+    done = run([*_BUILDER, "-fqbn", f"arduino:avr:{board}", "-build-path", out, sketch / "scan_player.ino"])
+    assert done.returncode == 0, done.stderr
+    warnings = [line for line in done.stderr.splitlines() if "warning:" in line]
+    assert [line for line in warnings if not line.startswith(f"{_SHARE}/hardware")] == []
+    return out / "scan_player.ino.elf"
+
+
+def _static_end(executable: Path) -> int:
+    return read_executable(executable).symbols["_end"] & 0xFFFF
+
+
+@pytest.fixture(scope="module")
+def avr_board(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The board's program."""
+    program = tmp_path_factory.mktemp("avr") / "avr_board"
+    run_clean(["gcc", "-std=gnu99", "-O2", HELPERS / "avr_board.c", "-o", program, "-lsimavr", "-lelf", "-lm"])
+    return program
+
+
+def test_arduino_mega(sketch: Path, avr_board: Path, tmp_path: Path) -> None:
+    """The sketch in simavr; words are what the converter puts out when LDAC falls."""
+    rate = 2000
+    text = (ARDUINO / "scan.toml").read_text("utf-8").replace("../../scanner.toml", str(EXAMPLE.parent / "scanner.toml"))
+    changes = {
+        "lines = 100 ": "lines = 4 ",
+        "pixels = 100 ": "pixels = 50 ",
+        "line_rate_hz = 2.0": "line_rate_hz = 5.0",
+        "size_nm = 400.0": "size_nm = 300.0",
+        'motion = "step"': "",
+        'mode = "direct"': 'mode = "interpolated"\nlength = 128',
+    }
+    small = text
+    for old, new in changes.items():
+        assert old in small
+        small = small.replace(old, new)
+    scans = []
+    for name, content in (("boot", text), ("scan", small)):
+        (tmp_path / f"{name}.toml").write_text(content, "utf-8")
+        scans.append(PreparedScan.of_plan(make_plan(load(tmp_path / f"{name}.toml"))))
+    executable = _compiled(sketch, "mega:cpu=atmega2560", tmp_path)
+    with PipeBoard([avr_board, executable, str(_static_end(executable))], AVR_HZ // rate) as board:
+        _play(board, rate, 115200, scans[1], "table")
+    lost, free = board.counts
+    print(lost, free, len(board.words))
+    assert lost == 0
+    _follow(board.words, *scans)
+    assert free > 400  # bytes that the stack never reached

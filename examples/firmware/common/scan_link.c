@@ -1,11 +1,15 @@
 /* The link of a build. It accepts tables as long as those of the build, and has the limits of that scan.
  * Options, with -D: LINK_X_INDEX_BITS and LINK_Y_INDEX_BITS for longer tables, LINK_HARMONICS (0: tables only), LINK_MAX_JUMP in
- * codes, LINK_KEY as the bytes of an array; DAC_LINK_RING.
+ * codes, DAC_LINK_RING; LINK_KEY_HEADER, a file that defines LINK_KEY as the bytes of an array, and LINK_DEVICE, a name as a string.
  */
 #include "scan_link.h"
 
 #include "names.h"
 #include SCAN_HEADER
+#ifdef LINK_KEY_HEADER
+#include LINK_KEY_HEADER
+#include "random.h"
+#endif
 
 /* A table that is not interpolated need not have 2^n words. */
 #define BITS_FOR(n) ((n) <= 8 ? 3 : (n) <= 16 ? 4 : (n) <= 32 ? 5 : (n) <= 64 ? 6 : (n) <= 128 ? 7 : (n) <= 256 ? 8 \
@@ -38,11 +42,8 @@ static int32_t x_fourier[2 * HARMONICS + 1], y_fourier[2 * HARMONICS + 1];
 static uint8_t hash[32];
 #ifdef LINK_KEY
 static const uint8_t key[] = {LINK_KEY};
-#define KEY key
-#define KEY_BYTES sizeof key
-#else
-#define KEY NULL
-#define KEY_BYTES 0
+static const char device[] = LINK_DEVICE; /* no other instrument with this key has it; on hardware better a serial number */
+typedef char link_device_has_4_to_32_characters[sizeof device - 1 >= 4 && sizeof device - 1 <= 32 ? 1 : -1];
 #endif
 
 #define AXIS(NAME, bits, tables, words)                                                                               \
@@ -59,9 +60,15 @@ static const dac_link_config config = {
     .sine_index_bits = SINE_BITS,
     .sine = SINE,
     .update_rate_hz = UPDATE_RATE_HZ,
-    .key_bytes = KEY_BYTES,
-    .key = KEY,
     .hash = hash,
+#ifdef LINK_KEY
+    .key_bytes = sizeof key,
+    .key = key,
+    .identity = (const uint8_t *)device,
+    .identity_bytes = sizeof device - 1,
+    .random = random_bytes,
+    .milliseconds = clock_milliseconds,
+#endif
 };
 
 static uint8_t digit(char c)

@@ -4,6 +4,7 @@
 #include "board.h"
 #include "control.h"
 #include "player.h"
+#include "random.h"
 
 enum { CLOCK_HZ = 12000000 };
 enum { RECEIVE_EMPTY = 1 << 4, TRANSMIT_FULL = 1 << 5 };         /* UARTFR */
@@ -70,6 +71,7 @@ void board_start_timer(uint32_t hz)
 
 void board_timer_interrupt(void)
 {
+    clock_tick();
     player_timer();
 }
 
