@@ -36,7 +36,8 @@ class Line:
 
     ``baud`` paces both ways (None: bytes take no time); ``out_s`` and ``back_s`` are their latencies. What comes back
     arrives at multiples of ``batch_s``, as through a USB bridge. The device plays ``tick_hz`` samples a second. Faults
-    are of ``chances`` and ``seed``; ``on_frame`` is called with every frame as it reaches the device, before it.
+    are of ``chances`` and ``seed``; ``on_frame`` is called with every frame as it reaches the device, before it. The
+    client is told ``told_baud`` where it is not the rate of the line.
     """
 
     def __init__(
@@ -51,8 +52,9 @@ class Line:
         chances: Chances = _NO_FAULTS,
         seed: int = 0,
         on_frame: Callable[[bytes], None] | None = None,
+        told_baud: int | None = None,
     ) -> None:
-        self.device, self.baud, self.now_s = device, baud, 0.0
+        self.device, self.baud, self.now_s = device, told_baud or baud, 0.0
         self.sent = 0  # bytes that the host wrote
         self.arrived = 0  # bytes that left the host's end by now, faults aside
         self.resets = self.opened = 0
