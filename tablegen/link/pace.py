@@ -11,7 +11,6 @@ LATENCY_S = 0.016  # latency of a USB bridge, which forwards bytes 60 times a se
 _DEVICE_DELAY_S = 0.02  # a device has other things to do
 _MARGIN = 1.5
 _DECAY = 0.8  # of a lateness, per answer
-_SAMPLES = 8  # answers that tell how much lateness grows with the bytes on their way
 _SPACINGS = 32  # of answers, for the rate of the line
 _MIN_SPACINGS = 8
 _SPACED_BYTES = 100  # frames of so many bytes show a rate; smaller ones are drowned by latency
@@ -22,20 +21,18 @@ _MAX_BACK_OFF = 4  # or up to so many times the first wait
 
 @dataclass(frozen=True, slots=True)
 class _Mark:
-    """A request as it was sent: when, how far it ended in all bytes, its load, and what the line takes."""
+    """A request as it was sent: when, how far it ended in all bytes, and when its answer should come."""
 
     at: float
     end: int
-    load: int
-    line_s: float
+    expected: float
 
 
 class Pace:
     """Learns the way to a device from the answers that come.
 
-    What an answer takes longer than line and latency explain is its lateness. A long way makes every answer equally
-    late; a line slower than its baud rate makes it late in proportion to its load, the bytes on their way up to it.
-    Waits allow for the worse of both. There is no cap. Only a request that was sent once teaches (Karn).
+    What an answer takes longer than line and latency explain is its lateness. Waits allow for the largest, without a
+    cap; it fades as other answers come. Only a request that was sent once teaches (Karn).
     """
 
     def __init__(self, latency_s: float) -> None:
@@ -44,7 +41,6 @@ class Pace:
         self._marks: dict[tuple[int, int], _Mark | None] = {}
         self._sent = self._answered = 0  # bytes: all, and up to the request that was answered last
         self._answered_at = 0.0
-        self._samples: deque[float] = deque(maxlen=_SAMPLES)  # seconds of lateness per byte of load
         self._spacings: deque[float] = deque(maxlen=_SPACINGS)  # seconds per byte
         self.late_s = 0.0  # the largest lateness, fading
 
@@ -52,11 +48,6 @@ class Pace:
         """What is on its way will not be answered: the port is another one."""
         self._marks.clear()
         self._line_free = 0.0
-        self.emptied()
-
-    def emptied(self) -> None:
-        """What was on its way is taken for lost: it does not delay what follows."""
-        self._answered = self._sent
 
     def sent(self, key: tuple[int, int], now: float, baud: int | None, sizes: tuple[int, int], learn: bool) -> float:
         """A request leaves; returns how long to wait for its answer.
@@ -68,23 +59,17 @@ class Pace:
         one = byte_s(baud)
         self._line_free = max(self._line_free, now) + one * request
         self._sent += request
-        load = self._sent - self._answered + answer
-        line_s = self._line_free - now + one * answer
+        way = self._line_free - now + one * answer + self._latency_s
         if learn:
-            mark = _Mark(now, self._sent, load, line_s)
-            self._marks[key] = None if key in self._marks else mark
-        slowness = min(self._samples, default=0.0)
-        late_s = max(self._latency_s + self.late_s, slowness * load)
-        return _MARGIN * (line_s + late_s) + _DEVICE_DELAY_S
+            self._marks[key] = None if key in self._marks else _Mark(now, self._sent, now + way)
+        return _MARGIN * (way + self.late_s) + _DEVICE_DELAY_S
 
     def answered(self, key: tuple[int, int], now: float, answer_bytes: int) -> None:
         """An answer of so many bytes of payload has come."""
         mark = self._marks.pop(key, None)
         if mark is None:
             return
-        late_s = max(now - mark.at - mark.line_s, 0.0)
-        self.late_s = max(late_s - self._latency_s, _DECAY * self.late_s)
-        self._samples.append(late_s / mark.load)
+        self.late_s = max(now - mark.expected, _DECAY * self.late_s)
         between = mark.end - self._answered
         if between <= 0:
             return

@@ -246,11 +246,7 @@ class Uploader:
 
     def _overdue(self, now: float) -> None:
         """What is not answered in time is taken for lost, until its answer comes."""
-        in_vain = self._flight.in_vain
-        overdue = self._flight.overdue(now)
-        if self._flight.in_vain > in_vain:
-            self._exchange.pace.emptied()
-        for sent in overdue:
+        for sent in self._flight.overdue(now):
             if sent.kind in (Request.COMMIT, Request.STATUS):
                 self._poll_at = now
             elif sent.kind == Request.BEGIN:

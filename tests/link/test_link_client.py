@@ -10,7 +10,6 @@ from client_line import VirtualLine
 from client_rig import BOOT, FOURIER, KEY, LARGE, LARGE_INFO, NEW, TABLE, Watched, client, model
 from link_programs import INFO, LIMITS, make_scan
 
-from tablegen.link import exchange
 from tablegen.link.device import Device
 from tablegen.link.errors import (
     LinkError,
@@ -187,14 +186,6 @@ def test_a_long_way_is_learned(way_s: float) -> None:
         result = device.upload(LARGE)
     assert result.retransmissions == 0
     assert line.count(Request.BEGIN) == line.count(Request.COMMIT) == 1
-
-
-def test_without_learning_a_long_way_is_never_at_its_end(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Negative control."""
-    monkeypatch.setattr(exchange, "_MAX_LATENESS_S", 0.0)
-    line = Watched(model(LARGE_INFO), out_s=0.06, back_s=0.06, tick_hz=500_000)
-    with client(line) as device, pytest.raises(OutOfTime):
-        device.upload(LARGE)
 
 
 def test_the_window_of_the_device_is_kept() -> None:
