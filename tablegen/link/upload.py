@@ -190,11 +190,11 @@ class Uploader:
                 self._send(Request.BEGIN, self._image.info.pack())
             elif not self._begun and not self._pipelined:
                 return
-            elif self._digest and self._nonce is None and not flight.has(Request.CHALLENGE):
-                flight.forget(Request.CHALLENGE)  # the next one replaces what the device gave for it
-                self._send(Request.CHALLENGE, b"")
             elif self._next < size:
                 self._send_data()
+            elif self._digest and self._nonce is None and not flight.has(Request.CHALLENGE):
+                flight.forget(Request.CHALLENGE)  # the next one replaces what the device gave for it
+                self._send(Request.CHALLENGE, b"")  # only now: it expires
             elif self._commit is None and (self._nonce is not None or not self._digest):
                 self._send_commit()
             elif self._poll_at and now >= self._poll_at and not flight.has(Request.STATUS):
@@ -419,10 +419,13 @@ class Uploader:
             what = f"the device has received everything, but has {waits}; see `tablegen status`"
         else:
             have = self._confirmed if status is None else max(self._confirmed, self._received(status))
-            what = f"by its last answer the device has {have} of {total} bytes and keeps them: "
-            what += "repeat the upload to continue"
-            if self._committed:
-                what += " (it may be complete, and become active: see `tablegen status`)"
+            what = f"by its last answer the device has {have} of {total} bytes"
+            if not self._committed:
+                what += " and keeps them: repeat the upload to continue"
+            elif have < total:
+                what += ": repeat the upload to continue (if more has arrived, the scan may become active)"
+            else:
+                what += ", and the scan may become active: see `tablegen status`"
         silence = now - self._flight.heard_at
         if silence >= _LONG_SILENCE_S:
             what = f"no answer for {silence:.0f} s; {what}"

@@ -29,7 +29,7 @@ def check_claims(said: str, device_model: ModelDevice) -> None:
     if found := re.search(r"has (\d+) of (\d+) bytes", said):
         assert int(found[2]) == SIZE
         assert in_force or int(found[1]) <= len(device_model.memory), said
-        assert not in_force or "may be complete" in said, said
+        assert not in_force or "may become active" in said, said
     assert found or "everything" in said or "no longer answers" in said or "busy" in said, said
 
 
