@@ -103,13 +103,16 @@ def table() -> str:
     """What the page has."""
     scan = PreparedScan.of_plan(make_plan(load(EXAMPLE)))
     text = "| way | finished | bytes sent / bytes of the image | s | said |\n|---|---|---|---|---|\n"
-    for way in WAYS:
-        found = cost(scan, way)
-        mean = f" (mean {found.mean:.2f})" if way.uploads > 1 else ""
-        said = f"answers come at about {found.slow_baud} baud" if found.slow_baud else ""
-        text += f"| {way.name} | {found.finished} of {way.uploads} | {found.proportion:.2f}{mean} | "
-        text += f"{found.seconds:.1f} | {said} |\n"
+    text += "".join(row(way, cost(scan, way)) for way in WAYS)
     return text + _NOTE.format(size=len(scan.image("table").data))
+
+
+def row(way: Way, found: Cost) -> str:
+    """A line of the table."""
+    mean = f" (mean {found.mean:.2f})" if way.uploads > 1 else ""
+    said = f"answers come at about {found.slow_baud} baud" if found.slow_baud else ""
+    sent = f"{found.proportion:.2f}{mean}"
+    return f"| {way.name} | {found.finished} of {way.uploads} | {sent} | {found.seconds:.1f} | {said} |\n"
 
 
 def main() -> None:

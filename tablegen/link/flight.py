@@ -6,7 +6,7 @@ from tablegen.link.messages import Request
 from tablegen.link.pace import back_off
 
 _MIN_SILENCE_S = 5.0  # at least, and so many waits for one answer
-_SILENCE_WAITS = 8
+_SILENCE_WAITS = 16
 _MIN_WAIT_S = 0.1  # for an answer, however near the deadline
 _ANSWERED_IN_ORDER = (Request.BEGIN, Request.DATA, Request.CHALLENGE)
 

@@ -38,6 +38,7 @@ class BabblingServer:
         self._listener = socket.create_server(("127.0.0.1", 0))
         self._listener.settimeout(0.05)
         self._stop = threading.Event()
+        self.listened = threading.Event()  # somebody has connected, and listens
         self.sent = 0
         self.url = f"socket://127.0.0.1:{self._listener.getsockname()[1]}"
         self._threads = [threading.Thread(target=self._accept, daemon=True)]
@@ -70,6 +71,7 @@ class BabblingServer:
             while not self._stop.is_set():
                 try:
                     self.sent += connection.send(self._babble)
+                    self.listened.set()
                 except TimeoutError:
                     continue
                 except OSError:

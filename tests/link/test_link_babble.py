@@ -1,5 +1,6 @@
 """Lines that never fall silent: whatever the client waits for, it ends in time and says what it heard."""
 
+import signal
 import socket
 import subprocess
 import sys
@@ -19,7 +20,7 @@ from tablegen.link.exchange import Answer, Exchange
 from tablegen.link.messages import DeviceState
 from tablegen.link.transport import open_port
 
-_FOR_EVER_S = 60.0  # of the virtual clock
+_FOR_EVER_S = 30.0  # of the virtual clock
 
 
 class ForEver(Exception):
@@ -132,6 +133,26 @@ def test_a_babbling_socket_ends_the_command_line() -> None:
         "the port is open, but no device answers: the received bytes are not frames of the device: is --baud the rate "
         "of the device?\n"
     )
+
+
+def test_ctrl_c_ends_the_command_line_on_a_babbling_socket() -> None:
+    with BabblingServer() as server:
+        started = subprocess.Popen(
+            [sys.executable, "-m", "tablegen", "park", "--port", server.url],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        )
+        try:
+            assert server.listened.wait(PATIENCE_S)
+            started.send_signal(signal.SIGINT)
+            out, err = started.communicate(timeout=PATIENCE_S)
+        finally:
+            started.kill()
+            started.wait(PATIENCE_S)
+    assert (started.returncode, out, err) == (130, "", "interrupted; the device continues as before\n")
 
 
 def test_a_socket_is_not_emptied_as_it_is_opened() -> None:
