@@ -20,8 +20,8 @@ from tablegen.cli.exit_status import ExitStatus
 if TYPE_CHECKING:
     from tablegen.link.device import Device
     from tablegen.link.image import ProgramImage
+    from tablegen.link.outcome import UploadResult
     from tablegen.link.prepare import Form, PreparedScan
-    from tablegen.link.upload import UploadResult
 
 _HASH_DIGITS = 12  # digits of a hash in messages
 _BEGIN_AND_COMMIT_BYTES = 60 + 16  # bytes of BEGIN and COMMIT on the wire

@@ -19,12 +19,13 @@ from tablegen.link.messages import (
     Reason,
     Request,
 )
+from tablegen.link.outcome import ProgressCall, UploadResult, UploadState
 from tablegen.link.pace import LATENCY_S, Deadline
 from tablegen.link.readback import read_back
 from tablegen.link.reasons import Limits
 from tablegen.link.session import LinkSession
 from tablegen.link.transport import Opener, Transport, byte_s, open_port
-from tablegen.link.upload import ProgressCall, Uploader, UploadResult, UploadState
+from tablegen.link.upload import Uploader
 
 if TYPE_CHECKING:
     from tablegen.link.image import ProgramImage

@@ -43,7 +43,7 @@ class LinkSession:
         self.info: DeviceInfo
         self.status: DeviceStatus  # when HELLO was answered last, at the time
         self.status_at = 0.0
-        self.acts: list[Request] = []  # requests that act which were sent: the device may have carried them out
+        self.acts: dict[Request, None] = {}  # requests that act which were sent, in order, each once
         self._opener = opener
         self._sleep = sleep
         self._heard = False
@@ -128,7 +128,7 @@ class LinkSession:
             try:
                 if body is None:
                     body = payload + (self.tag(kind, number, payload, deadline) if tagged else b"")
-                self.acts.append(kind)
+                self.acts[kind] = None
                 return self._repeat(kind, number, body, answer_bytes, deadline)
             except Silent:
                 raise

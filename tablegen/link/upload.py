@@ -2,15 +2,15 @@
 
 import hashlib
 import struct
-from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tablegen.link.errors import LinkError, LinkLost, NotUnderstood, OutOfTime, Refused, Silent
 from tablegen.link.exchange import Answer
 from tablegen.link.flight import Flight, Sent
 from tablegen.link.messages import DATA_BYTES, NONCE_BYTES, DeviceStatus, Reason, Request, Upload
+from tablegen.link.outcome import ProgressCall, UploadResult, UploadState, out_of_time
 from tablegen.link.pace import Deadline
 from tablegen.link.reasons import Limits, refused
 from tablegen.link.session import LinkSession
@@ -20,43 +20,11 @@ if TYPE_CHECKING:
 
 _POLL_S = (0.03, 0.25)  # between two STATUS while a COMMIT is in progress: first, and at most
 _BUSY_S = 0.05
-_LONG_SILENCE_S = 2.0
 _MAX_RESTARTS = 4  # restarts of an upload for the same reason
 _MAX_KEY_RESTARTS = 2
 _LAYOUT_REASONS = (Reason.SHAPE, Reason.LENGTH, Reason.HARMONICS)  # when the program words are complete
 _CRC = struct.Struct("<I")
 _COMMITTED = struct.Struct("<2I")
-
-ProgressCall = Callable[[int, int], None]  # (bytes that the device has, all bytes)
-
-
-@dataclass(frozen=True, slots=True)
-class UploadResult:
-    """What became of an upload.
-
-    ``line`` is that of the old frame which was the last, None where the answer was lost with the port. ``bytes`` of the
-    image, ``wire_bytes`` that were sent for it, ``resumed`` bytes that the device had before. ``slow_baud`` is about
-    the rate at which answers came, None where it was not far below that of the port.
-    """
-
-    already_running: bool
-    generation: int
-    line: int | None
-    bytes: int
-    wire_bytes: int
-    resumed: int
-    retransmissions: int
-    seconds: float
-    slow_baud: int | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class UploadState:
-    """What is known of an upload: the bytes that the device confirmed, all bytes, and whether a COMMIT was sent."""
-
-    confirmed: int
-    total: int
-    committed: bool
 
 
 class _Anew(Exception):
@@ -232,7 +200,7 @@ class Uploader:
         assert self._commit is not None
         self._committed = True
         if not again:
-            self._session.acts.append(Request.COMMIT)
+            self._session.acts[Request.COMMIT] = None
         self._commit.due = self._exchange.send(Request.COMMIT, self._commit.seq, self._commit_body, again=again)
         self._commit.at = self._session.now()
         self._flight.add(self._commit, self._deadline)
@@ -408,27 +376,13 @@ class Uploader:
         return refused(answer.kind, answer.reason, answer.detail, self._session.info, contents, self._limits)
 
     def _out_of_time(self, now: float) -> OutOfTime:
-        """What the device said last."""
-        status, total = self._status, len(self._image.data)
-        ours = status is not None and status.image_crc == self._image.info.image_crc
-        at_work = status is not None and status.upload in (Upload.CHECKING, Upload.WAITING)
-        if self._busy:
-            what = "the device is busy with another upload; try again when that is active"
-        elif status is not None and ours and at_work:
-            waits = "not reached the start of a line" if status.upload == Upload.WAITING else "not ended its checks"
-            what = f"the device has received everything, but has {waits}; see `tablegen status`"
-        else:
-            have = self._confirmed if status is None else max(self._confirmed, self._received(status))
-            what = f"by its last answer the device has {have} of {total} bytes"
-            if not self._committed:
-                what += " and keeps them: repeat the upload to continue"
-            elif have < total:
-                what += ": repeat the upload to continue (if more has arrived, the scan may become active)"
-            else:
-                what += ", and the scan may become active: see `tablegen status`"
-        silence = now - self._flight.heard_at
-        if silence >= _LONG_SILENCE_S:
-            what = f"no answer for {silence:.0f} s; {what}"
-        if slow := self._slow_baud():
-            what += f"; the line is slow, answers come at about {slow} baud: give --baud {slow}"
-        return OutOfTime(f"timeout: {what}, or increase --timeout")
+        silence_s = now - self._flight.heard_at
+        received = 0 if self._status is None else self._received(self._status)
+        ours = self._status is not None and self._status.image_crc == self._image.info.image_crc
+        return out_of_time(
+            replace(self.state, confirmed=max(self._confirmed, received)),
+            self._status.upload if self._status is not None and ours else None,
+            self._busy,
+            silence_s,
+            self._slow_baud(),
+        )

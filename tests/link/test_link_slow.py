@@ -17,8 +17,8 @@ from tablegen.link.device import Device
 from tablegen.link.errors import LinkError, OutOfTime
 from tablegen.link.flight import Flight, Sent
 from tablegen.link.messages import Request
+from tablegen.link.outcome import UploadResult
 from tablegen.link.pace import Pace, back_off
-from tablegen.link.upload import UploadResult
 
 SIZE = len(LARGE.data)
 NEVER = Chances()
