@@ -8,7 +8,7 @@ from tablegen.link.frames import MAXIMUM_FRAME
 from tablegen.link.messages import DATA_BYTES, DeviceInfo, Reason, Request
 from tablegen.link.pace import Deadline, back_off
 from tablegen.link.reasons import refused
-from tablegen.link.session import LinkSession
+from tablegen.link.session import LinkSession, SessionEnded
 
 _REQUEST = struct.Struct("<IB")
 _OFFSET = struct.Struct("<I")
@@ -23,14 +23,10 @@ def read_back(session: LinkSession, deadline: Deadline) -> bytes:
 
     Raises ``Refused`` where the device does not hold it, ``OutOfTime``, and what lines raise.
     """
-    return _Reader(session, deadline).read()
+    return _ImageReader(session, deadline).read()
 
 
-class _Anew(Exception):
-    """The session is another one; begin with HELLO."""
-
-
-class _Reader:
+class _ImageReader:
     """Pieces of an image that have come, and requests for others that may still be answered, however late."""
 
     def __init__(self, session: LinkSession, deadline: Deadline) -> None:
@@ -53,7 +49,7 @@ class _Reader:
             except LinkLost as lost:
                 self._session.reopen(self._deadline, lost)
                 self._asked.clear()
-            except _Anew:
+            except SessionEnded:
                 restarts += 1
                 if restarts > _MAX_RESTARTS:
                     raise self._session.contested() from None
@@ -107,7 +103,7 @@ class _Reader:
             return False
         at = self._asked.pop(answer.seq)
         if answer.reason == Reason.SESSION:
-            raise _Anew
+            raise SessionEnded
         if answer.reason:
             raise refused(answer.kind, answer.reason, answer.detail, self._session.info)
         self._found[at] = _piece(answer.payload, at)

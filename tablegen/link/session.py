@@ -26,6 +26,10 @@ _MAX_RESTARTS = 4  # new sessions or challenges for one request
 _REOPEN_INTERVAL_S = 0.25
 
 
+class SessionEnded(Exception):
+    """The device knows another session, or none: the next request has to be HELLO. For use within the client."""
+
+
 class LinkSession:
     """One host at one device. Requests end in an answer or an error before their deadline, a time of ``now``."""
 

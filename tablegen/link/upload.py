@@ -13,7 +13,7 @@ from tablegen.link.messages import DATA_BYTES, NONCE_BYTES, DeviceStatus, Reason
 from tablegen.link.outcome import ProgressCall, UploadResult, UploadState, out_of_time
 from tablegen.link.pace import Deadline
 from tablegen.link.reasons import Limits, refused
-from tablegen.link.session import LinkSession
+from tablegen.link.session import LinkSession, SessionEnded
 
 if TYPE_CHECKING:
     from tablegen.link.image import ProgramImage
@@ -25,10 +25,6 @@ _MAX_KEY_RESTARTS = 2
 _LAYOUT_REASONS = (Reason.SHAPE, Reason.LENGTH, Reason.HARMONICS)  # when the program words are complete
 _CRC = struct.Struct("<I")
 _COMMITTED = struct.Struct("<2I")
-
-
-class _Anew(Exception):
-    """The session is another one; begin with HELLO."""
 
 
 class Uploader:
@@ -68,7 +64,7 @@ class Uploader:
                 raise
             except LinkLost as lost:
                 self._session.reopen(self._deadline, lost)
-            except _Anew:
+            except SessionEnded:
                 self._count(Reason.SESSION, self._session.contested())
                 self._session.greet(self._deadline, anew=True)
             else:
@@ -252,7 +248,7 @@ class Uploader:
                 return None
             sent = self._commit  # it was late, and STATUS had been asked
         if answer.reason in (Reason.SESSION, Reason.OLD):
-            raise _Anew
+            raise SessionEnded
         try:
             if sent.kind == Request.COMMIT:
                 return self._take_commit(answer, sent)
