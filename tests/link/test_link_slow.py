@@ -147,7 +147,7 @@ class Bridge(VirtualLine):
     ROOM = 1200  # bytes
 
     def write(self, data: bytes) -> None:
-        waiting = (self._out_free - self._t) / self._byte_s
+        waiting = (self._out_free - self.now_s) / self._byte_s
         super().write(b"" if waiting + len(data) > self.ROOM else data)
         self.sent += len(data) if waiting + len(data) > self.ROOM else 0
 
