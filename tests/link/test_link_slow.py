@@ -108,6 +108,20 @@ def test_a_readback_through_a_slow_line(slower: int) -> None:
     assert line.sent < 60 * (SIZE / 240) if slower > 1 else line.sent < SIZE / 4
 
 
+def test_a_readback_keeps_the_time_that_it_was_given() -> None:
+    device_model = model(LARGE_INFO)
+    with client(VirtualLine(device_model)) as device:
+        device.upload(LARGE)
+    line = Line(device_model, baud=9600, told_baud=115200)
+    with Device(line.open, random=Random(1), sleep=line.sleep) as device:
+        start = line.now_s
+        with pytest.raises(
+            OutOfTime, match=r"\d+ bytes of the image were read; the line is slow, answers come at about"
+        ):
+            device.readback(timeout_s=5.0)
+        assert line.now_s - start < 5.5
+
+
 def test_the_time_allowed_grows_with_the_way() -> None:
     device_model = model(LARGE_INFO)
     line = Line(device_model, baud=2400, told_baud=115200, tick_hz=500_000)
