@@ -7,7 +7,6 @@ from tablegen.link.pace import back_off
 
 _MIN_SILENCE_S = 5.0  # at least, and so many waits for one answer
 _SILENCE_WAITS = 16
-_MIN_WAIT_S = 0.1  # for an answer, however near the deadline
 _ANSWERED_IN_ORDER = (Request.BEGIN, Request.DATA, Request.CHALLENGE)
 
 Key = tuple[int, int]  # type and seq
@@ -49,12 +48,10 @@ class Flight:
         """Whether a request of this type, of this round, is on its way."""
         return any(s.kind == kind and of_round in (None, s.round) for s in self._on_way.values())
 
-    def add(self, sent: Sent, deadline: float) -> None:
-        """It was sent; each wait in vain doubles the next. The first leaves time for another before the deadline."""
+    def add(self, sent: Sent) -> None:
+        """It was sent; each wait in vain doubles the next."""
         wait = sent.due - sent.at
         self._longest_wait = max(self._longest_wait, wait)
-        if self.in_vain == 0:
-            wait = min(wait, max((deadline - sent.at) / 2.0, _MIN_WAIT_S))
         sent.due = sent.at + back_off(wait, self.in_vain)
         self._late.pop((sent.kind, sent.seq), None)
         self._on_way[sent.kind, sent.seq] = sent

@@ -85,8 +85,6 @@ class _ImageReader:
             )
             self._asked[seq] = at
         until = min(now + back_off(due - now, self._in_vain), self._deadline)
-        if self._in_vain == 0:
-            until = min(until, (now + self._deadline) / 2.0)
         heard = False
         while exchange.now() < until and not all(at in self._found for at in wanted):
             for answer in exchange.receive(until):

@@ -204,8 +204,6 @@ class LinkSession:
             due = self.exchange.send(kind, seq, payload, answer_bytes, again)
             now = self.now()
             until = min(now + back_off(due - now, count), deadline)
-            if count == 0:
-                until = min(until, (now + deadline) / 2.0)  # a long wait leaves time for another try
             while self.now() < until:
                 for answer in self.exchange.receive(until):
                     if answer.kind == kind and answer.seq in sent:

@@ -170,14 +170,14 @@ class Uploader:
     def _send(self, kind: Request, payload: bytes, answer_bytes: int = NONCE_BYTES) -> None:
         seq = self._exchange.seq()
         due = self._exchange.send(kind, seq, payload, answer_bytes, again=self._flight.in_vain > 0)
-        self._flight.add(Sent(kind, seq, self._session.now(), due), self._deadline)
+        self._flight.add(Sent(kind, seq, self._session.now(), due))
 
     def _send_data(self) -> None:
         offset = self._next
         data = self._image.data[offset : offset + self._step]
         seq, end = self._exchange.seq(), offset + len(data)
         due = self._exchange.send(Request.DATA, seq, _CRC.pack(offset) + data, again=self._flight.in_vain > 0)
-        self._flight.add(Sent(Request.DATA, seq, self._session.now(), due, self._round, end), self._deadline)
+        self._flight.add(Sent(Request.DATA, seq, self._session.now(), due, self._round, end))
         self._retransmissions += offset < self._sent_to
         self._sent_to = max(self._sent_to, end)
         self._next = end
@@ -199,7 +199,7 @@ class Uploader:
             self._session.acts[Request.COMMIT] = None
         self._commit.due = self._exchange.send(Request.COMMIT, self._commit.seq, self._commit_body, again=again)
         self._commit.at = self._session.now()
-        self._flight.add(self._commit, self._deadline)
+        self._flight.add(self._commit)
 
     def _wake(self) -> float:
         """When something is to be done without an answer."""

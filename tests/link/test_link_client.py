@@ -235,6 +235,30 @@ def test_a_device_that_falls_silent_is_lost_and_the_port_is_left_alone() -> None
     assert line.opened == 1, "to open a port resets some devices"
 
 
+def test_a_readback_ends_when_the_device_falls_silent() -> None:
+    """Long before its time is over."""
+    line = VirtualLine(model(LARGE_INFO))
+    with client(line) as device:
+        device.upload(LARGE)
+        answers = [0]
+
+        def stop(piece: bytes) -> list[bytes]:
+            answers[0] += 1
+            return [piece] if answers[0] < 12 else []
+
+        line.spoil_back, start = stop, line.now()
+        with pytest.raises(Silent, match="no longer answers"):
+            device.readback(timeout_s=1000.0)
+        assert line.now() - start < 20.0
+
+
+def test_a_silent_device_is_given_up_when_the_time_is_over() -> None:
+    line = VirtualLine(model(), spoil_out=never_answering)
+    with pytest.raises(NoAnswer):
+        client(line, timeout_s=0.3)
+    assert line.now() == pytest.approx(0.3, abs=0.01)
+
+
 def test_a_port_that_is_not_there() -> None:
     line = VirtualLine(model())
     line.there = False

@@ -282,7 +282,7 @@ def test_requests_on_their_way_have_a_bound_of_their_own() -> None:
     flight = Flight(8, 0.0)
     for seq in range(8):
         assert flight.has_room()
-        flight.add(Sent(Request.DATA, seq, 0.0, 1.0), 100.0)
+        flight.add(Sent(Request.DATA, seq, 0.0, 1.0))
     assert not flight.has_room()
     assert flight.take((Request.DATA, 3), 0.5) is not None
     assert [seq for seq in range(8) if flight.take((Request.DATA, seq), 0.6) is not None] == [0, 1, 2, 4, 5, 6, 7]
@@ -290,7 +290,7 @@ def test_requests_on_their_way_have_a_bound_of_their_own() -> None:
     flight.lost()
     for seq in range(2):
         assert flight.has_room()
-        flight.add(Sent(Request.DATA, seq, 1.0, 2.0), 100.0)
+        flight.add(Sent(Request.DATA, seq, 1.0, 2.0))
     assert not flight.has_room()
     assert [sent.seq for sent in flight.overdue(5.0)] == [0, 1]
     assert flight.take((Request.DATA, 0), 6.0) is not None, "late, and it counts"
