@@ -78,6 +78,7 @@ instructions: $(VENV)/installed-test
 link: $(VENV)/installed-test
 	@.ci/system-packages gcc-arm-none-eabi
 	$(BIN)/python benchmarks/link.py --write
+	$(BIN)/python benchmarks/slow_link.py --write
 
 # What is found goes into build/fuzz; what reaches something new may go into the corpus: build/fuzz/link -merge=1.
 FUZZ_RUNS ?= 1000000
