@@ -103,7 +103,7 @@ def _opened(path: str | os.PathLike[str]) -> Iterator[int]:
     try:
         _require_file(os.stat(path).st_mode)  # first of all: to open some devices is to do something
         flags = ("O_NONBLOCK", "O_NOCTTY", "O_CLOEXEC", "O_BINARY")
-        handle = os.open(path, sum((getattr(os, flag, 0) for flag in flags), os.O_RDONLY))
+        handle = os.open(os.fspath(path), sum((getattr(os, flag, 0) for flag in flags), os.O_RDONLY))
     except ValueError:
         raise OSError(errno.EINVAL, "no file can have such a name") from None
     try:

@@ -25,6 +25,7 @@ from tablegen.reading import IMAGE
 
 _MIN_PIXELS = 32  # rows and columns
 _MAX_PIXELS = 1 << 25  # 5792 x 5792; more than that in floating point would be most of a computer's memory
+_MAX_HEIGHT = 1e30  # in any unit; squares of heights have to be numbers
 _MAX_CHANNELS_LISTED = 12  # channels in a message
 _MAX_TITLE = 60  # characters of a channel in a message
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+(,\d+)?([eE][+-]?\d+)?")
@@ -93,7 +94,9 @@ def read_image(path: Path, channel: str | None = None) -> ScanImage:
     bad = int(np.sum(~np.isfinite(heights)))
     if bad:
         raise refuse(f"{what}{bad} pixels are not finite; crop or interpolate them")
-    if not np.ptp(heights) > 0.0:
+    if np.max(np.abs(heights)) > _MAX_HEIGHT:
+        raise refuse(f"{what}has heights beyond {_MAX_HEIGHT:g}; is it damaged?")
+    if not np.ptp(heights) > 1.0 / _MAX_HEIGHT:
         raise refuse(f"{what}all pixels are {heights.flat[0]:g}; was a different channel saved?")
     return ScanImage(name, Source(path.name, hashlib.sha256(content).hexdigest()[:16]), heights)
 
