@@ -304,3 +304,11 @@ def run_clean(command: Sequence[str | Path], folder: Path | None = None) -> str:
     assert result.returncode == 0, shown
     assert result.stderr == "", shown
     return result.stdout
+
+
+def run_warned(command: Sequence[str | Path]) -> str:
+    """The same of what builds a scan that is small for a test: of that it may be warned."""
+    result = run(command)
+    assert result.returncode == 0, f"{result.stdout[-4000:]}{result.stderr[-4000:]}"
+    assert [line for line in result.stderr.splitlines() if not line.startswith("warning: ")] == []
+    return result.stdout

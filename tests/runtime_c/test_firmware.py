@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from building import EXAMPLE, REMOVED, REPOSITORY, VARIANTS, Variant, build, run, run_clean, write_variant
+from building import EXAMPLE, REMOVED, REPOSITORY, VARIANTS, Variant, build, run, run_clean, run_warned, write_variant
 from emulation import BOARDS, CmsdkBoard, Firmware, Pl011Board
 from following import Differs, Follower, follow
 from qemu import Machine
@@ -50,7 +50,7 @@ PLAYED: dict[str, Variant] = {
 def make_firmware(folder: Path, scan: Path, board: str, player: str, *more: str) -> Path:
     """The firmware as its Makefile makes it."""
     target = folder / f"{board}-{player}"
-    run_clean(
+    run_warned(
         ["make", "-C", FIRMWARE / "cortex_m", f"BOARD={board}", f"SCAN={scan}", f"PLAYER={player}", f"BUILD={target}",
          f"TABLEGEN={sys.executable} -m tablegen", "CONTROL=console", "DAC=log", *more]
     )  # fmt: skip

@@ -13,7 +13,7 @@ from random import Random
 
 import numpy as np
 import pytest
-from building import REMOVED, REPOSITORY, VARIANTS, Variant, run_clean, write_variant
+from building import REMOVED, REPOSITORY, VARIANTS, Variant, run_warned, write_variant
 from emulation import CmsdkBoard, Firmware, Pl011Board
 from limits import PATIENCE_S
 from line_log import LineCheck, PlayedLine
@@ -65,7 +65,7 @@ def _built(folder: Path, board: Board) -> Built:
     files = [write_variant(folder / "boot", Variant(SCAN))]
     files += [write_variant(folder / f"{size}", Variant({**SCAN, "x.size_nm": size})) for size in SIZES_NM]
     target = folder / "firmware"
-    run_clean(
+    run_warned(
         ["make", "-C", REPOSITORY / "examples" / "firmware" / "cortex_m", f"BOARD={board.name}", f"SCAN={files[0]}",
          f"BUILD={target}", f"TABLEGEN={sys.executable} -m tablegen", "CONTROL=link", "DAC=lines"]
     )  # fmt: skip
