@@ -30,7 +30,12 @@ extern "C" {
 #endif
 
 #ifndef DAC_LINK_RING
-#define DAC_LINK_RING 2048 /* bytes received but not processed yet: a power of two, 512..32768; a frame takes 256 */
+#if defined(__AVR__)
+#define DAC_LINK_RING 512 /* of the 8 KB of the largest Arduino with an AVR */
+#else
+#define DAC_LINK_RING 2048
+#endif
+/* bytes received but not processed yet: a power of two, 512..32768; a frame takes 256 */
 #endif
 #ifndef DAC_LINK_SLICE
 #define DAC_LINK_SLICE 64 /* words, or received bytes, that one call of dac_link_work() processes */

@@ -6,7 +6,7 @@
 #include "player.h"
 #include "random.h"
 
-enum { CLOCK_HZ = 12000000, BAUD = 115200 };
+enum { CLOCK_HZ = 12000000 };
 enum { RECEIVE_EMPTY = 1 << 4, TRANSMIT_FULL = 1 << 5 };         /* UARTFR */
 enum { RECEIVE_INTERRUPT = 1 << 4, RECEIVE_TIMEOUT = 1 << 6 };   /* UARTIM, UARTICR */
 

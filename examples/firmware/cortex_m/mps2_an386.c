@@ -6,7 +6,7 @@
 #include "player.h"
 #include "random.h"
 
-enum { CLOCK_HZ = 25000000, BAUD = 115200 };
+enum { CLOCK_HZ = 25000000 };
 enum { TRANSMIT_FULL = 1, RECEIVE_FULL = 2 };                          /* STATE */
 enum { TRANSMIT = 1, RECEIVE = 2, RECEIVE_INTERRUPT = 8 };             /* CTRL */
 enum { RECEIVED_ONE = 2 };                                             /* INTCLEAR */

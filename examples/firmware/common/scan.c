@@ -1,8 +1,8 @@
 /* The programs of a build. */
 #include "scan.h"
 
-#include SCAN_HEADER
 #include "names.h"
+#include SCAN_HEADER
 
 const dac_program scan_whole = PROGRAM(SCAN_UPPER, SCAN);
 const dac_converter scan_x_converter = CONVERTER(CONSTANT(_X));
@@ -16,7 +16,7 @@ static bool halve(dac_axis_program *axis, dac_word *table, const int32_t *words,
     if (axis->index_bits == 0)
         return true; /* a direct table cannot be computed here: use the table of the whole scan */
     axis->table = table;
-#ifdef SCAN_SINE
+#if CONSTANT(_SINE_LENGTH)
     return dac_synthesize(table, axis->length + 1, axis->index_bits, axis->bits, words, harmonics, NAMED(_sine),
                           CONSTANT(_SINE_INDEX_BITS));
 #else

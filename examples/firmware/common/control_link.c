@@ -1,10 +1,9 @@
 /* Commands as frames of docs/protocol.md; dac_link.c does all the work. */
-#include "board.h"
 #include "control.h"
 #include "dac_link.h"
-#include "player.h"
 #include "scan.h"
 #include "scan_link.h"
+#include "uart.h"
 
 static dac_link link;
 

@@ -1,11 +1,12 @@
 /* The link of a build. It accepts tables as long as those of the build, and has the limits of that scan.
- * Options, with -D: LINK_X_INDEX_BITS and LINK_Y_INDEX_BITS for longer tables, LINK_HARMONICS, LINK_MAX_JUMP in codes,
- * DAC_LINK_RING; LINK_KEY_HEADER, a file that defines LINK_KEY as the bytes of an array, and LINK_DEVICE, a name as a string.
+ * Options, with -D: LINK_X_INDEX_BITS and LINK_Y_INDEX_BITS for longer tables, LINK_HARMONICS (0: tables only),
+ * LINK_MAX_JUMP in codes, DAC_LINK_RING; LINK_KEY_HEADER, a file that defines LINK_KEY as the bytes of an array, and
+ * LINK_DEVICE, a name as a string; with a key the port has random.h.
  */
 #include "scan_link.h"
 
-#include SCAN_HEADER
 #include "names.h"
+#include SCAN_HEADER
 #ifdef LINK_KEY_HEADER
 #include LINK_KEY_HEADER
 #include "random.h"
@@ -27,11 +28,11 @@
 #ifndef LINK_MAX_JUMP
 #define LINK_MAX_JUMP UINT32_C(0xFFFFFF)
 #endif
-#ifdef SCAN_SINE
+#if CONSTANT(_SINE_LENGTH) && LINK_HARMONICS
 #define SINE NAMED(_sine)
 #define SINE_BITS CONSTANT(_SINE_INDEX_BITS)
 #define HARMONICS LINK_HARMONICS
-#else /* a build without interpolated tables has no sine table, and cannot compute tables */
+#else /* a build without interpolated tables has no sine table, and cannot compute tables; nor can a small memory */
 #define SINE NULL
 #define SINE_BITS 0
 #define HARMONICS 0
@@ -43,6 +44,7 @@ static uint8_t hash[32];
 #ifdef LINK_KEY
 static const uint8_t key[] = {LINK_KEY};
 static const char device[] = LINK_DEVICE; /* no other instrument with this key has it; on hardware better a serial number */
+typedef char link_device_has_4_to_32_characters[sizeof device - 1 >= 4 && sizeof device - 1 <= 32 ? 1 : -1];
 #endif
 
 #define AXIS(NAME, bits, tables, words)                                                                               \
