@@ -472,7 +472,7 @@ def _sequencer() -> Iterator[Mutant]:
             "s->fault_counts[i] = s->fault_counts[i] + 1",
             "s->fault_counts[i] = s->fault_counts[i] + 2",
         ),
-        ("faults are not sticky", "s->faults = (uint8_t)(s->faults | fault)", "s->faults = fault", "checks"),
+        ("faults are not sticky", "s->faults = (uint8_t)(s->faults | (fault & 15u))", "s->faults = fault", "checks"),
         ("the last bits of a period go on", "    axis->at.low = 0;\n", "", "step"),
         ("the place in a period goes on", "    axis->at.high = 0;\n", ""),
         ("a scan begins in mid-line", "    s->tick = 0;\n    s->line = 0;\n", "    s->line = 0;\n"),
