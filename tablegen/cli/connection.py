@@ -11,6 +11,7 @@ import click
 
 from tablegen.cli.common import fail, planned
 from tablegen.cli.exit_status import ExitStatus
+from tablegen.reading import KEY, read_text
 
 if TYPE_CHECKING:
     from tablegen.link.device import Device
@@ -109,7 +110,7 @@ def _left_behind(device: "Device | None", goes_on: str) -> str:
 
 def _read_key(path: Path) -> bytes:
     try:
-        key = binascii.unhexlify("".join(path.read_text("ascii").split()))
+        key = binascii.unhexlify("".join(read_text(path, KEY, "ascii").split()))
         mode = path.stat().st_mode
     except OSError as error:
         fail([f"{path}: cannot be read: {error.strerror or error}"], ExitStatus.WRONG_INPUT)
