@@ -36,19 +36,20 @@ class Proof:
     asserts_in_stubs: bool = True
 
 
-ALL_STUBS = ("dac_axis", "dac_axis_serial", "dac_fourier")
+ALL_STUBS = ("dac_axis", "dac_axis_serial", "dac_fourier", "dac_fit")
 PROOFS = {
     "slew": Proof("slew_properties", 1, 12, {"BITS": 4}),
     # These look back for as long as a sample is under way.
     "writes_pipelined": Proof("writes_properties", 26, 34, {"LOW_AREA": 0}, ALL_STUBS, 40),
     "writes_low_area": Proof("writes_properties", 10, 20, {"LOW_AREA": 1}, ALL_STUBS, 30),
     "scan": Proof("scan_properties", 2, 20, covers=20),
-
     "play_pipelined": Proof("play_properties", 26, 34, {"LOW_AREA": 0}, ALL_STUBS, 40, asserts_in_stubs=False),
     "play_low_area": Proof("play_properties", 18, 26, {"LOW_AREA": 1}, ALL_STUBS, 30),
     "valid": Proof("valid_properties", 4, 20, covers=12),
-    "sequencer": Proof("sequencer_properties", 26, 34, stubs=("dac_axis",), covers=40),
-    "sequencer_of_look_up_tables": Proof("sequencer_properties", 38, 40, {"PLAIN_MULTIPLIER": 0}, stubs=("dac_axis",)),
+    "sequencer": Proof("sequencer_properties", 26, 34, stubs=("dac_axis", "dac_fit"), covers=40),
+    "sequencer_of_look_up_tables": Proof(
+        "sequencer_properties", 38, 40, {"PLAIN_MULTIPLIER": 0}, stubs=("dac_axis", "dac_fit")
+    ),
 }
 
 
@@ -208,11 +209,15 @@ MUTANTS = {
     "slew_fault_not_flagged": ("valid", "dac_verdict", "runs && !reached && !was", "runs && !reached && !runs && !was"),
     # f. refusals are said, a commit is kept
     "refusal_not_said": ("sequencer", "dac_sequencer", "if (write && !writable)", "if (write && committed)"),
+    "commit_of_what_does_not_fit": ("sequencer", "dac_sequencer", "rendered = sound_commit", "rendered = host_commit"),
+    "refused_commit_not_said": ("sequencer", "dac_sequencer", " || (host_commit && !fits))", ")"),
     "commit_lost": ("scan", "dac_bank", "withdraw || take", "withdraw || take || (committed && !bank)"),
     "commit_not_withdrawn": ("scan", "dac_bank", "reset || withdraw || take", "reset || take"),
     # g. what stops a scan
     "park_ignored": ("requests", "dac_scan", "(still_running || go) && !park", "(still_running || go)"),
-    "park_lost_to_trigger": ("requests", "dac_scan", "(still_running || go) && !park", "(still_running && !park || go)"),
+    "park_lost_to_trigger": (
+        "requests", "dac_scan", "(still_running || go) && !park", "(still_running && !park || go)"
+    ),
     "park_lost_to_arm": ("requests", "dac_scan", "&& !park && !reset;", "&& !(park && !arm) && !reset;"),
     "park_waits_for_a_tick": ("requests", "dac_scan", "&& !park && !reset;", "&& !(park && tick) && !reset;"),
     "park_leaves_it_armed": ("requests", "dac_scan", "if (park || reset) armed", "if (reset) armed"),
@@ -221,11 +226,11 @@ MUTANTS = {
     "trigger_without_program": ("requests", "dac_scan", "(loaded || (tick && committed))", "1"),
     "trigger_restarts_a_scan": ("requests", "dac_scan", " && !still_running;", ";"),
     "arm_alone_starts": ("requests", "dac_scan", "go = trigger && (armed || arm)", "go = (trigger && armed || arm)"),
-    "armed_for_ever": ("requests", "dac_scan", "            armed <= 1'b0;\n            frames_left", "            frames_left"),
+    "armed_for_ever": ("requests", "dac_scan", "armed <= 1'b0;\n            frames_left", "frames_left"),
     "endless_count": ("requests", "dac_scan", "!(frame_ends && last_frame)", "1"),
     "count_a_frame_short": ("requests", "dac_scan", "frames_left == 1", "frames_left <= 2"),
     "count_of_lines": ("requests", "dac_scan", "!(frame_ends && last_frame)", "!(plays && last && last_frame)"),
-    "count_of_the_last_arm": ("requests", "dac_scan", "frames_left <= arm ? arm_frames :", "frames_left <= 0 ? arm_frames :"),
+    "count_of_the_last_arm": ("requests", "dac_scan", "frames_left <= arm ? arm_frames : ", "frames_left <= "),
     "count_is_endless_where_armed_before": ("requests", "dac_scan", ": armed_frames == 0;", ": arm_frames == 0;"),
     "line_number_does_not_wrap": ("requests", "dac_scan", "bottom ? {LINE_BITS{1'b0}} : at_line + 1", "at_line + 1"),
     "frame_a_line_longer": ("requests", "dac_scan", "idle_lines - 1", "idle_lines"),
@@ -235,7 +240,7 @@ MUTANTS = {
         "play_low_area", "dac_sequencer", "scan (\n        .clock(clock), .reset(reset)",
         "scan (\n        .clock(clock), .reset(reset && !arm)",
     ),
-    "plays_what_did_not_run": ("play_pipelined", "dac_sequencer", "= runnings_now[LATENCY]", "= runnings_now[LATENCY-1]"),
+    "plays_what_did_not_run": ("play_pipelined", "dac_sequencer", "= runnings_now[LATENCY]", "= runnings[LATENCY-2]"),
     "low_area_plays_what_ran_before": ("play_low_area", "dac_sequencer", "runs <= runs_0;", "runs <= runs_0 || runs;"),
     # h. the imaging window
     "window_a_tick_longer": ("windows", "dac_window", "idle_first + idle_count;", "idle_first + idle_count + 1;"),
@@ -243,7 +248,7 @@ MUTANTS = {
     "window_a_tick_long": ("windows", "dac_window", "idle_first + idle_count;", "idle_first + 1;"),
     "window_without_end": ("windows", "dac_window", "imaging <= !is_stop && (", "imaging <= ("),
     "window_into_the_next_line": ("windows", "dac_window", "(imaging && !is_zero)", "imaging"),
-    "window_of_the_last_program": ("windows", "dac_window", "        if (load) begin", "        if (load && valid) begin"),
+    "window_of_the_last_program": ("windows", "dac_window", "if (load) begin", "if (load && valid) begin"),
     "backward_window_not_seen": (
         "windows", "dac_markers", "settled_2 && (forward_imaging || backward_imaging)", "settled_2 && forward_imaging"
     ),

@@ -23,20 +23,17 @@
 #endif
 #endif
 
-/* 1 if a 32 x 32 to 64 bit multiplication is an instruction, 0 if it is a call. */
-#ifndef DAC_LONG_MULTIPLY
-#if defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__) || defined(__AVR__)
+/* 1: runs add products of 64 bits; 0: they do with 32 bits, for processors that need a call or several instructions for one. Words of
+ * more than 16 bits need 64 bits everywhere. */
+#if DAC_TABLE_STORAGE_BITS != 16
+#undef DAC_LONG_MULTIPLY
+#define DAC_LONG_MULTIPLY 1
+#elif !defined(DAC_LONG_MULTIPLY)
+#if defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__) || defined(__AVR__) || (defined(__riscv) && __riscv_xlen == 32)
 #define DAC_LONG_MULTIPLY 0
 #else
 #define DAC_LONG_MULTIPLY 1
 #endif
-#endif
-
-/* Where it is a call, runs multiply gain and sample in two halves; this is the width of the lower half in bits. */
-#if DAC_LONG_MULTIPLY || DAC_TABLE_STORAGE_BITS != 16
-#define DAC_SPLIT 0
-#else
-#define DAC_SPLIT 10
 #endif
 
 #if DAC_TABLE_STORAGE_BITS == 16

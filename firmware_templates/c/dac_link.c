@@ -114,7 +114,7 @@ static uint8_t plain_bytes(uint8_t request, uint8_t length)
     case DAC_LINK_HELLO:
         return 1;
     case DAC_LINK_BEGIN:
-        return sizeof ((dac_link_image *)0)->info;
+        return DAC_LINK_INFO;
     case DAC_LINK_READ:
         return 5;
     case DAC_LINK_COMMIT:

@@ -88,6 +88,7 @@ enum { DAC_LINK_NONE, DAC_LINK_RECEIVING, DAC_LINK_CHECKING, DAC_LINK_WAITING };
 /* The announcement of an image in BEGIN. */
 enum { DAC_LINK_HASH = 0, DAC_LINK_BYTES = 32, DAC_LINK_IMAGE_CRC = 36, DAC_LINK_SHAPES = 40 };
 #define DAC_LINK_PROGRAM 192 /* bytes of the program words */
+#define DAC_LINK_INFO 48     /* bytes of an announcement */
 
 /* Words of the pages. */
 enum { DAC_LINK_LINE_TICKS, DAC_LINK_FRAME_LINES, DAC_LINK_SETTLE_LINES, DAC_LINK_TURN_TICK, DAC_LINK_FORWARD,

@@ -96,9 +96,14 @@ static void allow_runs(dac_bank_axis *b, const dac_axis_program *p)
 
     b->run_bits = 0;
     b->run_most = 0;
-#if DAC_SPLIT
-    if (p->gain_q > 32 || p->gain_q < DAC_SPLIT)
-        return;
+#if !DAC_LONG_MULTIPLY
+    uint32_t gain = (uint32_t)(p->gain_word < 0 ? -p->gain_word : p->gain_word);
+
+    b->run_spread = 31;
+    for (; gain != 0; gain >>= 1)
+        b->run_spread--;
+    if (b->run_spread > 19)
+        b->run_spread = 19;
 #else
     const unsigned left = 32u - p->gain_q;
     if (left > 14) /* the gain would not fit */
@@ -109,7 +114,7 @@ static void allow_runs(dac_bank_axis *b, const dac_axis_program *p)
     b->run_most = most > 258 ? 256 : most > 2 ? most - 2 : 0;
     if (widest > p->max_step)
         widest = p->max_step;
-    while ((widest + 1) >> (b->run_bits + 1) != 0)
+    while ((widest + 1) >> (b->run_bits + 1) != 0) /* gain_q + run_bits <= 31, with words of 16 bits */
         b->run_bits++;
     b->run_half = INT32_C(1) << b->run_bits >> 1;
     b->run_room = p->code_max - p->code_min + 1 - (INT32_C(1) << b->run_bits);

@@ -184,6 +184,7 @@ static void act(dac_sequencer *s, uint8_t what, uint32_t argument)
         break;
     default:
         park(s);
+        break;
     }
 }
 
@@ -307,7 +308,7 @@ static uint8_t play(dac_sequencer *s)
         s->catching_up = false;
     else if (!s->catching_up)
         dac_sequencer_report(s, DAC_FAULT_SLEW);
-    mark(s, reached && !s->faults, &markers, 1);
+    (void)mark(s, reached && !s->faults, &markers, 1);
     go_on(s, 1);
     return markers;
 }

@@ -212,7 +212,7 @@ typedef struct {
 
 /* One axis of a bank: its program, and values derived from it when it was loaded. */
 typedef struct {
-    uint8_t holds, guard, gain_q, run_bits;
+    uint8_t holds, guard, gain_q, run_bits, run_spread;
     const dac_word *table;
     uint32_t length;            /* words of the table, without the one behind the last */
     int32_t gain, run_gain;     /* with gain_q and with 32 fraction bits */

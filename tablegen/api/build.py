@@ -170,7 +170,7 @@ class Build:
         Raises ``CannotWrite``; what stood there before then still stands.
         """
         folder = Path(folder)
-        return write_files(folder, self.files, self.outdated(folder))
+        return write_files(folder, self.files, lambda: self.outdated(folder))
 
     def outdated(self, folder: str | Path) -> list[str]:
         """Files of a directory that an earlier build made and this one does not: ``write`` removes them.

@@ -119,11 +119,8 @@ class EmittedPeriod:
         """Ticks in [first, stop) at which a run begins or ends."""
         if self.runs.by_tick:
             return np.arange(first, stop)
-        starts, lasts = (
-            ascending[slice(*np.searchsorted(ascending, (first, stop)))]
-            for ascending in (self.runs.starts, self._lasts)
-        )
-        return merged(starts, lasts)
+        both = (self.runs.starts, self._lasts)
+        return merged(*(ticks[slice(*np.searchsorted(ticks, (first, stop)))] for ticks in both))
 
 
 def _times(line: LinePlan, side: str, position: Floats) -> Floats:

@@ -5,7 +5,17 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tablegen.cli.common import fail, format_option, planned, rendered, scan_argument, strict_option, written
+from tablegen.cli.common import (
+    OutputFile,
+    OutputFolder,
+    fail,
+    format_option,
+    planned,
+    rendered,
+    scan_argument,
+    strict_option,
+    written,
+)
 from tablegen.cli.depfile import Depfile
 from tablegen.cli.exit_status import ExitStatus
 
@@ -20,7 +30,7 @@ _NAMES_SHOWN = 8
 @click.option(
     "-o",
     "--output",
-    type=click.Path(path_type=Path, file_okay=False),
+    type=OutputFolder(),
     default=Path("build"),
     show_default=True,
     metavar="DIR",
@@ -35,7 +45,7 @@ _NAMES_SHOWN = 8
 )
 @click.option(
     "--depfile",
-    type=click.Path(path_type=Path, dir_okay=False),
+    type=OutputFile(),
     metavar="FILE",
     help="Also write a dependency file for make, CMake or Ninja, like gcc -MD -MP. FILE is removed first and written "
     "last, so it exists only after a successful build.",
@@ -84,11 +94,11 @@ def build(
     rule = Depfile(depfile, depfile_target or str(output / "manifest.json"), scan) if depfile is not None else None
     built = planned(scan, list(formats) or None, strict)
     files = rendered(built)
-    outdated, leftovers = built.outdated(output), built.leftovers(output)
     if only_check:
         from tablegen.cli.difference import differences
 
         found = differences(output, files)
+        outdated, leftovers = built.outdated(output), built.leftovers(output)
         found += [f"{output / name}: left over from an earlier build" for name in outdated]
         found += [_leftover(output / name) for name in leftovers]
         if not found:
@@ -98,18 +108,24 @@ def build(
         fail([f"{output} is stale; run: tablegen build {scan} -o {output}{again}"], ExitStatus.STALE)
     if rule is not None:
         rule.note(built.setup.files, built.formats)
-    changed = written(output, files, outdated)
+    removed: list[str] = []
+
+    def outdated_now() -> list[str]:
+        removed[:] = built.outdated(output)
+        return removed
+
+    changed = written(output, files, outdated_now)
     if rule is not None:
         rule.write()
-    for name in leftovers:
+    for name in built.leftovers(output):
         click.echo(f"note: {_leftover(output / name)}", err=True)
     if not quiet:
         from tablegen.cli.report import certificate_table
 
         click.echo("\n".join(certificate_table(built.plan, built.certificates)))
         click.echo(f"\n{output}: {_state(built, changed)}")
-        if outdated:
-            click.echo(f"{output}: removed files of an earlier build: {_few(outdated)}")
+        if removed:
+            click.echo(f"{output}: removed files of an earlier build: {_few(removed)}")
     return ExitStatus.OK
 
 

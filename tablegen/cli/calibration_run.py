@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from tablegen.cli.common import fail, require, written
+from tablegen.cli.common import OutputFile, fail, require, written
 from tablegen.cli.exit_status import ExitStatus
+from tablegen.reading import CONFIGURATION, RESPONSE, read_bytes, read_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -45,7 +46,7 @@ def shared_options(command: F) -> F:
         click.option("--axis", type=click.Choice(("x", "y")), required=True, help="The axis that was measured."),
         click.option(
             "--scanner",
-            type=click.Path(path_type=Path, dir_okay=False),
+            type=OutputFile(),
             metavar="FILE",
             help="Scanner file. The command reads v_max from it.",
         ),
@@ -63,7 +64,7 @@ def shared_options(command: F) -> F:
         click.option("--force", is_flag=True, help="With --write, write a fit even if it is meaningless."),
         click.option(
             "--plot",
-            type=click.Path(path_type=Path, dir_okay=False),
+            type=OutputFile(),
             metavar="FILE",
             help="Plot the data and the fit to FILE: .png, .svg or .pdf.",
         ),
@@ -251,7 +252,7 @@ def _write(
         beside[response.name] = _response(fit, response, sources)
     try:
         path = common.scanner.resolve()
-        text = path.read_bytes().decode("utf-8") if path.exists() else new_file(path.stem, full_scale(common))
+        text = read_text(path, CONFIGURATION) if path.exists() else new_file(path.stem, full_scale(common))
         put = change(fit, sources, points, response.name, forced)
         content = updated(text, name, common.axis, put).encode("utf-8")
     except Rejected as rejected:
@@ -273,7 +274,7 @@ def _response(fit: "ResonanceFit", path: Path, sources: "Sequence[Source]") -> b
     from tablegen.problems import Unphysical
 
     try:
-        if path.exists() and not path.read_bytes().startswith(MARK.encode("ascii")):
+        if path.exists() and not read_bytes(path, RESPONSE).startswith(MARK.encode("ascii")):
             fail([f"{path}: was not written by tablegen calibrate; move it away"], ExitStatus.WRONG_INPUT)
         return response_csv(fit, sources)
     except Unphysical as reason:

@@ -2,19 +2,19 @@
 
 import importlib.util
 import os
-import signal
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
 from tablegen.cli.exit_status import ExitStatus
 from tablegen.cli.progress import Progress
 from tablegen.installation import install_advice
+from tablegen.reading import other_than_file
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from tablegen.api.build import Build
 
@@ -29,6 +29,34 @@ format_option = click.option(
     help="Output format; repeat the option for several formats. `tablegen formats` lists them.  [default: emit.formats "
     "of the scan file, or c and verilog]",
 )
+
+
+class OutputFile(click.Path):
+    """A file to write: a new one, or one that is replaced; never a pipe, a device or a directory."""
+
+    def __init__(self) -> None:
+        super().__init__(path_type=Path)
+
+    def convert(self, value: Any, parameter: click.Parameter | None, context: click.Context | None) -> Path:
+        """The path; a usage error names what stands there."""
+        path = Path(os.fsdecode(super().convert(value, parameter, context)))
+        if other := other_than_file(path):
+            self.fail(f"'{path}' is {other}, where a file has to go.", parameter, context)
+        return path
+
+
+class OutputFolder(click.Path):
+    """A directory to write into: a new one, or one that is there."""
+
+    def __init__(self) -> None:
+        super().__init__(path_type=Path, file_okay=False)
+
+    def convert(self, value: Any, parameter: click.Parameter | None, context: click.Context | None) -> Path:
+        """The path; a usage error names what stands there."""
+        path = Path(os.fsdecode(super().convert(value, parameter, context)))
+        if (other := other_than_file(path)) not in (None, "a directory"):
+            self.fail(f"'{path}' is {other}, where a directory has to go.", parameter, context)
+        return path
 
 
 def finite(_context: click.Context, _option: click.Parameter, value: float | None) -> float | None:
@@ -116,19 +144,23 @@ def rendered(built: "Build") -> "dict[str, bytes]":
         fail(rejected.problems, ExitStatus.WRONG_INPUT)
 
 
-def written(folder: Path, files: "Mapping[str, bytes]", outdated: "Sequence[str]" = ()) -> list[str]:
+def written(
+    folder: Path, files: "Mapping[str, bytes]", outdated: "Sequence[str] | Callable[[], Sequence[str]]" = ()
+) -> list[str]:
     """Write files and return the names of those that changed; a failure or an interruption ends the command.
 
-    Files that are ``outdated`` are removed.
+    Files that are ``outdated`` are removed; a function is asked for them when no other build writes.
 
     An interruption waits until all files are in place, so that none is left half renamed; a second one does not wait.
     """
-    from tablegen.emit.write import CannotWrite, write_files
-    from tablegen.interruption import held
+    from tablegen.emit.write import CannotWrite, NoPlace, write_files
+    from tablegen.interruption import ENDINGS, held
 
     try:
-        with held(signal.SIGINT) as came:
+        with held(*ENDINGS) as came:
             names = write_files(folder, files, outdated)
+    except NoPlace as error:
+        fail([error], ExitStatus.WRONG_INPUT)
     except CannotWrite as error:
         fail([error], ExitStatus.CANNOT_WRITE)
     except OSError as error:

@@ -53,6 +53,12 @@ def refused(
     return Refused(request, reason, detail, f"the device refused {asked} ({name}): {sentence}")
 
 
+def keyless(request: Request) -> Refused:
+    """The error where a device has a key and the host has none; nothing was sent."""
+    why = f"the device has a key, and refuses {request.name} without it; give the key of this device (--key-file FILE)"
+    return Refused(request, Reason.KEY, 0, why)
+
+
 def explain(
     reason: int,
     detail: int,

@@ -1,4 +1,4 @@
-/* An ATmega2560 in simavr with a converter MCP4922 on SPI: FIRMWARE END, where END is the end of its static memory.
+/* An Arduino in simavr with a converter MCP4922 on SPI: mega|uno FIRMWARE END, where END is the end of its static memory.
  *
  * Commands are lines "CYCLES BYTES"; so many cycles are played, in which the bytes (hexadecimal, or "-") arrive at UART
  * 0 at 115200 baud. The answer is "SENT WORDS LOST FREE": what the UART sent; what both channels put out each time that
@@ -17,7 +17,6 @@
 enum { HZ = 16000000, BYTE = HZ / 11520, HELD = 2, MOST = 1 << 20 };
 enum { SPCR = 0x4C, SPSR = 0x4D, SPDR = 0x4E, TIMSK1 = 0x6F, UCSR0A = 0xC0, UDR0 = 0xC6 };
 enum { SPIF = 1 << 7, RXC = 1 << 7 };
-enum { CS = 4, LDAC = 6 }; /* pins 10 and 9: PB4, PH6 */
 
 static unsigned char sent[MOST], arriving[MOST];
 static unsigned sent_bytes, arriving_bytes, given;
@@ -93,10 +92,11 @@ int main(int count, char **arguments)
     bool on = false;
 
     avr_global_logger_set(quiet);
-    if (count != 3 || elf_read_firmware(arguments[1], &firmware) != 0)
+    if (count != 4 || elf_read_firmware(arguments[2], &firmware) != 0)
         return 2;
-    const unsigned static_end = (unsigned)strtoul(arguments[2], NULL, 0);
-    avr_t *const avr = avr_make_mcu_by_name("atmega2560");
+    const bool uno = strcmp(arguments[1], "uno") == 0; /* pins 10 and 9: PB2, PB1, or PB4, PH6 */
+    const unsigned static_end = (unsigned)strtoul(arguments[3], NULL, 0);
+    avr_t *const avr = avr_make_mcu_by_name(uno ? "atmega328p" : "atmega2560");
     avr_init(avr);
     firmware.frequency = HZ;
     avr_load_firmware(avr, &firmware);
@@ -108,8 +108,8 @@ int main(int count, char **arguments)
     avr_ioctl(avr, AVR_IOCTL_UART_SET_FLAGS('0'), &flags);
     avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_OUTPUT), on_sent, NULL);
     avr->io[AVR_DATA_TO_IO(SPDR)].w.c = on_spi;
-    avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('B'), CS), on_select, NULL);
-    avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('H'), LDAC), on_latch, NULL);
+    avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('B'), uno ? 2 : 4), on_select, NULL);
+    avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ(uno ? 'B' : 'H'), uno ? 1 : 6), on_latch, NULL);
     read_udr = avr->io[AVR_DATA_TO_IO(UDR0)].r.c;
     avr->io[AVR_DATA_TO_IO(UDR0)].r.c = on_read;
     while (scanf("%lu %2097151s", &cycles, bytes) == 2) {

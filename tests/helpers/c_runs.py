@@ -202,6 +202,40 @@ def no_run_beyond_a_limit(libraries: Libraries) -> None:
                 assert (done, code.value) == (0, last), f"from {last} to {target} by {max_step}"
 
 
+def jumps_that_32_bits_do_not_tell(libraries: Libraries) -> None:
+    """A code that is 2^12 beside the window, or a few of them, has the same 32 bits with its fraction as one inside."""
+    rng = np.random.default_rng(3)
+    for gain in (1 << 16, (1 << 17) - 1, -(1 << 17), 3 << 14, 1 << 15, -(1 << 16), 99_999, 1000):
+        beside = [0, *(k * (1 << 28) // gain + few for k in (-3, -2, -1, 1, 2, 3) for few in (-1, 0, 1))]
+        inside = [word for word in beside if abs(word) < 1 << 15]
+        words = np.repeat(rng.choice(inside, 60), rng.integers(1, 40, 60))
+        words[rng.integers(0, len(words), 40)] = rng.choice(inside, 40)  # alone, in the middle of a block
+        schedule = replace(flat(1).schedule, ticks=len(words), lines=1, turn_line=1, turn_tick=8, up=Lines(0, 1))
+        schedule = replace(schedule, forward=Lines(0, 8), backward=Lines(8, 0), down=Lines(1, 0))
+        rest = flat(32768, schedule, park_code=32768, max_step=50_000)
+        output = replace(rest.x.output, gain_word=gain, offset_word=32768 << 20)
+        x = replace(rest.x, mode="direct", words=words, output=output)
+        program = DualProgram(x, rest.y, schedule)
+        for library in libraries:
+            twin = Twin(library, program, (32768, 32768))
+            twin.commit(program)
+            twin.play(1)
+            twin.ask("arm", "trigger")
+            for ticks in (241, 1000, 3 * len(words)):
+                twin.play(ticks, "fill")
+    far = flat(30000)
+    for library in libraries:
+        device = device_for(library, far)
+        assert device.load(far) == LOADED
+        for last in range(30000 - 5 * 4096, 65536, 4096):  # the output has not arrived yet
+            position, code = (c_uint64(0), c_uint32(0)), c_int32(last)
+            out = np.zeros(20 * library.stride, library.output)
+            done = library.dll.probe_run(
+                device.state, 0, *map(byref, position), byref(code), out.ctypes.data_as(c_void_p), c_uint32(16)
+            )
+            assert (done, code.value) == ((16, 30000) if last in range(29_500, 30_500) else (0, last)), last
+
+
 def limits(libraries: Libraries) -> None:
     """A wave whose peaks are so many codes beyond the limits or short of them, in runs wherever there is room."""
     for library in libraries:

@@ -1,7 +1,7 @@
 """An emulated board behind a pipe: bytes to its UART and back, and the words at its converters, in its own time.
 
-Its program reads lines "CYCLES BYTES" and answers "SENT WORDS COUNTS..", all but the numbers in
-hexadecimal; see ``rp2040/board.mjs`` and ``avr_board.c``. It is the far end of a ``link_line.Line``, so that time is virtual.
+Its program reads lines "CYCLES BYTES" and answers "SENT WORDS COUNTS..", all but the numbers in hexadecimal; see
+``rp2040/board.mjs`` and ``avr_board.c``. It is the far end of a ``link_line.Line``, so that time is virtual.
 """
 
 import subprocess

@@ -119,10 +119,10 @@ def test_the_map_of_another_plant_is_not(example: Setup, monkeypatch: pytest.Mon
         calibrated = calibrate(scan, plant, amplitudes=(0.2, 0.6)).setup
         return float(np.max(np.abs(size_map(calibrated, plant, (OFFSETS[0], OFFSETS[-2], OFFSETS[-1]), sizes))))
 
-    assert 4.25 < worst(same_numbers, 0.02) < 4.75
+    assert 4.25 < worst(same_numbers, 0.02) < 5.0
     assert 1.0 < worst(uniform_density, 0.02) < 2.0
     for page in ("README.md", "docs/virtual.md"):
-        assert "up to 4.6 % wrong near the" in " ".join((REPOSITORY / page).read_text("utf-8").split()), page
+        assert "up to 5 % wrong near the" in " ".join((REPOSITORY / page).read_text("utf-8").split()), page
     assert 3.0 < worst(same_numbers, 0.06) < 3.6
     monkeypatch.setattr(laboratory, "OFFSET_SIZE", 0.06)  # offsets from images of the size that is scanned
     assert worst(same_numbers, 0.06) < 1.2

@@ -1,6 +1,7 @@
 /* The link of a build. It accepts tables as long as those of the build, and has the limits of that scan.
- * Options, with -D: LINK_X_INDEX_BITS and LINK_Y_INDEX_BITS for longer tables, LINK_HARMONICS (0: tables only), LINK_MAX_JUMP in
- * codes, DAC_LINK_RING; LINK_KEY_HEADER, a file that defines LINK_KEY as the bytes of an array, and LINK_DEVICE, a name as a string.
+ * Options, with -D: LINK_X_INDEX_BITS and LINK_Y_INDEX_BITS for longer tables, LINK_HARMONICS (0: tables only),
+ * LINK_MAX_JUMP in codes, DAC_LINK_RING; LINK_KEY_HEADER, a file that defines LINK_KEY as the bytes of an array, and
+ * LINK_DEVICE, a name as a string; with a key the port has random.h.
  */
 #include "scan_link.h"
 

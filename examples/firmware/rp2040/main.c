@@ -178,8 +178,7 @@ int main(void)
         GPIO_CTRL(pin) = FUNCTION_PIO0;
     start_machine(X, X_DATA, X_CLOCK);
     start_machine(Y, Y_DATA, Y_CLOCK);
-    dac_sequencer_init(&sequencer, &scan_x_converter, &scan_y_converter);
-    const bool good = control_start();
+    const bool good = dac_sequencer_init(&sequencer, &scan_x_converter, &scan_y_converter) && control_start();
     start_uart();
     start_core1();
     while (good && dac_sequencer_status(&sequencer).swaps == 0)

@@ -152,8 +152,7 @@ void board_putc(char c)
 int main(void)
 {
     start_clocks();
-    dac_sequencer_init(&sequencer, &scan_x_converter, &scan_y_converter);
-    const bool good = control_start();
+    const bool good = dac_sequencer_init(&sequencer, &scan_x_converter, &scan_y_converter) && control_start();
     fill(0); /* takes the program; the outputs begin to ramp to its park codes */
     fill(1);
     start_converters();

@@ -15,6 +15,7 @@ from tablegen.fixedpoint.phase import PHASE_BITS
 from tablegen.fixedpoint.rounding import signed_limits
 from tablegen.fixedpoint.synthesis import sine_periods
 from tablegen.numerics.arrays import Ints
+from tablegen.reading import BUILD_FILE, read_text
 from tablegen.resources import c_link, c_runtime, resource_folder
 
 _NUMBER = re.compile(r"(?:U?INT(?:32|64)_C)?\(?(-?\d{1,40})\)?")
@@ -75,7 +76,7 @@ def wrong_constants(folder: Path, content: Content) -> tuple[int, list[str]]:
     """How many constants the C header is to have, and those that it has not, or not so."""
     name, wanted = f"{content.name}.h", _constants(content)
     try:
-        text = (folder / name).read_text("utf-8", "replace")
+        text = read_text(folder / name, BUILD_FILE, errors="replace")
     except OSError as error:
         return len(wanted), [f"{name}: cannot be read: {error.strerror or error}"]
     prefix = f"{content.name.upper()}_"
@@ -88,7 +89,7 @@ def wrong_arrays(folder: Path, content: Content) -> tuple[int, list[str]]:
     name, wanted = arrays_file(content), _arrays(content)
     count = sum(map(len, wanted.values()))
     try:
-        text = (folder / name).read_text("utf-8", "replace")
+        text = read_text(folder / name, BUILD_FILE, errors="replace")
     except OSError as error:
         return count, [f"{name}: cannot be read: {error.strerror or error}"]
     found = {array: values.split(",") for array, values in _ARRAY.findall(text)}

@@ -18,10 +18,12 @@
 
 static const uint8_t SELECT = 10;  // CS of the converter
 static const uint8_t LATCH = 9;    // LDAC: both channels change when it falls
-#if defined(__AVR__)
-enum { HALF = 8 };  // ticks in half a buffer
+#if !defined(__AVR__)
+enum { HALF = 32 };  // ticks in half a buffer
+#elif LINKED
+enum { HALF = 8 };
 #else
-enum { HALF = 32 };
+enum { HALF = 2 };
 #endif
 
 dac_sequencer sequencer;
@@ -66,7 +68,16 @@ static void refill()
     for (; reported != underruns; reported++)
         dac_sequencer_report(&sequencer, DAC_FAULT_UNDERRUN);
     while (!full[next]) {
+#if LINKED
         dac_sequencer_fill(&sequencer, codes[next], codes[next] + 1, NULL, HALF);
+#else
+        for (uint8_t i = 0; i < HALF; i++) {  // slower, but with less of the stack
+            dac_tick now;
+            dac_sequencer_step(&sequencer, &now);
+            codes[next][2 * i] = now.x;
+            codes[next][2 * i + 1] = now.y;
+        }
+#endif
         __asm__ volatile("" ::: "memory");  // write the samples before `full`
         full[next] = true;
         next ^= 1;
@@ -159,8 +170,7 @@ void setup()
     digitalWrite(LATCH, HIGH);
     SPI.begin();
     SPI.beginTransaction(SPISettings(20000000, MSBFIRST, SPI_MODE0));
-    dac_sequencer_init(&sequencer, &scan_x_converter, &scan_y_converter);
-    const bool good = start();
+    const bool good = dac_sequencer_init(&sequencer, &scan_x_converter, &scan_y_converter) && start();
     refill();
     start_timer();
 #if LINKED
