@@ -11,6 +11,7 @@ import click
 
 from tablegen.cli.common import fail, planned
 from tablegen.cli.exit_status import ExitStatus
+from tablegen.reading import KEY, read_text
 
 if TYPE_CHECKING:
     from tablegen.link.device import Device
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 _KEY_BYTES = range(16, 33)
+_OF_OTHERS = 0o077  # what a group or others may do with a file
 
 baud_option = click.option(
     "--baud",
@@ -108,13 +110,20 @@ def _left_behind(device: "Device | None", goes_on: str) -> str:
 
 def _read_key(path: Path) -> bytes:
     try:
-        key = binascii.unhexlify("".join(path.read_text("ascii").split()))
+        key = binascii.unhexlify("".join(read_text(path, KEY, "ascii").split()))
+        mode = path.stat().st_mode
     except OSError as error:
         fail([f"{path}: cannot be read: {error.strerror or error}"], ExitStatus.WRONG_INPUT)
     except ValueError:  # also raised for text that is not ASCII
         fail([f"{path}: the file must contain 32 to 64 hexadecimal digits and nothing else"], ExitStatus.WRONG_INPUT)
     if len(key) not in _KEY_BYTES:
         fail([f"{path}: the key has {len(key)} bytes; 16 to 32 are needed"], ExitStatus.WRONG_INPUT)
+    if os.name == "posix" and mode & _OF_OTHERS:
+        click.echo(
+            f"warning: {path}: others can read the key (mode {mode & 0o777:04o}): run `chmod 600 {path}`, and give "
+            "device and host a new key if somebody may have read this one",
+            err=True,
+        )
     return key
 
 

@@ -11,15 +11,18 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
-from tablegen.cli.common import fail
+from tablegen.cli.common import OutputFile, OutputFolder, fail
 from tablegen.cli.exit_status import ExitStatus
 from tablegen.cli.progress import Progress
+from tablegen.cli.terminal import tell
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from tablegen.verification.build import Report
     from tablegen.verification.checks import Check
+
+_FAILED = "FAILED"
 
 
 @click.command(short_help="Simulate or run the sequencer of a build; check every sample.")
@@ -68,13 +71,13 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--junit",
-    type=click.Path(path_type=Path, dir_okay=False),
+    type=OutputFile(),
     metavar="FILE",
     help="Also write the results as JUnit XML to FILE, one test case per check.",
 )
 @click.option(
     "--keep",
-    type=click.Path(path_type=Path, file_okay=False),
+    type=OutputFolder(),
     metavar="DIR",
     help="Run in DIR and keep its scripts, records and logs. By default they are deleted.",
 )
@@ -148,7 +151,8 @@ def verify(
     except OSError as error:
         place = error.filename or keep or tempfile.gettempdir()
         fail([f"cannot verify: {place}: {error.strerror or error}"], ExitStatus.CANNOT_WRITE)
-    click.echo("\n".join(_table(report.checks)))
+    for line in _table(report.checks):
+        tell(line, bold=line.endswith(_FAILED))
     for note in report.notes:
         click.echo(f"note: {note}")
     written = junit is None or _write(junit, report)
@@ -198,7 +202,7 @@ def _write(path: Path, report: "Report") -> bool:
 def _table(checks: "Sequence[Check]") -> list[str]:
     head = ("", "against", "compared", "worst", "limit", "")
     rows = [
-        (c.subject, c.against, c.compared, c.worst, c.limit, "ok" if c.failure is None else "FAILED") for c in checks
+        (c.subject, c.against, c.compared, c.worst, c.limit, "ok" if c.failure is None else _FAILED) for c in checks
     ]
     widths = [max(len(row[i]) for row in [head, *rows]) for i in range(len(head))]
     lines = []
@@ -207,8 +211,5 @@ def _table(checks: "Sequence[Check]") -> list[str]:
             cell.rjust(width) if i in (3, 4) else cell.ljust(width)
             for i, (cell, width) in enumerate(zip(row[:-1], widths[:-1], strict=True))
         ]
-        verdict = row[-1]
-        if verdict == "FAILED":
-            verdict = click.style(verdict, bold=True)
-        lines.append(("  ".join([*cells, verdict])).rstrip())
+        lines.append(("  ".join([*cells, row[-1]])).rstrip())
     return lines

@@ -86,7 +86,7 @@ def explain(
 
 
 def _key(detail: int, info: DeviceInfo | None) -> str:
-    return "the tag is missing or wrong; give the key of this device (--key-file FILE)"
+    return "the tag is missing, wrong or too late; give the key of this device (--key-file FILE)"
 
 
 def _version(detail: int, info: DeviceInfo | None) -> str:

@@ -305,6 +305,7 @@ def test_a_key_opens_what_is_locked(tmp_path: Path, folder: Path, info: DeviceIn
     bench = Bench(model(info, KEY))
     path = tmp_path / "key"
     path.write_text(KEY.hex()[:16] + "\n" + KEY.hex()[16:] + "\n", "ascii")
+    path.chmod(0o600)
     for command in (("upload", folder), ("park",)):
         outcome = bench.run(*command)
         assert (outcome.status, outcome.out) == (9, "")
@@ -312,6 +313,22 @@ def test_a_key_opens_what_is_locked(tmp_path: Path, folder: Path, info: DeviceIn
         assert bench.run(*command, "--key-file", path).status == 0
     path.write_text(bytes(16).hex(), "ascii")
     assert bench.run("upload", folder, "--force", "--key-file", path).status == 9
+
+
+def test_a_key_that_others_can_read_is_warned_of(tmp_path: Path, info: DeviceInfo) -> None:
+    bench = Bench(model(info, KEY))
+    path = tmp_path / "key"
+    path.write_text(KEY.hex(), "ascii")
+    for mode, warned in ((0o600, False), (0o400, False), (0o640, True), (0o604, True), (0o644, True), (0o620, True)):
+        path.chmod(mode)
+        outcome = bench.run("park", "--key-file", path)
+        assert outcome.status == 0
+        assert (
+            outcome.err.startswith(f"warning: {path}: others can read the key (mode {mode:04o}): run `chmod 600 ")
+            == warned
+        )
+        assert warned or outcome.err == ""
+        assert KEY.hex() not in outcome.out + outcome.err
 
 
 def test_ports_are_listed() -> None:

@@ -101,6 +101,17 @@ def test_an_upload_comes_into_force_and_can_be_read_back(image: object, window: 
     assert line.count(Request.DATA) == sum(-(-len(i.data) // 240) for i in (image, TABLE))  # type: ignore[attr-defined]
 
 
+def test_a_challenge_does_not_expire_while_an_image_is_on_its_way() -> None:
+    """An image that takes half a minute, and a nonce that lasts ten seconds: no request is refused."""
+    clock: list[VirtualLine] = []
+    line = Watched(model(LARGE_INFO, KEY, milliseconds=lambda: round(1000 * clock[0].now()) if clock else 0), baud=2400)
+    clock.append(line)
+    with client(line, key=KEY) as device:
+        assert device.upload(LARGE).generation == 2
+        assert line.now() > 30.0
+        assert (line.count(Request.CHALLENGE), line.count(Request.COMMIT)) == (1, 1)
+
+
 def test_what_waits_for_a_line_is_asked_for_and_not_sent_again() -> None:
     """The lines of the boot program last 5 s here."""
     line = Watched(model(), tick_hz=20)
