@@ -30,7 +30,7 @@ def upload(
     seed: int = 1, key: bytes = b"", window: int = 8, timeout_s: float | None = None, **line_options: object
 ) -> tuple[UploadResult, Line]:
     """Over a line of these properties, which the client is not told."""
-    device_model = model(replace(LARGE_INFO, window=window), key)
+    device_model = model(replace(LARGE_INFO, window=window), key, milliseconds=lambda: int(1000.0 * line.now_s))
     line = Line(device_model, seed=seed, tick_hz=500_000, **line_options)  # type: ignore[arg-type]
     with Device(line.open, key=key or None, random=Random(seed), sleep=line.sleep) as device:
         device.arm()
