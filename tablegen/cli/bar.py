@@ -46,7 +46,7 @@ class Bar:
         full = _BAR_WIDTH * done // total
         text = f"[{'#' * full}{'.' * (_BAR_WIDTH - full)}] {done}/{total} bytes"
         if done == total:
-            return f"{text}  waiting for the start of a line"
+            return f"{text}  checked, then waiting for a line"
         seconds, first = now - self._start[0], self._start[1]
         if seconds <= 0.0 or done <= first:
             return text

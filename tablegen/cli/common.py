@@ -98,8 +98,18 @@ def fail(lines: "Sequence[object]", status: ExitStatus) -> NoReturn:
     raise Failure(lines, status)
 
 
-def planned(scan: Path, formats: "Sequence[str] | None" = None) -> "Build":
-    """Load, plan and certify a scan; every failure ends the command with its status."""
+strict_option = click.option(
+    "--strict",
+    is_flag=True,
+    help="Treat warnings as errors: exit with status 3, and write nothing.",
+)
+
+
+def planned(scan: Path, formats: "Sequence[str] | None" = None, strict: bool = False) -> "Build":
+    """Load, plan and certify a scan; every failure ends the command with its status.
+
+    Warnings go to stderr; with ``strict`` they end the command too.
+    """
     # No linear algebra library is used, and its threads would only spin: a good part of what importing numpy costs.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from tablegen.api.build import BrokenLimit, build
@@ -107,11 +117,19 @@ def planned(scan: Path, formats: "Sequence[str] | None" = None) -> "Build":
 
     try:
         with Progress() as progress:
-            return build(scan, formats=formats, progress=progress.now)
+            built = build(scan, formats=formats, progress=progress.now)
+            progress.now("looking for remedies")
+            warnings = built.warnings
     except BrokenLimit as broken:
         fail(broken.problems, ExitStatus.BROKEN_LIMIT)
     except Rejected as rejected:
         fail(rejected.problems, ExitStatus.WRONG_INPUT)
+    lines = [f"warning: {warning}" for warning in warnings]
+    if lines and strict:
+        fail(lines, ExitStatus.BROKEN_LIMIT)
+    for line in lines:
+        click.echo(line, err=True)
+    return built
 
 
 def rendered(built: "Build") -> "dict[str, bytes]":

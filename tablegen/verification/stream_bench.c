@@ -15,7 +15,7 @@ enum { RESET = 1, COMMIT = 2, WITHDRAW = 4, ARM = 8, TRIGGER = 16, PARK = 32, CL
 enum { PAGE = 16, SCAN = 0, X = PAGE, Y = 2 * PAGE };                         /* pages of the registers */
 
 static dac_sequencer sequencer;
-static dac_word x_table[2][BENCH_TABLE_WORDS], y_table[2][BENCH_TABLE_WORDS];
+static dac_word x_table[2][BENCH_TABLE_WORDS + 1], y_table[2][BENCH_TABLE_WORDS + 1];
 
 static uint32_t period, until, ticks_due, commits_in;
 
@@ -88,8 +88,8 @@ static const dac_word *rendered(const dac_axis_program *p, const bench_axis *axi
     if (axis->fourier == NULL)
         return p->table;
     bench_check(p->length <= BENCH_TABLE_WORDS, "a table of this length");
-    bench_check(dac_synthesize(table, p->index_bits, p->bits, axis->fourier, axis->harmonics, bench_sine,
-                               bench_sine_index_bits), "dac_synthesize");
+    bench_check(dac_synthesize(table, BENCH_TABLE_WORDS + 1, p->index_bits, p->bits, axis->fourier, axis->harmonics,
+                               bench_sine, bench_sine_index_bits), "dac_synthesize");
     return table;
 }
 
@@ -109,6 +109,7 @@ static void load(uint32_t variation)
         "", "load: DAC_BUSY", "load: DAC_OTHER_CONVERTER",
         "load: DAC_BAD_SCHEDULE", "load: DAC_BAD_TABLE",
         "load: DAC_BAD_PERIOD", "load: DAC_BAD_OUTPUT",
+        "load: DAC_OTHER_STORAGE",
     };
     dac_program p = bench_program;
     const unsigned idle = dac_sequencer_idle(&sequencer);
@@ -164,6 +165,7 @@ static dac_axis_program axis(unsigned page, dac_word *table, const int32_t *four
     dac_axis_program p;
 
     p.table = table;
+    p.storage_bits = DAC_TABLE_STORAGE_BITS;
     p.bits = (uint8_t)bits;
     p.index_bits = (uint8_t)index_bits;
     p.phase_period = r[2];
@@ -184,7 +186,10 @@ static dac_axis_program axis(unsigned page, dac_word *table, const int32_t *four
         unsigned sine_index_bits = 0;
         while (UINT32_C(5) << sine_index_bits < 4 * sine_words)
             sine_index_bits++;
-        bench_check(dac_synthesize(table, index_bits, bits, fourier, r[10], sine, sine_index_bits), "synthesize");
+        bench_check(dac_synthesize(table, BENCH_TABLE_WORDS + 1, index_bits, bits, fourier, r[10], sine, sine_index_bits),
+                    "synthesize");
+    } else {
+        table[p.length] = table[0];
     }
     return p;
 }

@@ -32,6 +32,7 @@ ALLOWED = {
     ("verification/c_target.py", "read_text"): "its own script",
     ("verification/directory.py", "shutil.copyfile"): "files of a build, which read_build has found to be files",
     ("verification/verilog_target.py", "shutil.copyfile"): "as in directory.py",
+    ("link/transport.py", "open"): "a serial port",
     ("calibration/image_files.py", "Pillow.open"): "bytes that were read already",
 }
 PARSERS = {"json.loads", "tomllib.loads", "tomlkit.parse", "msgspec.json.decode"}

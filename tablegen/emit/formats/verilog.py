@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+from tablegen.device.widths import least_widths
 from tablegen.emit.constants import axis_constants, scan_constants, sequence_constants
 from tablegen.emit.content import AxisContent, Content
 from tablegen.emit.format import Comparison, Format, differing
@@ -109,6 +110,7 @@ def _context(content: Content) -> dict[str, Any]:
         "scanner": comment_safe(content.scanner),
         "summary": content.summary,
         "sequence": sequence_constants(content.schedule),
+        "widths": least_widths(content.schedule, content.y.program),
         "program_memory": f"{content.name}_program.mem",
         "sine_memory": f"{content.name}_sine.mem",
         "sine": content.sine_index_bits,
@@ -130,6 +132,7 @@ def _constants(content: Content) -> dict[str, int | str]:
     """Every localparam of the header: numbers, and names of files."""
     name = content.name
     own: dict[str, int | str] = {"HASH": int(content.hash, 16), **scan_constants(content)}
+    own |= least_widths(content.schedule, content.y.program)
     own["PROGRAM_FILE"] = f"{name}_program.mem"
     if content.sine_index_bits:
         own["SINE_FILE"] = f"{name}_sine.mem"
