@@ -121,13 +121,16 @@ class SequencerBench:
     def run(self, clocks: int) -> dict[str, Any]:
         """Play the script that stands in the folder, of so many clocks; the counters of the bench by name."""
         self._capture.unlink(missing_ok=True)
-        status_file = self.folder / "status.json"
-        status_file.unlink(missing_ok=True)
-        timeout = (clocks + 1000) * 10 // 1000 + 10
-        tests, _ = self._design.run(
-            TEST_MODULE, {"TABLEGEN_STATUS": str(status_file), "TABLEGEN_TIMEOUT_US": str(timeout)}
-        )
-        if tests != 1 or not status_file.exists():
-            raise SimulationFailed("the bench did not play its script to the end")
-        status: dict[str, Any] = json.loads(status_file.read_text("ascii"))
-        return status
+        return run_bench(self._design, self.folder, clocks)
+
+
+def run_bench(design: Compiled, folder: Path, clocks: int) -> dict[str, Any]:
+    """Play the script of so many clocks that a compiled bench reads; the counters of the bench by name."""
+    status_file = folder / "status.json"
+    status_file.unlink(missing_ok=True)
+    timeout = (clocks + 1000) * 10 // 1000 + 10
+    tests, _ = design.run(TEST_MODULE, {"TABLEGEN_STATUS": str(status_file), "TABLEGEN_TIMEOUT_US": str(timeout)})
+    if tests != 1 or not status_file.exists():
+        raise SimulationFailed("the bench did not play its script to the end")
+    status: dict[str, Any] = json.loads(status_file.read_text("ascii"))
+    return status

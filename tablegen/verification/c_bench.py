@@ -1,10 +1,11 @@
 """The C sequencer under the scripts of the Verilog one: compiled with a compiler of this machine, run as a process."""
 
+import re
 import shlex
 import shutil
 import subprocess
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from tablegen.numerics.arrays import Ints
 from tablegen.resources import c_runtime
 from tablegen.verification.bench import SequencerShape
 from tablegen.verification.simulate import SimulationFailed, ToolMissing
-from tablegen.verification.stream import Script, Words
+from tablegen.verification.stream import FAULTS, STATE_WORDS, Script, Words
 
 _HERE = Path(__file__).parent
 BENCH = (_HERE / "stream_bench.c", _HERE / "stream_bench.h")
@@ -25,10 +26,19 @@ OPTIONS = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", 
 
 @dataclass(frozen=True)
 class CPlayed:
-    """What a script made: the ticks, and how often each fault was seen."""
+    """What a script made: the ticks, how often each fault was seen, and the words of the states it asked for."""
 
     capture: Words
     counts: list[int]
+    states: list[int] = field(default_factory=list)
+
+    @classmethod
+    def of(cls, capture: Words, script: str) -> "CPlayed":
+        """What the bench wrote while it played a script: after the ticks come counts and states."""
+        states = STATE_WORDS * len(re.findall(r"^6", script, re.MULTILINE))
+        ticks = len(capture) - len(FAULTS) - states
+        tail = [int(word) for word in capture[ticks:]]
+        return cls(capture[:ticks], tail[: len(FAULTS)], tail[len(FAULTS) :])
 
 
 def storage_bits(bits: int) -> int:
@@ -120,4 +130,4 @@ class CBench:
         if done.returncode:
             raise SimulationFailed(done.stderr.strip() or f"the bench ended with status {done.returncode}")
         capture = np.frombuffer(bytes.fromhex(done.stdout), dtype=">u8").astype(np.uint64)
-        return CPlayed(capture[:-4], [int(count) for count in capture[-4:]])
+        return CPlayed.of(capture, words)

@@ -283,7 +283,7 @@ class CortexMBench:
                 processor.write("bench_script_words", len(part).to_bytes(4, "little"))
             processor.resume("bench_exchange")
         capture = np.concatenate(captures).astype(np.uint64)
-        return CPlayed(capture[:-4], [int(count) for count in capture[-4:]])
+        return CPlayed.of(capture, words)
 
     def _check(self, processor: Processor) -> None:
         at = int.from_bytes(processor.read("bench_refused"), "little")

@@ -25,12 +25,11 @@ void bench_play(void);
 #ifdef BENCH_EMITTED
 #include "dac_sequencer.h"
 
-/* What stands in an emitted header, and is played in place of what a script writes: tablegen.verification.emitted makes the file that
- * holds it. Where `fourier` is NULL the table is played as it was emitted, elsewhere it is rendered. */
+/* What stands in an emitted header, and is played in place of what a script writes: tablegen.verification.c_target makes the file
+ * that holds it. Where `fourier` is NULL the table is played as it was emitted, elsewhere it is rendered. */
 typedef struct {
     const int32_t *fourier;
     unsigned harmonics;
-    int32_t offset_code;
 } bench_axis;
 
 extern const dac_program bench_program;
