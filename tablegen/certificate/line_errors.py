@@ -64,6 +64,7 @@ class EmittedPeriod:
         self._last = self.runs.codes - self._asked(self.runs.lasts)
 
     def _extremes(self) -> Ints:
+        """The ticks before and behind each extreme of the float waveform."""
         points = 64 * self._line.series.harmonics
         w = self._line.series.on_grid(points)
         turning = (w - np.roll(w, 1)) * (np.roll(w, -1) - w) <= 0.0
@@ -73,7 +74,8 @@ class EmittedPeriod:
             step = self._line.series.value(t, 1) / np.where(bend == 0.0, np.inf, bend)
             t = t - np.clip(step, -1.0 / points, 1.0 / points)
         ticks = self._line.program.ticks
-        return np.unique(np.floor(t * ticks).astype(np.int64) % ticks)
+        before = np.floor(t * ticks).astype(np.int64)
+        return np.unique(np.concatenate([before, before + 1]) % ticks)
 
     def _asked(self, k: Ints) -> Floats:
         return self._line.float_codes(self._reference.at(k // self._hold))
@@ -183,12 +185,13 @@ def _chords(
     """Slope errors (1 is 100 %) of the chords inside the window: of the emitted integers, and of quantisation alone.
 
     Of all chords those count that begin or end where a run does: between those the error of a chord is a straight
-    line. ``deviation`` and ``steepness`` of the waveform stand at ``position``.
+    line. ``deviation`` and ``steepness`` of the waveform stand at ``position``. A code stands for the middle of its
+    tick.
     """
     ticks, turn = line.program.ticks, line.drive.turn
     share = turn if side == "forward" else 1.0 - turn
     ends = sorted(float(t) * ticks for t in _times(line, side, position[[0, -1]]))
-    first, stop = ceil(ends[0]), min(floor(ends[1]) + 1, ticks)  # a window may reach the end of the period
+    first, stop = ceil(ends[0] - 0.5), floor(ends[1] - 0.5) + 1
     baseline = max(1, min(round(CHORD * share * ticks), stop - first - 1))
     if stop - first < 2:
         return np.zeros(1), np.zeros(1)
@@ -197,7 +200,7 @@ def _chords(
         begin = np.array([first])
 
     def noise_and_total(k: Ints) -> tuple[Floats, Floats, Floats]:
-        t = k / ticks
+        t = (k + 0.5) / ticks
         where = t / turn if side == "forward" else (1.0 - t) / share
         noise = played.errors(k) / line.codes_per_unit / np.interp(where, position, steepness)
         return where, noise, noise + np.interp(where, position, deviation)

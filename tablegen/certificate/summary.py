@@ -1,11 +1,16 @@
 """Plan and certificate in words: the block that stands in every emitted file and on the terminal. Plain ASCII."""
 
 from fractions import Fraction
+from math import log10
 
 import numpy as np
 
 from tablegen.certificate.certificate import Certificate
+from tablegen.compensation.hold import hold_inverse
+from tablegen.device.schedule import MAXIMUM_LINE_TICKS
 from tablegen.planning.line_plan import LinePlan, Plan
+from tablegen.planning.timing import exact
+from tablegen.planning.windows import matching_lines, retrace_mismatch
 
 _GRID = 32  # points per period of the highest harmonic
 
@@ -35,10 +40,21 @@ def drive_lines(line: LinePlan) -> list[tuple[str, str]]:
     if line.layer is not None:
         layer = 100.0 * float(np.max(np.abs(line.layer.on_grid(_GRID * line.layer.harmonics))))
         rows.append(("refinement", f"{line.layer.harmonics} harmonics learnt, up to {layer:.3g} % of the line"))
+    rows.append(("hold", _hold(line)))
     if line.held_harmonics:
         first, last = line.held_harmonics[0], line.held_harmonics[-1]
         rows.append(("boost limit", f"holds back {len(line.held_harmonics)} harmonics, {first} to {last}"))
     return rows
+
+
+def _hold(line: LinePlan) -> str:
+    """How the compensation of the converter's hold changes the harmonics."""
+    codes = line.program.phase.ticks
+    text = f"{5e5 / (float(line.rate) * codes):.6g} us ahead, half of what a code holds"
+    if line.program.hold > 1:
+        return text
+    raised = 20.0 * log10(float(np.hypot(*hold_inverse(line.series.harmonics, codes, steps=False))[-1]))
+    return text if raised < 0.001 else f"{text}; the highest harmonic raised by {raised:.2g} dB"
 
 
 def _branches(line: LinePlan) -> str:
@@ -109,6 +125,25 @@ def _percent(value: float) -> str:
     return f"{value:.3g}" if abs(value) >= 0.0005 else "0.000"
 
 
+def _windows(plan: Plan) -> list[str]:
+    """Which ticks are imaged, and how far apart trace and retrace are for that alone."""
+    schedule = plan.schedule
+    text = f"imaged are ticks {schedule.forward.first}..{schedule.forward.stop - 1}"
+    if not schedule.backward.count:
+        return [text]
+    apart = 100.0 * retrace_mismatch(schedule, plan.x.drive.turn)
+    text += f" and {schedule.backward.first}..{schedule.backward.stop - 1}"
+    return [f"{text}; a pixel's places in trace and retrace are up to {_percent(apart)} % of the line apart"]
+
+
+def _matching(plan: Plan) -> str:
+    """Which lines would have none of that, if there are some."""
+    schedule, (low, high) = plan.schedule, plan.x.band_limit.window
+    asked = exact(plan.x.drive.turn), exact(low), exact(high)
+    lines = matching_lines(*asked, schedule.ticks, schedule.pixels, MAXIMUM_LINE_TICKS)
+    return f"; a timing.ticks_per_line of {' or '.join(map(str, lines))} makes them match" if lines else ""
+
+
 def notes(plan: Plan) -> list[str]:
     """What a user should know before trusting the image, in sentences."""
     schedule, found = plan.schedule, []
@@ -119,6 +154,11 @@ def notes(plan: Plan) -> list[str]:
         found.append(
             f"a pixel is {float(per_pixel):.4g} ticks, so its start is rounded to the tick; "
             f"line rates near {' or '.join(rates)} make it {' or '.join(map(str, whole))} whole ticks"
+        )
+    if apart := 100.0 * retrace_mismatch(schedule, plan.x.drive.turn):
+        found.append(
+            f"the same pixel of trace and retrace shows places up to {apart:.2g} % of the line apart, since pixels "
+            f"begin on whole ticks{_matching(plan)}"
         )
     found.append(
         f"a frame images {schedule.pixels} x {schedule.up.count}"
@@ -136,7 +176,8 @@ def summary(plan: Plan, certificates: dict[str, Certificate]) -> list[str]:
     schedule = plan.schedule
     lines = [
         f"{schedule.ticks} ticks a line, {schedule.lines} lines a frame, "
-        f"{rate(schedule.line_rate)} lines, {rate(schedule.frame_rate)} frames, {schedule.pixels} pixels"
+        f"{rate(schedule.line_rate)} lines, {rate(schedule.frame_rate)} frames, {schedule.pixels} pixels",
+        *_windows(plan),
     ]
     for line in plan.lines:
         lines += ["", f"{line.axis} drive"]
