@@ -4,6 +4,7 @@ import json
 from dataclasses import dataclass
 from fractions import Fraction
 from hashlib import sha256
+from math import isfinite
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -39,11 +40,35 @@ Digest = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
 FileName = Annotated[str, Meta(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$")]  # never outside the directory
 
 
+class ManifestBranch(Struct):
+    """Hysteresis of one branch: the peak of its residual, and where that is."""
+
+    beta: float
+    u_peak: float
+
+
+class ManifestResonance(Struct):
+    """Where the response is largest, and half its width there."""
+
+    hz: float
+    half_width_hz: float
+
+
 class ManifestDrive(Struct):
-    """Volts at the piezo."""
+    """Volts at the piezo, and the shape that they follow."""
 
     v_offset: float
     v_amplitude: float
+    v_scan: float
+    m: float
+    g: float
+    size_nm: float
+    window_nm: float
+    turn: Annotated[float, Meta(gt=0.0, lt=1.0)]
+    model: str
+    forward: ManifestBranch
+    backward: ManifestBranch
+    resonance: ManifestResonance | None = None
 
 
 class ManifestLine(Struct):
@@ -53,10 +78,20 @@ class ManifestLine(Struct):
     hold_ticks: Positive
     phase_step: Annotated[int, Meta(ge=0, le=1 << 32)]
     phase_remainder: Natural
+    rate_hz: float
+    rate_exact: tuple[int, Positive]
+
+
+class ManifestSeries(Struct):
+    """A waveform w(t) in float64."""
+
+    a0: float
+    a: list[float]
+    b: list[float]
 
 
 class ManifestFourier(Struct):
-    """w(t) in float64; of the words only how many there are."""
+    """w(t) in float64, its words, and what the piezo is to follow where dynamics or a layer make that another one."""
 
     harmonics: Annotated[int, Meta(ge=1, le=4096)]
     a0: float
@@ -65,6 +100,12 @@ class ManifestFourier(Struct):
     a0_word: Word
     a_words: list[Word]
     b_words: list[Word]
+    window: tuple[float, float]
+    directions: Literal["forward", "both"]
+    held_harmonics: list[Positive] = []
+    held_factors: list[float] = []
+    target: ManifestSeries | None = None
+    refinement: ManifestSeries | None = None
 
 
 class ManifestTable(Struct):
@@ -73,6 +114,7 @@ class ManifestTable(Struct):
     mode: Literal["interpolated", "direct"]
     bits: Bits
     guard_bits: int
+    scale: Annotated[float, Meta(gt=0.0)]
     words: Annotated[list[Annotated[int, Meta(ge=-(1 << 23), lt=1 << 23)]], Meta(min_length=1, max_length=1 << 20)]
 
 
@@ -99,6 +141,19 @@ class ManifestCertificate(Struct):
     """What the build promised of an axis."""
 
     max_error_lsb: Annotated[float, Meta(ge=0.0)]
+    ticks: int | None = None
+    rms_error_lsb: float | None = None
+    lowest_code: int | None = None
+    highest_code: int | None = None
+    headroom_low: int | None = None
+    headroom_high: int | None = None
+    largest_step: int | None = None
+    max_step: int | None = None
+    peak_slew_v_per_s: float | None = None
+    beyond_cutoff_db: float | None = None
+    at_resonance_db: float | None = None
+    scaling_error_percent: dict[str, dict[str, float]] | None = None
+    refinement_percent: dict[str, dict[str, float]] | None = None
 
 
 class ManifestAxis(Struct):
@@ -295,6 +350,17 @@ def _wrong_schedule(sequence: ManifestSequence) -> list[str]:
     return wrong
 
 
+def _finite(value: Any) -> bool:
+    """Whether all floats below a value are finite: JSON as Python reads it knows NaN."""
+    if isinstance(value, Struct):
+        return all(_finite(getattr(value, name)) for name in value.__struct_fields__)
+    if isinstance(value, dict):
+        return all(map(_finite, value.values()))
+    if isinstance(value, list | tuple):
+        return all(map(_finite, value))
+    return not isinstance(value, float) or isfinite(value)
+
+
 def _wrong_axes(manifest: Manifest) -> list[str]:
     """Why no device could play these axes."""
     wrong = []
@@ -330,6 +396,7 @@ def _wrong_axes(manifest: Manifest) -> list[str]:
                 "output.code_min, park_code, code_max are not in order within the converter",
             ),
             (output.v_per_code != 0.0, "output.v_per_code is 0"),
+            (_finite(axis), "holds a number that is not finite"),
             (
                 {len(found) for found in (fourier.a, fourier.b, fourier.a_words, fourier.b_words)}
                 == {fourier.harmonics},
