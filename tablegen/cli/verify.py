@@ -188,7 +188,7 @@ def _write(path: Path, report: "Report") -> bool:
 
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(junit(report.name, report.checks), "utf-8")
+        path.write_text(junit(report.name, report.checks, report.seconds), "utf-8")
     except OSError as error:
         click.echo(f"{path}: {error.strerror or error}", err=True)
         return False
@@ -197,9 +197,7 @@ def _write(path: Path, report: "Report") -> bool:
 
 def _table(checks: "Sequence[Check]") -> list[str]:
     head = ("", "against", "compared", "worst", "limit", "")
-    rows = [
-        (c.subject, c.against, c.compared, c.worst, c.limit, "ok" if c.failure is None else "FAILED") for c in checks
-    ]
+    rows = [(c.subject, c.against, c.compared, c.worst, c.limit, c.verdict) for c in checks]
     widths = [max(len(row[i]) for row in [head, *rows]) for i in range(len(head))]
     lines = []
     for row in [head, *rows]:

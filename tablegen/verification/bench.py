@@ -13,6 +13,7 @@ from tablegen.verification.simulate import Compiled, Design, SimulationFailed, c
 from tablegen.verification.stream import Mismatch, Script, Words, compare, read_capture
 
 TEST_MODULE = "tablegen.verification.cocotb_stream"
+STREAM_BENCH = Path(str(files("tablegen.verification"))) / "stream_bench.v"
 SCRIPT, CAPTURE = "script.hex", "capture.hex"  # in the folder of a bench
 
 
@@ -84,13 +85,12 @@ class SequencerBench:
         self.folder = folder.resolve()
         self.folder.mkdir(parents=True, exist_ok=True)
         self._script, self._capture = self.folder / SCRIPT, self.folder / CAPTURE
-        bench = Path(str(files("tablegen.verification"))) / "stream_bench.v"
         runtime = verilog_runtime() if sources is None else list(sources)
         self._most_counted = (1 << int((parameters or {}).get("COUNT_BITS", 32))) - 1
         self._design: Compiled = compile_design(
             simulator,
             Design(
-                [*runtime, bench],
+                [*runtime, STREAM_BENCH],
                 top,
                 {
                     **shape.parameters(),

@@ -118,9 +118,7 @@ def _slew(capture: Capture, axis: str, content: ManifestAxis) -> Check:
     failure = None
     if len(beyond):
         at = int(beyond[np.argmax(np.abs(steps[beyond]) - most[beyond])])
-        failure = (
-            f"{axis}: steps by {abs(int(steps[at]))} codes a tick, above {most[at]}; at {_where(capture, at + 1)}"
-        )
+        failure = f"{axis}: steps by {abs(int(steps[at]))} codes a tick, above {most[at]}; at {_where(capture, at + 1)}"
     compared = f"{len(steps)} steps, held {up} up, {down} down"
     largest = int(np.max(np.abs(steps)[capture.own[1:] & known[1:] & known[:-1]], initial=0))
     limit = str(content.output.max_step)
@@ -173,7 +171,9 @@ def check_faults(capture: Capture, counted: list[int], counts: list[int]) -> Che
     elif counted != counts:
         failure = f"faults: expected are {_counts(counts)}; counted are {_counts(counted)}"
     seen = [name for bit, name in enumerate(FAULTS) if np.any(wanted >> bit & 1)]
-    return Check("faults", "integer model", f"{len(got)} ticks: {', '.join(seen)}", f"{len(wrong)} differ", "0", failure)
+    return Check(
+        "faults", "integer model", f"{len(got)} ticks: {', '.join(seen)}", f"{len(wrong)} differ", "0", failure
+    )
 
 
 def check_states(
@@ -258,9 +258,7 @@ def check_whole(subject: str, capture: Capture, how: str) -> Check:
     return Check(subject, "integer model", compared, f"{len(differs)} differ", "0", failure)
 
 
-def check_filled(
-    capture: Capture, states: Check, counted: list[int], counts: list[int]
-) -> Check:
+def check_filled(capture: Capture, states: Check, counted: list[int], counts: list[int]) -> Check:
     """The same session played many ticks at a time: codes and markers; of faults how many there were, and states."""
     check = check_whole("fill", _with(capture, without_faults(capture.got), without_faults(capture.wanted)), "")
     failure = check.failure

@@ -32,7 +32,9 @@ class Loader:
     own: DualProgram
     memories: Memories | None
     placement: Placement
-    _tables: dict[tuple[int, int], int] = field(default_factory=dict)  # length of a variation's table, by bank and region
+    _tables: dict[tuple[int, int], int] = field(
+        default_factory=dict
+    )  # length of a variation's table, by bank and region
 
     @property
     def own_commit_clocks(self) -> int:

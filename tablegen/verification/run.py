@@ -36,7 +36,7 @@ def verify(
     nothing can be written.
     """
     folder = Path(folder)
-    chosen, most_ticks = _target(target or default_target(folder), simulator, axis, fourier)
+    chosen, most_ticks = _target(target or default_target(folder), simulator, axis, fourier, ticks is None)
     with _work_folder(None if keep is None else Path(keep)) as work:
         return verify_build(folder, work, chosen, most_ticks if ticks is None else ticks, seed, progress)
 
@@ -52,8 +52,9 @@ def _target(
     simulator: Literal["icarus", "verilator"],
     axis: Literal["pipelined", "blocks", "serial"],
     fourier: bool,
+    as_usual: bool,
 ) -> tuple[Target, int]:
-    """What plays, and how many ticks of it are soon over."""
+    """What plays, and how many ticks of it are soon over; a frame may be played apart where it is played ``as_usual``."""
     if name == "files":
         return FilesTarget(), DEFAULT_TICKS[name]
     if name != "verilog":
@@ -64,7 +65,8 @@ def _target(
     from tablegen.verification.verilog_target import VerilogTarget
 
     placement = Placement(axis, fourier)
-    return VerilogTarget(simulator, placement), DEFAULT_TICKS[simulator] // placement.tick_clocks
+    apart = simulator == "icarus" and axis == "pipelined" and not fourier and as_usual
+    return VerilogTarget(simulator, placement, apart), DEFAULT_TICKS[simulator] // placement.tick_clocks
 
 
 @contextmanager

@@ -66,9 +66,7 @@ def hold_response(harmonics: int, advances: int, steps: bool) -> tuple[Floats, F
 
 def _times(series: ManifestSeries, real: Floats, imaginary: Floats) -> ManifestSeries:
     a, b = np.array(series.a), np.array(series.b)
-    return ManifestSeries(
-        series.a0, (a * real + b * imaginary).tolist(), (b * real - a * imaginary).tolist()
-    )
+    return ManifestSeries(series.a0, (a * real + b * imaginary).tolist(), (b * real - a * imaginary).tolist())
 
 
 def followed(axis: ManifestAxis) -> ManifestSeries:

@@ -28,6 +28,7 @@ class BuildSession:
     script: Script
     whole_frame: bool
     swapped_in_frame: bool
+    wired_ticks: int  # at least so many samples came slowly enough for a serial converter
 
 
 def needed_ticks(program: DualProgram) -> int:
@@ -115,13 +116,15 @@ def make_session(
 
     if requests:
         Requests(script, loader, placement, driver_reports=memories is None).play()
+        script.request("arm", "trigger")
+        script.wait_ticks(2)
+        own.take_over()
     else:
-        _first_variation(script, loader, pace)
-    script.tick_every(pace)
-    script.request("clear_faults")
-    script.request("arm", "trigger")
-    script.wait_ticks(2)
-    own.take_over()
+        loader.load_own()
+        loader.commit_own()
+        script.tick_every(pace)
+        script.wait_ticks(2)
+        script.request("arm", "trigger")
 
     begun = own.played
     first_part = own.most if own.most >= needed_ticks(program) else begun + max(own.most - begun, 0) * 7 // 10
@@ -135,21 +138,31 @@ def make_session(
     script.tick_every(pace)
     while not script.model.parked and own.played < own.most:
         script.wait_ticks(min(_CATCH_UP_STRIDE, own.most - own.played))
+    if requests:
+        _slowly(own)
     script.state("at the end")
-    return BuildSession(script, whole, in_frame)
+    return BuildSession(script, whole, in_frame, WIRED_TICKS if requests else 0)
 
 
-def _first_variation(script: Script, loader: Loader, pace: int) -> None:
-    program = loader.load("free")
-    loader.commit(program)
-    script.tick_every(pace)
-    script.wait_ticks(2)
+def _slowly(own: _Own) -> None:
+    """A start, with ticks so far apart that a serial converter gets every sample."""
+    script = own.script
+    script.request("arm", "trigger")
+    script.tick_every(0)
+    script.wait(WIRED_CLOCKS)
+    script.tick_every(max(WIRED_CLOCKS, own.pace))
+    script.wait_ticks(WIRED_TICKS)
+    script.tick_every(0)
+    script.wait(WIRED_CLOCKS)
+    script.request("park")
+    script.tick_every(own.pace)
+    script.wait_ticks(1)
 
 
 def _swap_and_back(own: _Own, line: int, settle_lines: int) -> bool:
     """A variation in mid-frame, and the own program again; whether both came in mid-frame."""
     script = own.script
-    variation = own.loader.load("clamped")
+    variation = own.loader.load("free")
     script.tick_every(own.pace)
     swaps = script.swaps
     own.loader.commit(variation)
@@ -162,19 +175,13 @@ def _swap_and_back(own: _Own, line: int, settle_lines: int) -> bool:
     script.wait_ticks(variation.schedule.frame_ticks)
     script.state("with a variation in mid-frame")
     script.tick_every(own.pace)
-    script.request("clear_faults")
-    script.wait_ticks(1)
     if own.loader.own_commit_clocks > 8:  # rendered once is enough: it takes longer than all the rest
         script.request("park")
         return True
     own.take_over()
-    script.request("clear_faults")
     script.tick_every(0)
     script.wait(int(own.random.integers(1, 100)))  # ticks may stop, and come at another rate
     script.tick_every(own.pace * int(own.random.integers(1, 3, endpoint=True)))
     own.catch_up(budget)
     script.wait_ticks(max(min((settle_lines + 1) * line, budget - own.played), 0))
-    script.tick_every(0)
-    script.tick_every(max(WIRED_CLOCKS, own.pace))
-    script.wait_ticks(WIRED_TICKS)
     return True

@@ -6,7 +6,7 @@
  * capture then has no faults, since a fill tells them only at its end. With BENCH_EMITTED the program is that of an emitted
  * header, unless a commit says that it is another, which the script wrote; and a tick is two captures: converter words
  * of up to 32 bits, then markers and faults. After the ticks come the counts of faults, then the states that the script
- * asked for, three captures each.
+ * asked for, three captures each, and with BENCH_EMITTED the constants of the header.
  */
 #include "dac_sequencer.h"
 #include "stream_bench.h"
@@ -368,4 +368,10 @@ void bench_play(void)
         bench_write(status.fault_counts[i]);
     for (unsigned i = 0; i < STATE_WORDS * states_stored; i++)
         bench_write(states[i]);
+#ifdef BENCH_EMITTED
+    for (unsigned i = 0; i < BENCH_CONSTANTS; i++)
+        bench_write((uint64_t)bench_constants[i]);
+    for (unsigned i = 0; i < BENCH_HASH_DIGITS; i++)
+        bench_write((unsigned char)bench_hash[i]);
+#endif
 }

@@ -35,6 +35,10 @@ typedef struct {
 extern const dac_program bench_program;
 extern const dac_converter bench_x_converter, bench_y_converter;
 extern const bench_axis bench_x, bench_y;
+/* The constants of the header, and the characters of its hash. */
+enum { BENCH_HASH_DIGITS = 64 };
+extern const int64_t bench_constants[BENCH_CONSTANTS];
+extern const char bench_hash[BENCH_HASH_DIGITS + 1];
 extern const int32_t *const bench_sine;
 extern const unsigned bench_sine_index_bits;
 #endif

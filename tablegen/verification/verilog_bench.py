@@ -149,5 +149,3 @@ def read_wires(folder: Path) -> Mapping[int, int]:
     """Both words of every sample that came over the wires, x in the lower half, by the number of the sample."""
     words: Words = read_capture(folder / WIRES)
     return dict(zip(map(int, words[::WIRE_WORDS]), map(int, words[1::WIRE_WORDS]), strict=False))
-
-
