@@ -100,12 +100,12 @@ def verify_build(folder: Path, work: Path, target: Target, most_ticks: int, seed
     watch = Stopwatch()
     progress("hashing the files")
     same = stored.manifest.tablegen == __version__
-    formats, notes = known_formats(stored)
-    notes = [f"{why}; only the SHA-256 of its files was checked" for why in notes]
+    known, unknown = known_formats(stored)
+    notes = [f"{why}; only the SHA-256 of its files was checked" for why in unknown]
     content = stored_content(stored)
     checks = watch.timed(_manifest_checks(folder, stored))
-    checks += watch.timed(_file_checks(folder, stored, content, formats, same))
-    checks += watch.timed(_format_checks(folder, content, formats))
+    checks += watch.timed(_file_checks(folder, stored, content, known, same))
+    checks += watch.timed(_format_checks(folder, content, known))
     progress("measuring the certificate")
     certificates = check_certificates(stored, same)
     checks += watch.timed(certificates.checks)

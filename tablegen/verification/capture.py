@@ -34,7 +34,8 @@ class Capture:
     @property
     def known(self) -> Bools:
         """Ticks of which the simulator knew every bit."""
-        return self.got != UNDEFINED
+        known: Bools = self.got != UNDEFINED
+        return known
 
     def limits(self, axis: str, name: str) -> Ints:
         """A figure of the output stage, such as max_step, of the program of each tick; 0 before the first one."""

@@ -19,7 +19,8 @@ class Certificates:
 
 def check_certificates(stored: StoredBuild, same_version: bool) -> Certificates:
     """Every figure of both axes; those of scaling errors only where this version of tablegen stated them."""
-    checks, limits = [], {}
+    checks: list[Check] = []
+    limits: dict[str, float] = {}
     for name, axis in stored.axes:
         check, limits[name] = _check(name, axis, stored, same_version)
         checks.append(check)

@@ -81,7 +81,8 @@ class PlayedPeriod:
         f, after = rest / self.program.phase.ticks, (at + 1) % _GRID
         y0, y1 = self._asked[at], self._asked[after]
         s0, s1 = (self.codes_per_unit / _GRID * self._slope[i] for i in (at, after))
-        return y0 + f * (s0 + f * (3.0 * (y1 - y0) - 2.0 * s0 - s1 + f * (2.0 * (y0 - y1) + s0 + s1)))
+        asked: Floats = y0 + f * (s0 + f * (3.0 * (y1 - y0) - 2.0 * s0 - s1 + f * (2.0 * (y0 - y1) + s0 + s1)))
+        return asked
 
     def error_moments(self) -> tuple[float, float, float]:
         """Largest magnitude, mean, and mean square, over every tick."""

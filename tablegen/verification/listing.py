@@ -65,7 +65,7 @@ def _is_runtime(name: str) -> bool:
 
 
 def unlike_installed(folder: Path, content: Content, formats: list[Format]) -> tuple[int, list[str]]:
-    """How many files are the same in every build of this version, or are made again from the manifest, and which differ.
+    """How many files are alike in every build of this version, or follow from the manifest, and which differ.
 
     A comment at the beginning of a file that is made again is passed over: no manifest has its words.
     """

@@ -118,7 +118,7 @@ class Requests:
         self._ticks(line + 7)
 
     def _refusals(self) -> None:
-        """A program that waits: writes are refused, it is withdrawn, emptied by a reset, and then taken in mid-frame."""
+        """A program that waits: writes are refused, it is withdrawn, or emptied by a reset."""
         script, loader = self.script, self.loader
         line = script.model.playing.schedule.ticks if script.model.playing else 1
         for empties in ("withdraw", "reset"):

@@ -54,7 +54,7 @@ def _target(
     fourier: bool,
     as_usual: bool,
 ) -> tuple[Target, int]:
-    """What plays, and how many ticks of it are soon over; a frame may be played apart where it is played ``as_usual``."""
+    """What plays, and how many ticks of it are soon over; ``as_usual`` a long frame is played apart."""
     if name == "files":
         return FilesTarget(), DEFAULT_TICKS[name]
     if name != "verilog":

@@ -1,4 +1,4 @@
-"""The bench of ``tablegen verify`` for Verilog: the stream bench for the constants of an emitted header, and a converter.
+"""The bench of ``tablegen verify`` for Verilog: the stream bench by the constants of a header, and a converter.
 
 The header is compiled into it as a user would include it: its constants set up the sequencer, the coding of codes and
 the serial output, and are written down, so that what the simulator reads is compared, not the text.
