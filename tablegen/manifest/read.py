@@ -60,6 +60,7 @@ class ManifestDrive(Struct):
     v_offset: float
     v_amplitude: float
     v_scan: float
+    v_scan_normalised: Annotated[float, Meta(gt=0.0)]
     m: float
     g: float
     size_nm: float
@@ -79,6 +80,7 @@ class ManifestLine(Struct):
     phase_step: Annotated[int, Meta(ge=0, le=1 << 32)]
     phase_remainder: Natural
     rate_hz: float
+    requested_hz: float
     rate_exact: tuple[int, Positive]
 
 
@@ -100,6 +102,8 @@ class ManifestFourier(Struct):
     a0_word: Word
     a_words: list[Word]
     b_words: list[Word]
+    band_limit: Literal["truncate", "lanczos", "window"]
+    q_format: Literal["Q2.30"]
     window: tuple[float, float]
     directions: Literal["forward", "both"]
     held_harmonics: list[Positive] = []

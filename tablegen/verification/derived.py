@@ -22,9 +22,17 @@ def wrong_derived(stored: StoredBuild) -> tuple[int, list[str]]:
     checks = _sequence(manifest)
     for name, axis in stored.axes:
         checks += [(f"axes.{name}.{key}", right, why) for key, right, why in _axis(manifest, name, axis)]
+    x, y = manifest.axes.x, manifest.axes.y
+    ranges = [axis.drive.v_scan / axis.drive.v_scan_normalised for axis in (x, y)]
+    told = y.line.requested_hz
+    right = x.line.requested_hz / manifest.sequence.frame_lines
+    checks += [
+        ("axes.y.drive.v_scan_normalised", _close(*ranges), f"of {ranges[1]:g} V, of x it is of {ranges[0]:g} V"),
+        ("axes.y.line.requested_hz", _close(told, right), f"{told}, that of x makes it {right}"),
+    ]
     for key in ("v_zero", "v_per_code", "coding", "align", "word_bits"):
-        x, y = (getattr(axis.output, key) for _, axis in stored.axes)
-        checks.append((f"axes.y.output.{key}", x == y, f"{y}, of x it is {x}"))
+        mine, other = getattr(y.output, key), getattr(x.output, key)
+        checks.append((f"axes.y.output.{key}", mine == other, f"{mine}, of x it is {other}"))
     return len(checks), [f"{key} is {why}" for key, right, why in checks if not right]
 
 

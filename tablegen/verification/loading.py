@@ -9,7 +9,7 @@ from tablegen.verification.placement import Placement
 from tablegen.verification.stream import PROGRAM, X_FOURIER, X_TABLE, Y_FOURIER, Y_TABLE, Script
 from tablegen.verification.variation import Kind, variation
 
-_LOADING_PACE = 7  # clocks between ticks while words are written: a scan goes on, and a long table is soon written
+_LOADING_PACE, _LOADING_TICKS = 7, 500  # clocks between ticks while words are written, at least, and how many at most
 VARIATION = 1  # as the argument of a commit, to a device that has the program of the build already
 
 
@@ -65,9 +65,9 @@ class Loader:
         """Commit it; its tables are rendered first if they have to be."""
         self.script.request("commit", program=self.own, commit_clocks=self.own_commit_clocks)
 
-    def load(self, kind: Kind) -> DualProgram:
+    def load(self, kind: Kind, longer: int = 0) -> DualProgram:
         """Write a variation: its registers, and its tables unless the bank has them."""
-        program, script = variation(self.own, kind, self._bank), self.script
+        program, script = variation(self.own, kind, self._bank, longer), self.script
         self._begin()
         script.write(PROGRAM, program_words(program.schedule, program.x, program.y))
         for axis, region in ((program.x, X_TABLE), (program.y, Y_TABLE)):
@@ -84,7 +84,9 @@ class Loader:
     def _begin(self) -> None:
         self.script.wait_writable()
         assert self.script.writable
-        self.script.tick_every(max(_LOADING_PACE, self.placement.tick_clocks))
+        words = len(self.own.x.words) + len(self.own.y.words)
+        least = self.placement.tick_clocks
+        self.script.pace(max(_LOADING_PACE, words // _LOADING_TICKS, least), least)
 
     @property
     def _bank(self) -> int:

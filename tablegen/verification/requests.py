@@ -7,21 +7,26 @@ from tablegen.device.dual_program import DualProgram
 from tablegen.verification.loading import Loader
 from tablegen.verification.placement import Placement
 from tablegen.verification.stream import PROGRAM, X_TABLE, Y_TABLE, Script
+from tablegen.verification.variation import Kind
 
 _NONSENSE = 0x15555555
 _LONGEST_RAMP = 2000  # ticks
 _RESTING_TICKS = 3
 _FAR_REGISTERS = (0, 16, 32)  # pages of the scan, x and y
-_WIRED_SAMPLES = 24
+_LONGER = 600  # ticks by which a line is longer where that costs nothing
+_SWAPS = 14
+_IN_TURN: tuple[Kind, ...] = ("clamped", "held", "free", "free", "held")
 
 
 class Requests:
     """Plays them on a script that has just begun; the variations take turns in both banks."""
 
-    def __init__(self, script: Script, loader: Loader, placement: Placement, driver_reports: bool) -> None:
-        """``driver_reports`` where a driver tells of overruns, as in C."""
+    def __init__(
+        self, script: Script, loader: Loader, placement: Placement, driver_reports: bool, long_lines: bool = False
+    ) -> None:
+        """``driver_reports`` where a driver tells of overruns, as in C; ``long_lines`` where ticks cost little."""
         self.script, self.loader, self.placement = script, loader, placement
-        self._driver_reports = driver_reports
+        self._driver_reports, self._long = driver_reports, long_lines
 
     def play(self) -> None:
         """All parts, one after the other."""
@@ -30,17 +35,20 @@ class Requests:
         self._refusals()
         self._clamps()
         self._held_back()
+        self._swaps()
+        if self._long:
+            self._long_lines()
         self._faults_of_the_clock()
 
     def _ticks(self, ticks: int) -> None:
         """Play so many, as fast as they may come."""
         script = self.script
-        script.tick_every(self.placement.tick_clocks)
+        script.pace(self.placement.tick_clocks, self.placement.tick_clocks)
         script.wait_ticks(ticks)
 
     def _rest(self, when: str) -> None:
         self.script.state(when)
-        self.script.tick_every(self.placement.tick_clocks)
+        self.script.pace(self.placement.tick_clocks, self.placement.tick_clocks)
 
     def _ramp(self) -> None:
         """Until the codes have parked, and a little longer."""
@@ -106,6 +114,9 @@ class Requests:
         script.request("arm", "trigger", "park")  # park has the last word
         self._ticks(_RESTING_TICKS)
         self._rest("after arm, trigger and park at once")
+        script.request("arm", "trigger", frames=2)  # the count of this clock
+        self._ticks(2 * frame + line)
+        self._rest("after two frames that were armed with their trigger")
         script.request("arm", "trigger")
         self._ticks(line + 5)
         script.request("arm")
@@ -139,7 +150,10 @@ class Requests:
             script.request("clear_faults")
             script.request("arm", "trigger")
             self._ticks(line + 3)
-        self._rest("playing on")
+        program = loader.load("clamped")
+        script.request("commit", "withdraw", program=program)
+        self._ticks(2 * line)
+        self._rest("after commit and withdraw at once")
 
     def _mid_line(self, line: int) -> None:
         """On to the middle of a line, so that a commit waits for the next one."""
@@ -154,8 +168,9 @@ class Requests:
         self.loader.commit(program)
         self._ticks(line + 2 * program.schedule.frame_ticks + 5)
         self._rest("with codes that clamp")
-        script.request("clear_faults")
-        self._ticks(program.schedule.ticks)
+        for _ in range(program.schedule.ticks):  # the first tick that clamps after it is every one in turn
+            script.request("clear_faults")
+            self._ticks(program.schedule.ticks)
         self._rest("with codes that clamp, after faults were cleared")
 
     def _held_back(self) -> None:
@@ -172,6 +187,50 @@ class Requests:
         self._ramp()
         self._rest("with faults cleared")
 
+    def _swaps(self) -> None:
+        """One after the other: each register has to change with the first sample of its program, and not before."""
+        script = self.script
+        script.request("arm", "trigger")
+        self._ticks(2)
+        for number in range(_SWAPS):
+            assert script.model.playing is not None
+            line = script.model.playing.schedule.ticks
+            kind = _IN_TURN[number % len(_IN_TURN)]
+            program = self.loader.load(kind)
+            self._mid_line(line)
+            self.loader.commit(program)
+            if number == _SWAPS // 2 and not self._driver_reports:
+                self._write_too_soon(line)
+            self._ticks(line + number)
+            if kind == "free":  # the one after it has no faults to begin with: its first line may be an image
+                script.request("clear_faults")
+                self._ticks(1)
+        script.request("park")
+        script.request("clear_faults")
+        self._ramp()
+        self._rest("after many swaps")
+
+    def _long_lines(self) -> None:
+        """Codes that change slowly, near their limits: a device that plays many ticks at a time does so here."""
+        script = self.script
+        script.request("arm", "trigger")
+        self._ticks(2)
+        for kind in ("clamped", "held", "clamped", "free", "held"):
+            program = self.loader.load(kind, _LONGER)
+            self.loader.commit(program)
+            self._ticks(program.schedule.frame_ticks * 3)
+        script.request("park")
+        script.request("clear_faults")
+        self._ramp()
+        self._rest("after long lines")
+
+    def _write_too_soon(self, line: int) -> None:
+        """While the last samples of the program before are on their way: those registers come late in it."""
+        script = self.script
+        self._ticks((-script.model.tick) % line)
+        for first, words in ((_FAR_REGISTERS[1] + 3, 8), (_FAR_REGISTERS[2] + 3, 8), (_FAR_REGISTERS[1] + 6, 2)):
+            script.write_refused(PROGRAM, [_NONSENSE] * words, first)
+
     def _faults_of_the_clock(self) -> None:
         """Samples that were missed, ticks that came too early: no pixel is valid until they are forgotten."""
         script = self.script
@@ -180,6 +239,9 @@ class Requests:
         self._ramp()
         lines = program.schedule.lines * program.schedule.ticks
         for clears in ("clear_faults", "reset"):
+            script.come_to_rest()
+            script.request("clear_faults")
+            self._ticks(1)
             script.come_to_rest()
             script.request("underrun")
             script.request("underrun")
@@ -200,7 +262,7 @@ class Requests:
         if self._driver_reports:
             script.lost_tick(under_way=False)
         elif self.placement.axis == "serial":
-            script.tick_every(self.placement.tick_clocks)
+            script.pace(self.placement.tick_clocks, self.placement.tick_clocks)
             script.wait_ticks(1)
             script.tick_every(0)
             script.wait(8)

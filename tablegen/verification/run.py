@@ -47,6 +47,18 @@ def default_target(folder: Path) -> TargetName:
     return "verilog" if "verilog" in formats else "c" if "c" in formats else "files"
 
 
+def rendering_clocks(folder: Path, axis: Literal["pipelined", "blocks", "serial"]) -> int:
+    """Clocks in which the Verilog of a build renders its tables once. Raises ``NotABuild``."""
+    from tablegen.verification.placement import Placement
+
+    stored, placement = read_build(folder), Placement(axis, fourier=True)
+    tables = [
+        (len(one.words), content.fourier.harmonics if placement.renders(one) else 0)
+        for one, (_, content) in zip((stored.program.x, stored.program.y), stored.axes, strict=True)
+    ]
+    return placement.commit_clocks(*tables)
+
+
 def _target(
     name: TargetName,
     simulator: Literal["icarus", "verilator"],

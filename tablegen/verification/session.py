@@ -18,7 +18,8 @@ _CATCH_UP_STRIDE = 64  # ticks after which it is seen whether an output has caug
 _POWER_UP_STEPS = 20  # of max_step, from the codes of power-up to the park codes
 WIRED_TICKS = 24  # ticks so far apart that a serial converter gets each of them
 WIRED_CLOCKS = 240  # clocks between them
-REQUEST_TICKS = 3500  # more than the requests take
+_LONG_LINES_TICKS = 45_000  # more than the long lines take that are played in C
+REQUEST_TICKS = 6500  # more than the requests take, and the words of the program after them
 
 
 @dataclass(frozen=True)
@@ -73,12 +74,12 @@ class _Own:
         variation = script.model.playing
         assert variation is not None
         self.loader.load_own()
-        script.tick_every(self.pace)
+        script.pace(self.pace, self.pace)
         if rendered:
             script.tick_every(0)
             self.loader.commit_own()
             script.wait(self.loader.own_commit_clocks - 8)
-            script.tick_every(self.pace)
+            script.pace(self.pace, self.pace)
             script.wait_ticks(8 + 2 * variation.schedule.ticks)
             return
         script.wait_ticks((variation.schedule.ticks // 2 - script.model.tick) % variation.schedule.ticks + 1)
@@ -115,19 +116,20 @@ def make_session(
     own = _Own(script, loader, most - WIRED_TICKS, seed, pace)
 
     if requests:
-        Requests(script, loader, placement, driver_reports=memories is None).play()
+        in_c = memories is None
+        Requests(script, loader, placement, in_c, in_c and most >= needed_ticks(program) + _LONG_LINES_TICKS).play()
         script.request("arm", "trigger")
         script.wait_ticks(2)
         own.take_over()
     else:
         loader.load_own()
         loader.commit_own()
-        script.tick_every(pace)
+        script.pace(pace, pace)
         script.wait_ticks(2)
         script.request("arm", "trigger")
 
     begun = own.played
-    first_part = own.most if own.most >= needed_ticks(program) else begun + max(own.most - begun, 0) * 7 // 10
+    first_part = own.most if most >= needed_ticks(program) else begun + max(own.most - begun, 0) * 7 // 10
     own.catch_up(first_part)
     wished = begun + schedule.frame_ticks + int(own.random.integers(schedule.ticks, 2 * schedule.ticks, endpoint=True))
     own.play_until(min(wished, first_part))
@@ -135,7 +137,7 @@ def make_session(
     in_frame = requests and _swap_and_back(own, schedule.ticks, schedule.settle_lines)
 
     script.request("park")
-    script.tick_every(pace)
+    script.pace(pace, pace)
     while not script.model.parked and own.played < own.most:
         script.wait_ticks(min(_CATCH_UP_STRIDE, own.most - own.played))
     if requests:
@@ -150,12 +152,12 @@ def _slowly(own: _Own) -> None:
     script.request("arm", "trigger")
     script.tick_every(0)
     script.wait(WIRED_CLOCKS)
-    script.tick_every(max(WIRED_CLOCKS, own.pace))
+    script.pace(max(WIRED_CLOCKS, own.pace), own.pace)
     script.wait_ticks(WIRED_TICKS)
     script.tick_every(0)
     script.wait(WIRED_CLOCKS)
     script.request("park")
-    script.tick_every(own.pace)
+    script.pace(own.pace, own.pace)
     script.wait_ticks(1)
 
 
@@ -163,7 +165,7 @@ def _swap_and_back(own: _Own, line: int, settle_lines: int) -> bool:
     """A variation in mid-frame, and the own program again; whether both came in mid-frame."""
     script = own.script
     variation = own.loader.load("free")
-    script.tick_every(own.pace)
+    script.pace(own.pace, own.pace)
     swaps = script.swaps
     own.loader.commit(variation)
     budget = own.most - own.most // 20
@@ -174,14 +176,14 @@ def _swap_and_back(own: _Own, line: int, settle_lines: int) -> bool:
         return False
     script.wait_ticks(variation.schedule.frame_ticks)
     script.state("with a variation in mid-frame")
-    script.tick_every(own.pace)
+    script.pace(own.pace, own.pace)
     if own.loader.own_commit_clocks > 8:  # rendered once is enough: it takes longer than all the rest
         script.request("park")
         return True
     own.take_over()
     script.tick_every(0)
     script.wait(int(own.random.integers(1, 100)))  # ticks may stop, and come at another rate
-    script.tick_every(own.pace * int(own.random.integers(1, 3, endpoint=True)))
+    script.pace(own.pace * int(own.random.integers(1, 3, endpoint=True)), own.pace)
     own.catch_up(budget)
     script.wait_ticks(max(min((settle_lines + 1) * line, budget - own.played), 0))
     return True

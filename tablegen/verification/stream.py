@@ -94,7 +94,7 @@ class Script:
     def __post_init__(self) -> None:
         self.model = Sequencer(None, codes=self.power_up)
         self.clocks = 0
-        self._period = self._until = 0
+        self._period = self._until = self._ticked_at = 0
         self._commits: DualProgram | None = None
         self._commits_at = self._writable_at = 0
         self._reported = {"overrun": 0, "underrun": 0}  # the model has no clock, and no faults of it
@@ -104,6 +104,15 @@ class Script:
         """Ticks every so many clocks from the next clock on; 0 for none."""
         self._command(_PERIOD | clocks)
         self._period, self._until = clocks, 0
+
+    def pace(self, clocks: int, least: int) -> None:
+        """Ticks every so many clocks, if they do not come so already; none less than ``least`` after the last one."""
+        if self._period == clocks:
+            return
+        if self._period:
+            self.tick_every(0)
+        self.wait(max(self._ticked_at + least - self.clocks - 1, 0))
+        self.tick_every(clocks)
 
     def wait(self, clocks: int) -> None:
         """Let so many clocks pass."""
@@ -243,6 +252,7 @@ class Script:
         while self.clocks + self._until < end:
             self.clocks += self._until + 1
             self._until = self._period - 1
+            self._ticked_at = self.clocks
             tick = self.model.step()
             if tick.swapped:
                 assert self.model.playing is not None

@@ -25,17 +25,18 @@ _LEAST_CODES = 12  # of its amplitude, unless the converter has fewer
 _PEAK = 0.9  # of a table's full scale
 
 
-def variation(own: DualProgram, kind: Kind, bank: int) -> DualProgram:
-    """A program for the device of ``own`` whose tables are those of a bank, 0 or 1.
+def variation(own: DualProgram, kind: Kind, bank: int, longer: int = 0) -> DualProgram:
+    """A program for the device of ``own`` whose tables are those of a bank, 0 or 1; lines ``longer`` by so many ticks.
 
     A ``free`` one neither clamps nor is held back, and images both ways. A ``clamped`` one is held at both limits of
     both axes, a ``held`` one by the slew guard, up and down; it steps y once a line.
     """
     x_words = _room(own.x)
-    ticks = min(_LEAST_TICKS + {"free": 24, "clamped": 21, "held": 23}[kind], x_words)
+    ticks = min(_LEAST_TICKS + {"free": 24, "clamped": 21, "held": 23}[kind] + longer, x_words)
     lines = min({"free": 3, "clamped": 2, "held": 4}[kind], _room(own.y))
     steps = kind == "held" or lines * ticks > _room(own.y)
-    schedule = _schedule(ticks, lines, {"free": 1, "clamped": 0, "held": 2}[kind])
+    settle_lines = {"free": 1 - bank, "clamped": 0, "held": 2}[kind]
+    schedule = _schedule(ticks, lines, settle_lines, at_once=kind == "free" and bank == 1)
     return DualProgram(
         _axis(own.x, RationalPhase(ticks), 1, kind, bank),
         _axis(own.y, RationalPhase(lines if steps else lines * ticks), ticks if steps else 1, kind, bank),
@@ -48,8 +49,8 @@ def _room(own: Program) -> int:
     return 1 << 12 if own.mode == "interpolated" else 1 << max(index_bits_of(len(own.words)), 3)
 
 
-def _schedule(ticks: int, lines: int, settle_lines: int) -> Schedule:
-    """Both sweeps image, on the last line as y goes on and, of three or more, on the one before it."""
+def _schedule(ticks: int, lines: int, settle_lines: int, at_once: bool) -> Schedule:
+    """Both sweeps image, on the last line and the one before it; ``at_once`` on the first, all of it the sweep back."""
     turn, count = ticks // 2 + 1, ticks * 3 // 8 - 1
     return Schedule(
         ticks=ticks,
@@ -58,11 +59,11 @@ def _schedule(ticks: int, lines: int, settle_lines: int) -> Schedule:
         requested_hz=1.0,
         pixels=max(count * 2 // 3, 1),
         settle_lines=settle_lines,
-        turn_tick=turn,
+        turn_tick=0 if at_once else turn,
         forward=Window(1, count),
         backward=Window(turn + 1, count - 1),
         turn_line=max(lines - 1, 1),
-        up=Window(max(lines - 2, 0), 1),
+        up=Window(0 if at_once else max(lines - 2, 0), 1),
         down=Window(lines - 1, 1) if lines > 1 else Window(0, 0),
     )
 
