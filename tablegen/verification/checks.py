@@ -11,7 +11,7 @@ from tablegen.numerics.arrays import Floats, Ints
 from tablegen.verification.capture import UNDEFINED, Capture, part, without_faults
 from tablegen.verification.stream import FAULTS, FLAGS, STATES, DeviceState, Sample
 
-_FLOAT_TOLERANCE_LSB = 1e-9  # the last bits of two ways to evaluate the float waveform
+_FLOAT_TOLERANCE_LSB = 1e-6  # the last bits of two ways to evaluate the float waveform
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ _NONSENSE = 0x15555555
 _LONGEST_RAMP = 2000  # ticks
 _RESTING_TICKS = 3
 _FAR_REGISTERS = (0, 16, 32)  # pages of the scan, x and y
-_LONGER = 600  # ticks by which a line is longer where that costs nothing
+_LONGER = 6000  # ticks by which a line is longer where that costs nothing
 _SWAPS = 14
 _IN_TURN: tuple[Kind, ...] = ("clamped", "held", "free", "free", "held")
 
@@ -215,10 +215,11 @@ class Requests:
         script = self.script
         script.request("arm", "trigger")
         self._ticks(2)
-        for kind in ("clamped", "held", "clamped", "free", "held"):
+        for kind in ("clamped", "free", "held", "clamped", "free"):
+            line = script.model.playing.schedule.ticks if script.model.playing else 1
             program = self.loader.load(kind, _LONGER)
             self.loader.commit(program)
-            self._ticks(program.schedule.frame_ticks * 3)
+            self._ticks(line + program.schedule.frame_ticks + 10)
         script.request("park")
         script.request("clear_faults")
         self._ramp()

@@ -18,7 +18,7 @@ _CATCH_UP_STRIDE = 64  # ticks after which it is seen whether an output has caug
 _POWER_UP_STEPS = 20  # of max_step, from the codes of power-up to the park codes
 WIRED_TICKS = 24  # ticks so far apart that a serial converter gets each of them
 WIRED_CLOCKS = 240  # clocks between them
-_LONG_LINES_TICKS = 45_000  # more than the long lines take that are played in C
+_LONG_LINES_TICKS = 150_000  # more than the long lines take that are played in C
 REQUEST_TICKS = 6500  # more than the requests take, and the words of the program after them
 
 

@@ -22,6 +22,7 @@ Kind = Literal["free", "clamped", "held"]
 _LEAST_TICKS = 8  # of a line
 _RAMP_STEPS = 16  # of the build's own max_step: how far a variation leads at most
 _LEAST_CODES = 12  # of its amplitude, unless the converter has fewer
+_ROOM = 40  # of a guard above the largest step
 _PEAK = 0.9  # of a table's full scale
 
 
@@ -34,19 +35,21 @@ def variation(own: DualProgram, kind: Kind, bank: int, longer: int = 0) -> DualP
     x_words = _room(own.x)
     ticks = min(_LEAST_TICKS + {"free": 24, "clamped": 21, "held": 23}[kind] + longer, x_words)
     lines = min({"free": 3, "clamped": 2, "held": 4}[kind], _room(own.y))
-    steps = kind == "held" or lines * ticks > _room(own.y)
+    steps = kind == "held" or (kind == "free" and longer > 0) or lines * ticks > _room(own.y)
     settle_lines = {"free": 1 - bank, "clamped": 0, "held": 2}[kind]
     schedule = _schedule(ticks, lines, settle_lines, at_once=kind == "free" and bank == 1)
     return DualProgram(
-        _axis(own.x, RationalPhase(ticks), 1, kind, bank),
-        _axis(own.y, RationalPhase(lines if steps else lines * ticks), ticks if steps else 1, kind, bank),
+        _axis(own.x, RationalPhase(ticks), 1, kind, bank, roomy=longer > 0),
+        _axis(
+            own.y, RationalPhase(lines if steps else lines * ticks), ticks if steps else 1, kind, bank, roomy=longer > 0
+        ),
         schedule,
     )
 
 
 def _room(own: Program) -> int:
     """How many advances a period may have: a word each in a direct table, which is as long as the device's memory."""
-    return 1 << 12 if own.mode == "interpolated" else 1 << max(index_bits_of(len(own.words)), 3)
+    return 1 << 16 if own.mode == "interpolated" else 1 << max(index_bits_of(len(own.words)), 3)
 
 
 def _schedule(ticks: int, lines: int, settle_lines: int, at_once: bool) -> Schedule:
@@ -68,7 +71,8 @@ def _schedule(ticks: int, lines: int, settle_lines: int, at_once: bool) -> Sched
     )
 
 
-def _axis(own: Program, phase: RationalPhase, hold: int, kind: Kind, bank: int) -> Program:
+def _axis(own: Program, phase: RationalPhase, hold: int, kind: Kind, bank: int, roomy: bool) -> Program:
+    """One axis; the guard of a ``roomy`` one is far above its steps, as that of a build is."""
     words = _words(own, phase.ticks, bank)
     gain, middle = _gain(own.output)
     gain_q = own.output.gain_q
@@ -84,7 +88,7 @@ def _axis(own: Program, phase: RationalPhase, hold: int, kind: Kind, bank: int) 
         wide,
         code_min=low + rest if rest else max(low - 3 - bank, 0),
         code_max=high - rest if rest else min(high + 5 + bank, (1 << wide.dac_bits) - 1),
-        max_step=max(largest // 3, 1) if kind == "held" else largest + 3,
+        max_step=max(largest // 3, 1) if kind == "held" else (_ROOM if roomy else 1) * largest + 3,
         park_code=low + (high - low) * (2 + bank) // 6,
     )
     return replace(free, output=replace(output, park_code=min(max(output.park_code, output.code_min), output.code_max)))
