@@ -5,6 +5,7 @@ have to equal the manifest; ``examples/verilog/play.v`` has to put out the codes
 """
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -76,6 +77,17 @@ def manifest_words(built: Build) -> list[int]:
     return [word for axis in axes for word in [*axis["table"]["words"], *fourier_words(axis)]]
 
 
+def widths(manifest: dict[str, Any]) -> dict[str, int]:
+    """The least widths of the counters, from the definitions of their parameters."""
+    scan = constants(manifest)
+    period, bits = scan["Y_PHASE_PERIOD"], range(32)
+    return {
+        "TICK_BITS": next(n for n in bits if scan["LINE_TICKS"] <= 2**n and n >= 3),
+        "LINE_BITS": next(n for n in bits if scan["FRAME_LINES"] <= 2**n and n >= 1),
+        "PERIOD_BITS": next(n for n in bits if period < 2**n),
+    }
+
+
 def flip(path: Path, line: int, bit: int) -> None:
     """Flip one bit of one word of a memory file."""
     words = path.read_text("ascii").split()
@@ -92,7 +104,7 @@ def test_header_parses_inside_a_module(built: Build, dialect: str) -> None:
 
 def test_constants_equal_the_manifest(built: Build) -> None:
     """Every localparam but the file names, printed by a simulation; the header defines no others."""
-    manifest, names = built.manifest, constants(built.manifest)
+    manifest, names = built.manifest, constants(built.manifest) | widths(built.manifest)
     header = built.files[f"{NAME}.vh"].decode("ascii")
     defined = [line.split("=")[0].split()[-1] for line in header.splitlines() if line.startswith("localparam")]
     prefix = f"{NAME.upper()}_"

@@ -52,15 +52,3 @@ def test_modules_are_clean_for_every_tool(tmp_path: Path, module: Path, values: 
     )
     synthesis = tool("yosys", "-q", "-p", script, folder=tmp_path)
     assert (synthesis.returncode, synthesis.stdout + synthesis.stderr) == (0, "")
-
-
-@pytest.mark.parametrize(
-    "values",
-    [{"DATA_LSB": 1}, {"FRAME_BITS": 33}, {"TOPOLOGY": 4}, {"HALF_PERIOD": 0}, {"GAP": 0}, {"LDAC_DELAY": 0}],
-    ids=lambda values: next(iter(values)),
-)
-def test_parameters_out_of_range_do_not_compile(tmp_path: Path, values: dict[str, int]) -> None:
-    given = [f"-Pdac_spi.{name}={value}" for name, value in values.items()]
-    refused = tool("iverilog", "-g2005", "-t", "null", *given, SPI, folder=tmp_path)
-    assert refused.returncode != 0
-    assert "dac_spi_parameters_are_out_of_range" in refused.stderr

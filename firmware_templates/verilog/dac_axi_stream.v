@@ -32,6 +32,20 @@ module dac_axi_stream #(
     input  wire                   m_axis_tready,
     output reg                    missed
 );
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason. An unknown
+    // module is the one complaint of Verilog-2005 that every tool takes for an error.
+    generate
+        if (WORD_BITS < 1 || WORD_BITS > 64) begin : guard_0
+            dac_axi_stream_WORD_BITS_is_not_1_to_64 stop ();
+        end
+        if (MARKER_BITS < 1 || MARKER_BITS > 64) begin : guard_1
+            dac_axi_stream_MARKER_BITS_is_not_1_to_64 stop ();
+        end
+        if (LANE_BITS != 8 * ((WORD_BITS + 7) / 8)) begin : guard_2
+            dac_axi_stream_LANE_BITS_follows_from_WORD_BITS_do_not_set_it stop ();
+        end
+    endgenerate
+
     reg [WORD_BITS-1:0] x_held, y_held;
 
     // The beat in the register leaves on this clock, or there is none.

@@ -42,6 +42,44 @@ module dac_boot #(
     localparam X_ADDRESS_BITS = X_WORDS > 1 ? $clog2(X_WORDS) : 1;
     localparam Y_ADDRESS_BITS = Y_WORDS > 1 ? $clog2(Y_WORDS) : 1;
 
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason. An unknown
+    // module is the one complaint of Verilog-2005 that every tool takes for an error.
+    generate
+        if (FOURIER < 0 || FOURIER > 1) begin : guard_0
+            dac_boot_FOURIER_is_not_0_to_1 stop ();
+        end
+        if (X_WORDS < 1 || X_WORDS > 65536) begin : guard_1
+            dac_boot_X_WORDS_is_not_1_to_65536 stop ();
+        end
+        if (FOURIER == 0 && (X_WORD_BITS < 8 || X_WORD_BITS > 24)) begin : guard_2
+            dac_boot_X_WORD_BITS_of_a_table_is_not_8_to_24 stop ();
+        end
+        if (FOURIER != 0 && X_WORD_BITS != 32) begin : guard_3
+            dac_boot_X_WORD_BITS_of_Fourier_words_is_not_32 stop ();
+        end
+        if (FOURIER != 0 && (X_HARMONICS < 1 || X_HARMONICS > 512)) begin : guard_4
+            dac_boot_X_HARMONICS_is_not_1_to_512 stop ();
+        end
+        if (FOURIER != 0 && X_WORDS != 2 * X_HARMONICS + 1) begin : guard_5
+            dac_boot_X_WORDS_is_not_two_X_HARMONICS_and_one stop ();
+        end
+        if (Y_WORDS < 1 || Y_WORDS > 65536) begin : guard_6
+            dac_boot_Y_WORDS_is_not_1_to_65536 stop ();
+        end
+        if (FOURIER == 0 && (Y_WORD_BITS < 8 || Y_WORD_BITS > 24)) begin : guard_7
+            dac_boot_Y_WORD_BITS_of_a_table_is_not_8_to_24 stop ();
+        end
+        if (FOURIER != 0 && Y_WORD_BITS != 32) begin : guard_8
+            dac_boot_Y_WORD_BITS_of_Fourier_words_is_not_32 stop ();
+        end
+        if (FOURIER != 0 && (Y_HARMONICS < 1 || Y_HARMONICS > 512)) begin : guard_9
+            dac_boot_Y_HARMONICS_is_not_1_to_512 stop ();
+        end
+        if (FOURIER != 0 && Y_WORDS != 2 * Y_HARMONICS + 1) begin : guard_10
+            dac_boot_Y_WORDS_is_not_two_Y_HARMONICS_and_one stop ();
+        end
+    endgenerate
+
     reg [31:0] program_words [0:PROGRAM_WORDS-1];
     reg [X_WORD_BITS-1:0] x_words [0:X_WORDS-1];
     reg [Y_WORD_BITS-1:0] y_words [0:Y_WORDS-1];

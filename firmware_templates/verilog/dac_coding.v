@@ -22,6 +22,23 @@ module dac_coding #(
 );
     localparam INVERTED = TWOS_COMPLEMENT != 0;
 
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason. An unknown
+    // module is the one complaint of Verilog-2005 that every tool takes for an error.
+    generate
+        if (BITS < 2 || BITS > 32) begin : guard_0
+            dac_coding_BITS_is_not_2_to_32 stop ();
+        end
+        if (WORD_BITS < BITS || WORD_BITS > 64) begin : guard_1
+            dac_coding_WORD_BITS_is_not_BITS_to_64 stop ();
+        end
+        if (TWOS_COMPLEMENT < 0 || TWOS_COMPLEMENT > 1) begin : guard_2
+            dac_coding_TWOS_COMPLEMENT_is_not_0_to_1 stop ();
+        end
+        if (LEFT_ALIGNED < 0 || LEFT_ALIGNED > 1) begin : guard_3
+            dac_coding_LEFT_ALIGNED_is_not_0_to_1 stop ();
+        end
+    endgenerate
+
     wire [BITS-1:0] coded = {code[BITS-1] ^ INVERTED, code[BITS-2:0]};
 
     // There is no vector of no bits, hence the three cases.

@@ -84,6 +84,29 @@ module dac_fourier #(
     localparam X_SHIFT = 60 - (X_WORD_BITS - 1) - DROPPED;
     localparam Y_SHIFT = 60 - (Y_WORD_BITS - 1) - DROPPED;
 
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason. An unknown
+    // module is the one complaint of Verilog-2005 that every tool takes for an error.
+    generate
+        if (X_INDEX_BITS < 3 || X_INDEX_BITS > 16) begin : guard_0
+            dac_fourier_X_INDEX_BITS_is_not_3_to_16 stop ();
+        end
+        if (X_WORD_BITS < 8 || X_WORD_BITS > 24) begin : guard_1
+            dac_fourier_X_WORD_BITS_is_not_8_to_24 stop ();
+        end
+        if (Y_INDEX_BITS < 3 || Y_INDEX_BITS > 16) begin : guard_2
+            dac_fourier_Y_INDEX_BITS_is_not_3_to_16 stop ();
+        end
+        if (Y_WORD_BITS < 8 || Y_WORD_BITS > 24) begin : guard_3
+            dac_fourier_Y_WORD_BITS_is_not_8_to_24 stop ();
+        end
+        if (HARMONICS < 1 || HARMONICS > 512) begin : guard_4
+            dac_fourier_HARMONICS_is_not_1_to_512 stop ();
+        end
+        if (MULTIPLIER < 0 || MULTIPLIER > 1) begin : guard_5
+            dac_fourier_MULTIPLIER_is_not_0_to_1 stop ();
+        end
+    endgenerate
+
     // Coefficients and the quarter of the sine: block RAMs, one clocked read port each. One is written while not busy
     // and read while busy, and a synthesiser sees that: what a read of the word being written gives is of no account.
     reg [31:0] coefficients [0:(2 << ADDRESS_BITS)-1];

@@ -40,7 +40,7 @@ module dac_sequencer #(
     input  wire [15:0]             write_address,
     input  wire [31:0]             write_data,
     output wire                    writable,       // low: a write is refused
-    output reg                     refused,        // a write was refused; holds until clear_faults or reset
+    output reg                     refused,        // a write or a commit was refused; holds until clear_faults or reset
     input  wire                    commit,
     input  wire                    withdraw,
     output wire                    committed,
@@ -77,6 +77,62 @@ module dac_sequencer #(
     localparam MARKERS_AT = 3;
     localparam X_PERIOD_BITS = TICK_BITS + 1;  // the period of x is a line
 
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason. An unknown
+    // module is the one complaint of Verilog-2005 that every tool takes for an error.
+    generate
+        if (DAC_BITS < 8 || DAC_BITS > 24) begin : guard_0
+            dac_sequencer_DAC_BITS_is_not_8_to_24 stop ();
+        end
+        if (X_INTERPOLATED < 0 || X_INTERPOLATED > 1) begin : guard_1
+            dac_sequencer_X_INTERPOLATED_is_not_0_to_1 stop ();
+        end
+        if (X_INDEX_BITS < 2 || X_INDEX_BITS > 16) begin : guard_2
+            dac_sequencer_X_INDEX_BITS_is_not_2_to_16 stop ();
+        end
+        if (X_WORD_BITS < 8 || X_WORD_BITS > 24) begin : guard_3
+            dac_sequencer_X_WORD_BITS_is_not_8_to_24 stop ();
+        end
+        if (Y_INTERPOLATED < 0 || Y_INTERPOLATED > 1) begin : guard_4
+            dac_sequencer_Y_INTERPOLATED_is_not_0_to_1 stop ();
+        end
+        if (Y_INDEX_BITS < 2 || Y_INDEX_BITS > 16) begin : guard_5
+            dac_sequencer_Y_INDEX_BITS_is_not_2_to_16 stop ();
+        end
+        if (Y_WORD_BITS < 8 || Y_WORD_BITS > 24) begin : guard_6
+            dac_sequencer_Y_WORD_BITS_is_not_8_to_24 stop ();
+        end
+        if (TICK_BITS < 3 || TICK_BITS > 30) begin : guard_7
+            dac_sequencer_TICK_BITS_is_not_3_to_30 stop ();
+        end
+        if (LINE_BITS < 1 || LINE_BITS > 16) begin : guard_8
+            dac_sequencer_LINE_BITS_is_not_1_to_16 stop ();
+        end
+        if (PERIOD_BITS < 1 || PERIOD_BITS > 31) begin : guard_9
+            dac_sequencer_PERIOD_BITS_is_not_1_to_31 stop ();
+        end
+        if (COUNT_BITS < 2 || COUNT_BITS > 32) begin : guard_10
+            dac_sequencer_COUNT_BITS_is_not_2_to_32 stop ();
+        end
+        if (PLAIN_MULTIPLIER < 0 || PLAIN_MULTIPLIER > 1) begin : guard_11
+            dac_sequencer_PLAIN_MULTIPLIER_is_not_0_to_1 stop ();
+        end
+        if (LOW_AREA < 0 || LOW_AREA > 1) begin : guard_12
+            dac_sequencer_LOW_AREA_is_not_0_to_1 stop ();
+        end
+        if (FOURIER < 0 || FOURIER > 1) begin : guard_13
+            dac_sequencer_FOURIER_is_not_0_to_1 stop ();
+        end
+        if (HARMONICS < 1 || HARMONICS > 512) begin : guard_14
+            dac_sequencer_HARMONICS_is_not_1_to_512 stop ();
+        end
+        if (X_POWER_UP_CODE >> DAC_BITS != 64'd0) begin : guard_15
+            dac_sequencer_X_POWER_UP_CODE_has_more_than_DAC_BITS stop ();
+        end
+        if (Y_POWER_UP_CODE >> DAC_BITS != 64'd0) begin : guard_16
+            dac_sequencer_Y_POWER_UP_CODE_has_more_than_DAC_BITS stop ();
+        end
+    endgenerate
+
     // Writes go to the idle bank, one clock late. A commit is as late, so that it never overtakes a write.
     wire idle_writable, rendered, rendering;
     reg host_write, host_commit;
@@ -108,7 +164,7 @@ module dac_sequencer #(
         region <= write_region;
         address <= write_address;
         data <= write_data;
-        if (write && !writable)
+        if ((write && !writable) || (host_commit && !fits))
             refused <= 1'b1;
         else if (clear_faults || reset)
             refused <= 1'b0;
@@ -117,6 +173,19 @@ module dac_sequencer #(
     wire [15:0] table_address;
     wire [23:0] table_data;
     wire unused_bits = &{table_address, table_data};  // upper bits, unused for short tables and words
+
+    // A program with a word that does not fit its register is not committed.
+    wire fits;
+    wire sound_commit = host_commit && fits;
+    dac_fit #(
+        .DAC_BITS(DAC_BITS), .X_INTERPOLATED(X_INTERPOLATED), .X_INDEX_BITS(X_INDEX_BITS), .X_WORD_BITS(X_WORD_BITS),
+        .Y_INTERPOLATED(Y_INTERPOLATED), .Y_INDEX_BITS(Y_INDEX_BITS), .Y_WORD_BITS(Y_WORD_BITS), .TICK_BITS(TICK_BITS),
+        .LINE_BITS(LINE_BITS), .X_PERIOD_BITS(X_PERIOD_BITS), .Y_PERIOD_BITS(PERIOD_BITS),
+        .HARMONICS(FOURIER ? HARMONICS : 0)
+    ) fit (
+        .clock(clock), .scan_write(scan_write), .x_write(x_write), .y_write(y_write), .address(address[3:0]),
+        .data(data), .fits(fits)
+    );
 
     wire bank, loaded, take, drained;
     dac_bank banks (
@@ -289,7 +358,7 @@ module dac_sequencer #(
                 .write_x_harmonics(x_write && address[3:0] == AXIS_HARMONICS),
                 .write_y_harmonics(y_write && address[3:0] == AXIS_HARMONICS),
                 .write_x_word(host_write && region == X_FOURIER), .write_y_word(host_write && region == Y_FOURIER),
-                .write_address(address[10:0]), .write_data(data), .commit(host_commit), .rendered(rendered),
+                .write_address(address[10:0]), .write_data(data), .commit(sound_commit), .rendered(rendered),
                 .rendering(rendering), .x_write(x_rendered), .y_write(y_rendered), .address(rendered_address),
                 .data(rendered_data)
             );
@@ -298,7 +367,7 @@ module dac_sequencer #(
             assign table_address = rendering ? rendered_address : address;
             assign table_data = rendering ? rendered_data : data[23:0];
         end else begin : uploaded
-            assign rendered = host_commit;
+            assign rendered = sound_commit;
             assign rendering = 1'b0;
             assign x_table_write = host_write && region == X_TABLE;
             assign y_table_write = host_write && region == Y_TABLE;

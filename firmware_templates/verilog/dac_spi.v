@@ -46,7 +46,8 @@
 //
 // busy: frames are under way, or the rest after them. A strobe with busy low goes out on the next clock.
 // All pins but an unused mosi_y come straight from flip-flops.
-// Limits: 2 <= FRAME_BITS <= 32, DATA_LSB + WORD_BITS <= FRAME_BITS, HALF_PERIOD, GAP, LDAC_DELAY >= 1.
+// Limits: 2 <= FRAME_BITS <= 32, DATA_LSB + WORD_BITS <= FRAME_BITS, HALF_PERIOD, GAP, LDAC_DELAY >= 1; a
+// prefix has FRAME_BITS bits.
 module dac_spi #(
     parameter WORD_BITS = 16,
     parameter FRAME_BITS = 16,
@@ -102,11 +103,47 @@ module dac_spi #(
     localparam [31:0] GAP_LAST = GAP - 1;
     localparam [31:0] REST_LAST = REST - 1;
 
-    // An unknown module is the one complaint of Verilog-2005 that every tool takes for an error.
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason. An unknown
+    // module is the one complaint of Verilog-2005 that every tool takes for an error.
     generate
-        if (FRAME_BITS < 2 || FRAME_BITS > 32 || DATA_LSB < 0 || DATA_LSB + WORD_BITS > FRAME_BITS || TOPOLOGY < 0
-            || TOPOLOGY > 3 || HALF_PERIOD < 1 || GAP < 1 || LDAC_CLOCKS < 0 || LDAC_DELAY < 1) begin : refused
-            dac_spi_parameters_are_out_of_range refused();
+        if (FRAME_BITS < 2 || FRAME_BITS > 32) begin : guard_0
+            dac_spi_FRAME_BITS_is_not_2_to_32 stop ();
+        end
+        if (DATA_LSB < 0 || WORD_BITS < 1 || DATA_LSB + WORD_BITS > FRAME_BITS) begin : guard_1
+            dac_spi_word_is_not_inside_FRAME_BITS stop ();
+        end
+        if (FRAME_BITS < 32 && X_PREFIX >> FRAME_BITS != 32'd0) begin : guard_2
+            dac_spi_X_PREFIX_has_more_than_FRAME_BITS stop ();
+        end
+        if (FRAME_BITS < 32 && Y_PREFIX >> FRAME_BITS != 32'd0) begin : guard_3
+            dac_spi_Y_PREFIX_has_more_than_FRAME_BITS stop ();
+        end
+        if (TOPOLOGY < 0 || TOPOLOGY > 3) begin : guard_4
+            dac_spi_TOPOLOGY_is_not_0_to_3 stop ();
+        end
+        if (Y_FIRST < 0 || Y_FIRST > 1) begin : guard_5
+            dac_spi_Y_FIRST_is_not_0_to_1 stop ();
+        end
+        if (CPOL < 0 || CPOL > 1) begin : guard_6
+            dac_spi_CPOL_is_not_0_to_1 stop ();
+        end
+        if (CPHA < 0 || CPHA > 1) begin : guard_7
+            dac_spi_CPHA_is_not_0_to_1 stop ();
+        end
+        if (HALF_PERIOD < 1 || HALF_PERIOD > 65536) begin : guard_8
+            dac_spi_HALF_PERIOD_is_not_1_to_65536 stop ();
+        end
+        if (GAP < 1 || GAP > 65536) begin : guard_9
+            dac_spi_GAP_is_not_1_to_65536 stop ();
+        end
+        if (LDAC_CLOCKS < 0 || LDAC_CLOCKS > 65536) begin : guard_10
+            dac_spi_LDAC_CLOCKS_is_not_0_to_65536 stop ();
+        end
+        if (LDAC_DELAY < 1 || LDAC_DELAY > 65536) begin : guard_11
+            dac_spi_LDAC_DELAY_is_not_1_to_65536 stop ();
+        end
+        if (LDAC_HELD < 0 || LDAC_HELD > 1) begin : guard_12
+            dac_spi_LDAC_HELD_is_not_0_to_1 stop ();
         end
     endgenerate
 

@@ -117,6 +117,68 @@ module program_loader #(
     wire [5*32-1:0] parts_of_more = {DAC, FRAMES, WORD, MOST_HARMONICS, RING_AT & PAGE_AT};
     wire unused = &{parts_of_numbers, parts_of_more, IMAGE_AT};
 
+    // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason. An unknown
+    // module is the one complaint of Verilog-2005 that every tool takes for an error.
+    generate
+        if (CLOCKS_PER_BIT < 8 || CLOCKS_PER_BIT > 65536) begin : guard_0
+            program_loader_CLOCKS_PER_BIT_is_not_8_to_65536 stop ();
+        end
+        if (MEMORY_BYTES < 2048 || MEMORY_BYTES > 65536 || MEMORY_BYTES != (1 << $clog2(MEMORY_BYTES))) begin : guard_1
+            program_loader_MEMORY_BYTES_is_no_power_of_two_from_2048_to_65536 stop ();
+        end
+        if (WINDOW < 1 || WINDOW > 255) begin : guard_2
+            program_loader_WINDOW_is_not_1_to_255 stop ();
+        end
+        if (DAC_BITS < 8 || DAC_BITS > 24) begin : guard_3
+            program_loader_DAC_BITS_is_not_8_to_24 stop ();
+        end
+        if (X_INTERPOLATED < 0 || X_INTERPOLATED > 1) begin : guard_4
+            program_loader_X_INTERPOLATED_is_not_0_to_1 stop ();
+        end
+        if (X_INDEX_BITS < 2 || X_INDEX_BITS > 16) begin : guard_5
+            program_loader_X_INDEX_BITS_is_not_2_to_16 stop ();
+        end
+        if (X_WORD_BITS < 8 || X_WORD_BITS > 24) begin : guard_6
+            program_loader_X_WORD_BITS_is_not_8_to_24 stop ();
+        end
+        if (Y_INTERPOLATED < 0 || Y_INTERPOLATED > 1) begin : guard_7
+            program_loader_Y_INTERPOLATED_is_not_0_to_1 stop ();
+        end
+        if (Y_INDEX_BITS < 2 || Y_INDEX_BITS > 16) begin : guard_8
+            program_loader_Y_INDEX_BITS_is_not_2_to_16 stop ();
+        end
+        if (Y_WORD_BITS < 8 || Y_WORD_BITS > 24) begin : guard_9
+            program_loader_Y_WORD_BITS_is_not_8_to_24 stop ();
+        end
+        if (TICK_BITS < 3 || TICK_BITS > 30) begin : guard_10
+            program_loader_TICK_BITS_is_not_3_to_30 stop ();
+        end
+        if (LINE_BITS < 1 || LINE_BITS > 16) begin : guard_11
+            program_loader_LINE_BITS_is_not_1_to_16 stop ();
+        end
+        if (FOURIER < 0 || FOURIER > 1) begin : guard_12
+            program_loader_FOURIER_is_not_0_to_1 stop ();
+        end
+        if (HARMONICS < 1 || HARMONICS > 512) begin : guard_13
+            program_loader_HARMONICS_is_not_1_to_512 stop ();
+        end
+        if (CONVERTER % 64 < DAC_BITS || CONVERTER % 64 > 32 || CONVERTER > 255) begin : guard_14
+            program_loader_CONVERTER_is_no_word_of_DAC_BITS_or_more stop ();
+        end
+        if (X_CODE_MIN > X_CODE_MAX || X_CODE_MAX >= 32'd1 << DAC_BITS) begin : guard_15
+            program_loader_X_CODE_MIN_to_X_CODE_MAX_is_no_range_of_DAC_BITS stop ();
+        end
+        if (X_MAX_STEP < 32'd1 || X_MAX_STEP >= 32'd1 << DAC_BITS) begin : guard_16
+            program_loader_X_MAX_STEP_is_not_1_to_the_highest_code stop ();
+        end
+        if (Y_CODE_MIN > Y_CODE_MAX || Y_CODE_MAX >= 32'd1 << DAC_BITS) begin : guard_17
+            program_loader_Y_CODE_MIN_to_Y_CODE_MAX_is_no_range_of_DAC_BITS stop ();
+        end
+        if (Y_MAX_STEP < 32'd1 || Y_MAX_STEP >= 32'd1 << DAC_BITS) begin : guard_18
+            program_loader_Y_MAX_STEP_is_not_1_to_the_highest_code stop ();
+        end
+    endgenerate
+
     // Bytes from the line go into the ring whenever the processor does not write.
     wire [7:0] received, from_memory;
     wire byte_came, core_write;

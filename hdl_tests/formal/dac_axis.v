@@ -75,9 +75,11 @@ module dac_axis #(
     assign reached = restart;
     assign clamped = advance;
 
+`ifndef PROPERTIES_ALONE
     // Every sample under way reads the bank that it was made for: none is that which is written.
     always @* if (table_write) assert (banks == {READ_AT{bank}});
     always @* assert (!(write || table_write) || !(take || loads != 0));
+`endif
 endmodule
 
 `default_nettype wire

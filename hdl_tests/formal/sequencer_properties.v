@@ -31,11 +31,12 @@ module sequencer_properties #(
     localparam LATENCY = PLAIN_MULTIPLIER ? 22 : 34;
     wire writable, refused, committed, armed, running, busy, strobe, swapped_marker;
     wire line_marker, frame_marker, pixel_marker, backward_marker, valid_marker, playing, parked;
-    wire [3:0] x_code, y_code, faults;
+    wire [7:0] x_code, y_code;
+    wire [3:0] faults;
     wire [4*2-1:0] fault_counts;
 
     dac_sequencer #(
-        .DAC_BITS(4), .X_INDEX_BITS(3), .X_WORD_BITS(8), .Y_INDEX_BITS(3), .Y_WORD_BITS(8), .TICK_BITS(TICK_BITS),
+        .DAC_BITS(8), .X_INDEX_BITS(3), .X_WORD_BITS(8), .Y_INDEX_BITS(3), .Y_WORD_BITS(8), .TICK_BITS(TICK_BITS),
         .LINE_BITS(LINE_BITS), .PERIOD_BITS(8), .COUNT_BITS(2), .PLAIN_MULTIPLIER(PLAIN_MULTIPLIER)
     ) uut (
         .clock(clock), .reset(reset), .write(write), .write_region(write_region), .write_address(write_address),
@@ -80,29 +81,32 @@ module sequencer_properties #(
 
     // b. All parts of both axes are of one program at every sample; the stub's codes are the colours each has met.
     always @* if (strobe) begin
-        assert (x_code == 4'b0000 || x_code == 4'b1111);
+        assert (x_code == 8'b0000 || x_code == 8'b1111);
         assert (x_code == y_code);
     end
 
     // Not vacuous: a program of the other colour can be taken, and played by both axes.
-    always @* cover (strobe && playing && line_marker && x_code == 4'b1111);
+    always @* cover (strobe && playing && line_marker && x_code == 8'b1111);
 
     // c. No write while a program waits or is under way; what is written is never what plays.
     always @* begin
         if (uut__x_table_write || uut__y_table_write || uut__x_write || uut__y_write || uut__scan_write)
             assert (!committed && !uut__banks__draining);
     end
-    // f. A refused write is said; a commit stays until it is taken, withdrawn or reset.
-    reg before, refused_write, was_committed, may_go;
+    // f. A program that does not fit is not committed, and that is said. A refused write is said; a commit stays until it is taken, withdrawn or reset.
+    wire uut__fits;
+    reg before, refused_write, refused_commit, was_committed, may_go;
     initial before = 0;
     always @(posedge clock) begin
         before <= 1;
         refused_write <= write && !writable;
+        refused_commit <= uut__host_commit && !uut__fits;
         was_committed <= committed;
         may_go <= uut__take || withdraw || reset;
     end
     always @* if (before) begin
-        if (refused_write) assert (refused);
+        if (refused_write || refused_commit) assert (refused);
+        if (refused_commit) assert (!committed);
         if (was_committed && !may_go) assert (committed);
         if (was_committed && may_go) assert (!committed);
     end

@@ -119,9 +119,33 @@ module valid_properties #(
     always @(posedge clock) faults_before <= faults;
     always @* if (!clears_out) assert ((faults & faults_before) == faults_before);
 
+    // Counters: cleared alone, or one more for each clock of their fault, up to the most they hold, and there they stay.
+    // A code off its target is a slew fault, unless a scan or a program has begun and not been caught up with yet.
+    reg catching_up, slew;
+    initial catching_up = 0;
+    initial slew = 0;
+    always @(posedge clock) begin
+        slew <= done && runs_done && !reached && !catching_up && !begins_done;
+        if (done && runs_done) catching_up <= (catching_up || begins_done) && !reached;
+    end
+    wire [3:0] counted = happened | {3'd0, slew};
+    always @* assert ((faults & counted) == counted);
+    reg [4*COUNT_BITS-1:0] counts_before;
+    initial counts_before = 0;
+    always @(posedge clock) counts_before <= fault_counts;
+    genvar i;
+    generate
+        for (i = 0; i < 4; i = i + 1) begin : counter
+            wire [COUNT_BITS-1:0] count = fault_counts[i*COUNT_BITS +: COUNT_BITS];
+            wire [COUNT_BITS-1:0] from = clears_out ? 0 : counts_before[i*COUNT_BITS +: COUNT_BITS];
+            always @* assert (count == (counted[i] && from != {COUNT_BITS{1'b1}} ? from + 1 : from));
+        end
+    endgenerate
+
     // What makes it inductive: the count of dac_markers is the one above, two clocks later.
     wire markers__tick_1, markers__tick_2, markers__begins_1, markers__line_1, markers__runs_1, markers__runs_2;
-    wire markers__settled_2;
+    wire markers__settled_2, verdict__catching_up;
+    always @* assert (verdict__catching_up == catching_up);
     wire [7:0] markers__settle_left, markers__settle_lines, markers__settle_lines_word__idle;
     wire [7:0] left_then = !markers__tick_1 ? markers__settle_left
         : markers__begins_1 ? markers__settle_lines

@@ -26,11 +26,12 @@ module writes_properties #(
 );
     wire writable, refused, committed, armed, running, busy, strobe, swapped_marker;
     wire line_marker, frame_marker, pixel_marker, backward_marker, valid_marker, playing, parked;
-    wire [3:0] x_code, y_code, faults;
+    wire [7:0] x_code, y_code;
+    wire [3:0] faults;
     wire [4*2-1:0] fault_counts;
 
     dac_sequencer #(
-        .DAC_BITS(4), .X_INDEX_BITS(3), .X_WORD_BITS(8), .Y_INDEX_BITS(3), .Y_WORD_BITS(8), .TICK_BITS(4),
+        .DAC_BITS(8), .X_INDEX_BITS(3), .X_WORD_BITS(8), .Y_INDEX_BITS(3), .Y_WORD_BITS(8), .TICK_BITS(4),
         .LINE_BITS(2), .PERIOD_BITS(8), .COUNT_BITS(2), .PLAIN_MULTIPLIER(1), .LOW_AREA(LOW_AREA), .FOURIER(1)
     ) uut (
         .clock(clock), .reset(reset), .write(write), .write_region(write_region), .write_address(write_address),

@@ -6,11 +6,10 @@ from math import log10
 import numpy as np
 
 from tablegen.certificate.certificate import Certificate
+from tablegen.certificate.excess import excess
+from tablegen.certificate.matching import apart_note, apart_percent
 from tablegen.compensation.hold import hold_inverse
-from tablegen.device.schedule import MAXIMUM_LINE_TICKS
 from tablegen.planning.line_plan import LinePlan, Plan
-from tablegen.planning.timing import exact
-from tablegen.planning.windows import matching_lines, retrace_mismatch
 
 _GRID = 32  # points per period of the highest harmonic
 
@@ -131,17 +130,10 @@ def _windows(plan: Plan) -> list[str]:
     text = f"imaged are ticks {schedule.forward.first}..{schedule.forward.stop - 1}"
     if not schedule.backward.count:
         return [text]
-    apart = 100.0 * retrace_mismatch(schedule, plan.x.drive.turn)
     text += f" and {schedule.backward.first}..{schedule.backward.stop - 1}"
-    return [f"{text}; a pixel's places in trace and retrace are up to {_percent(apart)} % of the line apart"]
-
-
-def _matching(plan: Plan) -> str:
-    """Which lines would have none of that, if there are some."""
-    schedule, (low, high) = plan.schedule, plan.x.band_limit.window
-    asked = exact(plan.x.drive.turn), exact(low), exact(high)
-    lines = matching_lines(*asked, schedule.ticks, schedule.pixels, MAXIMUM_LINE_TICKS)
-    return f"; a timing.ticks_per_line of {' or '.join(map(str, lines))} makes them match" if lines else ""
+    return [
+        f"{text}; a pixel's places in trace and retrace are up to {_percent(apart_percent(plan))} % of the line apart"
+    ]
 
 
 def notes(plan: Plan) -> list[str]:
@@ -155,11 +147,8 @@ def notes(plan: Plan) -> list[str]:
             f"a pixel is {float(per_pixel):.4g} ticks, so its start is rounded to the tick; "
             f"line rates near {' or '.join(rates)} make it {' or '.join(map(str, whole))} whole ticks"
         )
-    if apart := 100.0 * retrace_mismatch(schedule, plan.x.drive.turn):
-        found.append(
-            f"the same pixel of trace and retrace shows places up to {apart:.2g} % of the line apart, since pixels "
-            f"begin on whole ticks{_matching(plan)}"
-        )
+    if apart := apart_note(plan):
+        found.append(apart)
     found.append(
         f"a frame images {schedule.pixels} x {schedule.up.count}"
         + (f" + {schedule.down.count}" if schedule.down.count else "")
@@ -184,4 +173,7 @@ def summary(plan: Plan, certificates: dict[str, Certificate]) -> list[str]:
         lines += [f"  {label:<18}{value}" for label, value in drive_lines(line)]
         lines += [f"{line.axis} certificate"]
         lines += [f"  {label:<18}{value}" for label, value in certificate_lines(certificates[line.axis])]
+        found = excess(certificates[line.axis].scaling)
+        for i, text in enumerate([] if found is None else found.text(line.axis).split("; ")):
+            lines.append(f"  {'' if i else 'warning':<18}{text}")
     return lines

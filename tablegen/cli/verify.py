@@ -11,15 +11,18 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
-from tablegen.cli.common import fail
+from tablegen.cli.common import OutputFile, OutputFolder, fail
 from tablegen.cli.exit_status import ExitStatus
 from tablegen.cli.progress import Progress
+from tablegen.cli.terminal import tell
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from tablegen.verification.build import Report
     from tablegen.verification.checks import Check
+
+_FAILED = "FAILED"
 
 
 _MANY_CLOCKS = 200_000  # of a simulation that takes more than some seconds
@@ -73,13 +76,13 @@ _CLOCKS_A_SECOND = 20_000  # that Icarus simulates, more or less
 )
 @click.option(
     "--junit",
-    type=click.Path(path_type=Path, dir_okay=False),
+    type=OutputFile(),
     metavar="FILE",
     help="Also write the results as JUnit XML to FILE, one test case per check.",
 )
 @click.option(
     "--keep",
-    type=click.Path(path_type=Path, file_okay=False),
+    type=OutputFolder(),
     metavar="DIR",
     help="Run in DIR and keep its scripts, records and logs. By default they are deleted.",
 )
@@ -161,7 +164,8 @@ def verify(
     except OSError as error:
         place = error.filename or keep or tempfile.gettempdir()
         fail([f"cannot verify: {place}: {error.strerror or error}"], ExitStatus.CANNOT_WRITE)
-    click.echo("\n".join(_table(report.checks)))
+    for line in _table(report.checks):
+        tell(line, bold=line.endswith(_FAILED))
     for note in report.notes:
         click.echo(f"note: {note}")
     written = junit is None or _write(junit, report)
@@ -231,8 +235,5 @@ def _table(checks: "Sequence[Check]") -> list[str]:
             cell.rjust(width) if i in (3, 4) else cell.ljust(width)
             for i, (cell, width) in enumerate(zip(row[:-1], widths[:-1], strict=True))
         ]
-        verdict = row[-1]
-        if verdict == "FAILED":
-            verdict = click.style(verdict, bold=True)
-        lines.append(("  ".join([*cells, verdict])).rstrip())
+        lines.append(("  ".join([*cells, row[-1]])).rstrip())
     return lines

@@ -13,6 +13,7 @@ from tablegen.device.sequencer import pixel_starts
 from tablegen.numerics.arrays import Floats
 
 _HALF = Fraction(1, 2)
+_ROUNDING = 1e-12  # of the line: places that are the same may differ so in their last bits
 
 
 def line_windows(
@@ -53,7 +54,8 @@ def pixel_places(schedule: Schedule, turn: float) -> tuple[Floats, Floats]:
 def retrace_mismatch(schedule: Schedule, turn: float) -> float:
     """The largest distance between a pixel's places in trace and retrace, as a share of the line, from ticks alone."""
     forward, backward = pixel_places(schedule, turn)
-    return float(np.max(np.abs(forward - backward))) if len(backward) else 0.0
+    worst = float(np.max(np.abs(forward - backward))) if len(backward) == len(forward) else 0.0
+    return worst if worst > _ROUNDING else 0.0
 
 
 def matching_lines(turn: Fraction, low: Fraction, high: Fraction, ticks: int, pixels: int, most: int) -> list[int]:

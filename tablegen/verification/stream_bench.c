@@ -18,7 +18,7 @@ enum { PAGE = 16, SCAN = 0, X = PAGE, Y = 2 * PAGE };                         /*
 enum { STATES = 64, STATE_WORDS = 3, WRITABLE = 1, REFUSED = 2, COMMITTED = 4 };  /* states */
 
 static dac_sequencer sequencer;
-static dac_word x_table[2][BENCH_TABLE_WORDS], y_table[2][BENCH_TABLE_WORDS];
+static dac_word x_table[2][BENCH_TABLE_WORDS + 1], y_table[2][BENCH_TABLE_WORDS + 1];
 
 static uint32_t period, until, ticks_due, commits_in;
 
@@ -98,8 +98,8 @@ static const dac_word *rendered(const dac_axis_program *p, const bench_axis *axi
     if (axis->fourier == NULL)
         return p->table;
     bench_check(p->length <= BENCH_TABLE_WORDS, "a table of this length");
-    bench_check(dac_synthesize(table, p->index_bits, p->bits, axis->fourier, axis->harmonics, bench_sine,
-                               bench_sine_index_bits), "dac_synthesize");
+    bench_check(dac_synthesize(table, BENCH_TABLE_WORDS + 1, p->index_bits, p->bits, axis->fourier, axis->harmonics,
+                               bench_sine, bench_sine_index_bits), "dac_synthesize");
     return table;
 }
 
@@ -131,7 +131,8 @@ static void render(dac_word *table, unsigned index_bits, unsigned bits, const in
     unsigned sine_index_bits = 0;
     while (UINT32_C(5) << sine_index_bits < 4 * sine_words)
         sine_index_bits++;
-    bench_check(dac_synthesize(table, index_bits, bits, fourier, harmonics, sine, sine_index_bits), "synthesize");
+    bench_check(dac_synthesize(table, BENCH_TABLE_WORDS + 1, index_bits, bits, fourier, harmonics, sine,
+                               sine_index_bits), "synthesize");
 }
 
 /* Converter and tables, before anything else. */
@@ -167,6 +168,7 @@ static dac_axis_program axis(unsigned page, dac_word *table, const dac_converter
     dac_axis_program p;
 
     p.table = table;
+    p.storage_bits = DAC_TABLE_STORAGE_BITS;
     p.bits = (uint8_t)bits;
     p.index_bits = (uint8_t)index_bits;
     p.phase_period = r[2];
@@ -199,6 +201,10 @@ static void written(dac_program *p, unsigned idle)
     p->schedule.pixels = registers[12];
     p->x = axis(X, x_table[idle], &x_converter, x_bits, x_index_bits);
     p->y = axis(Y, y_table[idle], &y_converter, y_bits, y_index_bits);
+    if (p->x.length <= BENCH_TABLE_WORDS && p->y.length <= BENCH_TABLE_WORDS) {
+        x_table[idle][p->x.length] = x_table[idle][0];
+        y_table[idle][p->y.length] = y_table[idle][0];
+    }
 #ifndef BENCH_EMITTED
     if (registers[X + 10] != 0)
         render(x_table[idle], x_index_bits, x_bits, x_fourier, registers[X + 10]);
@@ -213,6 +219,7 @@ static void load(uint32_t variation)
         "", "load: DAC_BUSY", "load: DAC_OTHER_CONVERTER",
         "load: DAC_BAD_SCHEDULE", "load: DAC_BAD_TABLE",
         "load: DAC_BAD_PERIOD", "load: DAC_BAD_OUTPUT",
+        "load: DAC_OTHER_STORAGE",
     };
     dac_program p;
     const unsigned idle = dac_sequencer_idle(&sequencer);

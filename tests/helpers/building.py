@@ -39,6 +39,7 @@ PACKAGES = {
     "gcov": "gcc",
     "mips-linux-gnu-gcc": "gcc-mips-linux-gnu",
     "ninja": "ninja-build",
+    "node": "nodejs",
     "srec_cat": "srecord",
     "nm": "binutils",
     "qemu-mips": "qemu-user",

@@ -1,6 +1,7 @@
 """Which programs the C sequencer takes, and why it refuses others; checks of ``c_checks``."""
 
 from collections.abc import Iterator
+from ctypes import addressof, c_int32
 from dataclasses import replace
 
 from c_devices import Libraries, device_for, flat
@@ -11,6 +12,7 @@ from c_library import (
     BAD_TABLE,
     LOADED,
     OTHER_CONVERTER,
+    OTHER_STORAGE,
     Converter,
     CProgram,
     Device,
@@ -35,9 +37,12 @@ def _axis_refusals(axis: str, length: int) -> Iterator[tuple[int, str, object]]:
         ("dac_bits", 15), ("word_bits", 15), ("twos_complement", True),
     ))  # fmt: skip
     yield from ((BAD_TABLE, f"{axis}.{key}", value) for key, value in (
-        ("table", None), ("bits", 7), ("bits", 17), ("bits", 25), ("index_bits", 2), ("index_bits", 17),
+        ("table", None), ("bits", 7), ("index_bits", 2), ("index_bits", 17),
         ("index_bits", 0),
         ("length", length - 1), ("length", length + 1), ("length", 0),
+    ))  # fmt: skip
+    yield from ((OTHER_STORAGE, f"{axis}.{key}", value) for key, value in (
+        ("bits", 17), ("bits", 25), ("storage_bits", 0), ("storage_bits", 8), ("storage_bits", 32),
     ))  # fmt: skip
     yield from ((BAD_PERIOD, f"{axis}.{key}", value) for key, value in (
         ("phase_period", 0), ("phase_period", 1), ("phase_period", 99), ("hold_ticks", 0), ("hold_ticks", 2),
@@ -115,6 +120,8 @@ def the_largest_schedules(libraries: Libraries) -> None:
         program.schedule.frame_lines, program.y.phase_period = lines, ticks * lines
         assert device.load(program) == result, (ticks, lines)
         device.alive.append(axes)
+    blank = (c_int32 * ((1 << 17) + 2))()
+    device.alive.append(blank)
     for interpolated, index_bits, bits, length, result in (
         (1, 16, 24, 65536, LOADED), (1, 16, 25, 65536, BAD_TABLE), (1, 3, 8, 8, LOADED),
         (0, 0, 24, 131072, LOADED), (0, 0, 24, 131073, BAD_TABLE),
@@ -123,10 +130,23 @@ def the_largest_schedules(libraries: Libraries) -> None:
         ticks = 32 if interpolated else length
         program, axes = library.program(flat(1, replace(flat(1).schedule, ticks=ticks, lines=1, pixels=1, **none)))
         program.x.index_bits, program.x.length, program.x.bits = index_bits, length, bits
+        program.x.table = addressof(blank)
         program.x.gain_q = 16 + bits + min(4, 25 - bits) - 16
         program.x.offset_word = 0
         assert device.load(program) == result, (interpolated, index_bits, bits, length)
         device.alive.append(axes)
+
+
+def the_first_word_again(libraries: Libraries) -> None:
+    """A table is refused without the word that runs and steps read behind the last one."""
+    for library in libraries:
+        device = device_for(library, flat(1))
+        for axis in (0, 1):
+            for last, result in ((1, BAD_TABLE), (-1, BAD_TABLE), (0, LOADED)):
+                program, axes = library.program(flat(1))
+                axes[axis].words[len(axes[axis].words) - 1] = axes[axis].words[0] + last
+                assert device.load(program) == result, (axis, last)
+                device.alive.append(axes)
 
 
 def offsets_that_overflow(libraries: Libraries) -> None:

@@ -127,6 +127,14 @@ def test_each_harmonic_is_divided_by_the_dynamics(example: Plan) -> None:
     assert example.y.drive_series is example.y.target
 
 
+def test_an_axis_that_steps_is_in_the_middle_of_its_line_where_a_ramp_would_be(tmp_path: Path) -> None:
+    """The hold is a line long: the code of line j is what the target has at j + 1/2, and a row is at its code."""
+    ramp, step = (plan_of(tmp_path, {"y.motion": f'"{motion}"'}).y for motion in ("ramp", "step"))
+    j = np.arange(200)
+    assert step.series.value(j / 200) == pytest.approx(step.target.value((j + 0.5) / 200), abs=1e-12)
+    assert step.codes(0, 250_000)[::1250] == pytest.approx(ramp.codes(0, 250_000)[625::1250], abs=2.0)
+
+
 def test_the_boost_limit_holds_back_and_says_so(tmp_path: Path) -> None:
     limits = {"limits.max_scaling_error_percent": ""}
     line = plan_of(tmp_path, limits, {"x.resonance.frequency_hz": "4000.0", "x.resonance.max_boost_db": "3.0"}).x

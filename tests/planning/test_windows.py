@@ -107,6 +107,12 @@ def test_what_remains_is_said(tmp_path: Path) -> None:
         shown = run("show", tmp_path / "scan.toml", "--no-plot").out
         assert "are up to 0.000 % of the line apart" in shown
         assert "makes them match" not in shown
+    assert run("check", tmp_path / "scan.toml").err == ""
+    # More than a quarter of a pixel is a warning of `check`, at the key that makes the line.
+    setup_of(tmp_path, {"timing.ticks_per_line": "1250", "timing.pixels": "300"})
+    warned = run("check", tmp_path / "scan.toml")
+    assert warned.status == 0
+    assert "timing.ticks_per_line: the same pixel of trace and retrace shows places up to 0.08 % of" in warned.err
     setup_of(tmp_path, {"x.band_limit.directions": '"forward"'})
     shown = run("show", tmp_path / "scan.toml", "--no-plot").out
     assert "imaged are ticks 62..561\n" in shown

@@ -12,6 +12,7 @@ from fine_time import PARTS, followed, linear_setup, mismatch, staircase
 from numpy.typing import NDArray
 
 from tablegen.config.load import Setup
+from tablegen.planning import line_plan
 from tablegen.planning.line_plan import Plan, make_plan
 from tablegen.planning.windows import retrace_mismatch
 from tablegen.refinement.round import Options, refine
@@ -88,12 +89,19 @@ def test_the_virtual_scanner_holds_its_codes(tmp_path: Path) -> None:
         assert (apart < 0.02) != resonance
 
 
-def test_what_is_played_is_measured_at_its_time(tmp_path: Path) -> None:
-    """An ideal scanner: residuals about its line are those of the band limit, at a tick of 0.2 % of the line."""
-    plan = planned(tmp_path, SIZES[0])
-    error = run_line(plan.x, linear()).imaged
-    for branch in (error.forward, error.backward):
-        assert max(map(abs, branch.residual_range)) < AGREES
+def test_what_is_played_is_measured_at_its_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An ideal scanner: residuals about its line are those of the band limit, at a tick of 0.2 % of the line.
+
+    The negative control is a build that leaves the hold as it is: both directions are off by half a tick.
+    """
+    limits = []
+    for undone in (True, False):
+        if not undone:
+            monkeypatch.setattr(line_plan, "hold_inverse", lambda n, *_, **__: (np.ones(n), np.zeros(n)))
+        error = run_line(planned(tmp_path, SIZES[0]).x, linear()).imaged
+        limits.append([max(map(abs, branch.residual_range)) for branch in (error.forward, error.backward)])
+    assert max(limits[0]) < AGREES
+    assert limits[1] == pytest.approx([0.1, 0.1], rel=0.02)
 
 
 def _refined(setup: Setup, axis: VirtualAxis, triggered: bool, rounds: int) -> Setup:

@@ -4,11 +4,13 @@ import re
 from pathlib import Path
 from typing import Any
 
+from tablegen.device.widths import least_widths
 from tablegen.emit.constants import axis_constants, scan_constants, sequence_constants
 from tablegen.emit.content import AxisContent, Content
 from tablegen.emit.format import Comparison, Format, differing
 from tablegen.emit.memory import memory_files
 from tablegen.emit.templates import comment_safe, template
+from tablegen.reading import BUILD_FILE, read_text
 from tablegen.resources import resource_folder, verilog_runtime
 
 _LOCALPARAM = re.compile(r"^localparam\s[^=]*?(\w+)\s*=\s*(.*?)\s*;", re.MULTILINE)
@@ -67,7 +69,7 @@ def wrong_constants(folder: Path, content: Content) -> tuple[int, list[str]]:
     """How many constants the Verilog header is to have, and those that it has not, or not so."""
     name, wanted = f"{content.name}.vh", _constants(content)
     try:
-        text = (folder / name).read_text("utf-8", "replace")
+        text = read_text(folder / name, BUILD_FILE, errors="replace")
     except OSError as error:
         return len(wanted), [f"{name}: cannot be read: {error.strerror or error}"]
     found: dict[str, int | str] = {key: _value(value) for key, value in _LOCALPARAM.findall(text)}
@@ -81,7 +83,7 @@ def wrong_memories(folder: Path, content: Content) -> tuple[int, list[str]]:
         wanted = right.decode("ascii").split()
         count += len(wanted)
         try:
-            found = (folder / name).read_text("ascii", "replace").split()
+            found = read_text(folder / name, BUILD_FILE, "ascii", "replace").split()
         except OSError as error:
             wrong.append(f"{name}: cannot be read: {error.strerror or error}")
             continue
@@ -108,6 +110,7 @@ def _context(content: Content) -> dict[str, Any]:
         "scanner": comment_safe(content.scanner),
         "summary": content.summary,
         "sequence": sequence_constants(content.schedule),
+        "widths": least_widths(content.schedule, content.y.program),
         "program_memory": f"{content.name}_program.mem",
         "sine_memory": f"{content.name}_sine.mem",
         "sine": content.sine_index_bits,
@@ -129,6 +132,7 @@ def _constants(content: Content) -> dict[str, int | str]:
     """Every localparam of the header: numbers, and names of files."""
     name = content.name
     own: dict[str, int | str] = {"HASH": int(content.hash, 16), **scan_constants(content)}
+    own |= least_widths(content.schedule, content.y.program)
     own["PROGRAM_FILE"] = f"{name}_program.mem"
     if content.sine_index_bits:
         own["SINE_FILE"] = f"{name}_sine.mem"

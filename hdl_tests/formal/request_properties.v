@@ -1,0 +1,180 @@
+// What requests do to a scan: `park` and `reset` stop it whatever else comes on their clock, a trigger starts it only if
+// it was armed, a counted scan plays its frames and no tick more, and lines are counted round a frame.
+//
+// dac_scan and dac_bank as dac_sequencer wires them. The host may do anything on any clock; of a program that it commits
+// is asked what dac_fit asks of it: lines of at least 8 ticks, at least one line, and both within their counters. The
+// reference counts ticks, lines and frames by itself.
+
+`default_nettype none
+
+module request_properties #(
+    parameter TICK_BITS = 4,
+    parameter LINE_BITS = 2,
+    parameter FRAME_BITS = 3
+) (
+    input wire                  clock,
+    input wire                  reset,
+    input wire                  write,
+    input wire [3:0]            write_address,
+    input wire [31:0]           write_data,
+    input wire                  commit,
+    input wire                  withdraw,
+    input wire                  arm,
+    input wire [FRAME_BITS-1:0] arm_frames,
+    input wire                  trigger,
+    input wire                  park,
+    input wire                  tick,
+    input wire                  drained
+);
+    wire take, committed, loaded, bank, writable, armed, running, tick_out, load, runs, begins, line, frame, y_advance;
+    wire [TICK_BITS-1:0] tick_number;
+    wire [LINE_BITS-1:0] line_number;
+    dac_bank banks (
+        .clock(clock), .reset(reset), .commit(commit), .withdraw(withdraw), .take(take), .drained(drained),
+        .bank(bank), .committed(committed), .loaded(loaded), .writable(writable)
+    );
+    dac_scan #(.TICK_BITS(TICK_BITS), .LINE_BITS(LINE_BITS), .FRAME_BITS(FRAME_BITS)) scan (
+        .clock(clock), .reset(reset), .write(write && writable), .write_address(write_address), .write_data(write_data),
+        .tick(tick), .arm(arm), .arm_frames(arm_frames), .trigger(trigger), .park(park), .committed(committed),
+        .loaded(loaded), .take(take), .armed(armed), .running(running), .tick_out(tick_out), .load(load), .runs(runs),
+        .begins(begins), .line(line), .frame(frame), .y_advance(y_advance), .tick_number(tick_number),
+        .line_number(line_number)
+    );
+
+    // The schedule that was written, and the one that plays.
+    reg [TICK_BITS:0] written_ticks, ticks;
+    reg [LINE_BITS:0] written_lines, lines;
+    initial begin
+        written_ticks = 0;
+        written_lines = 0;
+        ticks = 8;
+        lines = 1;
+    end
+    wire [TICK_BITS:0] ticks_now = write && writable && write_address == 4'd0 ? write_data[TICK_BITS:0] : written_ticks;
+    wire [LINE_BITS:0] lines_now = write && writable && write_address == 4'd1 ? write_data[LINE_BITS:0] : written_lines;
+    always @* if (commit && writable) begin
+        assume (ticks_now >= 8 && ticks_now <= (1 << TICK_BITS));
+        assume (lines_now >= 1 && lines_now <= (1 << LINE_BITS));
+    end
+
+    // The reference: tick k of line j, frames that this scan has played, and how many it is to play; 0 is without end.
+    reg plays, is_armed;
+    reg [TICK_BITS:0] k;
+    reg [LINE_BITS:0] j;
+    reg [FRAME_BITS-1:0] frames, wanted, asked;
+    initial begin
+        plays = 0;
+        is_armed = 0;
+        k = 0;
+        j = 0;
+        frames = 0;
+        wanted = 0;
+        asked = 0;
+    end
+    wire takes = tick && committed && (!plays || k == 0);
+    wire [LINE_BITS:0] this_j = takes ? 0 : j;  // of the tick of this clock
+    wire line_ends = k + 1 == ticks;            // a line of 8 ticks or more ends with another tick than it begins with
+    wire frame_ends = line_ends && this_j + 1 == lines;
+    wire ends = tick && plays && frame_ends && wanted != 0 && frames + 1 == wanted;
+    wire goes_on = plays && !ends;
+    wire starts = trigger && (is_armed || arm) && !goes_on && (loaded || takes) && !park && !reset;
+    always @(posedge clock) begin
+        written_ticks <= ticks_now;
+        written_lines <= lines_now;
+        if (takes) begin
+            ticks <= written_ticks;
+            lines <= written_lines;
+        end
+        plays <= (goes_on || starts) && !park && !reset;
+        is_armed <= (is_armed || arm) && !starts && !park && !reset;
+        if (arm) asked <= arm_frames;
+        if (starts) begin
+            k <= 0;
+            j <= 0;
+            frames <= 0;
+            wanted <= arm ? arm_frames : asked;
+        end else if (tick && plays) begin
+            k <= line_ends ? 0 : k + 1;
+            j <= !line_ends ? this_j : frame_ends ? 0 : this_j + 1;
+            if (frame_ends && wanted != 0) frames <= frames + 1;
+        end
+    end
+
+    // The properties, of ports alone: what was asked on the clock before, and what is on this one.
+    reg before, was_stopped, was_running, was_armed, was_arm, was_trigger, was_loaded, was_tick, was_playing, was_ended;
+    reg [TICK_BITS:0] was_k;
+    reg [LINE_BITS:0] was_j;
+    initial before = 0;
+    always @(posedge clock) begin
+        before <= 1;
+        was_stopped <= park || reset;
+        was_running <= running;
+        was_armed <= armed;
+        was_arm <= arm;
+        was_trigger <= trigger;
+        was_loaded <= loaded || take;
+        was_tick <= tick;
+        was_playing <= plays;
+        was_ended <= ends;
+        was_k <= k;
+        was_j <= this_j;
+    end
+    always @* if (before) begin
+        // After a park or a reset nothing plays on the next tick, and nothing is armed.
+        if (was_stopped) assert (!running && !armed);
+        // A scan begins by a trigger of an armed device with a program, and by nothing else.
+        if (running && !was_running) assert (was_trigger && (was_armed || was_arm) && was_loaded && !was_stopped);
+        // A trigger is taken once.
+        if (running && !was_running) assert (!armed);
+        if (armed && !was_armed) assert (was_arm);
+        // A counted scan is over with the last tick of its last frame, and not before.
+        if (was_ended && !was_trigger) assert (!running);
+        if (was_running && !running) assert (was_stopped || was_ended);
+        assert (running == plays && armed == is_armed);
+        // What a tick is.
+        assert (tick_out == was_tick);
+        assert (runs == (was_tick && was_playing));
+        if (runs) begin
+            assert (tick_number == was_k && line_number == was_j);
+            assert ({1'b0, line_number} < lines && {1'b0, tick_number} < ticks);
+            assert (line == (was_k == 0) && frame == (was_k == 0 && was_j == 0));
+        end else
+            assert (!line && !frame && !begins && !y_advance);
+    end
+
+
+`ifndef PROPERTIES_ALONE
+    // What makes it inductive.
+    wire scan__first, scan__last, scan__top, scan__bottom, scan__last_frame, scan__endless, scan__starts;
+    wire [TICK_BITS-1:0] scan__at_tick, scan__next_to_last_tick;
+    wire [TICK_BITS:0] scan__idle_ticks;
+    wire [LINE_BITS-1:0] scan__at_line, scan__last_line_number;
+    wire [LINE_BITS:0] scan__idle_lines;
+    wire [FRAME_BITS-1:0] scan__frames_left, scan__armed_frames;
+    always @* begin
+        assert (scan__idle_ticks == written_ticks && scan__idle_lines == written_lines);
+        if (committed) assert (written_ticks >= 8 && written_ticks <= (1 << TICK_BITS));
+        if (committed) assert (written_lines >= 1 && written_lines <= (1 << LINE_BITS));
+        if (loaded) begin
+            assert ({1'b0, scan__next_to_last_tick} + 2 == ticks && ticks >= 8 && ticks <= (1 << TICK_BITS));
+            assert ({1'b0, scan__last_line_number} + 1 == lines && lines >= 1 && lines <= (1 << LINE_BITS));
+        end
+        if (is_armed) assert (scan__armed_frames == asked);
+        if (plays) begin
+            assert (loaded);
+            assert (k == {1'b0, scan__at_tick} && k < ticks);
+            assert (j == {1'b0, scan__at_line} && j < lines);
+            assert (scan__first == (k == 0));
+            assert (scan__last == (k == ticks - 1));
+            assert (scan__top == (j == 0) || (scan__starts && k == 0));
+            if (scan__starts) assert (k == 0 && j == 0);
+            if (k >= 2) assert (scan__bottom == (j == lines - 1));
+            assert (scan__endless == (wanted == 0));
+            if (wanted != 0) assert (frames < wanted && scan__frames_left == wanted - frames);
+            if (k >= 1) assert (scan__last_frame == (wanted != 0 && wanted - frames == 1));
+        end
+    end
+`endif
+endmodule
+
+`default_nettype wire

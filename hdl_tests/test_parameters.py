@@ -1,0 +1,236 @@
+"""Illegal parameters stop the elaboration with their reason, in Icarus, Verilator and yosys; legal ones do not.
+
+An illegal value is one beyond the range that a guard gives; the values at both ends of it elaborate. No parameter of a
+module that a design instantiates is without its guard.
+"""
+
+import re
+import subprocess
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+from building import REPOSITORY, tool
+from test_lint import MODULES, SOURCES, lint
+
+MODULE = re.compile(r"^module (\w+) #\((.*?)^\)", re.MULTILINE | re.DOTALL)
+GUARD = re.compile(r"^ +(\w+) stop \(\);$", re.MULTILINE)
+PUBLIC = ("dac_sequencer", "program_loader", "dac_boot", "dac_fourier", "dac_coding", "dac_spi", "dac_axi_stream")
+Values = Mapping[str, int | str]
+
+FOURIER = {"FOURIER": 1, "X_WORD_BITS": 32, "Y_WORD_BITS": 32, "X_WORDS": 3, "Y_WORDS": 3, "X_HARMONICS": 1}
+BOOT = FOURIER | {"Y_HARMONICS": 1}
+# What is illegal, and the reason that a tool gives.
+ILLEGAL: dict[str, list[tuple[Values, str]]] = {
+    "dac_sequencer": [
+        ({"DAC_BITS": 7}, "DAC_BITS_is_not_8_to_24"),
+        ({"DAC_BITS": 25}, "DAC_BITS_is_not_8_to_24"),
+        ({"X_INTERPOLATED": 2}, "X_INTERPOLATED_is_not_0_to_1"),
+        ({"Y_INTERPOLATED": -1}, "Y_INTERPOLATED_is_not_0_to_1"),
+        ({"X_INDEX_BITS": 17}, "X_INDEX_BITS_is_not_2_to_16"),
+        ({"Y_INDEX_BITS": 1}, "Y_INDEX_BITS_is_not_2_to_16"),
+        ({"X_WORD_BITS": 25}, "X_WORD_BITS_is_not_8_to_24"),
+        ({"Y_WORD_BITS": 7}, "Y_WORD_BITS_is_not_8_to_24"),
+        ({"TICK_BITS": 2}, "TICK_BITS_is_not_3_to_30"),
+        ({"TICK_BITS": 31}, "TICK_BITS_is_not_3_to_30"),
+        ({"LINE_BITS": 0}, "LINE_BITS_is_not_1_to_16"),
+        ({"LINE_BITS": 17}, "LINE_BITS_is_not_1_to_16"),
+        ({"PERIOD_BITS": 0}, "PERIOD_BITS_is_not_1_to_31"),
+        ({"PERIOD_BITS": 32}, "PERIOD_BITS_is_not_1_to_31"),
+        ({"COUNT_BITS": 1}, "COUNT_BITS_is_not_2_to_32"),
+        ({"COUNT_BITS": 33}, "COUNT_BITS_is_not_2_to_32"),
+        ({"PLAIN_MULTIPLIER": 2}, "PLAIN_MULTIPLIER_is_not_0_to_1"),
+        ({"LOW_AREA": -1}, "LOW_AREA_is_not_0_to_1"),
+        ({"FOURIER": 2}, "FOURIER_is_not_0_to_1"),
+        ({"HARMONICS": 0}, "HARMONICS_is_not_1_to_512"),
+        ({"HARMONICS": 513, "FOURIER": 1}, "HARMONICS_is_not_1_to_512"),
+        ({"X_INDEX_BITS": 2, "FOURIER": 1}, "X_INDEX_BITS_is_not_3_to_16"),
+        ({"X_POWER_UP_CODE": 65536}, "X_POWER_UP_CODE_has_more_than_DAC_BITS"),
+        ({"Y_POWER_UP_CODE": 256, "DAC_BITS": 8}, "Y_POWER_UP_CODE_has_more_than_DAC_BITS"),
+    ],
+    "program_loader": [
+        ({"CLOCKS_PER_BIT": 7}, "CLOCKS_PER_BIT_is_not_8_to_65536"),
+        ({"MEMORY_BYTES": 1024}, "MEMORY_BYTES_is_no_power_of_two"),
+        ({"MEMORY_BYTES": 3000}, "MEMORY_BYTES_is_no_power_of_two"),
+        ({"WINDOW": 0}, "WINDOW_is_not_1_to_255"),
+        ({"DAC_BITS": 7}, "DAC_BITS_is_not_8_to_24"),
+        ({"X_INTERPOLATED": 2}, "X_INTERPOLATED_is_not_0_to_1"),
+        ({"Y_INTERPOLATED": 2}, "Y_INTERPOLATED_is_not_0_to_1"),
+        ({"X_INDEX_BITS": 17}, "X_INDEX_BITS_is_not_2_to_16"),
+        ({"Y_INDEX_BITS": 17}, "Y_INDEX_BITS_is_not_2_to_16"),
+        ({"X_WORD_BITS": 25}, "X_WORD_BITS_is_not_8_to_24"),
+        ({"Y_WORD_BITS": 25}, "Y_WORD_BITS_is_not_8_to_24"),
+        ({"TICK_BITS": 31}, "TICK_BITS_is_not_3_to_30"),
+        ({"LINE_BITS": 17}, "LINE_BITS_is_not_1_to_16"),
+        ({"FOURIER": 2}, "FOURIER_is_not_0_to_1"),
+        ({"HARMONICS": 0}, "HARMONICS_is_not_1_to_512"),
+        ({"CONVERTER": 15}, "CONVERTER_is_no_word_of_DAC_BITS_or_more"),
+        ({"X_CODE_MIN": 5, "X_CODE_MAX": 4}, "X_CODE_MIN_to_X_CODE_MAX_is_no_range_of_DAC_BITS"),
+        ({"Y_CODE_MAX": 65536}, "Y_CODE_MIN_to_Y_CODE_MAX_is_no_range_of_DAC_BITS"),
+        ({"X_MAX_STEP": 0}, "X_MAX_STEP_is_not_1_to_the_highest_code"),
+        ({"Y_MAX_STEP": 65536}, "Y_MAX_STEP_is_not_1_to_the_highest_code"),
+    ],
+    "dac_boot": [
+        ({"FOURIER": 2}, "FOURIER_is_not_0_to_1"),
+        ({"X_WORDS": 0}, "X_WORDS_is_not_1_to_65536"),
+        ({"Y_WORDS": 65537}, "Y_WORDS_is_not_1_to_65536"),
+        ({"X_WORD_BITS": 7}, "X_WORD_BITS_of_a_table_is_not_8_to_24"),
+        ({"Y_WORD_BITS": 25}, "Y_WORD_BITS_of_a_table_is_not_8_to_24"),
+        ({**BOOT, "X_WORD_BITS": 16}, "X_WORD_BITS_of_Fourier_words_is_not_32"),
+        ({**BOOT, "Y_WORD_BITS": 31}, "Y_WORD_BITS_of_Fourier_words_is_not_32"),
+        ({**BOOT, "X_HARMONICS": 0}, "X_HARMONICS_is_not_1_to_512"),
+        ({**BOOT, "Y_HARMONICS": 513, "Y_WORDS": 1027}, "Y_HARMONICS_is_not_1_to_512"),
+        ({**BOOT, "X_WORDS": 4}, "X_WORDS_is_not_two_X_HARMONICS_and_one"),
+        ({**BOOT, "Y_HARMONICS": 2}, "Y_WORDS_is_not_two_Y_HARMONICS_and_one"),
+    ],
+    "dac_fourier": [
+        ({"X_INDEX_BITS": 2}, "X_INDEX_BITS_is_not_3_to_16"),
+        ({"Y_INDEX_BITS": 17}, "Y_INDEX_BITS_is_not_3_to_16"),
+        ({"X_WORD_BITS": 7}, "X_WORD_BITS_is_not_8_to_24"),
+        ({"Y_WORD_BITS": 25}, "Y_WORD_BITS_is_not_8_to_24"),
+        ({"HARMONICS": 0}, "HARMONICS_is_not_1_to_512"),
+        ({"MULTIPLIER": 2}, "MULTIPLIER_is_not_0_to_1"),
+    ],
+    "dac_coding": [
+        ({"BITS": 1}, "BITS_is_not_2_to_32"),
+        ({"BITS": 18}, "WORD_BITS_is_not_BITS_to_64"),
+        ({"TWOS_COMPLEMENT": 2}, "TWOS_COMPLEMENT_is_not_0_to_1"),
+        ({"LEFT_ALIGNED": -1}, "LEFT_ALIGNED_is_not_0_to_1"),
+    ],
+    "dac_spi": [
+        ({"FRAME_BITS": 33}, "FRAME_BITS_is_not_2_to_32"),
+        ({"WORD_BITS": 17}, "word_is_not_inside_FRAME_BITS"),
+        ({"DATA_LSB": 1}, "word_is_not_inside_FRAME_BITS"),
+        ({"X_PREFIX": 65536}, "X_PREFIX_has_more_than_FRAME_BITS"),
+        ({"Y_PREFIX": 65536}, "Y_PREFIX_has_more_than_FRAME_BITS"),
+        ({"TOPOLOGY": 4}, "TOPOLOGY_is_not_0_to_3"),
+        ({"Y_FIRST": 2}, "Y_FIRST_is_not_0_to_1"),
+        ({"CPOL": 2}, "CPOL_is_not_0_to_1"),
+        ({"CPHA": 2}, "CPHA_is_not_0_to_1"),
+        ({"HALF_PERIOD": 0}, "HALF_PERIOD_is_not_1_to_65536"),
+        ({"GAP": 0}, "GAP_is_not_1_to_65536"),
+        ({"LDAC_CLOCKS": -1}, "LDAC_CLOCKS_is_not_0_to_65536"),
+        ({"LDAC_DELAY": 0}, "LDAC_DELAY_is_not_1_to_65536"),
+        ({"LDAC_HELD": 2}, "LDAC_HELD_is_not_0_to_1"),
+    ],
+    "dac_axi_stream": [
+        ({"WORD_BITS": 0}, "WORD_BITS_is_not_1_to_64"),
+        ({"MARKER_BITS": 65}, "MARKER_BITS_is_not_1_to_64"),
+        ({"LANE_BITS": 17}, "LANE_BITS_follows_from_WORD_BITS"),
+    ],
+}
+# Everything at the lower end of its range, and at the upper.
+SMALL = {"X_INDEX_BITS": 2, "Y_INDEX_BITS": 2, "X_WORD_BITS": 8, "Y_WORD_BITS": 8, "DAC_BITS": 8}
+LARGE = {"X_INDEX_BITS": 16, "Y_INDEX_BITS": 16, "X_WORD_BITS": 24, "Y_WORD_BITS": 24, "DAC_BITS": 24}
+TOP = "64'hffffff"
+LEGAL: dict[str, list[Values]] = {
+    "dac_sequencer": [
+        {**SMALL, "TICK_BITS": 3, "LINE_BITS": 1, "PERIOD_BITS": 1, "COUNT_BITS": 2, "HARMONICS": 1},
+        {**SMALL, "TICK_BITS": 3, "LINE_BITS": 1, "PERIOD_BITS": 1, "COUNT_BITS": 2, "LOW_AREA": 1},
+        {**SMALL, "X_INDEX_BITS": 3, "Y_INDEX_BITS": 3, "FOURIER": 1, "HARMONICS": 1, "X_INTERPOLATED": 0},
+        {**LARGE, "TICK_BITS": 30, "LINE_BITS": 16, "PERIOD_BITS": 31, "COUNT_BITS": 32, "X_POWER_UP_CODE": TOP},
+        {**LARGE, "TICK_BITS": 30, "LOW_AREA": 1, "FOURIER": 1, "HARMONICS": 512, "Y_POWER_UP_CODE": TOP},
+    ],
+    "program_loader": [
+        {**SMALL, "CLOCKS_PER_BIT": 8, "MEMORY_BYTES": 2048, "WINDOW": 1, "TICK_BITS": 3, "LINE_BITS": 1},
+        {**LARGE, "MEMORY_BYTES": 65536, "WINDOW": 255, "TICK_BITS": 30, "FOURIER": 1, "HARMONICS": 512},
+    ],
+    "dac_boot": [
+        {"X_WORDS": 1, "Y_WORDS": 1, "X_WORD_BITS": 8, "Y_WORD_BITS": 24},
+        BOOT,
+        {"X_WORDS": 65536, "Y_WORDS": 65536},
+    ],
+    "dac_fourier": [
+        {"X_INDEX_BITS": 3, "Y_INDEX_BITS": 3, "X_WORD_BITS": 8, "Y_WORD_BITS": 8, "HARMONICS": 1},
+        {"X_INDEX_BITS": 16, "Y_INDEX_BITS": 16, "X_WORD_BITS": 24, "Y_WORD_BITS": 24, "HARMONICS": 512},
+    ],
+    "dac_coding": [{"BITS": 2, "WORD_BITS": 2}, {"BITS": 32, "WORD_BITS": 64, "LEFT_ALIGNED": 1}],
+    "dac_spi": [
+        {"WORD_BITS": 2, "FRAME_BITS": 2, "LDAC_CLOCKS": 0, "LDAC_DELAY": 1, "GAP": 1},
+        {"WORD_BITS": 32, "FRAME_BITS": 32, "X_PREFIX": "32'hffffffff", "TOPOLOGY": 3, "GAP": 65536},
+    ],
+    "dac_axi_stream": [{"WORD_BITS": 1, "MARKER_BITS": 1}, {"WORD_BITS": 64, "MARKER_BITS": 64}],
+}
+
+
+def icarus(top: str, values: Values, folder: Path) -> str:
+    """What it says; nothing where it compiles."""
+    given = [f"-P{top}.{name}={value}" for name, value in values.items()]
+    command = ["iverilog", "-g2005", "-Wall", "-o", folder / "out", "-s", top, *given, *SOURCES]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert (done.returncode == 0) == (done.stderr == ""), done.stderr
+    return done.stderr
+
+
+def yosys(top: str, values: Values, modules: Path = MODULES) -> str:
+    given = " ".join(f"-chparam {name} {value}" for name, value in values.items())
+    script = f"read_verilog -defer {modules}/*.v; hierarchy -check -top {top} {given}"
+    done = subprocess.run([tool("yosys"), "-q", "-p", script], capture_output=True, text=True)
+    assert (done.returncode == 0) == ("ERROR" not in done.stderr), done.stderr
+    return done.stderr
+
+
+CASES = [(top, values, reason) for top, cases in ILLEGAL.items() for values, reason in cases]
+NAMES = [f"{top}-{reason}-{index}" for index, (top, _, reason) in enumerate(CASES)]
+
+
+@pytest.mark.parametrize(("top", "values", "reason"), CASES, ids=NAMES)
+def test_an_illegal_parameter_is_refused_by_icarus(top: str, values: Values, reason: str, tmp_path: Path) -> None:
+    assert re.search(rf"error: Unknown module type: \w*{reason}", icarus(top, values, tmp_path))
+
+
+@pytest.mark.common
+@pytest.mark.parametrize(("top", "values", "reason"), CASES, ids=NAMES)
+def test_an_illegal_parameter_is_refused_by_verilator(top: str, values: Values, reason: str) -> None:
+    assert re.search(rf"%Error-MODMISSING: .*Cannot find file containing module: '\w*{reason}", lint(top, values))
+
+
+@pytest.mark.rest
+@pytest.mark.parametrize(("top", "values", "reason"), CASES, ids=NAMES)
+def test_an_illegal_parameter_is_refused_by_yosys(top: str, values: Values, reason: str) -> None:
+    assert re.search(rf"ERROR: Module `\\\w*{reason}\w*' referenced in module", yosys(top, values))
+
+
+LEGAL_CASES = [(top, values) for top, cases in LEGAL.items() for values in cases]
+
+
+@pytest.mark.common
+@pytest.mark.parametrize(("top", "values"), LEGAL_CASES)
+def test_legal_ones_at_both_ends_are_taken(top: str, values: Values, tmp_path: Path) -> None:
+    assert lint(top, values) == ""
+    assert icarus(top, values, tmp_path) == ""
+
+
+@pytest.mark.rest
+@pytest.mark.parametrize(("top", "values"), LEGAL_CASES)
+def test_legal_ones_at_both_ends_are_taken_by_yosys(top: str, values: Values) -> None:
+    assert yosys(top, values) == ""
+
+
+@pytest.mark.parametrize("top", PUBLIC)
+def test_every_parameter_has_its_guard_and_every_guard_its_case(top: str) -> None:
+    """But names of files and hashes, of which any will do."""
+    text = (MODULES / f"{top}.v").read_text("utf-8")
+    found = MODULE.search(text)
+    assert found is not None
+    parameters = set(re.findall(r"parameter (?:\[[^]]*\] )?(\w+)", found[2])) - {"UPDATE_RATE", "BOOT_HASH"}
+    guards = GUARD.findall(text)
+    assert guards
+    for name in parameters:
+        assert name.endswith("_FILE") or any(name in guard for guard in guards) or name in _conditions(text), name
+    cases = [reason for _, reason in ILLEGAL[top]]
+    for guard in guards:
+        assert any(reason in guard for reason in cases), guard
+
+
+def _conditions(text: str) -> str:
+    return "".join(re.findall(r"if \(([^\n]*(?:\n[^\n]*)?)\) begin : guard_", text))
+
+
+def test_the_page_lists_every_parameter_and_its_range() -> None:
+    page = (REPOSITORY / "docs" / "verilog.md").read_text("utf-8")
+    for top in ("dac_sequencer", "program_loader"):
+        found = MODULE.search((MODULES / f"{top}.v").read_text("utf-8"))
+        assert found is not None
+        for name in re.findall(r"parameter (?:\[[^]]*\] )?(\w+)", found[2]):
+            assert f"`{name}`" in page, name

@@ -1,0 +1,92 @@
+"""Whether a program fits the registers of a device of given widths, and the least widths that it fits.
+
+The arithmetic of ``dac_fit.v``, which refuses the commit of any other program: a value that does not fit would be
+another one in its register. Widths are the parameters of ``dac_sequencer``, in lower case.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from tablegen.device.registers import AXIS_WORDS, OFFSET_LOW_BITS, PAGE_WORDS, SCAN_WORDS
+from tablegen.device.schedule import Schedule
+from tablegen.fixedpoint.interpolation import guard_bits
+from tablegen.fixedpoint.program import Program
+
+LEAST_LINE_TICKS = 8
+
+
+@dataclass(frozen=True)
+class AxisWidths:
+    """Of an axis: a table of 2^``index_bits`` words, periods below 2^``period_bits``; no harmonics, no renderer."""
+
+    interpolated: bool
+    index_bits: int
+    word_bits: int
+    period_bits: int
+
+
+@dataclass(frozen=True)
+class Widths:
+    """Of a device; at most ``harmonics`` are rendered, 0 where it has no renderer."""
+
+    dac_bits: int
+    tick_bits: int
+    line_bits: int
+    x: AxisWidths
+    y: AxisWidths
+    harmonics: int = 0
+
+
+def misfits(words: Sequence[int], widths: Widths) -> list[str]:
+    """The words of a program that do not fit, as ``scan.line_ticks`` or ``y.gain``, in order of address.
+
+    ``words`` are those of ``program_words``, unsigned, 48 of them.
+    """
+    pages = [words[page * PAGE_WORDS : (page + 1) * PAGE_WORDS] for page in range(3)]
+    found = [f"scan.{name}" for name, word in zip(SCAN_WORDS, pages[0], strict=False) if not _scan(name, word, widths)]
+    for axis, page, own in (("x", pages[1], widths.x), ("y", pages[2], widths.y)):
+        wrong = (name for name, word in zip(AXIS_WORDS, page, strict=False) if not _axis(name, word, own, widths))
+        found += [f"{axis}.{name}" for name in wrong]
+    return found
+
+
+def _scan(name: str, word: int, widths: Widths) -> bool:
+    if name == "line_ticks":
+        return LEAST_LINE_TICKS <= word <= 1 << widths.tick_bits
+    if name == "frame_lines":
+        return 1 <= word <= 1 << widths.line_bits
+    if name == "settle_lines":
+        return word < 1 << 8
+    if name == "y_steps":
+        return word < 1 << 1
+    return word < 1 << ((widths.line_bits if name.startswith(("up", "down")) else widths.tick_bits) + 1)
+
+
+def _axis(name: str, word: int, own: AxisWidths, widths: Widths) -> bool:
+    if name == "phase_remainder":
+        return not own.interpolated or word < 1 << own.period_bits
+    if name == "phase_period":
+        return word < 1 << own.period_bits if own.interpolated else word <= 1 << own.index_bits
+    if name == "gain":
+        return _is_signed(word, 18)
+    if name == "offset_low":
+        return word < 1 << OFFSET_LOW_BITS
+    if name == "offset_high":
+        return _is_signed(word, own.word_bits + guard_bits(own.word_bits))
+    if name == "harmonics":
+        return not widths.harmonics or word <= widths.harmonics
+    return name == "phase_step" or word < 1 << widths.dac_bits
+
+
+def _is_signed(word: int, bits: int) -> bool:
+    value = word - (word >> 31 << 32)
+    return -(1 << (bits - 1)) <= value < 1 << (bits - 1)
+
+
+def least_widths(schedule: Schedule, y: Program) -> dict[str, int]:
+    """The least TICK_BITS, LINE_BITS and PERIOD_BITS of a ``dac_sequencer`` that plays a program, by name."""
+    return {
+        "TICK_BITS": max((schedule.ticks - 1).bit_length(), 3),
+        "LINE_BITS": max((schedule.lines - 1).bit_length(), 1),
+        "PERIOD_BITS": y.phase.ticks.bit_length(),
+    }
