@@ -94,11 +94,11 @@ class ManifestLine(Struct):
 
 
 class ManifestSeries(Struct):
-    """A waveform w(t) in float64."""
+    """A waveform w(t) in float64; a layer has no mean."""
 
-    a0: float
     a: list[float]
     b: list[float]
+    a0: float = 0.0
 
 
 class ManifestFourier(Struct):

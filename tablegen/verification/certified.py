@@ -48,7 +48,7 @@ def at(series: ManifestSeries, t: Floats, derivative: int = 0) -> Floats:
 
 def played_series(axis: ManifestAxis) -> ManifestSeries:
     """The w that is played."""
-    return ManifestSeries(axis.fourier.a0, axis.fourier.a, axis.fourier.b)
+    return ManifestSeries(axis.fourier.a, axis.fourier.b, axis.fourier.a0)
 
 
 class PlayedPeriod:

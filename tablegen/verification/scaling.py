@@ -66,7 +66,7 @@ def hold_response(harmonics: int, advances: int, steps: bool) -> tuple[Floats, F
 
 def _times(series: ManifestSeries, real: Floats, imaginary: Floats) -> ManifestSeries:
     a, b = np.array(series.a), np.array(series.b)
-    return ManifestSeries(series.a0, (a * real + b * imaginary).tolist(), (b * real - a * imaginary).tolist())
+    return ManifestSeries((a * real + b * imaginary).tolist(), (b * real - a * imaginary).tolist(), series.a0)
 
 
 def followed(axis: ManifestAxis) -> ManifestSeries:
@@ -102,7 +102,7 @@ def refinement_figures(axis: ManifestAxis) -> dict[str, dict[str, float]] | None
     found = {}
     for side in sides:
         branch, position, sweep, times = _sweep(axis, side)
-        moved = at(ManifestSeries(layer.a0, layer.a, layer.b), times) / branch.slope(sweep)
+        moved = at(layer, times) / branch.slope(sweep)
         found[side] = {
             "position": 100.0 * float(np.max(np.abs(moved))),
             "scaling": _peak_to_peak(np.gradient(moved, position)),
