@@ -11,7 +11,7 @@ import click
 
 from tablegen.cli.common import OutputFile, fail, require, written
 from tablegen.cli.exit_status import ExitStatus
-from tablegen.reading import CONFIGURATION, read_text
+from tablegen.reading import CONFIGURATION, RESPONSE, read_bytes, read_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -274,7 +274,7 @@ def _response(fit: "ResonanceFit", path: Path, sources: "Sequence[Source]") -> b
     from tablegen.problems import Unphysical
 
     try:
-        if path.exists() and not path.read_bytes().startswith(MARK.encode("ascii")):
+        if path.exists() and not read_bytes(path, RESPONSE).startswith(MARK.encode("ascii")):
             fail([f"{path}: was not written by tablegen calibrate; move it away"], ExitStatus.WRONG_INPUT)
         return response_csv(fit, sources)
     except Unphysical as reason:
