@@ -24,7 +24,7 @@ class CannotWrite(Exception):
 
 
 class NoPlace(CannotWrite):
-    """Something else than a file or directory stands where one has to go."""
+    """A pipe or a device stands where a file or a directory has to go: no disk is at fault, but what was asked for."""
 
 
 def write_files(
@@ -55,7 +55,8 @@ def _write(folder: Path, files: Mapping[str, bytes], outdated: Sequence[str]) ->
         return []
     for name in changed:
         if other := other_than_file(folder / name):
-            raise NoPlace(f"{folder / name}: is {other}, where a file has to go")
+            why = f"{folder / name}: is {other}, where a file has to go"
+            raise CannotWrite(why) if other == "a directory" else NoPlace(why)
     staged: dict[str, Path] = {}
     try:
         for name in changed:
