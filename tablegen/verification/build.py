@@ -46,12 +46,12 @@ class Target(Protocol):
     def refuse(self, folder: Path, stored: StoredBuild) -> None:
         """Raise ``NotABuild`` for a build that it cannot play."""
 
-    def play(self, job: "Playing") -> Outcome:
+    def play(self, job: "PlayJob") -> Outcome:
         """Play the build, and check what comes."""
 
 
 @dataclass(frozen=True)
-class Playing:
+class PlayJob:
     """The build in ``folder`` is played in the directory ``work``; ``limits`` of x and y are in LSB."""
 
     folder: Path
@@ -109,7 +109,7 @@ def verify_build(folder: Path, work: Path, target: Target, most_ticks: int, seed
     progress("measuring the certificate")
     certificates = check_certificates(stored, same)
     checks += watch.timed(certificates.checks)
-    outcome = target.play(Playing(folder, work, stored, certificates.limits, most_ticks, seed, progress))
+    outcome = target.play(PlayJob(folder, work, stored, certificates.limits, most_ticks, seed, progress))
     checks += watch.timed(outcome.checks)
     if not same:
         notes.append(
@@ -197,4 +197,4 @@ def _coverage(stored: StoredBuild, outcome: Outcome) -> list[str]:
     return notes
 
 
-__all__ = ["NotABuild", "Outcome", "Playing", "Progress", "Report", "Target", "differing_check", "verify_build"]
+__all__ = ["NotABuild", "Outcome", "PlayJob", "Progress", "Report", "Target", "differing_check", "verify_build"]

@@ -21,7 +21,7 @@ from tablegen.fixedpoint.program import Program
 from tablegen.manifest.read import NotABuild, StoredBuild
 from tablegen.verification import worker
 from tablegen.verification.bench import CAPTURE, SCRIPT, SequencerShape
-from tablegen.verification.build import Outcome, Playing, differing_check
+from tablegen.verification.build import Outcome, PlayJob, differing_check
 from tablegen.verification.c_bench import CBench, CPlayed, require_compiler, script_words, storage_bits
 from tablegen.verification.capture import make_capture
 from tablegen.verification.checks import (
@@ -76,7 +76,7 @@ class CTarget:
                 f"{folder}: both tables are direct, and no device renders those; verify it without --fourier"
             )
 
-    def play(self, job: Playing) -> Outcome:
+    def play(self, job: PlayJob) -> Outcome:
         """One session by steps, and the same by fills."""
         stored, work, progress = job.stored, job.work, job.progress
         player = _compiler() if self.machine == "c" else "arm-none-eabi-gcc, Cortex-M4"

@@ -9,7 +9,7 @@ import numpy as np
 from tablegen.manifest.read import ManifestAxis, StoredBuild
 from tablegen.numerics.arrays import Floats, Ints
 from tablegen.verification.capture import UNDEFINED, Capture, part, without_faults
-from tablegen.verification.stream import FAULTS, FLAGS, STATES, DeviceState, Sample
+from tablegen.verification.stream import FAULTS, FLAGS, STATES, Sample, StoredState
 
 _FLOAT_TOLERANCE_LSB = 1e-6  # the last bits of two ways to evaluate the float waveform
 
@@ -177,7 +177,7 @@ def check_faults(capture: Capture, counted: list[int], counts: list[int]) -> Che
 
 
 def check_states(
-    wanted: list[tuple[str, DeviceState]], got: list[DeviceState], most_counted: int, untold: tuple[str, ...] = ()
+    wanted: list[tuple[str, StoredState]], got: list[StoredState], most_counted: int, untold: tuple[str, ...] = ()
 ) -> Check:
     """What the device says of itself after each request; it does not tell what is ``untold``."""
     wrong = []
@@ -195,7 +195,7 @@ def check_states(
     return Check("requests", "integer model", compared, f"{len(wrong)} differ", "0", wrong[0] if wrong else None)
 
 
-def _told(state: DeviceState) -> list[str]:
+def _told(state: StoredState) -> list[str]:
     flags = [name if flag else f"not {name}" for name, flag in zip(STATES, state.flags, strict=True)]
     return [*flags, f"faults {_raised(state.faults)}", *_counts(list(state.counts)).split(", ")]
 

@@ -54,7 +54,7 @@ class Sample:
 
 
 @dataclass(frozen=True)
-class DeviceState:
+class StoredState:
     """What a device says of itself while nothing is on its way: its flags, its faults and their counts."""
 
     flags: tuple[bool, ...]  # in the order of STATES
@@ -62,16 +62,16 @@ class DeviceState:
     counts: tuple[int, ...]  # in the order of FAULTS
 
     @classmethod
-    def of(cls, words: list[int]) -> "DeviceState":
+    def of(cls, words: list[int]) -> "StoredState":
         """The state of its stored words."""
         flags = tuple(bool(words[0] >> bit & 1) for bit in range(len(STATES)))
         counts = tuple(word >> shift & 0xFFFFFFFF for word in words[1:] for shift in (0, 32))
         return cls(flags, words[0] >> 8 & 0xF, counts)
 
-    def limited(self, most_counted: int, ignored: tuple[str, ...] = ()) -> "DeviceState":
+    def limited(self, most_counted: int, ignored: tuple[str, ...] = ()) -> "StoredState":
         """As a device has it whose counters end at ``most_counted``, and that does not tell the ``ignored`` flags."""
         flags = tuple(flag and name not in ignored for name, flag in zip(STATES, self.flags, strict=True))
-        return DeviceState(flags, self.faults, tuple(min(count, most_counted) for count in self.counts))
+        return StoredState(flags, self.faults, tuple(min(count, most_counted) for count in self.counts))
 
 
 @dataclass
@@ -88,7 +88,7 @@ class Script:
     expected: list[int] = field(default_factory=list)
     taken: list[DualProgram] = field(default_factory=list)  # programs, one a swap
     refused: bool = False  # a write was to be refused, and nobody has cleared that
-    states: list[tuple[str, DeviceState]] = field(default_factory=list)  # when each was asked for, and what it is
+    states: list[tuple[str, StoredState]] = field(default_factory=list)  # when each was asked for, and what it is
     programs: list[tuple[int, DualProgram | None]] = field(default_factory=list)  # from which tick on which one plays
 
     def __post_init__(self) -> None:
@@ -203,7 +203,7 @@ class Script:
         flags = (self.writable, self.refused, model.idle is not None, model.armed, model.running, False)
         reported = sum(1 << FAULTS.index(name) for name, count in self._reported.items() if count)
         counts = (*self.counts, *self._reported.values())
-        self.states.append((when, DeviceState(flags, int(model.faults) | reported, counts)))
+        self.states.append((when, StoredState(flags, int(model.faults) | reported, counts)))
         self._command(_STATE)
 
     def lost_tick(self, under_way: bool) -> None:
@@ -279,9 +279,9 @@ class Script:
         return [self.model.fault_counts[fault] for fault in (Fault.SLEW, Fault.CLAMP)]
 
 
-def read_states(words: list[int]) -> list[DeviceState]:
+def read_states(words: list[int]) -> list[StoredState]:
     """The states of their stored words, one after the other."""
-    return [DeviceState.of(words[at : at + STATE_WORDS]) for at in range(0, len(words), STATE_WORDS)]
+    return [StoredState.of(words[at : at + STATE_WORDS]) for at in range(0, len(words), STATE_WORDS)]
 
 
 def read_capture(path: Path) -> Words:

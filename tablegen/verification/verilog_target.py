@@ -16,7 +16,7 @@ from tablegen.emit.stored import stored_content
 from tablegen.manifest.read import NotABuild, StoredBuild
 from tablegen.verification import worker
 from tablegen.verification.bench import CAPTURE, SCRIPT, STREAM_BENCH, SequencerShape, run_bench
-from tablegen.verification.build import Outcome, Playing, differing_check
+from tablegen.verification.build import Outcome, PlayJob, differing_check
 from tablegen.verification.capture import Capture, make_capture
 from tablegen.verification.checks import (
     Check,
@@ -81,7 +81,7 @@ class VerilogTarget:
                 f"{folder}: both tables are direct, and no device renders those; verify it without --fourier"
             )
 
-    def play(self, job: Playing) -> Outcome:
+    def play(self, job: PlayJob) -> Outcome:
         """A session on the simulator, and a frame beside it where that takes too long."""
         stored, work, name = job.stored, job.work, job.stored.manifest.name
         memories, missing = _memories(job.folder, work, stored, self.placement)
@@ -108,7 +108,7 @@ class VerilogTarget:
             ticks = sum(len(run.session.script.expected) for run in runs)
             return Outcome([Check("simulation", self.simulator, f"{ticks} ticks", failure=f"simulation: {error}")])
 
-    def _runs(self, job: Playing, memories: Memories) -> "list[SimulatedRun]":
+    def _runs(self, job: PlayJob, memories: Memories) -> "list[SimulatedRun]":
         """The session as it is placed, and a whole frame with multiplier blocks, which are simulated twice as fast."""
         program, seed, placement = job.stored.program, job.seed, self.placement
         apart = self.frame_apart and min(needed_ticks(program), job.most_ticks) > _SESSION_TICKS
@@ -123,7 +123,7 @@ class VerilogTarget:
 
     def _outcome(
         self,
-        job: Playing,
+        job: PlayJob,
         runs: "list[SimulatedRun]",
         statuses: list[dict[str, Any]],
         captures: list[Capture],
