@@ -139,22 +139,22 @@ FAULTS: dict[str, tuple[str, ...]] = {
     "the_word_does_not_wait": ("now = writing && writable", "now = writing"),
     "the_address_does_not_wait": ("end else if (reading && writable)", "end else if (reading)"),
     "the_word_read_does_not_wait": ("        if (writable) begin", "        if (1'b1) begin"),
-    "x_has_no_sign": ("{{32{x_word[X_WORD_BITS-1]}}, x_word}", "{32'd0, x_word}"),
-    "y_has_no_sign": ("{{32{y_word[Y_WORD_BITS-1]}}, y_word}", "{32'd0, y_word}"),
+    "x_has_no_sign": ("{{32{x_word[X_WORD_BITS-1]}}, x_word[", "{32'd0, x_word["),
+    "y_has_no_sign": ("{{32{y_word[Y_WORD_BITS-1]}}, y_word[", "{32'd0, y_word["),
     "x_ends_early": ("LAST_X = X_WORDS - 1", "LAST_X = X_WORDS - 2"),
     "y_ends_late": ("LAST_Y = Y_WORDS - 1", "LAST_Y = Y_WORDS", "direct"),
     "tables_go_where_fourier_words_go": ("FOURIER ? 3'd2 : 3'd0", "3'd2"),
     "fourier_words_go_where_tables_go": ("FOURIER ? 3'd2 : 3'd0", "3'd0", "fourier"),
     "tables_have_harmonics": ("FOURIER != 0 && write_at[5:0] == X_", "write_at[5:0] == X_"),
     "harmonics_are_elsewhere": ("Y_HARMONICS_AT = 6'd42", "Y_HARMONICS_AT = 6'd43", "fourier"),
-    "no_commit": ("booting ? now && writes == COMMIT", "booting ? 1'b0"),
-    "the_commit_writes_as_well": ("now && writes != COMMIT", "now"),
+    "no_commit": ("booting ? now && writes == COMMIT && !missing", "booting ? 1'b0"),
+    "the_commit_writes_as_well": ("booting ? now && writes != COMMIT", "booting ? now"),
     "the_boot_has_no_end": ("booting <= 1'b0", "booting <= 1'b1"),
     "the_boot_ends_before_its_commit": ("!reading && !writing", "!reading"),
     "the_host_is_heard_in_a_boot": ("writes != COMMIT : host", "writes != COMMIT || host_write : host"),
-    "the_host_commits_in_a_boot": ("writes == COMMIT : host", "writes == COMMIT || host_commit : host"),
+    "the_host_commits_in_a_boot": ("COMMIT && !missing : host", "COMMIT && !missing || host_commit : host"),
     "the_host_is_not_heard": ("COMMIT : host_write", "COMMIT : 1'b0"),
-    "the_host_has_no_commit": ("COMMIT : host_commit", "COMMIT : 1'b0"),
+    "the_host_has_no_commit": ("missing : host_commit", "missing : 1'b0"),
     "the_host_is_heard_elsewhere": ("write_at : host_address", "write_at : write_at"),
     "a_reset_goes_on_where_it_was": ("            read_at <= 17'd0;\n", ""),
     "a_reset_goes_on_in_the_region": ("            reads <= PROGRAM;\n", ""),
@@ -211,7 +211,9 @@ def check(name: str, lines: Sequence[str]) -> int:
     ended = at = idle = 0
     for asked, line in zip(clocks, lines, strict=True):
         flags, *where = line.split()
-        booting, write, commit = (hexadecimal(flags) >> bit & 1 for bit in (2, 1, 0))
+        missing, booting, write, commit = (hexadecimal(flags) >> bit & 1 for bit in (3, 2, 1, 0))
+        if missing:
+            raise Wrong("a file was taken to be missing")
         if not booting:
             if at < len(writes):
                 raise Wrong(f"the host at word {at}")
@@ -267,6 +269,61 @@ def test_the_stimulus_does_what_it_is_for() -> None:
     assert {(region, data >> 31) for region, _, data in SETUPS["interpolated"].writes if region > 0} == {
         (region, sign) for region in (1, 2) for sign in (0, 1)
     }
+
+
+# Of which file no word, or only the first ones, are there; "" is a name that was never given.
+DAMAGED = {
+    **{
+        f"{name}_{file}_missing": (name, file, None)
+        for name in ("interpolated", "fourier")
+        for file in ("PROGRAM", "X", "Y")
+    },
+    **{
+        f"{name}_{file}_short": (name, file, -1)
+        for name in ("interpolated", "direct")
+        for file in ("PROGRAM", "X", "Y")
+    },
+    **{f"fourier_{file}_half": ("fourier", file, 2) for file in ("PROGRAM", "X", "Y")},
+}
+
+
+@pytest.mark.parametrize("simulator", ["icarus", pytest.param("verilator", marks=pytest.mark.rest)])
+def test_a_file_that_is_missing_or_short_is_never_committed(simulator: str, tmp_path: Path) -> None:
+    """And that is said, the boot ends, and the host has access after it: with every file there it is committed."""
+    (tmp_path / "build").mkdir()
+    instances, cases = [], {"whole": ("interpolated", "X", 0), **DAMAGED, "unnamed": ("interpolated", "PROGRAM", None)}
+    for index, (case, (name, file, words)) in enumerate(cases.items()):
+        given = [f".{key}({value})" for key, value in SETUPS[name].parameters.items()]
+        for key, content in SETUPS[name].files.items():
+            lines = content.splitlines(keepends=True)
+            if key != file or words is not None:
+                kept = lines if key != file or words == 0 else lines[:words]
+                (tmp_path / "build" / f"{case}_{key}.mem").write_bytes(b"".join(kept))
+            if case != "unnamed" or key != file:
+                given.append(f'.{key}_FILE("{case}_{key}.mem")')
+        instances.append(
+            f"    missing_bench #({', '.join(given)}) bench_{index} (.clock(clock), .committed(committed[{index}]),\n"
+            f"        .missing(missing[{index}]), .ended(ended[{index}]));\n"
+        )
+    top = tmp_path / "missing_top.v"
+    last = len(cases) - 1
+    top.write_text(
+        "`timescale 1ns / 1ps\nmodule missing_top;\n    reg clock = 0;\n    always #5 clock = !clock;\n"
+        f"    wire [{last}:0] committed, missing, ended;\n    reg all_done = 0;\n"
+        "    integer file;\n    always @(posedge clock) if (&ended && !all_done) begin\n"
+        '        file = $fopen("seen.txt", "w");\n        $fwrite(file, "%b %b", committed, missing);\n'
+        "        $fclose(file);\n        all_done <= 1;\n    end\n"
+        f"{''.join(instances)}endmodule\n",
+        "ascii",
+    )
+    compiled = compile_design(
+        simulator, Design([top, BENCHES / "missing_bench.v", BOOT], "missing_top"), tmp_path / "build"
+    )
+    assert compiled.run("cocotb_outputs") == (1, 0)
+    committed, missing = (tmp_path / "build" / "seen.txt").read_text("ascii").split()
+    for index, case in enumerate(cases):
+        seen = committed[last - index], missing[last - index]
+        assert seen == (("1", "0") if case == "whole" else ("0", "1")), case
 
 
 @pytest.fixture(scope="module")

@@ -52,7 +52,7 @@ module linked_scanner #(
     wire [2:0] host_region, region;
     wire [15:0] host_address, address, arm_frames;
     wire [31:0] host_data, data;
-    wire strobe, swapped, playing, parked, missed;
+    wire strobe, swapped, playing, parked, missed, missing;
     wire [15:0] x_code, y_code, x_word, y_word;
     wire [3:0] faults;
     wire [63:0] fault_counts;
@@ -86,7 +86,8 @@ module linked_scanner #(
     ) boot (
         .clock(clock), .reset(1'b0), .host_write(host_write), .host_region(host_region), .host_address(host_address),
         .host_data(host_data), .host_commit(host_commit), .writable(writable), .write(write), .write_region(region),
-        .write_address(address), .write_data(data), .commit(commit), .booting(booting)
+        .write_address(address), .write_data(data), .commit(commit), .booting(booting),
+        .missing(missing)
     );
 
     dac_sequencer #(
@@ -98,7 +99,8 @@ module linked_scanner #(
         .LOW_AREA(1), .FOURIER(1), .HARMONICS(HARMONICS), .SINE_FILE(ANNEXIN_200NM_SINE_FILE)
     ) sequencer (
         .clock(clock), .reset(1'b0), .write(write), .write_region(region), .write_address(address), .write_data(data),
-        .writable(writable), .refused(), .commit(commit), .withdraw(withdraw), .committed(), .arm(arm),
+        .writable(writable), .refused(), .commit(commit), .withdraw(withdraw || (booting && missing)),
+        .committed(), .arm(arm),
         .arm_frames(arm_frames), .trigger(trigger), .park(park), .clear_faults(clear_faults), .armed(), .running(),
         .tick(tick && !booting), .underrun(missed), .busy(), .strobe(strobe), .x_code(x_code), .y_code(y_code),
         .line_marker(line), .frame_marker(frame), .pixel_marker(pixel), .backward_marker(backward),
@@ -120,7 +122,7 @@ module linked_scanner #(
         .cs_y_n(), .mosi_x(x_data), .mosi_y(y_data), .ldac_n(load_n), .busy(), .missed(missed)
     );
 
-    assign fault = faults != 4'd0;
+    assign fault = faults != 4'd0 || missing;
 endmodule
 
 `default_nettype wire

@@ -40,7 +40,7 @@ module scanner #(
         {run_1, run_2, started, start} = 4'd0;
     end
 
-    wire writable, write, commit, missed, strobe, swapped;
+    wire writable, write, commit, missed, missing, strobe, swapped;
     wire [2:0] region;
     wire [15:0] address;
     wire [31:0] data;
@@ -69,7 +69,7 @@ module scanner #(
     ) boot (
         .clock(clock), .reset(1'b0), .host_write(1'b0), .host_region(3'd0), .host_address(16'd0), .host_data(32'd0),
         .host_commit(1'b0), .writable(writable), .write(write), .write_region(region), .write_address(address),
-        .write_data(data), .commit(commit), .booting()
+        .write_data(data), .commit(commit), .booting(), .missing(missing)
     );
 
     dac_sequencer #(
@@ -106,7 +106,7 @@ module scanner #(
         .cs_y_n(), .mosi_x(x_data), .mosi_y(y_data), .ldac_n(load_n), .busy(), .missed(missed)
     );
 
-    assign fault = faults != 4'd0;
+    assign fault = faults != 4'd0 || missing;
 endmodule
 
 `default_nettype wire

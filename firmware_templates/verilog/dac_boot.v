@@ -3,7 +3,8 @@
 // With FOURIER = 0 X_FILE and Y_FILE are the tables, <name>_x.mem and <name>_y.mem; with FOURIER = 1 the Fourier
 // words, <name>_x_fourier.mem and <name>_y_fourier.mem, from which a sequencer with FOURIER = 1 computes its tables;
 // they take less memory. PROGRAM_FILE is <name>_program.mem either way. The boot ends with a commit; arm and trigger
-// are left to the host.
+// are left to the host. A file that is missing or has too few words is not committed: the boot ends without, and
+// `missing` is high.
 
 `default_nettype none
 
@@ -32,7 +33,8 @@ module dac_boot #(
     output wire [15:0] write_address,
     output wire [31:0] write_data,
     output wire        commit,
-    output reg         booting          // the boot is running; host writes are lost
+    output reg         booting,         // the boot is running; host writes are lost
+    output reg         missing          // a file has not all of its words: there was no commit
 );
     localparam PROGRAM_WORDS = 48;
     localparam [31:0] LAST_PROGRAM = PROGRAM_WORDS - 1, LAST_X = X_WORDS - 1, LAST_Y = Y_WORDS - 1;
@@ -80,10 +82,15 @@ module dac_boot #(
         end
     endgenerate
 
-    reg [31:0] program_words [0:PROGRAM_WORDS-1];
-    reg [X_WORD_BITS-1:0] x_words [0:X_WORDS-1];
-    reg [Y_WORD_BITS-1:0] y_words [0:Y_WORDS-1];
+    // The bit above a word is 1 in the last word of a memory that no file has filled. Where one has, it is 0
+    // throughout, and a synthesiser takes it away.
+    reg [32:0] program_words [0:PROGRAM_WORDS-1];
+    reg [X_WORD_BITS:0] x_words [0:X_WORDS-1];
+    reg [Y_WORD_BITS:0] y_words [0:Y_WORDS-1];
     initial begin
+        program_words[PROGRAM_WORDS-1] = {1'b1, 32'd0};
+        x_words[X_WORDS-1] = {1'b1, {X_WORD_BITS{1'b0}}};
+        y_words[Y_WORDS-1] = {1'b1, {Y_WORD_BITS{1'b0}}};
         if (PROGRAM_FILE != "") $readmemh(PROGRAM_FILE, program_words);
         if (X_FILE != "") $readmemh(X_FILE, x_words);
         if (Y_FILE != "") $readmemh(Y_FILE, y_words);
@@ -94,9 +101,11 @@ module dac_boot #(
     reg [16:0] read_at;
     reg [15:0] write_at;
     reg reading, writing;
-    reg [31:0] program_word;
-    reg [X_WORD_BITS-1:0] x_word;
-    reg [Y_WORD_BITS-1:0] y_word;
+    reg [32:0] program_word;
+    reg [X_WORD_BITS:0] x_word;
+    reg [Y_WORD_BITS:0] y_word;
+    wire now = writing && writable;
+    wire unfilled = writes == PROGRAM ? program_word[32] : writes == X ? x_word[X_WORD_BITS] : y_word[Y_WORD_BITS];
     wire last = {15'd0, read_at} == (reads == PROGRAM ? LAST_PROGRAM : reads == X ? LAST_X : LAST_Y);
 
     initial begin
@@ -107,6 +116,7 @@ module dac_boot #(
         reading = 1'b1;
         writing = 1'b0;
         booting = 1'b1;
+        missing = 1'b0;
     end
 
     always @(posedge clock) begin
@@ -130,21 +140,21 @@ module dac_boot #(
             if (reads == COMMIT) reading <= 1'b0;
         end else if (!reading && !writing)
             booting <= 1'b0;
+        missing <= !reset && (missing || (now && writes != COMMIT && unfilled));
     end
 
-    wire [X_WORD_BITS+31:0] x_wide = {{32{x_word[X_WORD_BITS-1]}}, x_word};
-    wire [Y_WORD_BITS+31:0] y_wide = {{32{y_word[Y_WORD_BITS-1]}}, y_word};
+    wire [X_WORD_BITS+31:0] x_wide = {{32{x_word[X_WORD_BITS-1]}}, x_word[X_WORD_BITS-1:0]};
+    wire [Y_WORD_BITS+31:0] y_wide = {{32{y_word[Y_WORD_BITS-1]}}, y_word[Y_WORD_BITS-1:0]};
     wire [31:0] program_data = FOURIER != 0 && write_at[5:0] == X_HARMONICS_AT ? X_H :
-                               FOURIER != 0 && write_at[5:0] == Y_HARMONICS_AT ? Y_H : program_word;
+                               FOURIER != 0 && write_at[5:0] == Y_HARMONICS_AT ? Y_H : program_word[31:0];
     wire unused = &{read_at, x_wide, y_wide};
 
-    wire now = writing && writable;
     assign write = booting ? now && writes != COMMIT : host_write;
     assign write_region = !booting ? host_region : writes == PROGRAM ? 3'd0 : {1'b0, writes} + (FOURIER ? 3'd2 : 3'd0);
     assign write_address = booting ? write_at : host_address;
     assign write_data = !booting ? host_data :
                         writes == PROGRAM ? program_data : writes == X ? x_wide[31:0] : y_wide[31:0];
-    assign commit = booting ? now && writes == COMMIT : host_commit;
+    assign commit = booting ? now && writes == COMMIT && !missing : host_commit;
 endmodule
 
 `default_nettype wire

@@ -1,8 +1,8 @@
-// Whether every word of the idle program was written and fits its register: a commit of any other program is refused.
-// A line of 429 ticks would otherwise become one of 173 where TICK_BITS = 8.
+// Whether the idle program fits the registers of the device: a commit of any other program is refused. A line of 429
+// ticks would otherwise become one of 173 where TICK_BITS = 8.
 //
-// A flag a word says that it is wrong: from power-up on, until a value that fits is written. To write a right value
-// over a wrong one is enough. `fits` includes the write of this clock.
+// A word that does not fit spoils the idle program, until a withdrawal or a reset discards it. Nothing can be committed
+// before a line's length was written, at power-up and after a spoilt program was discarded.
 
 `default_nettype none
 
@@ -18,50 +18,81 @@ module dac_fit #(
     parameter LINE_BITS = 16,
     parameter X_PERIOD_BITS = 25,
     parameter Y_PERIOD_BITS = 31,
-    parameter HARMONICS = 0  // 0: there is no renderer, and the number of harmonics is not used
+    parameter HARMONICS = 0     // 0: there is no renderer, and the number of harmonics is not used
 ) (
     input  wire        clock,
-    input  wire        scan_write,
+    input  wire [31:0] data,        // the word of the write on the next clock
+    input  wire        scan_write,  // a write of this clock, to one of the three pages
     input  wire        x_write,
     input  wire        y_write,
     input  wire [3:0]  address,
-    input  wire [31:0] data,
-    output wire        fits
+    input  wire        discard,
+    output wire        fits         // with the write of this clock
 );
-    localparam SCAN_WORDS = 14;
+    localparam [3:0] LINE_TICKS = 4'd0;
+    localparam [31:0] MOST_HARMONICS = HARMONICS;
+    localparam X_HIGH_BITS = X_WORD_BITS > 21 ? 25 : X_WORD_BITS + 4;  // of the offset above its low word, signed
+    localparam Y_HIGH_BITS = Y_WORD_BITS > 21 ? 25 : Y_WORD_BITS + 4;
 
-    // A line has 8 ticks or more, a frame has a line or more, and neither has more than its counter counts.
-    wire is_tick = data >> (TICK_BITS + 1) == 0;
-    wire is_line = data >> (LINE_BITS + 1) == 0;
-    wire is_line_ticks = is_tick && (data[TICK_BITS] ? data[TICK_BITS-1:0] == 0 : data[TICK_BITS:3] != 0);
-    wire is_frame_lines = is_line && (data[LINE_BITS] != (data[LINE_BITS-1:0] != 0));
-    wire is_flag = data[31:1] == 0;
-    wire is_short = data[31:8] == 0;
-    wire [SCAN_WORDS-1:0] right = {
-        is_flag, is_tick, {4{is_line}}, {4{is_tick}}, is_tick, is_short, is_frame_lines, is_line_ticks
+    // What the word would fit. A line has 8 ticks or more, a frame has a line or more, and neither has more than its
+    // counter counts; a table without interpolation has a word for every advance, and needs no phase.
+    wire within_x_table = data >> (X_INDEX_BITS + 1) == 0 && !(data[X_INDEX_BITS] && data[X_INDEX_BITS-1:0] != 0);
+    wire within_y_table = data >> (Y_INDEX_BITS + 1) == 0 && !(data[Y_INDEX_BITS] && data[Y_INDEX_BITS-1:0] != 0);
+    wire within_x_period = data >> (X_PERIOD_BITS - 1) <= 32'd1;
+    wire within_y_period = data >> (Y_PERIOD_BITS - 1) <= 32'd1;
+    wire within_tick = data >> (TICK_BITS + 1) == 0;
+    wire within_line = data >> (LINE_BITS + 1) == 0;
+    reg is_tick, is_line, is_line_ticks, is_frame_lines, is_flag, is_short, is_code, is_gain, is_low;
+    reg is_x_high, is_y_high, is_x_phase, is_y_phase, is_x_period, is_y_period, is_harmonics;
+    always @(posedge clock) begin
+        is_tick <= within_tick;
+        is_line <= within_line;
+        is_line_ticks <= within_tick && (data[TICK_BITS] ? data[TICK_BITS-1:0] == 0 : data[TICK_BITS:3] != 0);
+        is_frame_lines <= within_line && (data[LINE_BITS] != (data[LINE_BITS-1:0] != 0));
+        is_flag <= data[31:1] == 0;
+        is_short <= data[31:8] == 0;
+        is_code <= data[31:DAC_BITS] == 0;
+        is_gain <= data[31:17] == 15'd0 || data[31:17] == {15{1'b1}};
+        is_low <= data[31:18] == 14'd0;
+        is_x_high <= data[31:X_HIGH_BITS-1] == 0 || &data[31:X_HIGH_BITS-1];
+        is_y_high <= data[31:Y_HIGH_BITS-1] == 0 || &data[31:Y_HIGH_BITS-1];
+        is_x_phase <= X_INTERPOLATED == 0 || within_x_period;
+        is_y_phase <= Y_INTERPOLATED == 0 || within_y_period;
+        is_x_period <= X_INTERPOLATED != 0 ? within_x_period : within_x_table;
+        is_y_period <= Y_INTERPOLATED != 0 ? within_y_period : within_y_table;
+        is_harmonics <= HARMONICS == 0 || data <= MOST_HARMONICS;
+    end
+
+    // By address; what is not named takes any word.
+    wire [15:0] scan = {
+        2'b11, is_flag, is_tick, {4{is_line}}, {4{is_tick}}, is_tick, is_short, is_frame_lines, is_line_ticks
     };
-    reg [SCAN_WORDS-1:0] wrong;
-    wire [SCAN_WORDS-1:0] wrong_now;
-    initial wrong = {SCAN_WORDS{1'b1}};
-    always @(posedge clock) wrong <= wrong_now;
-    genvar i;
-    generate
-        for (i = 0; i < SCAN_WORDS; i = i + 1) begin : word
-            assign wrong_now[i] = scan_write && address == i ? !right[i] : wrong[i];
-        end
-    endgenerate
+    wire [15:0] x = {
+        5'b11111, is_harmonics, {4{is_code}}, is_x_high, is_low, is_gain, is_x_period, is_x_phase, 1'b1
+    };
+    wire [15:0] y = {
+        5'b11111, is_harmonics, {4{is_code}}, is_y_high, is_low, is_gain, is_y_period, is_y_phase, 1'b1
+    };
+    wire spoils = (scan_write && !scan[address]) || (x_write && !x[address]) || (y_write && !y[address]);
+    wire begins = scan_write && address == LINE_TICKS;
 
-    wire x_fits, y_fits;
-    dac_fit_axis #(
-        .DAC_BITS(DAC_BITS), .INTERPOLATED(X_INTERPOLATED), .INDEX_BITS(X_INDEX_BITS), .WORD_BITS(X_WORD_BITS),
-        .PERIOD_BITS(X_PERIOD_BITS), .HARMONICS(HARMONICS)
-    ) x (.clock(clock), .write(x_write), .address(address), .data(data), .fits(x_fits));
-    dac_fit_axis #(
-        .DAC_BITS(DAC_BITS), .INTERPOLATED(Y_INTERPOLATED), .INDEX_BITS(Y_INDEX_BITS), .WORD_BITS(Y_WORD_BITS),
-        .PERIOD_BITS(Y_PERIOD_BITS), .HARMONICS(HARMONICS)
-    ) y (.clock(clock), .write(y_write), .address(address), .data(data), .fits(y_fits));
+    reg spoilt, empty;
+    initial begin
+        spoilt = 1'b0;
+        empty = 1'b1;
+    end
+    always @(posedge clock) begin
+        if (spoils)
+            spoilt <= 1'b1;
+        else if (discard)
+            spoilt <= 1'b0;
+        if (begins)
+            empty <= 1'b0;
+        else if (discard && spoilt)
+            empty <= 1'b1;
+    end
 
-    assign fits = wrong_now == 0 && x_fits && y_fits;
+    assign fits = !spoilt && !spoils && (!empty || begins);
 endmodule
 
 `default_nettype wire

@@ -183,8 +183,8 @@ module dac_sequencer #(
         .LINE_BITS(LINE_BITS), .X_PERIOD_BITS(X_PERIOD_BITS), .Y_PERIOD_BITS(PERIOD_BITS),
         .HARMONICS(FOURIER ? HARMONICS : 0)
     ) fit (
-        .clock(clock), .scan_write(scan_write), .x_write(x_write), .y_write(y_write), .address(address[3:0]),
-        .data(data), .fits(fits)
+        .clock(clock), .data(write_data), .scan_write(scan_write), .x_write(x_write), .y_write(y_write),
+        .address(address[3:0]), .discard(reset || withdraw), .fits(fits)
     );
 
     wire bank, loaded, take, drained;

@@ -5,7 +5,7 @@
 // STIMULUS is read by $readmemh: words of 64 bits,
 // {9'd0, reset, writable, host_write, host_commit, host_region[2:0], host_address[15:0], host_data[31:0]}.
 // There is no reset but those of the stimulus: the initial values have to do. CAPTURE gets a line a clock, the levels
-// just before the rising edge: {1'b0, booting, write, commit}, region, address, data, all in hexadecimal.
+// just before the rising edge: {missing, booting, write, commit}, region, address, data, all in hexadecimal.
 module boot_bench #(
     parameter STIMULUS = "stimulus.hex",
     parameter CAPTURE = "capture.txt",
@@ -26,7 +26,7 @@ module boot_bench #(
 );
     reg [63:0] stimulus [0:DEPTH-1];
     reg [63:0] entry;
-    wire write, commit, booting;
+    wire write, commit, booting, missing;
     wire [2:0] region;
     wire [15:0] address;
     wire [31:0] data;
@@ -41,7 +41,7 @@ module boot_bench #(
     end
 
     always @(posedge clock) if (!done) begin
-        $fwrite(capture, "%h %h %h %h\n", {1'b0, booting, write, commit}, region, address, data);
+        $fwrite(capture, "%h %h %h %h\n", {missing, booting, write, commit}, region, address, data);
         if (at == DEPTH) begin
             $fclose(capture);
             done <= 1'b1;
@@ -58,7 +58,7 @@ module boot_bench #(
         .clock(clock), .reset(entry[54]), .host_write(entry[52]), .host_region(entry[50:48]),
         .host_address(entry[47:32]), .host_data(entry[31:0]), .host_commit(entry[51]), .writable(entry[53]),
         .write(write), .write_region(region), .write_address(address), .write_data(data), .commit(commit),
-        .booting(booting)
+        .booting(booting), .missing(missing)
     );
 endmodule
 

@@ -1,6 +1,7 @@
 `default_nettype none
 
-// Bench of dac_fit: a write a clock from writes.hex, {address[7:0], data[31:0]}; prints `fits` on the clock of each.
+// Bench of dac_fit: an entry a clock from writes.hex, {discard, write, page[1:0], address[3:0], data[31:0]}; prints
+// `fits` on the clock of each.
 module fit_bench;
     parameter DAC_BITS = 16;
     parameter X_INTERPOLATED = 1;
@@ -17,7 +18,7 @@ module fit_bench;
     parameter DEPTH = 1;
 
     reg [39:0] writes [0:DEPTH-1];
-    reg [39:0] now;
+    reg [39:0] now, next;
     reg clock;
     wire fits;
     integer i;
@@ -26,17 +27,20 @@ module fit_bench;
         .Y_INTERPOLATED(Y_INTERPOLATED), .Y_INDEX_BITS(Y_INDEX_BITS), .Y_WORD_BITS(Y_WORD_BITS), .TICK_BITS(TICK_BITS),
         .LINE_BITS(LINE_BITS), .X_PERIOD_BITS(X_PERIOD_BITS), .Y_PERIOD_BITS(Y_PERIOD_BITS), .HARMONICS(HARMONICS)
     ) fit (
-        .clock(clock), .scan_write(now[37:36] == 0), .x_write(now[37:36] == 1), .y_write(now[37:36] == 2),
-        .address(now[35:32]), .data(now[31:0]), .fits(fits)
+        .clock(clock), .data(next[31:0]), .scan_write(now[38] && now[37:36] == 0),
+        .x_write(now[38] && now[37:36] == 1), .y_write(now[38] && now[37:36] == 2), .address(now[35:32]),
+        .discard(now[39]), .fits(fits)
     );
     initial begin
         $readmemh("writes.hex", writes);
         clock = 0;
-        for (i = 0; i < DEPTH; i = i + 1) begin
-            now = writes[i];
-            #1 $display("%b", fits);
+        now = 0;
+        for (i = 0; i <= DEPTH; i = i + 1) begin
+            next = i < DEPTH ? writes[i] : 0;
+            #1 if (i > 0) $display("%b", fits);
             #1 clock = 1;
             #1 clock = 0;
+            now = next;
         end
         $finish;
     end

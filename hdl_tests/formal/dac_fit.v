@@ -18,11 +18,12 @@ module dac_fit #(
     parameter HARMONICS = 0
 ) (
     input  wire        clock,
+    input  wire [31:0] data,
     input  wire        scan_write,
     input  wire        x_write,
     input  wire        y_write,
     input  wire [3:0]  address,
-    input  wire [31:0] data,
+    input  wire        discard,
     output wire        fits
 );
     (* anyseq *) wire any;

@@ -426,7 +426,7 @@ def _scan() -> Iterator[Mutant]:
         "accepted_write = write && writable;",
         "accepted_write = write;",
     )
-    yield Mutant("refused writes are not reported", "dac_sequencer", "if (write && !writable)", "if (1'b0)", "direct")
+    yield Mutant("refused writes are not reported", "dac_sequencer", "((write && !writable) ||", "(", "direct")
     yield Mutant(
         "refused writes are reported for ever",
         "dac_sequencer",
@@ -436,7 +436,7 @@ def _scan() -> Iterator[Mutant]:
     yield Mutant(
         "a commit comes a clock early",
         "dac_sequencer",
-        "assign rendered = host_commit;",
+        "assign rendered = sound_commit;",
         "assign rendered = commit && writable;",
     )
     yield Mutant(

@@ -80,7 +80,11 @@ class EmittedPeriod:
         return np.unique(np.concatenate([before, before + 1]) % ticks)
 
     def _asked(self, k: Ints) -> Floats:
-        return self._line.float_codes(self._reference.at(k // self._hold))
+        codes = np.empty(len(k))
+        for at in range(0, len(k), _CHUNK_RUNS):
+            chunk = slice(at, at + _CHUNK_RUNS)
+            codes[chunk] = self._line.float_codes(self._reference.at(k[chunk] // self._hold))
+        return codes
 
     def errors(self, k: Ints) -> Floats:
         """Emitted code less the code asked for, unrounded, at ticks k."""
@@ -207,9 +211,9 @@ def _chords(
     baseline = max(1, min(round(CHORD * share * ticks), stop - first - 1))
     if stop - first < 2:
         return np.zeros(1), np.zeros(1)
-    begin, end = played.corners(first, stop - baseline), played.corners(first + baseline, stop) - baseline
+    begin = played.corners(first, stop - baseline)
     if not played.runs.by_tick:
-        begin = merged(begin, end)
+        begin = merged(begin, played.corners(first + baseline, stop) - baseline)
     if not len(begin):
         begin = np.array([first])
 

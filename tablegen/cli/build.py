@@ -109,15 +109,16 @@ def build(
     if rule is not None:
         rule.note(built.setup.files, built.formats)
     removed: list[str] = []
+    kept: list[str] = []
 
     def outdated_now() -> list[str]:
-        removed[:] = built.outdated(output)
+        removed[:], kept[:] = built.outdated(output), built.leftovers(output)  # by the manifest that is replaced then
         return removed
 
     changed = written(output, files, outdated_now)
     if rule is not None:
         rule.write()
-    for name in built.leftovers(output):
+    for name in kept:
         click.echo(f"note: {_leftover(output / name)}", err=True)
     if not quiet:
         from tablegen.cli.report import certificate_table

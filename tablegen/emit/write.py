@@ -15,6 +15,7 @@ from tablegen.reading import BUILD_FILE, file_sha256, holds, other_than_file, re
 from tablegen.reading import MANIFEST as MANIFEST_KIND
 
 _STAGED = ".tablegen-"
+_MOST_THREADS = 64
 _LITTER = re.compile(rf"{re.escape(_STAGED)}[a-z0-9_]{{8}}")  # as ``mkstemp`` names files
 
 
@@ -23,7 +24,7 @@ class CannotWrite(Exception):
 
 
 class NoPlace(CannotWrite):
-    """Something else than a file or directory stands where one has to go."""
+    """A pipe or a device stands where a file or a directory has to go: no disk is at fault, but what was asked for."""
 
 
 def write_files(
@@ -54,7 +55,8 @@ def _write(folder: Path, files: Mapping[str, bytes], outdated: Sequence[str]) ->
         return []
     for name in changed:
         if other := other_than_file(folder / name):
-            raise NoPlace(f"{folder / name}: is {other}, where a file has to go")
+            why = f"{folder / name}: is {other}, where a file has to go"
+            raise CannotWrite(why) if other == "a directory" else NoPlace(why)
     staged: dict[str, Path] = {}
     try:
         for name in changed:
@@ -62,9 +64,8 @@ def _write(folder: Path, files: Mapping[str, bytes], outdated: Sequence[str]) ->
             staged[name] = Path(temporary)
             with os.fdopen(handle, "wb") as file:
                 file.write(files[name])
-                file.flush()
-                os.fsync(file.fileno())
             os.chmod(temporary, 0o666 & ~_umask())
+        _settle_files(list(staged.values()))
         for name in sorted(changed, key=lambda name: name == MANIFEST):
             if name == MANIFEST:  # which no longer lists them
                 _remove(folder, outdated)
@@ -89,6 +90,21 @@ def _removed_if_empty(made: Sequence[Path]) -> Iterator[None]:
             if not os.path.isdir(path) or any(path.iterdir()):
                 break
             path.rmdir()
+
+
+def _settle_files(paths: Sequence[Path]) -> None:
+    """Let the content of files reach the disk: all at once, which takes a disk hardly longer than one of them."""
+    from concurrent.futures import ThreadPoolExecutor  # here: nothing else needs it, and most builds change nothing
+
+    def sync(path: Path) -> None:
+        handle = os.open(path, os.O_RDWR)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+    with ThreadPoolExecutor(max(min(len(paths), _MOST_THREADS), 1)) as pool:
+        list(pool.map(sync, paths))
 
 
 def settle(folder: Path) -> None:

@@ -37,7 +37,7 @@ class Flight:
         self._on_way: dict[Key, Sent] = {}
         self._late: dict[Key, Sent] = {}  # overdue: their answers may come all the same
         self._longest_wait = 0.0
-        self.heard_at = now
+        self.heard_at = self._in_order_at = now
         self.in_vain = 0
 
     def has_room(self) -> bool:
@@ -62,6 +62,8 @@ class Flight:
         A line keeps the order, so that what was sent before it and is not answered was lost.
         """
         self.heard_at, self.in_vain = now, 0
+        if key[0] in _ANSWERED_IN_ORDER:
+            self._in_order_at = now
         if key not in self._on_way:
             return self._late.pop(key, None)
         for before in list(self._on_way):
@@ -83,9 +85,9 @@ class Flight:
 
     def _due(self, sent: Sent) -> float:
         """While answers come in their order, a line is slow, and has lost nothing: the next has half its wait again."""
-        if sent.kind not in _ANSWERED_IN_ORDER or self.heard_at <= sent.at:
+        if sent.kind not in _ANSWERED_IN_ORDER or self._in_order_at <= sent.at:
             return sent.due
-        return max(sent.due, self.heard_at + (sent.due - sent.at) / 2.0)
+        return max(sent.due, self._in_order_at + (sent.due - sent.at) / 2.0)
 
     def overdue(self, now: float) -> list[Sent]:
         """Take away what is not answered in time; where nothing was heard since, that is all that is on its way."""

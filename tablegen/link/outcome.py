@@ -15,7 +15,7 @@ ProgressCall = Callable[[int, int], None]  # (bytes that the device has, all byt
 class UploadResult:
     """What became of an upload.
 
-    ``line`` is that of the old frame which was the last, None where the answer was lost with the port. ``bytes`` of the
+    ``line`` is that of the old frame which was the last, None where the answer was lost. ``bytes`` of the
     image, ``wire_bytes`` that were sent for it, ``resumed`` bytes that the device had before. ``slow_baud`` is about
     the rate at which answers came, None where it was not far below that of the port.
     """

@@ -51,6 +51,7 @@ class Uploader:
         self._retransmissions = 0
         self._anew: dict[int, int] = {}
         self._flight = Flight(session.info.window, self._start)
+        self._before = session.status
         self._had = self._received(session.status)  # bytes that the device had before
         self._restart(session.status)
 
@@ -114,12 +115,15 @@ class Uploader:
         self._commit_body = b""
         self._nonce: bytes | None = None
         self._status: DeviceStatus | None = None  # the last one since COMMIT, or since the device was busy
+        self._asked_again = False  # the same COMMIT was sent though the scan is active
         self._poll_s = _POLL_S[0]
         self._poll_at = self._pause_until = 0.0
         self._busy = False  # BEGIN was refused so: STATUS before the next one
 
     def _in_force(self, status: DeviceStatus) -> bool:
-        return self._committed and status.hash == self._image.info.hash
+        """Whether this upload is, and not an earlier one of the same scan."""
+        same, before = status.hash == self._image.info.hash, self._before
+        return self._committed and same and (before.hash, before.generation) != (status.hash, status.generation)
 
     def _count(self, reason: int, error: LinkError) -> None:
         """Some things may happen by chance, but not for ever."""
@@ -357,7 +361,10 @@ class Uploader:
         elif at_work:
             self._poll_at = now + self._poll_s
             self._poll_s = min(2.0 * self._poll_s, _POLL_S[1])
+        elif self._in_force(status) and self._asked_again:
+            return status.generation, None
         else:
+            self._asked_again = self._in_force(status)
             self._repeat_commit()  # it was lost, or its answer was
         return None
 

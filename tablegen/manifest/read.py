@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from fractions import Fraction
 from hashlib import sha256
+from math import isfinite
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -48,11 +49,36 @@ Coefficient = Annotated[float, Meta(ge=-1e3, le=1e3)]  # of a waveform from 0 to
 LEAST_V_PER_CODE = 1e-15  # a range of 1 mV in 24 bits, behind an amplifier of 1e-4, is 6e-15 V
 
 
+class ManifestBranch(Struct):
+    """Hysteresis of one branch: the peak of its residual, and where that is."""
+
+    beta: float
+    u_peak: float
+
+
+class ManifestResonance(Struct):
+    """Where the response is largest, and half its width there."""
+
+    hz: float
+    half_width_hz: float
+
+
 class ManifestDrive(Struct):
-    """Volts at the piezo."""
+    """Volts at the piezo, and the shape that they follow."""
 
     v_offset: Volts
     v_amplitude: Volts
+    v_scan: Volts
+    v_scan_normalised: Annotated[float, Meta(gt=0.0)]
+    m: float
+    g: float
+    size_nm: float
+    window_nm: float
+    turn: Annotated[float, Meta(gt=0.0, lt=1.0)]
+    model: str
+    forward: ManifestBranch
+    backward: ManifestBranch
+    resonance: ManifestResonance | None = None
 
 
 class ManifestLine(Struct):
@@ -62,10 +88,21 @@ class ManifestLine(Struct):
     hold_ticks: Positive
     phase_step: Annotated[int, Meta(ge=0, le=1 << 32)]
     phase_remainder: Natural
+    rate_hz: float
+    requested_hz: float
+    rate_exact: tuple[int, Positive]
+
+
+class ManifestSeries(Struct):
+    """A waveform w(t) in float64; a layer has no mean."""
+
+    a: list[float]
+    b: list[float]
+    a0: float = 0.0
 
 
 class ManifestFourier(Struct):
-    """w(t) in float64; of the words only how many there are."""
+    """w(t) in float64, its words, and what the piezo is to follow where dynamics or a layer make that another one."""
 
     harmonics: Annotated[int, Meta(ge=1, le=4096)]
     a0: Coefficient
@@ -74,6 +111,14 @@ class ManifestFourier(Struct):
     a0_word: Word
     a_words: list[Word]
     b_words: list[Word]
+    band_limit: Literal["truncate", "lanczos", "window"]
+    q_format: Literal["Q2.30"]
+    window: tuple[float, float]
+    directions: Literal["forward", "both"]
+    held_harmonics: list[Positive] = []
+    held_factors: list[float] = []
+    target: ManifestSeries | None = None
+    refinement: ManifestSeries | None = None
 
 
 class ManifestTable(Struct):
@@ -82,6 +127,7 @@ class ManifestTable(Struct):
     mode: Literal["interpolated", "direct"]
     bits: Bits
     guard_bits: Number
+    scale: Annotated[float, Meta(gt=0.0, le=1e9)]
     words: Annotated[list[Annotated[int, Meta(ge=-(1 << 23), lt=1 << 23)]], Meta(min_length=1, max_length=1 << 20)]
 
 
@@ -108,6 +154,19 @@ class ManifestCertificate(Struct):
     """What the build promised of an axis."""
 
     max_error_lsb: Annotated[float, Meta(ge=0.0)]
+    ticks: int | None = None
+    rms_error_lsb: float | None = None
+    lowest_code: int | None = None
+    highest_code: int | None = None
+    headroom_low: int | None = None
+    headroom_high: int | None = None
+    largest_step: int | None = None
+    max_step: int | None = None
+    peak_slew_v_per_s: float | None = None
+    beyond_cutoff_db: float | None = None
+    at_resonance_db: float | None = None
+    scaling_error_percent: dict[str, dict[str, float]] | None = None
+    refinement_percent: dict[str, dict[str, float]] | None = None
 
 
 class ManifestAxis(Struct):
@@ -314,6 +373,17 @@ def _wrong_schedule(sequence: ManifestSequence) -> list[str]:
     return wrong
 
 
+def _finite(value: Any) -> bool:
+    """Whether all floats below a value are finite: JSON as Python reads it knows NaN."""
+    if isinstance(value, Struct):
+        return all(_finite(getattr(value, name)) for name in value.__struct_fields__)
+    if isinstance(value, dict):
+        return all(map(_finite, value.values()))
+    if isinstance(value, list | tuple):
+        return all(map(_finite, value))
+    return not isinstance(value, float) or isfinite(value)
+
+
 def _wrong_axes(manifest: Manifest) -> list[str]:
     """Why no device could play these axes."""
     wrong = []
@@ -349,6 +419,7 @@ def _wrong_axes(manifest: Manifest) -> list[str]:
                 "output.code_min, park_code, code_max are not in order within the converter",
             ),
             (abs(output.v_per_code) >= LEAST_V_PER_CODE, f"output.v_per_code is {output.v_per_code:g}"),
+            (_finite(axis), "holds a number that is not finite"),
             (
                 {len(found) for found in (fourier.a, fourier.b, fourier.a_words, fourier.b_words)}
                 == {fourier.harmonics},

@@ -17,7 +17,7 @@ import numpy as np
 from tablegen.installation import install_advice
 from tablegen.resources import c_runtime
 from tablegen.verification.bench import SequencerShape
-from tablegen.verification.c_bench import BENCH, OPTIONS, CPlayed, defines, script_words, sine_of
+from tablegen.verification.c_bench import BENCH, OPTIONS, CPlayed, constants_written, defines, script_words, sine_of
 from tablegen.verification.elf import Executable, read_executable
 from tablegen.verification.simulate import SimulationFailed, ToolMissing
 from tablegen.verification.stream import Script
@@ -253,6 +253,7 @@ class CortexMBench:
     ) -> None:
         runtime = list(c_runtime() if sources is None else sources)
         self.shape, self.core = shape, core
+        self._constants = constants_written(chosen)
         self.executable = compile_bare(
             folder / "stream_bench.elf",
             [*runtime, *BENCH, MEMORY],
@@ -287,7 +288,7 @@ class CortexMBench:
                 processor.write("bench_script_words", len(part).to_bytes(4, "little"))
             processor.resume("bench_exchange")
         capture = np.concatenate(captures).astype(np.uint64)
-        return CPlayed(capture[:-4], [int(count) for count in capture[-4:]])
+        return CPlayed.of(capture, words, self._constants)
 
     def _check(self, processor: Processor) -> None:
         at = int.from_bytes(processor.read("bench_refused"), "little")

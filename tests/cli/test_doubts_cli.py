@@ -101,7 +101,7 @@ def test_a_response_is_written_named_and_built_from(lab: Path) -> None:
     assert abs(true - 1.0) < 0.01
     assert np.all(np.abs(np.diff(np.interp(f, measured.f_hz, measured.phase_turns))) < 0.1)  # no jump of a turn
     assert run("check", "scan.toml").status == 0
-    series = make_plan(load("scan.toml")).x.drive_series
+    series = make_plan(load("scan.toml")).x.series
     target = make_plan(load("scan.toml")).x.target
     n = np.arange(1, 33)
     held = np.sinc(n / 1250.0) * np.exp(-1j * np.pi * n / 1250.0)  # by the converter, for a tick

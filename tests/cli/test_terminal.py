@@ -59,6 +59,7 @@ def test_every_control_of_unicode_is_seen() -> None:
     assert [c for c in controls if visible(chr(c)) == chr(c)] == [ord("\t"), ord("\n")]
 
 
+@pytest.mark.common
 @pytest.mark.parametrize("encoding", ["utf-8", "ascii"])
 def test_a_title_of_an_image(tmp_path: Path, encoding: str) -> None:
     container = GwyContainer()
@@ -88,6 +89,7 @@ def test_a_name_of_a_file(tmp_path: Path) -> None:
     assert SHOWN in shown
 
 
+@pytest.mark.common
 def test_a_manifest(tmp_path: Path) -> None:
     assert run("build", write_pair(tmp_path), "-o", tmp_path / "out", "-q").status == 0
     path = tmp_path / "out" / "manifest.json"

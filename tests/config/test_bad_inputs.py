@@ -1530,7 +1530,9 @@ def test_what_a_message_on_the_scanner_advises_helps(
     assert found
     write_pair(here, scan, edited(scanner, remedy.format(found[1])))
     after = run("check", "scan.toml")
-    assert (after.status, after.messages) == (0, [])
+    assert after.status == 0
+    # At the edge of what can be built a branch all but stands still somewhere, which is a warning.
+    assert all(message.startswith("warning: ") for message in after.messages)
 
 
 def refused(folder: Path, scan: str) -> str:

@@ -150,6 +150,7 @@ class Library:
         for name in REQUESTS:
             getattr(self.dll, f"dac_sequencer_{name}").restype = c_bool
         self.dll.dac_sequencer_arm.restype = c_bool
+        self.dll.dac_sequencer_init.restype = c_bool
         self.dll.dac_sequencer_writable.restype = c_bool
         self.dll.dac_sequencer_status.restype = Status
         self.dll.dac_synthesize.restype = c_bool

@@ -1,7 +1,7 @@
 """Which programs the C sequencer takes, and why it refuses others; checks of ``c_checks``."""
 
 from collections.abc import Iterator
-from ctypes import addressof, c_int32
+from ctypes import addressof, byref, c_int32
 from dataclasses import replace
 
 from c_devices import Libraries, device_for, flat
@@ -187,6 +187,36 @@ def other_converters(libraries: Libraries) -> None:
         axis: replace(getattr(left, axis), output=replace(getattr(left, axis).output, align="left")) for axis in "xy"
     })  # fmt: skip
     assert device.load(left) == LOADED
+
+
+def converters_that_do_not_fit(libraries: Libraries) -> None:
+    """Those that the runtime cannot serve are refused at the start, on either axis, and then no program is loaded."""
+    for library in libraries:
+        most = 8 * library.output_bytes
+        good = Converter(16, 16, False, False, 0)
+        refused = [
+            (7, 16, 0), (25, 32, 0), (0, 0, 0), (16, 15, 0), (16, most + 1, 0), (16, 16, -1), (16, 16, 1 << 16),
+            (8, 16, 256),
+        ]  # fmt: skip
+        accepted = [(16, 16, 65535), (8, 16, 255), (8, 8, 0), (12, most, 4095), (min(most, 24), most, 0)]
+        for bits, word_bits, code in (*refused, *accepted):
+            other = Converter(bits, word_bits, True, True, code)
+            for pair in ((other, good), (good, other)):
+                device = Device(library, good, good)
+                result = library.dll.dac_sequencer_init(device.state, *map(byref, pair))
+                assert result == ((bits, word_bits, code) in accepted), (bits, word_bits, code)
+                if not result:
+                    assert device.load(flat(1)) == OTHER_CONVERTER
+                    assert device.steps(3)[0].tolist() == [0, 0, 0]
+
+
+def requests_that_do_not_fit(libraries: Libraries) -> None:
+    """More frames than a count holds are refused; of a reported fault only the bits that there are become one."""
+    device = device_for(libraries.narrow, flat(1))
+    assert [device.arm(frames) for frames in (1 << 31, (1 << 31) + 1, (1 << 32) - 1)] == [True, False, False]
+    device.report(0xF4)
+    device.steps(1)
+    assert device.status().faults == 4
 
 
 def words_too_wide_for_their_storage(libraries: Libraries) -> None:

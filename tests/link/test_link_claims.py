@@ -6,14 +6,15 @@ from random import Random
 
 import pytest
 from client_line import VirtualLine
-from client_rig import FOURIER, TABLE, LoseOnce, client, model
+from client_rig import LARGE, LARGE_INFO, TABLE, LoseOnce, Watched, client, model
 from link_faults import Chances
 from link_line import Line
 from link_programs import INFO
 
 from tablegen.link.device import Device
 from tablegen.link.errors import LinkError, LinkLost, OutOfTime
-from tablegen.link.messages import Request, Upload
+from tablegen.link.frames import FrameReader
+from tablegen.link.messages import ANSWER, REFUSAL, Request, Upload
 from tablegen.link.model import ModelDevice
 from tablegen.link.upload import Uploader
 
@@ -108,16 +109,52 @@ def test_an_upload_of_the_same_bytes_as_another_scan_had_nothing() -> None:
 
 
 def test_a_scan_in_force_is_not_sent_again_though_its_answer_was_lost() -> None:
-    """All answers are lost from COMMIT on until the scan plays: DATA that is repeated then finds no upload."""
-    device_model = model()
+    """Those to COMMIT and to the last DATA are lost, and STATUS tells: twice the same scan, once by force."""
+    device_model = model(LARGE_INFO)
 
     def lose(piece: bytes) -> list[bytes]:
-        return [] if device_model.status().generation == 2 and line.now() < 1.0 else [piece]
+        (frame,) = FrameReader().feed(piece)
+        done = len(device_model.memory) == len(LARGE.data)
+        return (
+            [] if frame.type == Request.COMMIT | ANSWER or (done and frame.type == Request.DATA | ANSWER) else [piece]
+        )
 
-    line = VirtualLine(device_model, spoil_back=lose)
+    line = Watched(device_model, spoil_back=lose)
     with client(line) as device:
-        assert device.upload(FOURIER).generation == 2
-        assert device.status().generation == 2
+        for generation in (2, 3):
+            result = device.upload(LARGE, force=generation == 3)
+            assert (result.generation, result.line) == (generation, None)
+            assert result.seconds < 1.5
+    assert line.count(Request.BEGIN) == 2
+
+
+def test_data_that_finds_no_upload_is_no_reason_to_begin_again() -> None:
+    """It was repeated, and the scan became active meanwhile."""
+    device_model = model(LARGE_INFO)
+    lost = [0]
+
+    def lose(piece: bytes) -> list[bytes]:
+        """What answers while the scan becomes active, up to the first refusal."""
+        (frame,) = FrameReader().feed(piece)
+        done = len(device_model.memory) == len(LARGE.data) or device_model.status().generation == 2
+        lost[0] += done and frame.type == REFUSAL
+        return [] if done and not lost[0] else [piece]
+
+    line = Watched(device_model, spoil_back=lose)
+    with client(line) as device:
+        assert device.upload(LARGE).generation == 2
+    assert lost[0]
+    assert line.count(Request.BEGIN) == 1
+
+
+def test_data_waits_where_the_first_answers_are_lost() -> None:
+    """Until BEGIN is answered nobody knows what answers to DATA mean."""
+    line = Watched(
+        model(LARGE_INFO), spoil_out=LoseOnce(Request.DATA, 1), spoil_back=LoseOnce(Request.BEGIN | ANSWER, 1)
+    )
+    with client(line) as device:
+        result = device.upload(LARGE)
+    assert result.retransmissions <= 8, "one window"
 
 
 @pytest.mark.parametrize("seed", range(4))

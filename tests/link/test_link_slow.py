@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 from random import Random
+from unittest.mock import patch
 
 import pytest
 from client_line import VirtualLine
@@ -16,6 +17,7 @@ from link_line import Line
 from tablegen.link.device import Device
 from tablegen.link.errors import LinkError, OutOfTime
 from tablegen.link.flight import Flight, Sent
+from tablegen.link.frames import FrameReader
 from tablegen.link.messages import Request
 from tablegen.link.outcome import UploadResult
 from tablegen.link.pace import Pace, back_off
@@ -28,7 +30,7 @@ def upload(
     seed: int = 1, key: bytes = b"", window: int = 8, timeout_s: float | None = None, **line_options: object
 ) -> tuple[UploadResult, Line]:
     """Over a line of these properties, which the client is not told."""
-    device_model = model(replace(LARGE_INFO, window=window), key)
+    device_model = model(replace(LARGE_INFO, window=window), key, milliseconds=lambda: int(1000.0 * line.now_s))
     line = Line(device_model, seed=seed, tick_hz=500_000, **line_options)  # type: ignore[arg-type]
     with Device(line.open, key=key or None, random=Random(seed), sleep=line.sleep) as device:
         device.arm()
@@ -62,6 +64,10 @@ def test_a_slow_line_is_used_and_named(slower: int, key: bytes) -> None:
 def test_a_line_as_fast_as_it_should_be_is_not_called_slow() -> None:
     for options in ({}, {"baud": 460800, "back_s": 0.016}, {"baud": 460800, "batch_s": 0.016}, {"window": 1}):
         assert upload(**options)[0].slow_baud is None  # type: ignore[arg-type]
+    for window in (2, 3):
+        assert upload(window=window, out_s=0.1, back_s=0.1)[0].slow_baud is None, (
+            "some answers follow each other closely"
+        )
 
 
 @pytest.mark.common
@@ -108,6 +114,20 @@ def test_a_readback_through_a_slow_line(slower: int) -> None:
     assert line.sent < 60 * (SIZE / 240) if slower > 1 else line.sent < SIZE / 4
 
 
+def test_a_request_has_several_tries_through_a_long_way() -> None:
+    lost = [0]
+
+    def lose_three(piece: bytes) -> list[bytes]:
+        frames = FrameReader().feed(piece)
+        lost[0] += bool(frames) and frames[0].type == Request.STATUS
+        return [] if 0 < lost[0] <= 3 else [piece]
+
+    line = VirtualLine(model(), out_s=0.5, back_s=0.5, spoil_out=lose_three)
+    with client(line) as device:
+        assert device.status().generation == 1
+    assert lost[0] == 4
+
+
 def test_a_readback_keeps_the_time_that_it_was_given() -> None:
     device_model = model(LARGE_INFO)
     with client(VirtualLine(device_model)) as device:
@@ -145,14 +165,14 @@ def make_other() -> object:
 # Ways that change, and buffers that overflow
 
 
-def changed_way(way_s: float = 1.0) -> tuple[float, float]:
-    """Bytes in proportion, and seconds, of an upload whose way is long from its first frame on: nobody knew."""
+def changed_way(way_s: float = 1.0) -> float:
+    """Bytes in proportion, of an upload whose way is long from its first frame on: nobody knew."""
     line = Watched(model(LARGE_INFO), tick_hz=500_000)
     with client(line) as device:
         device.status()
         line._out_s = line._back_s = way_s
-        result = device.upload(LARGE)
-    return line.sent / SIZE, result.seconds
+        device.upload(LARGE)
+    return line.sent / SIZE
 
 
 class Bridge(VirtualLine):
@@ -179,7 +199,7 @@ def through_a_bridge() -> float:
 
 
 def test_a_way_that_becomes_long() -> None:
-    assert changed_way()[0] < 1.5
+    assert changed_way() < 1.5
 
 
 def test_a_buffer_that_is_too_small_for_the_window() -> None:
@@ -194,6 +214,12 @@ def _deaf_to_late(self: Flight, key: tuple[int, int], now: float) -> Sent | None
     return self._on_way.pop(key, None)
 
 
+def without_learning() -> float:
+    """Bytes in proportion, through a way that is longer than any wait: late answers alone bring it on."""
+    with patch("tablegen.link.pace.Pace.answered"):
+        return upload(out_s=0.75, back_s=0.75, timeout_s=60.0)[1].sent / SIZE
+
+
 def _capped(self: Pace, key: tuple[int, int], now: float, answer_bytes: int) -> None:
     ANSWERED(self, key, now, answer_bytes)
     self.late_s = min(self.late_s, 0.25)
@@ -202,8 +228,8 @@ def _capped(self: Pace, key: tuple[int, int], now: float, answer_bytes: int) -> 
 ANSWERED = Pace.answered
 BREAKS: dict[str, tuple[str, object, Callable[[], float]]] = {
     "lateness has a cap": ("link.pace.Pace.answered", _capped, lambda: upload(out_s=1.0, back_s=1.0)[1].sent / SIZE),
-    "late answers do not count": ("link.flight.Flight.take", _deaf_to_late, lambda: changed_way()[1]),
-    "waits do not double": ("link.flight.back_off", lambda wait_s, in_vain: wait_s, lambda: changed_way(2.0)[0]),
+    "late answers do not count": ("link.flight.Flight.take", _deaf_to_late, without_learning),
+    "waits do not double": ("link.flight.back_off", lambda wait_s, in_vain: wait_s, lambda: changed_way(2.0)),
     "the window does not shrink": ("link.flight.Flight.lost", lambda self: None, through_a_bridge),
 }
 
@@ -218,7 +244,7 @@ def test_a_client_that_does_not_learn_is_caught(name: str, monkeypatch: pytest.M
         bad = trial()
     except LinkError:
         return
-    assert bad > 1.05 * good
+    assert bad > 1.2 * good
 
 
 # The parts
@@ -274,7 +300,7 @@ def test_a_delay_that_was_once_fades() -> None:
     pace = Pace(0.016)
     _answered(pace, 0.0, 0, 2.0)
     waits = [_answered(pace, 10.0 * seq, seq, 0.03) for seq in range(1, 30)]
-    assert waits[0] > 2.0
+    assert waits[0] > waits[1] > waits[2] > 1.5, "one quick answer does not make the way short"
     assert waits[-1] < 0.2
 
 
@@ -296,3 +322,17 @@ def test_requests_on_their_way_have_a_bound_of_their_own() -> None:
     assert flight.take((Request.DATA, 0), 6.0) is not None, "late, and it counts"
     flight.forget(Request.DATA)
     assert flight.take((Request.DATA, 1), 6.0) is None
+
+
+@pytest.mark.parametrize(("tries_in_vain", "left"), [(0, 2), (2, 1)])
+def test_two_requests_stay_on_their_way_while_answers_come(tries_in_vain: int, left: int) -> None:
+    flight = Flight(8, 0.0)
+    for count in range(tries_in_vain):
+        flight.add(Sent(Request.STATUS, count, 10.0 * count, 10.0 * count + 1.0))
+        assert len(flight.overdue(10.0 * count + 9.0)) == 1
+    for _ in range(5):
+        flight.lost()
+    for seq in range(left):
+        assert flight.has_room()
+        flight.add(Sent(Request.DATA, seq, 1.0, 2.0))
+    assert not flight.has_room()

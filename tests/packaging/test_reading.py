@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 import tablegen
+from tablegen.reading import KINDS, size_shown
 
 PACKAGE = Path(tablegen.__file__).parent
 METHODS = {"open", "read_text", "read_bytes"}  # of paths
@@ -31,6 +32,7 @@ ALLOWED = {
     ("verification/c_target.py", "read_text"): "its own script",
     ("verification/directory.py", "shutil.copyfile"): "files of a build, which read_build has found to be files",
     ("verification/verilog_target.py", "shutil.copyfile"): "as in directory.py",
+    ("link/transport.py", "open"): "a serial port",
     ("calibration/image_files.py", "Pillow.open"): "bytes that were read already",
 }
 PARSERS = {"json.loads", "tomllib.loads", "tomlkit.parse", "msgspec.json.decode"}
@@ -121,3 +123,9 @@ def test_only_one_module_writes_controls(modules: dict[str, ast.AST]) -> None:
         if name.startswith("cli/") and node.value != "\r\n"
     }
     assert escapes == {"cli/terminal.py"}
+
+
+def test_the_page_of_inputs_has_every_limit() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "inputs.md").read_text("utf-8")
+    table = [line.strip("| ").split(" | ") for line in page.splitlines() if line.endswith(("iB |", "KiB |"))]
+    assert [tuple(row) for row in table] == [(kind.what, size_shown(kind.most_bytes)) for kind in KINDS]
