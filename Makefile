@@ -24,7 +24,8 @@ CHECK_TOOLS := gcc iverilog
 COMMON_TOOLS := $(CHECK_TOOLS) make g++ clang libclang-rt-dev cmake ninja-build srecord
 HDL_TOOLS := make g++ iverilog yosys nextpnr-ice40 z3
 FIRMWARE_TOOLS := gcc-arm-none-eabi qemu-system-arm gcc-avr avr-libc simavr gcc-riscv64-unknown-elf gcc-mips-linux-gnu \
-    libc6-dev-mips-cross qemu-user
+    libc6-dev-mips-cross qemu-user \
+    arduino-builder arduino-core-avr libsimavr-dev libelf-dev nodejs npm
 TOOLS := $(COMMON_TOOLS) $(HDL_TOOLS) $(FIRMWARE_TOOLS) cppcheck
 # A process that has nothing more to do takes tests from the end of the other's: neighbours stay together, so that what
 # they share is made once. OpenBLAS threads only spin beside the other processes.
@@ -77,6 +78,7 @@ instructions: $(VENV)/installed-test
 link: $(VENV)/installed-test
 	@.ci/system-packages gcc-arm-none-eabi
 	$(BIN)/python benchmarks/link.py --write
+	$(BIN)/python benchmarks/slow_link.py --write
 
 # What is found goes into build/fuzz; what reaches something new may go into the corpus: build/fuzz/link -merge=1.
 FUZZ_RUNS ?= 1000000

@@ -22,6 +22,7 @@ from tablegen.virtual.closed_loop import (
     with_scan,
 )
 from tablegen.virtual.laboratory import OFFSETS, calibrate
+from tablegen.virtual.other_plants import same_numbers, uniform_density
 from tablegen.virtual.parameters import load_truth
 from tablegen.virtual.scanner import VirtualScanner
 from tablegen.virtual.simulation import with_model
@@ -79,13 +80,33 @@ def map_table(example: Setup) -> list[str]:
     return lines
 
 
+def plants_table(example: Setup) -> list[str]:
+    """The range over the sizes of the map, a row a plant and a column an offset, after its own calibration."""
+    base = with_scan(example, size_v=20.0, rate_hz=EXAMPLE_RATE_HZ)
+    v_max = base.scanner.v_max
+    truth = load_truth()
+    plants = (
+        ("the virtual scanner", truth),
+        ("the same printed numbers, without that choice", same_numbers(truth)),
+        ("uniform density", uniform_density(truth)),
+    )
+    offsets = " | ".join(f"{at * v_max:g} V" for at in OFFSETS)
+    lines = [f"| plant | {offsets} |", "|---|---|---|---|---|---|"]
+    for name, one in plants:
+        scanner = VirtualScanner.of(one)
+        rows = size_map(calibrate(base, scanner).setup, scanner)
+        lines.append(f"| {name} | {' | '.join(f'{row.min():+.1f} .. {row.max():+.1f}' for row in rows)} |")
+    return lines
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--write", action="store_true", help=f"put the tables into {PAGE.name}")
     given = parser.parse_args()
     example = load(ROOT / "examples" / "annexin_200nm.toml")
     page = PAGE.read_text("utf-8")
-    for mark, table in (("measured", loop_table(example)), ("map", map_table(example))):
+    tables = (("measured", loop_table(example)), ("map", map_table(example)), ("plants", plants_table(example)))
+    for mark, table in tables:
         text = "\n".join(table) + "\n"
         print(text)
         marked = re.compile(rf"(?<=<!-- {mark} -->\n).*?(?=<!-- /{mark} -->)", re.DOTALL)

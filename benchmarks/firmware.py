@@ -1,7 +1,7 @@
-"""What the C sequencer takes on Cortex-M: instructions, code, memory, stack, as tables for docs/instructions.md.
+"""What the C sequencer takes on Cortex-M and RISC-V: instructions, code, memory, stack, for docs/instructions.md.
 
 ``python benchmarks/firmware.py`` prints the tables, ``--write`` puts them into the page. They are counted in emulation,
-of the shipped example, compiled by arm-none-eabi-gcc; another version of it gives other numbers. Instructions are not
+of the shipped example, compiled by gcc; another version of it gives other numbers. Instructions are not
 cycles.
 """
 
@@ -18,7 +18,7 @@ from tablegen.config.load import load
 from tablegen.emit.render import render
 from tablegen.planning.line_plan import make_plan
 from tablegen.resources import c_runtime
-from tablegen.verification.emulate import CORES, Processor, compile_bare
+from tablegen.verification.emulate import COMPILERS, CORES, Processor, compile_bare
 
 HERE = Path(__file__).parent
 EXAMPLE = HERE.parent / "examples" / "annexin_200nm.toml"
@@ -32,6 +32,8 @@ CASES = [
     ("cortex-m4", "-O2"),
     ("cortex-m4", "-Os"),
     ("cortex-m7", "-O2"),
+    ("cortex-m33", "-O2"),
+    ("riscv32", "-O2"),
 ]
 
 
@@ -42,9 +44,11 @@ class Counts:
     fill: float  # an axis sample, mean of a frame
     fill_line: float  # the same away from the ends of a line
     worst_fill: float  # a tick of both axes, of the call that took longest
+    limited_fill: float  # the same of a program that is at a limit for half of each line
     markers: float  # a tick
     step: float  # a tick, both axes, mean
     worst_step: int
+    plain: float  # an axis sample
     linear: float  # a sample
     word: float  # of a table
     load: int
@@ -68,16 +72,23 @@ def measure(core: str, optimisation: str, folder: Path) -> Counts:
     steps = [machine.call("count_step") for _ in range(plan.schedule.ticks)]
     fills = [machine.call("count_fill") for _ in range(plan.schedule.frame_ticks // TICKS)]
     marked = [machine.call("count_fill_markers") for _ in fills]
+    plain = [machine.call("count_plain").instructions for _ in fills]
     rendered = machine.call("count_synthesize")
+    machine.call("count_init")
+    machine.call("count_load_limited")
+    machine.call("count_start")
+    limited = [machine.call("count_fill").instructions for _ in fills]
     filled = sum(fill.instructions for fill in fills)
     everything, bank = (int.from_bytes(machine.read("bytes", 4, at), "little") for at in (0, 4))
     return Counts(
         fill=filled / len(fills) / TICKS / 2,
         fill_line=min(fill.instructions for fill in fills) / TICKS / 2,
         worst_fill=max(fill.instructions for fill in fills) / TICKS,
+        limited_fill=max(limited) / TICKS,
         markers=(sum(fill.instructions for fill in marked) - filled) / len(fills) / TICKS,
         step=sum(step.instructions for step in steps) / len(steps),
         worst_step=max(step.instructions for step in steps),
+        plain=sum(plain) / len(plain) / TICKS / 2,
         linear=machine.call("count_linear").instructions / TICKS,
         word=rendered.instructions / len(plan.x.program.words),
         load=loaded.instructions,
@@ -98,9 +109,10 @@ def _code(core: str, optimisation: str, folder: Path) -> dict[str, int]:
     for source in c_runtime():
         if source.suffix == ".c":
             target = folder / f"{source.stem}.o"
+            compiler = COMPILERS[CORES[core].architecture]
             options = [*CORES[core].options, "-std=c99", optimisation, "-ffreestanding"]
-            _run("arm-none-eabi-gcc", *options, "-c", str(source), "-o", str(target))
-            found[source.name] = int(_run("arm-none-eabi-size", str(target)).splitlines()[1].split()[0])
+            _run(compiler, *options, "-c", str(source), "-o", str(target))
+            found[source.name] = int(_run(compiler.replace("gcc", "size"), str(target)).splitlines()[1].split()[0])
     return found
 
 
@@ -121,13 +133,15 @@ def tables(measured: Mapping[tuple[str, str], Counts]) -> str:
     instructions = head + "".join(
         row(what, [shown.format(getattr(counts, name)) for counts in all_counts])
         for what, name, shown in (
+            ("the longest `fill` of a frame, a tick of both axes", "worst_fill", "{:.0f}"),
+            ("the longest at a limit, a tick of both axes", "limited_fill", "{:.0f}"),
+            ("the longest `step`, a tick of both axes", "worst_step", "{:.0f}"),
+            ("markers of `fill`, a tick", "markers", "{:.1f}"),
             ("`fill`, an axis sample, mean of a frame", "fill", "{:.1f}"),
             ("the same between the ends of a line", "fill_line", "{:.1f}"),
+            ("a plain loop, an axis sample, mean of a frame", "plain", "{:.1f}"),
             ("linear interpolation alone, a sample", "linear", "{:.1f}"),
-            ("the longest `fill`, a tick of both axes", "worst_fill", "{:.0f}"),
-            ("markers of `fill`, a tick", "markers", "{:.1f}"),
             ("`step`, a tick of both axes, mean of a line", "step", "{:.0f}"),
-            ("the longest of them", "worst_step", "{:.0f}"),
             ("`dac_synthesize`, a word", "word", "{:.0f}"),
             ("`load`", "load", "{:.0f}"),
         )

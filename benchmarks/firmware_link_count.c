@@ -5,14 +5,19 @@
 enum { HARMONICS = 64 };
 
 static const dac_program scan = DAC_PROGRAM(ANNEXIN_200NM, annexin_200nm);
-static dac_word x_table[2][ANNEXIN_200NM_X_TABLE_LENGTH], y_table[2][ANNEXIN_200NM_Y_TABLE_LENGTH];
+static dac_word x_table[2][ANNEXIN_200NM_X_TABLE_LENGTH + 1], y_table[2][ANNEXIN_200NM_Y_TABLE_LENGTH + 1];
 static int32_t x_fourier[2 * HARMONICS + 1], y_fourier[2 * HARMONICS + 1];
-static const uint8_t key[32] = {7};
+static const uint8_t key[32] = {7}, identity[8] = {1};
+
+static uint32_t milliseconds(void)
+{
+    return 0;
+}
 
 #define AXIS(NAME, table, fourier)                                                                                    \
     {                                                                                                                 \
         DAC_CONVERTER(NAME, 0), {NAME##_CODE_MIN, NAME##_CODE_MAX, NAME##_MAX_STEP, 0xFFFFFF}, NAME##_TABLE_BITS,     \
-        NAME##_INDEX_BITS, {table[0], table[1]}, fourier                                                              \
+        NAME##_INDEX_BITS, NAME##_TABLE_LENGTH + 1, {table[0], table[1]}, fourier                                     \
     }
 
 static dac_link_config config = {
@@ -22,6 +27,10 @@ static dac_link_config config = {
     .sine_index_bits = ANNEXIN_200NM_SINE_INDEX_BITS,
     .sine = annexin_200nm_sine,
     .key = key,
+    .identity = identity,
+    .identity_bytes = sizeof identity,
+    .boot_persists = true,
+    .milliseconds = milliseconds,
 };
 static dac_sequencer sequencer;
 static dac_link link;

@@ -5,7 +5,7 @@
 enum { TICKS = 256, HARMONICS = 64 };
 
 static const dac_program scan = DAC_PROGRAM(ANNEXIN_200NM, annexin_200nm);
-static dac_word x_tables[2][ANNEXIN_200NM_X_TABLE_LENGTH], y_tables[2][ANNEXIN_200NM_Y_TABLE_LENGTH];
+static dac_word x_tables[2][ANNEXIN_200NM_X_TABLE_LENGTH + 1], y_tables[2][ANNEXIN_200NM_Y_TABLE_LENGTH + 1];
 static int32_t x_fourier[2 * HARMONICS + 1], y_fourier[2 * HARMONICS + 1];
 static dac_sequencer sequencer;
 static dac_link link;
@@ -15,7 +15,7 @@ static uint8_t markers[TICKS];
 #define AXIS(NAME, tables, words)                                                                                     \
     {                                                                                                                 \
         DAC_CONVERTER(NAME, 0), {NAME##_CODE_MIN, NAME##_CODE_MAX, NAME##_MAX_STEP, 0xFFFFFF}, NAME##_TABLE_BITS,      \
-        NAME##_INDEX_BITS, {tables[0], tables[1]}, words                                                              \
+        NAME##_INDEX_BITS, NAME##_TABLE_LENGTH + 1, {tables[0], tables[1]}, words                                     \
     }
 
 static const dac_link_config config = {

@@ -7,6 +7,31 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
+# What ends a program in an orderly way: Ctrl-C, `kill` and every supervisor, and the terminal that was closed.
+ENDINGS = tuple(signal.Signals[name] for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+
+
+@contextmanager
+def endings_interrupt() -> Iterator[None]:
+    """Inside, all of ``ENDINGS`` raise ``KeyboardInterrupt``, so that whatever is being done is put in order first.
+
+    One that is ignored stays ignored, as ``nohup`` asks for, and one that somebody handles stays theirs.
+    """
+    before: list[signal.Signals] = []
+    if threading.current_thread() is threading.main_thread():
+        before = [number for number in ENDINGS if signal.getsignal(number) is signal.SIG_DFL]
+
+    def interrupt(_number: int, _frame: FrameType | None) -> None:
+        raise KeyboardInterrupt
+
+    for number in before:
+        signal.signal(number, interrupt)
+    try:
+        yield
+    finally:
+        for number in before:
+            signal.signal(number, signal.SIG_DFL)
+
 
 @contextmanager
 def held(*numbers: signal.Signals) -> Iterator[list[int]]:

@@ -5,6 +5,19 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+MOST_PROBLEMS = 50  # of one run; more are no help, and a file may have a million
+_MOST_KEY, _MOST_WHY = 200, 1000  # characters
+
+
+def shortened(text: str, most: int = 200) -> str:
+    """A text on one line, and of a long one its beginning and its end."""
+    text = text if text.isprintable() else "".join(c if c.isprintable() else ascii(c)[1:-1] for c in _cut(text, most))
+    return _cut(text, most)
+
+
+def _cut(text: str, most: int) -> str:
+    return text if len(text) <= most else f"{text[: most // 2]}...{text[len(text) - most // 2 + 3 :]}"
+
 
 class Unphysical(ValueError):
     """A quantity that the physics or the arithmetic cannot serve; the message says by how much and what would fit."""
@@ -20,14 +33,19 @@ class Problem(NamedTuple):
 
     def __str__(self) -> str:
         place = f"{self.file}:{self.line}" if self.line else self.file
-        return f"{place}: {self.key}: {self.why}" if self.key else f"{place}: {self.why}"
+        why = shortened(self.why, _MOST_WHY)
+        return f"{place}: {shortened(self.key, _MOST_KEY)}: {why}" if self.key else f"{place}: {why}"
 
 
 class Rejected(Exception):
-    """The input was refused; ``problems`` holds every fault found, in the order of the files."""
+    """The input was refused; ``problems`` holds the faults found, in the order of the files: at most 50, and a word."""
 
     def __init__(self, problems: list[Problem]) -> None:
         self.problems = sorted(dict.fromkeys(problems), key=lambda p: (p.file, p.line))
+        if len(self.problems) > MOST_PROBLEMS:
+            self.problems = self.problems[:MOST_PROBLEMS]
+            last = self.problems[-1]
+            self.problems.append(Problem(last.file, last.line, "", f"more faults than these {MOST_PROBLEMS}; stopped"))
         super().__init__("\n".join(map(str, self.problems)))
 
 
@@ -58,7 +76,7 @@ class Document:
 
 
 class Problems:
-    """Collects problems, so that one run reports them all."""
+    """Collects problems, so that one run reports them all; beyond ``MOST_PROBLEMS`` it raises ``Rejected``."""
 
     def __init__(self) -> None:
         self.found: list[Problem] = []
@@ -66,6 +84,8 @@ class Problems:
     def add(self, document: Document, key: str, why: str) -> None:
         """Note one problem and go on."""
         self.found.append(document.problem(key, why))
+        if len(self.found) > MOST_PROBLEMS:
+            raise Rejected(self.found)
 
     @contextmanager
     def at(self, document: Document, key: str) -> Iterator[None]:

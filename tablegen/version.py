@@ -1,3 +1,3 @@
 """The version, below everything else: pyproject.toml, manifests and headers take it from here."""
 
-__version__ = "0.2.0"
+__version__ = "0.3.0"

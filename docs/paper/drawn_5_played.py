@@ -42,9 +42,9 @@ def figure_5cdi() -> Figure:
     )
     for (upper, lower), (model, title, forward, backward) in zip(axes.T, panels, strict=True):
         line = full_scale(model)
-        t = np.arange(len(line.displacement_nm)) / len(line.displacement_nm)
+        t = line.drive.turns
         moved = (line.displacement_nm - np.min(line.displacement_nm)) / np.ptp(line.displacement_nm)
-        ideal = ideal_triangle(len(t), 0.5)
+        ideal = ideal_triangle(len(t), 0.5, 0.5)
         upper.plot(t, ideal, color=GREY, lw=1.0, ls="--", label="ideal")
         upper.plot(t, line.drive.volts / 100.0, color=RED, lw=1.2, label="drive, from emitted codes")
         upper.plot(t, moved, color=BLUE, label="displacement (simulation)")

@@ -50,7 +50,7 @@ def rows() -> list[Row]:
     simulated, fitted = Source.IDENTIFIED, law()
     return [
         Row("sec. 3, 5", "200 nm at 13 V, in nm/V", between("12", "20", "nm/V"), 200.0 / 13.0, Source.ARITHMETIC),
-        Row("2b", "lattice at 50 V, the offset of the calibration", exact("17.7", "nm"), LATTICE_NM, Source.FITTED),
+        Row("2b", "lattice at 50 V, the offset of the calibration", exact("17.7", "nm"), LATTICE_NM, Source.INPUT),
         Row(
             "2c",
             "lattice at 93 V",

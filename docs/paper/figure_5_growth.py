@@ -34,14 +34,14 @@ def rows() -> list[Row]:
             "(22), forward, at full scale",
             limits("beta_max, 3.7 %", "%", 3.6999, 3.7001, 3),
             growth(1.0, FORWARD_GROWTH),
-            law,
+            Source.INPUT,
         ),
         Row(
             "sec. 9",
             "(22), backward, at full scale",
             limits("beta_max, 8 %", "%", 7.9999, 8.0001, 3),
             growth(1.0, BACKWARD_GROWTH),
-            law,
+            Source.INPUT,
         ),
         Row("sec. 9", "forward at 200 nm = 13 V, (22)", between("2", "3", "%"), growth(BASE_V, FORWARD_GROWTH), law),
         Row(
@@ -76,7 +76,7 @@ def _turn_rows() -> list[Row]:
         'with the turn. We read the paper\'s "increased to" as a change, because the paper sees no major difference'
     )
     return [
-        Row("5l", what.format("0.7"), about("10", "%"), _increase(0.7), Source.SIMULATED, decimals=2),
+        Row("5l", what.format("0.7"), about("10", "%"), _increase(0.7), Source.SIMULATED, why, decimals=2),
         Row("5l", what.format("0.9"), about("25", "%"), _increase(0.9), Source.SIMULATED, why, decimals=2),
     ]
 

@@ -139,13 +139,14 @@ def _harmonic_rows() -> list[Row]:
     share = largest(forward) / largest(before.forward)
     return [
         Row("5i", f"{peak}, forward", about("0.5", "%", "±"), largest(forward), known, why, decimals=2),
-        Row("5i", f"{peak}, backward", about("1", "%", "±"), largest(backward), known, why, decimals=2),
+        Row("5i", f"{peak}, backward", about("1", "%", "±"), largest(backward), known, why, decimals=3),
         Row(
             "5i",
             "forward peak residual over that of the sinusoidal model",
             limits("about one third", low=0.3, high=0.3667, decimals=2),
             share,
             known,
+            why,
         ),
         Row("5j", f"{scaling}, forward", about("5", "%"), forward.scaling_peak_to_peak, known, why),
         Row("5j", f"{scaling}, backward", about("11", "%"), backward.scaling_peak_to_peak, known, why),

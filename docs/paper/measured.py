@@ -54,7 +54,7 @@ def full_scale(model: Model) -> Played:
         setup = replace(setup, scanner=msgspec.structs.replace(setup.scanner, x=x))
     drive = played(make_plan(with_model(setup, model)).x)
     moved = axis().settled(drive.volts, drive.tick_s)
-    return Played(drive, moved, line_error(moved, 0.5))
+    return Played(drive, moved, line_error(moved, 0.5, first=0.5))
 
 
 @cache

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from paper import drawn_5_played, figure_2, figure_3, figure_5_growth, figure_5_laws, figure_5_played, figure_6, table_1
 from paper.drawing import png
-from paper.rows import Row, Source, faults
+from paper.rows import MADE_SO, OWN, Row, Source, faults
 
 Pictures = dict[str, tuple[str, Callable[[], Figure]]]
 SECTIONS: tuple[tuple[str, str, Callable[[], list[Row]], Pictures], ...] = (
@@ -18,31 +18,42 @@ SECTIONS: tuple[tuple[str, str, Callable[[], list[Row]], Pictures], ...] = (
 )
 PICTURES: Pictures = {name: picture for *_, pictures in SECTIONS for name, picture in pictures.items()}
 
-_HEAD = """# The paper's numbers, and ours
+_TITLE = """# The paper's numbers, and ours
 
 This page compares every result that the text, Table 1 and the captions of *Feedforward Compensation of Piezo
 Nonlinearity for High-Precision High-Speed Atomic Force Microscopy* (Umeda and Kodera) print with our number. It is for
 readers of the paper who want to check tablegen. The page on the [virtual scanner](../virtual.md) describes the
 simulation behind many of our numbers. `make paper` writes this page and its pictures; `tests/docs/test_paper.py`
 compares the page with the program.
+"""
+
+_EVIDENCE = """## What is evidence: {same} of {count}
 
 The paper measured a piezo; we did not. A number of ours that is neither an equation nor arithmetic comes from the
-virtual scanner. It is **a simulation, and was identified on some of these numbers**. The column "from" says where our
-number comes from:
+virtual scanner. It is **a simulation, and was identified on some of these numbers**. Only a number that it was not
+identified on is evidence that it is like the paper's scanner. There are {count} of them, of {all}; {same} agree
+with the paper. The sections below have them again.
+"""
+
+_SOURCES = """## Where our numbers come from
+
+The column "from" says where our number comes from:
 
 | from | what agreement shows |
 |---|---|
+| simulation | something: the number follows from other numbers, and was not used itself |
 | law | our number is an equation of `tablegen` with the paper's parameters: we compute what the paper computes |
 | law, fitted | our number is an equation fitted to the paper's own numbers: these numbers belong together |
 | arithmetic | the paper's numbers are consistent with each other; nothing of ours is used |
 | simulation, identified | nothing: it was made to give this number, but cannot meet all numbers at once |
-| simulation | something: the number follows from other numbers, and was not used itself |
+| input | nothing: it is the printed number, put in |
 
-A row is "same" if our number lies in the range "same if". The range is half a unit of the last printed digit. If the
-paper says about, approximately, roughly or ~, it is a tenth of the value if that is more, and for three digits a unit
-of the last digit. If the paper says exactly, it is a thousandth. The program computes the verdict. The pictures show
-our numbers as lines and the printed numbers as open circles; the paper's curves are not available. Figures 1 and 4
-print no result.
+A row is "same" if our number lies in the range "same if". Where the printed number is the source of ours ("simulation,
+identified" and "input"), a row that lies there says "made so" instead. The range is half a unit of the last printed
+digit. If the paper says about, approximately, roughly or ~, it is a tenth of the value if that is more, and for three
+digits a unit of the last digit. If the paper says exactly, it is a thousandth. The program computes the verdict. The
+pictures show our numbers as lines and the printed numbers as open circles; the paper's curves are not available.
+Figures 1 and 4 print no result.
 """
 
 _SLIPS = """## Slips in the paper
@@ -76,7 +87,8 @@ def all_rows() -> list[tuple[str, list[Row]]]:
 def page() -> str:
     """README.md of this folder."""
     made = all_rows()
-    parts = [_HEAD, _summary([row for _, rows in made for row in rows])]
+    every = [row for _, rows in made for row in rows]
+    parts = [_TITLE, *_evidence(every), _SOURCES, _summary(every)]
     for (title, rows), (_, text, _, pictures) in zip(made, SECTIONS, strict=True):
         parts.append(f"## {title}\n\n{text}\n")
         parts.append(_table(rows))
@@ -87,6 +99,13 @@ def page() -> str:
 def pictures() -> dict[str, bytes]:
     """Every picture by its file name."""
     return {f"{name}.png": png(draw()) for name, (_, draw) in PICTURES.items()}
+
+
+def _evidence(every: list[Row]) -> list[str]:
+    """The numbers that could have come out otherwise, before all others."""
+    rows = [row for row in every if row.source is Source.SIMULATED]
+    counts = {"same": sum(row.same for row in rows), "count": len(rows), "all": len(every)}
+    return [_EVIDENCE.format(**counts), _table(rows)]
 
 
 def _table(rows: list[Row]) -> str:
@@ -102,10 +121,11 @@ def _table(rows: list[Row]) -> str:
 
 def _summary(rows: list[Row]) -> str:
     count = Counter((row.source, row.same) for row in rows)
-    lines = ["| from | numbers | same | differ |", "|---|---|---|---|"]
+    lines = [f"| from | numbers | same | {MADE_SO} | differ |", "|---|---|---|---|---|"]
     for source in Source:
-        same, other = count[source, True], count[source, False]
-        lines.append(f"| {source} | {same + other} | {same} | {other} |")
-    same = sum(row.same for row in rows)
-    lines.append(f"| all | {len(rows)} | {same} | {len(rows) - same} |")
+        met, other = count[source, True], count[source, False]
+        cells = ("", str(met)) if source in OWN else (str(met), "")
+        lines.append(f"| {source} | {met + other} | {' | '.join(cells)} | {other} |")
+    same, made_so = (sum(row.verdict == verdict for row in rows) for verdict in ("same", MADE_SO))
+    lines.append(f"| all | {len(rows)} | {same} | {made_so} | {len(rows) - same - made_so} |")
     return "\n".join(lines) + "\n"

@@ -9,13 +9,18 @@ ABOUT = 0.1  # what "about" leaves open, of the value
 
 
 class Source(StrEnum):
-    """Where our number comes from. This decides how much an agreement shows."""
+    """Where our number comes from. This decides how much an agreement shows; what shows most comes first."""
 
+    SIMULATED = "simulation"
     LAW = "law"
     FITTED = "law, fitted"
-    IDENTIFIED = "simulation, identified"
-    SIMULATED = "simulation"
     ARITHMETIC = "arithmetic"
+    IDENTIFIED = "simulation, identified"
+    INPUT = "input"
+
+
+OWN = (Source.IDENTIFIED, Source.INPUT)  # the printed number is the source of ours
+MADE_SO = "made so"
 
 
 @dataclass(frozen=True)
@@ -65,8 +70,10 @@ class Row:
 
     @property
     def verdict(self) -> str:
-        """``same``, or why not."""
-        return "same" if self.same else self.why
+        """``same``, or why not; ``made so`` where the printed number is the source of ours."""
+        if not self.same:
+            return self.why
+        return MADE_SO if self.source in OWN else "same"
 
     @property
     def shown(self) -> float:

@@ -1,6 +1,14 @@
-# What the ports have in common: SCAN is built into BUILD/scan, and OWN is compiled with it for CPU.
+# What all ports have in common: SCAN is built into BUILD/scan, and OWN is compiled with it and the link for CPU.
+#
+#     make SCAN=scan.toml BAUD=460800 CFLAGS=-O3
+#
+# A port sets OWN, CPU, LINK (where everything goes) and BOARD_FLAGS before it includes this, and PRIVATELY, which stands
+# in front of commands whose output others must not read.
 CROSS ?= arm-none-eabi-gcc
 CFLAGS ?= -O2
+BAUD ?= 115200
+CONTROL ?= link
+OWN_link := control_link scan_link
 
 TABLEGEN ?= tablegen
 include $(or $(shell $(TABLEGEN) paths --make),$(error $(TABLEGEN) does not run: install piezo-tablegen, or give TABLEGEN=PATH))
@@ -8,21 +16,32 @@ $(eval $(call tablegen_build,$(SCAN),$(BUILD)/scan))
 
 SCAN_NAME := $(basename $(notdir $(filter-out $(BUILD)/scan/dac_%,$($(BUILD)/scan_HEADERS))))
 SCAN_UPPER := $(shell echo $(SCAN_NAME) | tr a-z A-Z)
-vpath memory.c ..
-OBJECTS := $(patsubst %,$(BUILD)/%.o,$(OWN) memory) $(patsubst %.c,%.o,$($(BUILD)/scan_SOURCES))
-COMPILE := $(CROSS) -std=c99 -mcpu=$(CPU) -mthumb -ffreestanding -ffunction-sections -fdata-sections \
-    -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Werror -I$(BUILD)/scan -I. -MMD -MP \
-    -DSCAN=$(SCAN_NAME) -DSCAN_UPPER=$(SCAN_UPPER) -DSCAN_HEADER='"$(SCAN_NAME).h"' \
-    -DUPDATE_RATE_HZ=$(UPDATE_RATE_HZ) $(CFLAGS)
 
-$(BUILD)/firmware.elf: $(OBJECTS)
-	$(CROSS) -mcpu=$(CPU) -mthumb -nostdlib -static -Wl,--gc-sections $(LINK) $(OBJECTS) -lgcc -o $@
+vpath memory.c ..
+vpath %.c ../common
+OBJECTS := $(patsubst %,$(BUILD)/%.o,$(OWN) $(OWN_$(CONTROL)) scan memory) $(patsubst %.c,%.o,$($(BUILD)/scan_SOURCES))
+COMPILE := $(CROSS) -std=c99 -mcpu=$(CPU) -mthumb -ffreestanding -ffunction-sections -fdata-sections \
+    -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Werror -I$(BUILD)/scan -I. -I../common -MMD -MP \
+    -DSCAN=$(SCAN_NAME) -DSCAN_UPPER=$(SCAN_UPPER) -DSCAN_HEADER='"$(SCAN_NAME).h"' \
+    $($(BUILD)/scan_CPPFLAGS) -DUPDATE_RATE_HZ=$(UPDATE_RATE_HZ) -DBAUD=$(BAUD) $(BOARD_FLAGS) $(CFLAGS)
+
+$(BUILD)/firmware.elf: $(OBJECTS) $(LINK_FILES)
+	$(PRIVATELY) $(CROSS) -mcpu=$(CPU) -mthumb -nostdlib -static -Wl,--gc-sections $(LINK) $(OBJECTS) -lgcc -o $@
 
 $(BUILD)/%.o: %.c
-	$(COMPILE) -c $< -o $@
+	$(PRIVATELY) $(COMPILE) -c $< -o $@
 
 $(BUILD)/scan/%.o: $(BUILD)/scan/%.c
 	$(COMPILE) -c $< -o $@
+
+# Objects are made again when they would be made otherwise.
+$(OBJECTS): $(BUILD)/command
+ifneq ($(file <$(BUILD)/command),$(COMPILE) $(OWN) $(CONTROL))
+.PHONY: $(BUILD)/command
+endif
+$(BUILD)/command:
+	@mkdir -p $(@D)
+	$(file >$@,$(COMPILE) $(OWN) $(CONTROL))@:
 
 -include $(OBJECTS:.o=.d)
 

@@ -23,20 +23,17 @@
 #endif
 #endif
 
-/* 1 if a 32 x 32 to 64 bit multiplication is an instruction, 0 if it is a call. */
-#ifndef DAC_LONG_MULTIPLY
-#if defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__) || defined(__AVR__)
+/* 1: runs add products of 64 bits; 0: they do with 32 bits, for processors that need a call or several instructions for one. Words of
+ * more than 16 bits need 64 bits everywhere. */
+#if DAC_TABLE_STORAGE_BITS != 16
+#undef DAC_LONG_MULTIPLY
+#define DAC_LONG_MULTIPLY 1
+#elif !defined(DAC_LONG_MULTIPLY)
+#if defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__) || defined(__AVR__) || (defined(__riscv) && __riscv_xlen == 32)
 #define DAC_LONG_MULTIPLY 0
 #else
 #define DAC_LONG_MULTIPLY 1
 #endif
-#endif
-
-/* Where it is a call, runs multiply gain and sample in two halves; this is the width of the lower half in bits. */
-#if DAC_LONG_MULTIPLY || DAC_TABLE_STORAGE_BITS != 16
-#define DAC_SPLIT 0
-#else
-#define DAC_SPLIT 10
 #endif
 
 #if DAC_TABLE_STORAGE_BITS == 16
@@ -69,6 +66,9 @@ static inline dac_output dac_coded(const dac_axis *axis, int32_t code)
     return (dac_output)(((uint32_t)code ^ axis->flip) << axis->shift);
 }
 
+/* Whether a converter is one that the runtime can serve. */
+bool dac_axis_serves(const dac_converter *converter);
+
 /* One tick: moves the code towards the waveform, and advances the position. Returns whether the code has arrived; sets *outside
  * if the clamp acted. */
 bool dac_axis_step(dac_axis *axis, const dac_bank_axis *bank, bool *outside);
@@ -77,7 +77,7 @@ bool dac_axis_step(dac_axis *axis, const dac_bank_axis *bank, bool *outside);
 bool dac_axis_approach(dac_axis *axis, const dac_bank_axis *bank, int32_t target);
 
 /* Writes the codes of up to `ticks` ticks to out[0], out[DAC_STRIDE].., not coded yet; returns how many were played. It ends before
- * ticks on which the clamp or the slew guard might have to act, or which need the table's last word: the caller plays these itself. */
+ * ticks on which the clamp or the slew guard might have to act: the caller plays these itself. The ticks are those of one period. */
 uint32_t dac_axis_run(dac_axis *axis, const dac_bank_axis *bank, dac_output *out, uint32_t ticks);
 
 /* Returns the position `ticks` ticks later; ticks below 2^24. */

@@ -159,13 +159,13 @@ static bool fits(const int32_t *words, unsigned count)
     return total < UINT64_C(1) << 32; /* 4.0 */
 }
 
-bool dac_synthesize(dac_word *table, unsigned index_bits, unsigned bits, const int32_t *words, unsigned harmonics,
-                    const int32_t *sine, unsigned sine_index_bits)
+bool dac_synthesize(dac_word *table, uint32_t room, unsigned index_bits, unsigned bits, const int32_t *words,
+                    unsigned harmonics, const int32_t *sine, unsigned sine_index_bits)
 {
     struct renderer r;
 
-    if (index_bits < 3 || index_bits > 16 || sine_index_bits < index_bits || sine_index_bits > 16 || bits < 8 || bits > 24
-        || bits > DAC_TABLE_STORAGE_BITS || harmonics < 1 || harmonics > 4096 || !fits(words, 2 * harmonics + 1))
+    if (index_bits < 3 || index_bits > 16 || room < DAC_TABLE_ROOM(index_bits) || sine_index_bits < index_bits
+        || sine_index_bits > 16 || bits < 8 || bits > 24 || bits > DAC_TABLE_STORAGE_BITS || harmonics < 1 || harmonics > 4096 || !fits(words, 2 * harmonics + 1))
         return false;
     r.table = table;
     r.sine = sine;
@@ -178,5 +178,6 @@ bool dac_synthesize(dac_word *table, unsigned index_bits, unsigned bits, const i
     r.half = UINT32_C(1) << (bits - 1);
     r.mean = (int64_t)words[0] * (INT64_C(1) << 30) + (INT64_C(1) << (60 - bits));
     render(&r, 32 - index_bits);
+    table[r.length] = table[0];
     return true;
 }

@@ -12,17 +12,51 @@ enum { VERSION = 1, MOST_READ = 240, LIMITS = 32 };
 #error "DAC_LINK_RING is a power of two, 512..32768"
 #endif
 
-void dac_link_init(dac_link *l, const dac_link_config *config, dac_sequencer *sequencer, uint32_t boot)
+/* What does not fit is refused here, once: no request has to ask again. */
+
+static bool good_axis(const dac_link_axis *axis)
 {
+    const dac_link_limits *const limits = &axis->limits;
+
+    return dac_axis_serves(&axis->converter) && limits->code_min <= limits->code_max
+        && limits->code_max < UINT32_C(1) << axis->converter.bits && limits->max_step != 0
+        && axis->word_bits >= 8 && axis->word_bits <= 24 && axis->word_bits <= DAC_TABLE_STORAGE_BITS
+        && axis->index_bits >= 3 && axis->index_bits <= 16 && axis->room >= DAC_TABLE_ROOM(axis->index_bits)
+        && axis->table[0] != NULL && axis->table[1] != NULL && axis->table[0] != axis->table[1];
+}
+
+static bool good_fourier(const dac_link_config *c)
+{
+    return c->harmonics == 0
+        || (c->harmonics <= 4096 && c->x.fourier != NULL && c->y.fourier != NULL && c->sine != NULL
+            && c->sine_index_bits <= 16 && c->sine_index_bits >= c->x.index_bits
+            && c->sine_index_bits >= c->y.index_bits);
+}
+
+static dac_link_started judge_config(const dac_link_config *c)
+{
+    if (!good_axis(&c->x) || !good_axis(&c->y))
+        return DAC_LINK_BAD_AXIS;
+    if (!good_fourier(c))
+        return DAC_LINK_BAD_FOURIER;
+    return dac_link_judge_key(c);
+}
+
+dac_link_started dac_link_init(dac_link *l, const dac_link_config *config, dac_sequencer *sequencer, uint32_t boot)
+{
+    const dac_link_started started = judge_config(config);
     unsigned char *const bytes = (unsigned char *)l;
 
     for (size_t i = 0; i < sizeof *l; i++)
         bytes[i] = 0;
+    if (started != DAC_LINK_STARTED)
+        return started; /* without a configuration dac_link_work() does nothing */
     l->config = config;
     l->sequencer = sequencer;
     l->boot = boot;
     l->x_limits = config->x.limits;
     l->y_limits = config->y.limits;
+    return started;
 }
 
 /* The ring. `freed` is one byte, which an 8-bit processor reads at once; its `head` may change while it is read. */
@@ -80,7 +114,7 @@ static uint8_t plain_bytes(uint8_t request, uint8_t length)
     case DAC_LINK_HELLO:
         return 1;
     case DAC_LINK_BEGIN:
-        return sizeof ((dac_link_image *)0)->info;
+        return DAC_LINK_INFO;
     case DAC_LINK_READ:
         return 5;
     case DAC_LINK_COMMIT:
@@ -224,6 +258,9 @@ static void judge(dac_link *l)
 
 bool dac_link_work(dac_link *l)
 {
+    if (l->config == NULL)
+        return false;
+    dac_link_expire(l);
     if (l->upload == DAC_LINK_WAITING)
         dac_link_settle(l);
     if (l->upload == DAC_LINK_CHECKING)

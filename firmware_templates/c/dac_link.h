@@ -5,7 +5,8 @@
  *
  *     static dac_link link;
  *     dac_sequencer_init(&sequencer, &config.x.converter, &config.y.converter);
- *     dac_link_init(&link, &config, &sequencer, boot_count);
+ *     if (dac_link_init(&link, &config, &sequencer, boot_count) != DAC_LINK_STARTED)
+ *         ... the configuration is wrong
  *     ... interrupt of the UART: dac_link_receive(&link, byte)
  *     for (;;) {
  *         dac_link_work(&link);
@@ -29,10 +30,19 @@ extern "C" {
 #endif
 
 #ifndef DAC_LINK_RING
-#define DAC_LINK_RING 2048 /* bytes received but not processed yet: a power of two, 512..32768; a frame takes 256 */
+#if defined(__AVR__)
+#define DAC_LINK_RING 512 /* of the 8 KB of the largest Arduino with an AVR */
+#else
+#define DAC_LINK_RING 2048
+#endif
+/* bytes received but not processed yet: a power of two, 512..32768; a frame takes 256 */
 #endif
 #ifndef DAC_LINK_SLICE
 #define DAC_LINK_SLICE 64 /* words, or received bytes, that one call of dac_link_work() processes */
+#endif
+
+#ifndef DAC_LINK_CHALLENGE_MS
+#define DAC_LINK_CHALLENGE_MS 10000 /* how long the nonce of a CHALLENGE may be used */
 #endif
 
 #define DAC_LINK_ABORTS 8 /* ABORTs that can wait for a tick */
@@ -48,7 +58,8 @@ typedef struct {
     dac_link_limits limits;
     uint8_t word_bits;  /* bits of a table word, 8..24; more than 16 need DAC_TABLE_STORAGE_BITS 32 */
     uint8_t index_bits; /* a table has up to 2^index_bits words, 3..16 */
-    dac_word *table[2]; /* 2^index_bits words each; one is written while the other one plays */
+    uint32_t room;      /* words of memory of each table: DAC_TABLE_ROOM(index_bits) or more */
+    dac_word *table[2]; /* one is written while the other one plays */
     int32_t *fourier;   /* 2 harmonics + 1 words */
 } dac_link_axis;
 
@@ -63,8 +74,26 @@ typedef struct {
     const uint8_t *key;
     const uint8_t *hash;      /* 32 bytes: hash of the program in the firmware, or NULL: unknown */
     bool (*permits)(void);    /* the interlock, or NULL: no interlock */
-    void (*random)(uint8_t bytes[16]); /* source of challenges, or NULL: they are derived from key and boot count */
+
+    /* With a key; docs/protocol.md, "The key", says what it protects from. A request that was recorded must never be right
+     * again: each challenge is made of the identity, the boot count, a counter and random numbers. */
+    const uint8_t *identity;  /* what no other device with this key has, such as the serial number of the processor */
+    uint8_t identity_bytes;   /* 4..32 */
+    bool boot_persists;       /* the boot count is kept without power, and never comes twice */
+    void (*random)(uint8_t bytes[16]); /* numbers that nobody can foresee; NULL only if boot_persists */
+    uint32_t (*milliseconds)(void);    /* a clock that wraps at 2^32: a challenge expires after DAC_LINK_CHALLENGE_MS */
 } dac_link_config;
+
+/* Why a link was not started. */
+typedef enum {
+    DAC_LINK_STARTED = 0,
+    DAC_LINK_BAD_AXIS,    /* converter, limits, word_bits, index_bits, room or tables of an axis */
+    DAC_LINK_BAD_FOURIER, /* harmonics above 4096 or without memory, or a sine that is missing or too short */
+    DAC_LINK_BAD_KEY,     /* not 16..32 bytes */
+    DAC_LINK_NO_IDENTITY, /* a key, but no identity of 4..32 bytes */
+    DAC_LINK_NO_RANDOM,   /* a key, but neither `random` nor boot_persists: challenges would come again after a start */
+    DAC_LINK_NO_CLOCK     /* a key, but no `milliseconds`: challenges would last for ever */
+} dac_link_started;
 
 /* Private, down to the functions. It is declared here so that the application can allocate it. */
 
@@ -141,7 +170,7 @@ typedef struct {
 
     /* key */
     bool challenged, commit_challenged, commit_tagged;
-    uint32_t challenges;
+    uint32_t challenges, challenged_at; /* how many, and milliseconds() of the last one */
     uint8_t nonce[16], commit_nonce[16], commit_tag[16];
     dac_link_mac digest;
 
@@ -159,8 +188,8 @@ typedef struct {
 } dac_link;
 
 /* Call it after dac_sequencer_init(), and before the interrupt of the UART is enabled. `boot` should differ from start to
- * start. The application loads and commits the program of the firmware. */
-void dac_link_init(dac_link *l, const dac_link_config *config, dac_sequencer *sequencer, uint32_t boot);
+ * start. The application loads and commits the program of the firmware. A link that was not started is silent. */
+dac_link_started dac_link_init(dac_link *l, const dac_link_config *config, dac_sequencer *sequencer, uint32_t boot);
 
 /* Takes a received byte; called by the interrupt. False: the buffer was full; the byte is lost and counted. */
 bool dac_link_receive(dac_link *l, uint8_t byte);

@@ -50,7 +50,7 @@ static struct output playing_of(const dac_link *l, unsigned axis)
     struct output o;
 
     o.table = b->table;
-    o.length = b->last + 1;
+    o.length = b->length;
     o.guard = b->guard;
     o.gain_q = b->gain_q;
     o.gain = b->gain;
@@ -198,7 +198,7 @@ static void render(const dac_link *l, unsigned axis)
     const uint8_t *const shape = dac_link_shape(&l->image[l->idle], axis);
 
     if (part_of(l, axis)->harmonics != 0)
-        (void)dac_synthesize(here->table[l->idle], shape[0], shape[1], here->fourier, part_of(l, axis)->harmonics,
+        (void)dac_synthesize(here->table[l->idle], here->room, shape[0], shape[1], here->fourier, part_of(l, axis)->harmonics,
                              l->config->sine, l->config->sine_index_bits);
 }
 
@@ -206,7 +206,7 @@ static dac_link_finding check_words(dac_link *l, unsigned axis, bool *done)
 {
     const dac_link_part *const part = part_of(l, axis);
     const int32_t half = INT32_C(1) << (dac_link_shape(&l->image[l->idle], axis)[1] - 1);
-    const dac_word *const table = dac_link_axis_of(l, axis)->table[l->idle];
+    dac_word *const table = dac_link_axis_of(l, axis)->table[l->idle];
     dac_link_check *const c = &l->check;
 
     *done = true;
@@ -216,6 +216,8 @@ static dac_link_finding check_words(dac_link *l, unsigned axis, bool *done)
         if (table[c->at] < -half || table[c->at] >= half)
             return finding(DAC_LINK_WORD, axis, c->at);
     *done = c->at == part->words;
+    if (*done)
+        table[part->words] = table[0]; /* the sequencer reads the first word behind the last */
     return nothing;
 }
 

@@ -179,6 +179,7 @@ void dac_link_program_of(const dac_link *l, dac_program *p)
         const bool held = axis == 1 && dac_link_program_word(image, 0, DAC_LINK_Y_STEPS) != 0;
         a->table = here->table[l->idle];
         a->length = dac_link_table_words(image, axis);
+        a->storage_bits = DAC_TABLE_STORAGE_BITS;
         a->bits = shape[1];
         a->index_bits = shape[0];
         a->phase_period = dac_link_program_word(image, page, DAC_LINK_PHASE_PERIOD);

@@ -88,6 +88,7 @@ enum { DAC_LINK_NONE, DAC_LINK_RECEIVING, DAC_LINK_CHECKING, DAC_LINK_WAITING };
 /* The announcement of an image in BEGIN. */
 enum { DAC_LINK_HASH = 0, DAC_LINK_BYTES = 32, DAC_LINK_IMAGE_CRC = 36, DAC_LINK_SHAPES = 40 };
 #define DAC_LINK_PROGRAM 192 /* bytes of the program words */
+#define DAC_LINK_INFO 48     /* bytes of an announcement */
 
 /* Words of the pages. */
 enum { DAC_LINK_LINE_TICKS, DAC_LINK_FRAME_LINES, DAC_LINK_SETTLE_LINES, DAC_LINK_TURN_TICK, DAC_LINK_FORWARD,
@@ -133,6 +134,12 @@ void dac_link_send(dac_link *l, const dac_link_answer *a);
 void dac_link_send_late(dac_link *l);
 
 /* dac_link_key.c */
+
+/* Whether a configuration has all that its key needs. */
+dac_link_started dac_link_judge_key(const dac_link_config *config);
+
+/* Forgets a challenge that is too old. */
+void dac_link_expire(dac_link *l);
 
 /* Whether a tag is that of a request under the key. `digest`: the 32 bytes of a COMMIT, or NULL. */
 bool dac_link_tagged(const dac_link *l, const uint8_t *nonce, const uint8_t *request, uint8_t bytes,

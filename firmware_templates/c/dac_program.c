@@ -14,13 +14,23 @@ static bool good_schedule(const dac_schedule *p)
         && inside(&p->up, p->frame_lines) && inside(&p->down, p->frame_lines);
 }
 
-static bool good_table(const dac_axis_program *p)
+/* Words of another width in memory would be read as others, and behind the table. */
+static bool good_storage(const dac_axis_program *p)
 {
-    if (p->table == NULL || p->bits < 8 || p->bits > 24 || p->bits > DAC_TABLE_STORAGE_BITS)
-        return false;
+    return p->storage_bits == DAC_TABLE_STORAGE_BITS && p->bits <= DAC_TABLE_STORAGE_BITS;
+}
+
+static bool good_length(const dac_axis_program *p)
+{
     if (p->index_bits == 0)
         return p->length == p->phase_period && p->length <= UINT32_C(1) << 17;
     return p->index_bits >= 3 && p->index_bits <= 16 && p->length == UINT32_C(1) << p->index_bits;
+}
+
+/* Every tick reads a word and the next one: behind the last one has to stand the first one again. */
+static bool good_table(const dac_axis_program *p)
+{
+    return p->table != NULL && p->bits >= 8 && p->bits <= 24 && good_length(p) && p->table[p->length] == p->table[0];
 }
 
 /* x plays one period per line; y plays one period per frame, with one advance per tick, or per line if it is held for a line. */
@@ -86,9 +96,14 @@ static void allow_runs(dac_bank_axis *b, const dac_axis_program *p)
 
     b->run_bits = 0;
     b->run_most = 0;
-#if DAC_SPLIT
-    if (p->gain_q > 32 || p->gain_q < DAC_SPLIT)
-        return;
+#if !DAC_LONG_MULTIPLY
+    uint32_t gain = (uint32_t)(p->gain_word < 0 ? -p->gain_word : p->gain_word);
+
+    b->run_spread = 31;
+    for (; gain != 0; gain >>= 1)
+        b->run_spread--;
+    if (b->run_spread > 19)
+        b->run_spread = 19;
 #else
     const unsigned left = 32u - p->gain_q;
     if (left > 14) /* the gain would not fit */
@@ -99,7 +114,7 @@ static void allow_runs(dac_bank_axis *b, const dac_axis_program *p)
     b->run_most = most > 258 ? 256 : most > 2 ? most - 2 : 0;
     if (widest > p->max_step)
         widest = p->max_step;
-    while ((widest + 1) >> (b->run_bits + 1) != 0)
+    while ((widest + 1) >> (b->run_bits + 1) != 0) /* gain_q + run_bits <= 31, with words of 16 bits */
         b->run_bits++;
     b->run_half = INT32_C(1) << b->run_bits >> 1;
     b->run_room = p->code_max - p->code_min + 1 - (INT32_C(1) << b->run_bits);
@@ -111,7 +126,7 @@ static void derive(dac_bank_axis *b, const dac_axis_program *p)
 
     b->step = p->index_bits ? power_divided(79u + p->index_bits, p->phase_period) : word;
     b->table = p->table;
-    b->last = p->length - 1;
+    b->length = p->length;
     b->holds = p->hold_ticks != 1;
     b->guard = (uint8_t)guard_bits(p);
     b->gain = p->gain_word;
@@ -132,6 +147,8 @@ dac_loaded dac_sequencer_load(dac_sequencer *s, const dac_program *p)
         return DAC_OTHER_CONVERTER;
     if (!good_schedule(&p->schedule))
         return DAC_BAD_SCHEDULE;
+    if (!good_storage(&p->x) || !good_storage(&p->y))
+        return DAC_OTHER_STORAGE;
     if (!good_table(&p->x) || !good_table(&p->y))
         return DAC_BAD_TABLE;
     if (!good_periods(p))

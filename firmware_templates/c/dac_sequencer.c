@@ -23,16 +23,20 @@ static void power_up(dac_axis *axis, const dac_converter *converter)
     axis->shift = (uint8_t)(converter->left_aligned ? converter->word_bits - converter->bits : 0);
 }
 
-void dac_sequencer_init(dac_sequencer *s, const dac_converter *x, const dac_converter *y)
+bool dac_sequencer_init(dac_sequencer *s, const dac_converter *x, const dac_converter *y)
 {
+    const bool good = dac_axis_serves(x) && dac_axis_serves(y);
     unsigned char *const bytes = (unsigned char *)s;
 
     for (size_t i = 0; i < sizeof *s; i++)
         bytes[i] = 0;
-    power_up(&s->x, x);
-    power_up(&s->y, y);
     s->pixel_rest = UNKNOWN;
     s->playing = NOTHING;
+    if (good) { /* otherwise every program is for another converter */
+        power_up(&s->x, x);
+        power_up(&s->y, y);
+    }
+    return good;
 }
 
 bool dac_sequencer_writable(const dac_sequencer *s)
@@ -76,7 +80,11 @@ bool dac_sequencer_commit(dac_sequencer *s)
 }
 
 bool dac_sequencer_withdraw(dac_sequencer *s) { return request(s, WITHDRAW, 0); }
-bool dac_sequencer_arm(dac_sequencer *s, uint32_t frames) { return request(s, ARM, frames); }
+bool dac_sequencer_arm(dac_sequencer *s, uint32_t frames)
+{
+    return frames <= UINT32_C(1) << 31 && request(s, ARM, frames);
+}
+
 bool dac_sequencer_trigger(dac_sequencer *s) { return request(s, TRIGGER, 0); }
 bool dac_sequencer_park(dac_sequencer *s) { return request(s, PARK, 0); }
 bool dac_sequencer_reset(dac_sequencer *s) { return request(s, RESET, 0); }
@@ -112,7 +120,7 @@ void dac_sequencer_report(dac_sequencer *s, uint8_t fault)
     for (int i = 0; i < DAC_FAULTS; i++)
         if (((unsigned)fault >> i & 1u) != 0 && s->fault_counts[i] != UINT32_MAX)
             s->fault_counts[i] = s->fault_counts[i] + 1;
-    s->faults = (uint8_t)(s->faults | fault);
+    s->faults = (uint8_t)(s->faults | (fault & 15u));
 }
 
 static void to_start(dac_axis *axis)
@@ -176,6 +184,7 @@ static void act(dac_sequencer *s, uint8_t what, uint32_t argument)
         break;
     default:
         park(s);
+        break;
     }
 }
 
@@ -299,7 +308,7 @@ static uint8_t play(dac_sequencer *s)
         s->catching_up = false;
     else if (!s->catching_up)
         dac_sequencer_report(s, DAC_FAULT_SLEW);
-    mark(s, reached && !s->faults, &markers, 1);
+    (void)mark(s, reached && !s->faults, &markers, 1);
     go_on(s, 1);
     return markers;
 }

@@ -73,8 +73,9 @@ typedef struct {
 
 /* One axis. The table stays where it is, in flash or in memory of the application, until its bank is idle again. */
 typedef struct {
-    const dac_word *table;
-    uint32_t length;       /* words: 2^index_bits, or phase_period if not interpolated */
+    const dac_word *table; /* its words, and behind the last one the first one again */
+    uint32_t length;       /* words without that one: 2^index_bits, or phase_period if not interpolated */
+    uint8_t storage_bits;  /* bits of a word in memory: DAC_STORAGE_BITS(table) */
     uint8_t bits;          /* bits of a word, 8..24; it has min(4, 25 - bits) guard bits */
     uint8_t index_bits;    /* 3..16, or 0 if not interpolated */
     uint32_t phase_period; /* advances per period, up to 2^31 - 1 */
@@ -87,6 +88,9 @@ typedef struct {
     uint8_t dac_bits, word_bits;           /* bits of a code, 8..24, and of a converter word */
     bool twos_complement, left_aligned;
 } dac_axis_program;
+
+/* Words of memory of an interpolated table. */
+#define DAC_TABLE_ROOM(index_bits) ((UINT32_C(1) << (index_bits)) + 1)
 
 /* What both axes share. */
 typedef struct {
@@ -115,10 +119,22 @@ typedef struct {
 /* Initialiser for one axis of a program, with the emitted table or your own. */
 #define DAC_AXIS_PROGRAM(AXIS, words)                                                                                 \
     {                                                                                                                 \
-        words, AXIS##_TABLE_LENGTH, AXIS##_TABLE_BITS, AXIS##_INDEX_BITS, AXIS##_PHASE_PERIOD, AXIS##_HOLD_TICKS,     \
-        AXIS##_GAIN_WORD, AXIS##_OFFSET_WORD, AXIS##_GAIN_Q, AXIS##_CODE_MIN, AXIS##_CODE_MAX, AXIS##_PARK_CODE,      \
-        AXIS##_MAX_STEP, AXIS##_DAC_BITS, AXIS##_DAC_WORD_BITS, AXIS##_DAC_TWOS_COMPLEMENT, AXIS##_DAC_LEFT_ALIGNED   \
+        words, AXIS##_TABLE_LENGTH, DAC_STORAGE_BITS(words), AXIS##_TABLE_BITS, AXIS##_INDEX_BITS,                    \
+        AXIS##_PHASE_PERIOD, AXIS##_HOLD_TICKS, AXIS##_GAIN_WORD, AXIS##_OFFSET_WORD, AXIS##_GAIN_Q,                  \
+        AXIS##_CODE_MIN, AXIS##_CODE_MAX, AXIS##_PARK_CODE, AXIS##_MAX_STEP, AXIS##_DAC_BITS, AXIS##_DAC_WORD_BITS,   \
+        AXIS##_DAC_TWOS_COMPLEMENT, AXIS##_DAC_LEFT_ALIGNED                                                           \
     }
+/* Bits of a word of a table in memory. Does not compile if they are not DAC_TABLE_STORAGE_BITS: older compilers only warn of
+ * the other pointer, and the runtime would read behind the table. (C++ refuses the other pointer by itself.) */
+#ifdef __cplusplus
+#define DAC_STORAGE_BITS(words) ((uint8_t)(8 * sizeof *(words)))
+#else
+#define DAC_STORAGE_BITS(words)                                                                                       \
+    ((uint8_t)(8 * sizeof *(words)                                                                                    \
+               + 0 * sizeof(struct {                                                                                  \
+                     int compile_with_the_DAC_TABLE_STORAGE_BITS_of_the_table : sizeof *(words) == sizeof(dac_word) ? 1 : -1; \
+                 })))
+#endif
 
 /* The converter of an axis. Programs for a different converter are refused. */
 typedef struct {
@@ -159,9 +175,10 @@ typedef enum {
     DAC_BUSY,            /* a committed program has not been taken yet */
     DAC_OTHER_CONVERTER, /* made for other bits, coding or alignment, or too wide for DAC_OUTPUT_STORAGE_BITS */
     DAC_BAD_SCHEDULE,    /* empty, too long, or a window that is not inside its line or frame */
-    DAC_BAD_TABLE,       /* missing, or length or width out of range */
+    DAC_BAD_TABLE,       /* missing, length or width out of range, or the word behind the last one is not the first */
     DAC_BAD_PERIOD,      /* the period does not fit the schedule */
-    DAC_BAD_OUTPUT       /* gain, offset, codes or step out of range */
+    DAC_BAD_OUTPUT,      /* gain, offset, codes or step out of range */
+    DAC_OTHER_STORAGE    /* the runtime was compiled with another DAC_TABLE_STORAGE_BITS than the table, or too narrow a one */
 } dac_loaded;
 
 /* Output of one tick. */
@@ -195,9 +212,9 @@ typedef struct {
 
 /* One axis of a bank: its program, and values derived from it when it was loaded. */
 typedef struct {
-    uint8_t holds, guard, gain_q, run_bits;
+    uint8_t holds, guard, gain_q, run_bits, run_spread;
     const dac_word *table;
-    uint32_t last;              /* index of the last word */
+    uint32_t length;            /* words of the table, without the one behind the last */
     int32_t gain, run_gain;     /* with gain_q and with 32 fraction bits */
     int32_t code_min, code_max, max_step, park_code;
     int32_t run_half, run_room; /* half a window of 2^run_bits codes, and the room for it between the limits */
@@ -246,8 +263,9 @@ typedef struct {
  * Requests act in order before the next tick that is computed. Cost: less than 40 instructions. */
 
 /* Sets the power-up state: no program, not running, codes at the power-up codes of the converters. Call it before the
- * interrupt is enabled. */
-void dac_sequencer_init(dac_sequencer *s, const dac_converter *x, const dac_converter *y);
+ * interrupt is enabled. Returns false for converters that it cannot serve: bits outside 8..24 or above word_bits, word_bits
+ * above DAC_OUTPUT_STORAGE_BITS, a power_up_code of more bits. No program can be loaded then. */
+bool dac_sequencer_init(dac_sequencer *s, const dac_converter *x, const dac_converter *y);
 
 /* Returns whether the idle bank may be written: it holds no committed program, and no commit is queued. */
 bool dac_sequencer_writable(const dac_sequencer *s);
@@ -267,7 +285,8 @@ bool dac_sequencer_commit(dac_sequencer *s);
  * the program was taken before: it has then grown. */
 bool dac_sequencer_withdraw(dac_sequencer *s);
 
-/* Sets the number of frames that the next trigger starts, up to 2^31; 0: endless. A running scan keeps its own count. */
+/* Sets the number of frames that the next trigger starts, up to 2^31; 0: endless. Returns false for more. A running scan
+ * keeps its own count. */
 bool dac_sequencer_arm(dac_sequencer *s, uint32_t frames);
 
 /* Starts at line 0, if armed, not running, and a program is loaded. Otherwise does nothing. */
@@ -304,11 +323,12 @@ void dac_sequencer_report(dac_sequencer *s, uint8_t fault);
 /* ANY CALLER: no sequencer is involved. */
 
 /* Computes the 2^index_bits words of a table, index_bits 3..16, from Fourier words a0, a1..aH, b1..bH (Q2.30), equal to the table
- * of the build. `sine` is the emitted table NAME_sine of a length of 2^sine_index_bits, sine_index_bits >= index_bits.
+ * of the build, and puts the first one behind the last. `room`: words that the table has room for, DAC_TABLE_ROOM(index_bits)
+ * or more. `sine` is the emitted table NAME_sine of a length of 2^sine_index_bits, sine_index_bits >= index_bits.
  * Returns false, and writes nothing, if the accumulator could overflow (the magnitudes of the words sum to 4 or more) or a size is
  * out of range. Not re-entrant on the same table; the table must not be playing. */
-bool dac_synthesize(dac_word *table, unsigned index_bits, unsigned bits, const int32_t *words, unsigned harmonics,
-                    const int32_t *sine, unsigned sine_index_bits);
+bool dac_synthesize(dac_word *table, uint32_t room, unsigned index_bits, unsigned bits, const int32_t *words,
+                    unsigned harmonics, const int32_t *sine, unsigned sine_index_bits);
 
 #ifdef __cplusplus
 }

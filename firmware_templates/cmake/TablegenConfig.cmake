@@ -9,7 +9,8 @@
 #     tablegen_build(SCAN TARGET NAME [OUTPUT DIRECTORY])
 #
 # builds the scan file into DIRECTORY (by default tablegen/NAME in the binary directory), and makes a library NAME of
-# its C sources: NAME.c, unless the scan is header-only, and the runtime dac_*.c. Who links to it finds the headers.
+# its C sources: NAME.c, unless the scan is header-only, and the runtime dac_*.c. Who links to it finds the headers, and
+# is compiled with the DAC_TABLE_STORAGE_BITS and DAC_OUTPUT_STORAGE_BITS that the scan needs.
 #
 # TABLEGEN, which may be given on the command line of cmake, is the program; a list is one with its first arguments.
 #
@@ -64,6 +65,9 @@ function(tablegen_build scan)
     string(JSON name MEMBER "${listed}" ${i})
     list(APPEND files "${folder}/${name}")
   endforeach()
+  set(kinds TABLE OUTPUT)
+  set(parts table output)
+  set(keys bits word_bits)
   set(sources ${files})
   list(FILTER sources INCLUDE REGEX "\\.c$")
   if(NOT sources)
@@ -92,5 +96,15 @@ function(tablegen_build scan)
 
   add_library("${arg_TARGET}" STATIC ${sources})
   target_include_directories("${arg_TARGET}" PUBLIC "${folder}")
+  foreach(kind part key IN ZIP_LISTS kinds parts keys)
+    set(storage 16)
+    foreach(axis x y)
+      string(JSON bits GET "${manifest}" axes ${axis} ${part} ${key})
+      if(bits GREATER 16)
+        set(storage 32)
+      endif()
+    endforeach()
+    target_compile_definitions("${arg_TARGET}" PUBLIC DAC_${kind}_STORAGE_BITS=${storage})
+  endforeach()
   add_dependencies("${arg_TARGET}" "${arg_TARGET}_tablegen")
 endfunction()

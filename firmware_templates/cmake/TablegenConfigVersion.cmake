@@ -1,5 +1,5 @@
 # What find_package(Tablegen VERSION) accepts: this version where an older one or none is asked for.
-set(PACKAGE_VERSION "0.2.0")
+set(PACKAGE_VERSION "0.3.0")
 if(PACKAGE_VERSION VERSION_LESS PACKAGE_FIND_VERSION)
   set(PACKAGE_VERSION_COMPATIBLE FALSE)
 else()

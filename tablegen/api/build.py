@@ -1,12 +1,13 @@
 """From a scan file, or from values, to a plan, its certificate, its arrays and its files."""
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from tablegen.certificate.certificate import Certificate, broken_limits
 from tablegen.certificate.certificate import certify as certify_plan
+from tablegen.certificate.scan_warnings import brief_warnings, limit_advice, scan_warnings
 from tablegen.certificate.summary import notes, summary
 from tablegen.config.load import Setup, from_values
 from tablegen.config.load import load as load_files
@@ -76,7 +77,7 @@ def build(
     wanted = _formats(setup, made, formats)
     progress("measuring every tick of a line and a frame")
     certificates = certify_plan(made)
-    if broken := broken_limits(made, certificates, setup.scan_file):
+    if broken := broken_limits(made, certificates, setup.scan_file, partial(limit_advice, setup, made, certificates)):
         raise BrokenLimit(broken)
     built = Build(setup, made, certificates, [each.name for each in wanted], formats is not None)
     if out is not None:
@@ -147,6 +148,15 @@ class Build:
         """What to know before the image is trusted, in sentences."""
         return notes(self.plan)
 
+    @cached_property
+    def warnings(self) -> list[str]:
+        """Where the scan errs by more than 1 %, or by more than the uncompensated line; empty if it does nowhere.
+
+        Each names its key, the error, its cause (quantisation, band limit or model), and the remedies that were
+        planned and measured: only a scan with a warning takes this time.
+        """
+        return [str(warning) for warning in scan_warnings(self.setup, self.plan, self.certificates)]
+
     @property
     def prepared(self) -> "PreparedScan":
         """What ``Device.upload`` sends: ``device.upload(scan.prepared.image("auto", device.info))``."""
@@ -160,7 +170,7 @@ class Build:
         Raises ``CannotWrite``; what stood there before then still stands.
         """
         folder = Path(folder)
-        return write_files(folder, self.files, self.outdated(folder))
+        return write_files(folder, self.files, lambda: self.outdated(folder))
 
     def outdated(self, folder: str | Path) -> list[str]:
         """Files of a directory that an earlier build made and this one does not: ``write`` removes them.
@@ -181,9 +191,9 @@ class Build:
         worst = max(self.certificates.values(), key=lambda one: one.scaling_error_percent)
         errors = f"error up to {worst.max_error_lsb:.3f} LSB, scaling error {worst.scaling_error_percent:.3g} %"
         head = first.replace("<tablegen plan", "<tablegen build")
-        return f"{head}\n  {errors} peak to peak\n  x: {self.plan.x.drive.v_amplitude:.6g} V, " + (
-            f"y: {self.plan.y.drive.v_amplitude:.6g} V; formats {', '.join(self.formats)}>"
-        )
+        volts = ", ".join(f"{line.axis}: {line.drive.v_amplitude:.6g} V" for line in self.plan.lines)
+        found = [f"  warning: {text}\n" for text in brief_warnings(self.plan, self.certificates)]
+        return f"{head}\n  {errors} peak to peak\n{''.join(found)}  {volts}; formats {', '.join(self.formats)}>"
 
     def _repr_html_(self) -> str:
         """Drive, error and certificate, for notebooks."""

@@ -9,6 +9,7 @@ from html import escape
 import numpy as np
 
 from tablegen.certificate.certificate import Certificate
+from tablegen.certificate.scan_warnings import brief_warnings
 from tablegen.certificate.summary import certificate_lines, drive_lines, rate
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, Plan
@@ -24,6 +25,7 @@ def build_html(plan: Plan, certificates: dict[str, Certificate]) -> str:
     parts = [
         f"<p><b>{escape(title)}</b>, {schedule.lines} lines a frame, {escape(rate(schedule.frame_rate))} frames</p>"
     ]
+    parts += [f"<p><b>warning</b>: {escape(text)}</p>" for text in brief_warnings(plan, certificates)]
     for line in plan.lines:
         t = np.linspace(0.0, 1.0, _POINTS)
         volts = line.drive.v_offset + line.drive.v_amplitude * (line.series.value(t) - 0.5)

@@ -14,8 +14,9 @@ from tablegen.planning.line_plan import Plan
 class Samples:
     """Ticks of one period of an axis, a line of x or a frame of y. All arrays have the shape (ticks,).
 
-    ``time_s`` begins with the period. ``codes`` are what the converter plays, straight binary, and ``volts`` what they
-    make at the piezo; ``asked_volts`` is the float waveform at the same instants. ``line``, ``pixel`` and ``start``
+    ``time_s`` begins with the period; each code is held from there to the next. ``codes`` are what the converter plays,
+    straight binary, and ``volts`` what they make at the piezo; ``asked_volts`` is the float waveform of which they are
+    samples. ``line``, ``pixel`` and ``start``
     are True where a line, a pixel, and the period begin, ``backward`` during the sweep back, ``inside`` within the
     imaging window of the axis.
     """

@@ -20,6 +20,10 @@ _DEGREES = {"deg": _times(1.0), "rad": degrees}
 _NUMBER = {"": _times(1.0)}
 
 
+# No quantity that has to be above 0 is as small as this in any of these units, and nothing divided by it overflows.
+_SMALLEST = 1e-12
+
+
 @dataclass(frozen=True, slots=True)
 class Column:
     """One quantity: its units, the first of which is what the fits take, and the open range of its values there."""
@@ -40,14 +44,14 @@ class Column:
 
 
 OFFSET = Column("offset", _VOLTS, -1e6, 1e6)
-APPARENT = Column("apparent", _NANOMETRES, 0.0, 1e12)
-TRUE = Column("true", _NANOMETRES, 0.0, 1e12)
-NOMINAL = Column("nominal", _NANOMETRES, 0.0, 1e12)
-ACTUAL = Column("actual", _NANOMETRES, 0.0, 1e12)
+APPARENT = Column("apparent", _NANOMETRES, _SMALLEST, 1e12)
+TRUE = Column("true", _NANOMETRES, _SMALLEST, 1e12)
+NOMINAL = Column("nominal", _NANOMETRES, _SMALLEST, 1e12)
+ACTUAL = Column("actual", _NANOMETRES, _SMALLEST, 1e12)
 DRIVE = Column("drive", _VOLTS, -1e6, 1e6)
 TIME = Column("time", _SECONDS, -1e12, 1e12)
 DISPLACEMENT = Column("displacement", _NANOMETRES, -1e12, 1e12)
-FREQUENCY = Column("frequency", _HERTZ, 0.0, 1e12)
-GAIN = Column("gain", _GAIN, 0.0, 1e12)
+FREQUENCY = Column("frequency", _HERTZ, _SMALLEST, 1e12)
+GAIN = Column("gain", _GAIN, _SMALLEST, 1e12)
 PHASE = Column("phase", _DEGREES, -1e6, 1e6)
 TRACE = Column("trace", _NUMBER, -1e9, 1e9)

@@ -24,12 +24,18 @@ _LEAST_BETA_ERROR = 1e-9  # least error of a measured beta: that of the fit's ow
 
 @dataclass(frozen=True)
 class Growth:
-    """One branch: beta_max (of the scan), rho and u_peak; remarks on what they rest on."""
+    """One branch: beta_max (of the scan), rho and u_peak; remarks on what they rest on.
+
+    ``off_errors`` is by how many of their standard errors (22) misses the measured residuals, rms; ``off_share`` the
+    rms of what it misses as a fraction of the largest residual. Both are 0 for one amplitude.
+    """
 
     beta_max: Estimate
     rho: Estimate
     u_peak: Estimate
     remarks: tuple[str, ...]
+    off_errors: float = 0.0
+    off_share: float = 0.0
 
     def beta(self, v: Floats) -> Floats:
         """Equation (22) at normalised amplitudes."""
@@ -47,6 +53,7 @@ def fit_growth(v: Floats, branches: Sequence[MeasuredBranch], rho: float) -> Gro
     found = None
     if float(np.max(v)) - float(np.min(v)) > 0.05:
         found = _both(v, beta, error, rho, remarks)
+    found_rho = found
     if found is None:
         steep = _steepest(v, beta, error, rho)
         found = _height(v, beta, error, steep or rho, remarks)
@@ -67,7 +74,11 @@ def fit_growth(v: Floats, branches: Sequence[MeasuredBranch], rho: float) -> Gro
     top = float(np.max(v))
     if top < 0.6:
         remarks.append(f"beta_max is extrapolated from {top:.2g} of v_max; it holds up to about there")
-    return Growth(beta_max, estimate, _peak(branches, beta, error, remarks), tuple(remarks))
+    missed = beta_max.value * _share(v, estimate.value) - beta
+    freedom = max(len(v) - (1 if found_rho is None else 2), 1)
+    off_errors = sqrt(float(np.sum((missed / error) ** 2)) / freedom)
+    off_share = sqrt(float(np.sum(missed**2)) / freedom) / float(np.max(np.abs(beta)))
+    return Growth(beta_max, estimate, _peak(branches, beta, error, remarks), tuple(remarks), off_errors, off_share)
 
 
 def _both(v: Floats, beta: Floats, error: Floats, rho: float, remarks: list[str]) -> tuple[Estimate, Estimate] | None:

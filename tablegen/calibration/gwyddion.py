@@ -12,6 +12,7 @@ import numpy as np
 from tablegen.numerics.arrays import Floats
 
 _MAGIC = b"GWYP"
+_MAX_COMPONENTS = 100_000  # of an object or a list; files have some hundred
 _FIXED = {b"b": 1, b"c": 1, b"i": 4, b"q": 8, b"d": 8}
 _ITEMS = {b"C": 1, b"I": 4, b"Q": 8, b"D": 8}
 
@@ -61,7 +62,9 @@ def _object(content: bytes, at: int, end: int) -> tuple[str, tuple[int, int], in
 
 def _components(content: bytes, at: int, end: int) -> Iterator[tuple[str, bytes, int, int]]:
     """Name, type, first and last place of each component."""
-    while at < end:
+    for _ in range(_MAX_COMPONENTS):
+        if at >= end:
+            return
         name, at = _string(content, at, end)
         kind = content[at : at + 1]
         start = at + 1
@@ -69,6 +72,7 @@ def _components(content: bytes, at: int, end: int) -> Iterator[tuple[str, bytes,
         if at > end:
             raise ValueError(f"ends in the middle of {name[:40]!r}; copy it again")
         yield name, kind, start, at
+    raise ValueError(f"has an object of more than {_MAX_COMPONENTS} components")
 
 
 def _after(content: bytes, kind: bytes, at: int, end: int) -> int:
@@ -80,6 +84,8 @@ def _after(content: bytes, kind: bytes, at: int, end: int) -> int:
         return _one(content, kind, at, end)
     if kind in (b"S", b"O"):
         count, at = _count(content, at, end), at + 4
+        if count > _MAX_COMPONENTS:
+            raise ValueError(f"has {count} texts or objects in one; at most {_MAX_COMPONENTS} are read")
         for _ in range(count):
             at = _one(content, kind.lower(), at, end)
         return at

@@ -17,12 +17,17 @@ _POOR_PERCENT, _POOR_DEGREES = 5.0, 5.0
 
 @dataclass(frozen=True, kw_only=True)
 class ResonanceFit(Fit):
-    """The undamped resonance in Hz, the quality factor, the delay in s, and the gain at 0 Hz."""
+    """The undamped resonance in Hz, the quality factor, the delay in s, and the gain at 0 Hz.
+
+    ``response`` is what was measured, for ``resonance.response`` of the scanner file: rows of ascending Hz, gain, and
+    phase in degrees, unwrapped and without an inversion; None where no phase was measured.
+    """
 
     frequency_hz: Estimate
     quality: Estimate
     delay_s: Estimate
     gain: Estimate
+    response: Floats | None = None
 
 
 def fit_resonance(frequency_hz: Floats, gain: Floats, phase_deg: Floats | None = None) -> ResonanceFit:
@@ -75,7 +80,7 @@ def fit_resonance(frequency_hz: Floats, gain: Floats, phase_deg: Floats | None =
     if float(np.sqrt(np.mean(residual**2))) > _POOR_PERCENT:
         remarks.append(
             "one resonance does not describe this response; take the measurement itself: "
-            "resonance.response = FILE.csv with the header hz,gain,phase_deg"
+            "--write --points writes it beside the scanner file and names it there"
         )
     decibels = 20.0 * np.log10(g), 20.0 * np.log10(model)
     if phase is not None:
@@ -98,6 +103,7 @@ def fit_resonance(frequency_hz: Floats, gain: Floats, phase_deg: Floats | None =
         quality=q,
         delay_s=delay,
         gain=_of_logarithm(solution.estimate("gain")),
+        response=None if phase is None else np.stack([f, g, np.degrees(phase)], axis=1),
     )
 
 

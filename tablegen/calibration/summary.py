@@ -5,6 +5,7 @@ from math import isfinite
 from typing import Any
 
 from tablegen.calibration.branch import AmplitudeFit
+from tablegen.calibration.doubts import doubts
 from tablegen.calibration.estimate import Estimate, Fit
 from tablegen.calibration.frequency import FrequencyFit
 from tablegen.calibration.hysteresis import HysteresisFit, TurnFit
@@ -64,12 +65,16 @@ def _branch_parameters(branch: TurnFit) -> list[tuple[str, Estimate, str]]:
     return rows
 
 
-def change(fit: Fit, sources: Sequence[Source], points: bool = False) -> Change:
+def change(
+    fit: Fit, sources: Sequence[Source], points: bool = False, response: str = "", forced: bool = False
+) -> Change:
     """What the fit writes into the scanner file, and the comment that says where it came from.
 
-    With ``points`` hysteresis is written as it was measured at each amplitude, in place of (22).
+    With ``points`` hysteresis is written as it was measured at each amplitude, in place of (22). With ``response``, the
+    name of a file, the measured response takes the place of the resonance. ``forced`` is said in the comment.
     """
-    residual = f"{fit.points} points, residual {fit.rms_percent:.2g} % rms"
+    by_force = ", meaningless, written by --force" if forced else ""
+    residual = f"{fit.points} points, residual {fit.rms_percent:.2g} % rms{by_force}"
     files = [f"from {_printable(source.name)}, sha256 {source.sha256}" for source in sources]
     if isinstance(fit, HysteresisFit):
         branches, comments = [], []
@@ -87,7 +92,7 @@ def change(fit: Fit, sources: Sequence[Source], points: bool = False) -> Change:
             of = "pairs of images" if isinstance(branch.traces[0], ImageFit) else "traces"
             what = "pixels" if isinstance(branch.traces[0], ImageFit) else "samples"
             comments.append(
-                [f"{len(branch.traces)} {of}, {count} {what}, residual {fit.rms_percent:.2g} % rms", *files]
+                [f"{len(branch.traces)} {of}, {count} {what}, residual {fit.rms_percent:.2g} % rms{by_force}", *files]
             )
         return Change("hysteresis", {"model": "harmonic"}, (), branches, comments)
     values = {key: estimate.rounded for key, estimate, _ in parameters(fit) if not key.startswith("(")}
@@ -99,6 +104,9 @@ def change(fit: Fit, sources: Sequence[Source], points: bool = False) -> Change:
             return Change("size", {**values, "base_nm": fit.base_nm}, (), (), [[residual, *files]])
         case FrequencyFit():
             return Change("frequency", values, (), (), [[residual, *files]])
+        case ResonanceFit() if response:
+            as_measured = f"{fit.points} points, as measured"
+            return Change("resonance", {"response": response}, tuple(values), (), [[as_measured, *files]])
         case ResonanceFit():
             return Change("resonance", values, ("response",), (), [[residual, *files]])
     raise NotImplementedError(type(fit))
@@ -119,6 +127,7 @@ def record(fit: Fit, axis: str, sources: Sequence[Source]) -> dict[str, Any]:
             "each": fit.residual_percent.tolist(),
         },
         "remarks": list(fit.remarks),
+        "doubts": list(doubts(fit)),
         "outliers": list(fit.outliers),
     }
     if isinstance(fit, OffsetFit):

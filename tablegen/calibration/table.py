@@ -2,7 +2,9 @@
 
 import hashlib
 import os
-from collections.abc import Sequence
+import re
+from array import array
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
@@ -13,9 +15,12 @@ from tablegen.calibration.columns import Column, Conversion
 from tablegen.config.figures import shown_path
 from tablegen.numerics.arrays import Floats, Ints
 from tablegen.problems import Problem, Rejected
+from tablegen.reading import MEASUREMENT, Kind, read_bytes
 
-_MAXIMUM_BYTES = 256 << 20
 _MAX_PROBLEMS = 20
+_MAX_LINE = 1 << 20  # characters; a line of an image has a cell a pixel
+_LINE = re.compile(r"([^\r\n]*)(\r\n|\r|\n|\Z)")  # as Unix, Windows or old Macintosh end them
+_MAX_CELLS_SHOWN = 12
 
 
 @dataclass(frozen=True)
@@ -53,27 +58,31 @@ def read_table(path: Path, needed: Sequence[Column], optional: Sequence[Column] 
     """
     name = shown_path(path)
     content = file_content(path, name)
-    rows = _rows(file_text(content, name))
-    if not rows:
+    rows = _rows(file_text(content, name), name)
+    header_line, header = next(rows, (0, ""))
+    if not header_line:
         raise Rejected([Problem(name, 0, "", f"is empty; a header with {_list(needed)} is needed")])
-    header_line, header = rows[0]
     separator = next((mark for mark in (";", "\t") if mark in header), ",")
     wanted = [*needed, *optional]
     places = _places(name, header_line, _cells(header, separator), wanted, needed)
     reader = _Reader(name, separator, len(_cells(header, separator)), places)
-    values = [reader.row(line, text) for line, text in rows[1:]]
+    values, lines = array("d"), array("q")
+    for line, text in rows:
+        values.extend(reader.row(line, text))
+        lines.append(line)
+        if len(reader.problems) > _MAX_PROBLEMS:
+            break
     if reader.problems:
-        more = len(reader.problems) - _MAX_PROBLEMS
         found = reader.problems[:_MAX_PROBLEMS]
-        if more > 0:
-            found.append(Problem(name, found[-1].line, "", f"and {more} more"))
+        if len(reader.problems) > _MAX_PROBLEMS:
+            found.append(Problem(name, found[-1].line, "", "more faults follow; stopped"))
         raise Rejected(found)
-    if not values:
+    if not lines:
         raise Rejected([Problem(name, header_line, "", "no numbers follow the header")])
-    array = np.array(values, dtype=np.float64)
-    columns = {column.name: array[:, i] for i, (_, column, _, _) in enumerate(places)}
+    table = np.array(values, dtype=np.float64).reshape(len(lines), len(places))
+    columns = {column.name: table[:, i] for i, (_, column, _, _) in enumerate(places)}
     source = Source(path.name, hashlib.sha256(content).hexdigest()[:16])
-    return MeasuredTable(name, source, columns, np.array([line for line, _ in rows[1:]], dtype=np.int64))
+    return MeasuredTable(name, source, columns, np.array(lines, dtype=np.int64))
 
 
 _Place = tuple[int, Column, Conversion, str]  # where it stands, what it is, how it converts, how it is spelt
@@ -115,7 +124,8 @@ class _Reader:
         except OverflowError:
             value = column.below
         if not column.above < value < column.below:
-            side = f"above {column.above:g}" if value <= column.above else f"below {column.below:g}"
+            least = 0.0 if column.above > 0.0 >= value else column.above
+            side = f"above {least:g}" if value <= column.above else f"below {column.below:g}"
             self.problems.append(Problem(self._name, line, spelt, f"{cell[:40]} is not {side} ({column.name})"))
         return value
 
@@ -140,7 +150,8 @@ def _places(
             places.append((at, column, spelt[cell], cell))
         elif column in needed:
             others = [cell for cell in spelt if cell != column.name]
-            shown = ", ".join(cell[:40] for cell in header)
+            shown = ", ".join(cell[:40] for cell in header[:_MAX_CELLS_SHOWN])
+            shown += ", ..." if len(header) > _MAX_CELLS_SHOWN else ""
             instead = f" (or {', '.join(others)})" if others else ""
             why = f"missing{instead}; the header has {shown}"
             problems.append(Problem(name, line, column.name, why))
@@ -149,18 +160,14 @@ def _places(
     return places
 
 
-def file_content(path: Path, name: str) -> bytes:
+def file_content(path: Path, name: str, kind: Kind = MEASUREMENT) -> bytes:
     """The bytes of a measurement. Raises ``Rejected``."""
-    if not os.path.isfile(path):  # a pipe would be waited for
+    if not os.path.isfile(path):
         raise Rejected([Problem(name, 0, "", "is not a file")])
     try:
-        with path.open("rb") as file:
-            content = file.read(_MAXIMUM_BYTES + 1)
+        return read_bytes(path, kind)
     except OSError as error:
         raise Rejected([Problem(name, 0, "", f"cannot be read: {error.strerror or error}")]) from None
-    if len(content) > _MAXIMUM_BYTES:
-        raise Rejected([Problem(name, 0, "", f"above {_MAXIMUM_BYTES >> 20} MiB; thin it out")])
-    return content
 
 
 def file_text(content: bytes, name: str) -> str:
@@ -175,10 +182,19 @@ def file_text(content: bytes, name: str) -> str:
         raise Rejected([Problem(name, line, "", why)]) from None
 
 
-def _rows(text: str) -> list[tuple[int, str]]:
-    """What counts, with line numbers from 1; ends of lines as Unix, Windows or old Macintosh have them."""
-    lines = enumerate(text.replace("\r\n", "\n").replace("\r", "\n").split("\n"), 1)
-    return [(n, line) for n, line in lines if line.strip(" \t;,") and not line.lstrip().startswith("#")]
+def lines_of(text: str, name: str) -> Iterator[tuple[int, str]]:
+    """The lines of a text with their numbers from 1. Raises ``Rejected`` for one that is no line of any table."""
+    for number, found in enumerate(_LINE.finditer(text), 1):
+        if found.end(1) - found.start() > _MAX_LINE:
+            why = f"a line of {found.end(1) - found.start()} characters; at most 2^20 are read"
+            raise Rejected([Problem(name, number, "", why)])
+        yield number, found[1]
+
+
+def _rows(text: str, name: str) -> Iterator[tuple[int, str]]:
+    """What counts, with line numbers."""
+    lines = lines_of(text, name)
+    return ((n, line) for n, line in lines if line.strip(" \t;,") and not line.lstrip().startswith("#"))
 
 
 def _cells(line: str, separator: str) -> list[str]:

@@ -1,5 +1,6 @@
 """What a build promises, measured on every emitted integer of one whole period of each axis, and the limits on it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import log10, sqrt
 
@@ -13,6 +14,7 @@ from tablegen.certificate.line_errors import (
     refined,
     scaling_error,
 )
+from tablegen.compensation.hysteresis import BranchShape
 from tablegen.planning.line_plan import LinePlan, Plan
 from tablegen.problems import Document, Problem
 
@@ -55,8 +57,16 @@ def certify(plan: Plan) -> dict[str, Certificate]:
     return {line.axis: _certify(line) for line in plan.lines}
 
 
-def broken_limits(plan: Plan, certificates: dict[str, Certificate], file: Document) -> list[Problem]:
-    """The limits of the configuration that a certificate exceeds, each with a remedy."""
+def broken_limits(
+    plan: Plan,
+    certificates: dict[str, Certificate],
+    file: Document,
+    advise: Callable[[str], str] = lambda _: "",
+) -> list[Problem]:
+    """The limits of the configuration that a certificate exceeds, each with a remedy.
+
+    ``advise`` adds to a scaling error of an axis ("x" or "y") what was tried against it.
+    """
     problems = []
     for axis, certificate in certificates.items():
         if certificate.largest_step > certificate.max_step:
@@ -77,7 +87,7 @@ def broken_limits(plan: Plan, certificates: dict[str, Certificate], file: Docume
             what = f"scaling error of {worst:.4g} %" if worst > limit else f"size error of {size:+.4g} %"
             parts = max(certificate.scaling.values(), key=lambda error: max(error.total, error.band_limit))
             remedy = _remedy(plan.x if axis == "x" else plan.y, parts)
-            why = f"the {axis} axis has a {what}, above {limit:g} %; {remedy}"
+            why = "; ".join(filter(None, (f"the {axis} axis has a {what}, above {limit:g} %", remedy, advise(axis))))
             problems.append(file.problem("limits.max_scaling_error_percent", why))
     return problems
 
@@ -98,17 +108,15 @@ def _certify(line: LinePlan) -> Certificate:
     played, output = EmittedPeriod(line), line.program.output
     codes, lengths, ticks = played.runs.codes, played.runs.lengths, line.program.ticks
     mean, square = played.error_moments()
-    offset = float(output.offset_code)
-    code_mean = float(np.sum(lengths * (codes - offset))) / ticks
-    power = max(float(np.sum(lengths * (codes - offset - code_mean) ** 2)) / ticks, 1e-30)
-    directions = {"forward": line.drive.shape.forward}
-    if line.band_limit.directions == "both":
-        directions["backward"] = line.drive.shape.backward
+    levels = codes - float(output.offset_code)
+    levels -= float(np.sum(lengths * levels)) / ticks
+    levels *= levels
+    power = max(float(np.sum(lengths * levels)) / ticks, 1e-30)
     return Certificate(
         ticks=ticks,
         max_error_lsb=played.largest_error(),
         rms_error_lsb=sqrt(square),
-        scaling={side: scaling_error(line, played, side, branch) for side, branch in directions.items()},
+        scaling=_scaling(line, played),
         lowest_code=int(codes.min()),
         highest_code=int(codes.max()),
         headroom_low=int(codes.min()) - output.code_min,
@@ -120,5 +128,21 @@ def _certify(line: LinePlan) -> Certificate:
         at_resonance_db=power_at_resonance_db(line, played.runs, power),
         refinement=None
         if line.layer is None
-        else {side: refined(line, side, branch) for side, branch in directions.items()},
+        else {side: refined(line, side, branch) for side, branch in _directions(line).items()},
     )
+
+
+def scaling_errors(line: LinePlan) -> dict[str, ScalingError]:
+    """The scaling errors of an axis alone, by the directions that image."""
+    return _scaling(line, EmittedPeriod(line))
+
+
+def _scaling(line: LinePlan, played: EmittedPeriod) -> dict[str, ScalingError]:
+    return {side: scaling_error(line, played, side, branch) for side, branch in _directions(line).items()}
+
+
+def _directions(line: LinePlan) -> dict[str, BranchShape]:
+    """The branches that image."""
+    shape = line.drive.shape
+    both = {"forward": shape.forward, "backward": shape.backward}
+    return both if line.band_limit.directions == "both" else {"forward": shape.forward}

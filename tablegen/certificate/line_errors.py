@@ -16,10 +16,11 @@ from tablegen.fixedpoint.runs import Runs, runs_of
 from tablegen.numerics.arrays import Floats, Ints, merged
 from tablegen.planning.line_plan import LinePlan
 from tablegen.waveform.sampler import Sampler
-from tablegen.waveform.series import FourierSeries
+from tablegen.waveform.series import FourierSeries, values
 
 CHORD = 0.05  # share of the line, about one lattice constant of the paper's images
 _POINTS_PER_HARMONIC = 16  # points per harmonic over the window, for analytic slopes
+_CHUNK_RUNS = 1 << 14  # runs that are worked out together, in the cache
 _MAX_SPECTRUM_TICKS = 1 << 22  # longest period whose spectrum is taken
 
 
@@ -60,27 +61,34 @@ class EmittedPeriod:
         self._reference = Sampler(line.series, line.program.phase.ticks)
         # Between its extremes the float waveform is monotonic, so that errors are largest where runs begin and end.
         self.runs = runs_of(line.program).split_at(self._extremes())
+        self._lasts = self.runs.lasts
         self._first = self.runs.codes - self._asked(self.runs.starts)
-        self._last = self.runs.codes - self._asked(self.runs.lasts)
+        self._last = self._first if self.runs.by_tick else self.runs.codes - self._asked(self._lasts)
 
     def _extremes(self) -> Ints:
+        """The ticks before and behind each extreme of the float waveform."""
         points = 64 * self._line.series.harmonics
         w = self._line.series.on_grid(points)
         turning = (w - np.roll(w, 1)) * (np.roll(w, -1) - w) <= 0.0
         t = np.flatnonzero(turning) / points
         for _ in range(3):  # Newton on the slope; where it is flat any tick is as good
-            bend = self._line.series.value(t, 2)
-            step = self._line.series.value(t, 1) / np.where(bend == 0.0, np.inf, bend)
+            slope, bend = values(t, (self._line.series, 1), (self._line.series, 2))
+            step = slope / np.where(bend == 0.0, np.inf, bend)
             t = t - np.clip(step, -1.0 / points, 1.0 / points)
         ticks = self._line.program.ticks
-        return np.unique(np.floor(t * ticks).astype(np.int64) % ticks)
+        before = np.floor(t * ticks).astype(np.int64)
+        return np.unique(np.concatenate([before, before + 1]) % ticks)
 
     def _asked(self, k: Ints) -> Floats:
-        return self._line.float_codes(self._reference.at(k // self._hold))
+        codes = np.empty(len(k))
+        for at in range(0, len(k), _CHUNK_RUNS):
+            chunk = slice(at, at + _CHUNK_RUNS)
+            codes[chunk] = self._line.float_codes(self._reference.at(k[chunk] // self._hold))
+        return codes
 
     def errors(self, k: Ints) -> Floats:
         """Emitted code less the code asked for, unrounded, at ticks k."""
-        return self.runs.at(k) - self._asked(k)
+        return self._first[k] if self.runs.by_tick else self.runs.at(k) - self._asked(k)
 
     def largest_error(self) -> float:
         """max |error| over every tick."""
@@ -88,23 +96,35 @@ class EmittedPeriod:
 
     def error_moments(self) -> tuple[float, float]:
         """Mean and mean square of the error over every tick; along a run it is the parabola of three of its ticks."""
-        first, last, n = self._first, self._last, self.runs.lengths
+        sums = np.zeros(2)
+        for begin in range(0, len(self._first), _CHUNK_RUNS):
+            sums += self._moments(slice(begin, begin + _CHUNK_RUNS))
+        mean, square = sums / self.runs.ticks
+        return float(mean), float(square)
+
+    def _moments(self, which: slice) -> tuple[float, float]:
+        """Sums of the error and of its square over the ticks of some runs."""
+        first, last, starts = self._first[which], self._last[which], self.runs.starts[which]
+        if self.runs.by_tick:
+            return float(np.sum(first)), float(np.sum(first * first))
+        n = self.runs.lengths_of(which)
         steps = np.maximum(n - 1, 1)  # the parabola is 4 i (steps - i) / steps^2 at tick i, on a straight line
         halfway = n // 2
         straight = first + (last - first) * (halfway / steps)
         height = np.where(n > 2, 4.0 * halfway * (steps - halfway) / steps**2, 1.0)
-        bend = np.where(n > 2, self.runs.codes - self._asked(self.runs.starts + halfway % n) - straight, 0.0) / height
+        bend = np.where(n > 2, self.runs.codes[which] - self._asked(starts + halfway % n) - straight, 0.0) / height
         arch, arch_square = 2.0 / 3.0 * (1.0 - 1.0 / steps), 8.0 / 15.0 * (1.0 - 1.0 / steps) * (1.0 + 1.0 / steps**2)
         mean = 0.5 * (first + last)
         square = mean * mean + (last - first) ** 2 * (n + 1) / (12.0 * steps)
         square = square + bend * (2.0 * arch * mean + arch_square * bend)
-        ticks = self.runs.ticks
-        return float(np.sum(n * (mean + arch * bend))) / ticks, float(np.sum(n * square)) / ticks
+        return float(np.sum(n * (mean + arch * bend))), float(np.sum(n * square))
 
     def corners(self, first: int, stop: int) -> Ints:
         """Ticks in [first, stop) at which a run begins or ends."""
-        both = merged(self.runs.starts, self.runs.lasts)
-        return both[(both >= first) & (both < stop)]
+        if self.runs.by_tick:
+            return np.arange(first, stop)
+        both = (self.runs.starts, self._lasts)
+        return merged(*(ticks[slice(*np.searchsorted(ticks, (first, stop)))] for ticks in both))
 
 
 def _times(line: LinePlan, side: str, position: Floats) -> Floats:
@@ -141,13 +161,11 @@ def scaling_error(line: LinePlan, played: EmittedPeriod, side: str, branch: Bran
 def _slopes_and_value(line: LinePlan, times: Floats) -> tuple[Floats, Floats, Floats]:
     """The slope of the target, and slope and value of what the piezo sees of it; all without the layer."""
     reached = _reached(line)
-    target_slope = line.target.value(times, 1)
-    reached_slope = target_slope if reached is line.target else reached.value(times, 1)
-    value = reached.value(times)
+    target_slope, reached_slope, value = values(times, (line.target, 1), (reached, 1), (reached, 0))
     if line.layer is None:
         return target_slope, reached_slope, value
-    layer_slope = line.layer.value(times, 1)
-    return target_slope - layer_slope, reached_slope - layer_slope, value - line.layer.value(times)
+    layer_value, layer_slope = values(times, (line.layer, 0), (line.layer, 1))
+    return target_slope - layer_slope, reached_slope - layer_slope, value - layer_value
 
 
 def refined(line: LinePlan, side: str, branch: BranchShape) -> Refined:
@@ -183,28 +201,35 @@ def _chords(
     """Slope errors (1 is 100 %) of the chords inside the window: of the emitted integers, and of quantisation alone.
 
     Of all chords those count that begin or end where a run does: between those the error of a chord is a straight
-    line. ``deviation`` and ``steepness`` of the waveform stand at ``position``.
+    line. ``deviation`` and ``steepness`` of the waveform stand at ``position``. A code stands for the middle of its
+    tick.
     """
     ticks, turn = line.program.ticks, line.drive.turn
     share = turn if side == "forward" else 1.0 - turn
     ends = sorted(float(t) * ticks for t in _times(line, side, position[[0, -1]]))
-    first, stop = ceil(ends[0]), min(floor(ends[1]) + 1, ticks)  # a window may reach the end of the period
+    first, stop = ceil(ends[0] - 0.5), floor(ends[1] - 0.5) + 1
     baseline = max(1, min(round(CHORD * share * ticks), stop - first - 1))
     if stop - first < 2:
         return np.zeros(1), np.zeros(1)
-    begin = merged(played.corners(first, stop - baseline), played.corners(first + baseline, stop) - baseline)
+    begin = played.corners(first, stop - baseline)
+    if not played.runs.by_tick:
+        begin = merged(begin, played.corners(first + baseline, stop) - baseline)
     if not len(begin):
         begin = np.array([first])
 
     def noise_and_total(k: Ints) -> tuple[Floats, Floats, Floats]:
-        t = k / ticks
+        t = (k + 0.5) / ticks
         where = t / turn if side == "forward" else (1.0 - t) / share
         noise = played.errors(k) / line.codes_per_unit / np.interp(where, position, steepness)
         return where, noise, noise + np.interp(where, position, deviation)
 
-    x0, noise0, total0 = noise_and_total(begin)
-    x1, noise1, total1 = noise_and_total(begin + baseline)
-    return (total1 - total0) / (x1 - x0), (noise1 - noise0) / (x1 - x0)
+    totals, noises = np.empty(len(begin)), np.empty(len(begin))
+    for at in range(0, len(begin), _CHUNK_RUNS):
+        chunk = slice(at, at + _CHUNK_RUNS)
+        x0, noise0, total0 = noise_and_total(begin[chunk])
+        x1, noise1, total1 = noise_and_total(begin[chunk] + baseline)
+        totals[chunk], noises[chunk] = (total1 - total0) / (x1 - x0), (noise1 - noise0) / (x1 - x0)
+    return totals, noises
 
 
 def power_at_resonance_db(line: LinePlan, runs: Runs, power: float) -> float | None:

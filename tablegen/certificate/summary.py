@@ -1,10 +1,14 @@
 """Plan and certificate in words: the block that stands in every emitted file and on the terminal. Plain ASCII."""
 
 from fractions import Fraction
+from math import log10
 
 import numpy as np
 
 from tablegen.certificate.certificate import Certificate
+from tablegen.certificate.excess import excess
+from tablegen.certificate.matching import apart_note, apart_percent
+from tablegen.compensation.hold import hold_inverse
 from tablegen.planning.line_plan import LinePlan, Plan
 
 _GRID = 32  # points per period of the highest harmonic
@@ -35,10 +39,21 @@ def drive_lines(line: LinePlan) -> list[tuple[str, str]]:
     if line.layer is not None:
         layer = 100.0 * float(np.max(np.abs(line.layer.on_grid(_GRID * line.layer.harmonics))))
         rows.append(("refinement", f"{line.layer.harmonics} harmonics learnt, up to {layer:.3g} % of the line"))
+    rows.append(("hold", _hold(line)))
     if line.held_harmonics:
         first, last = line.held_harmonics[0], line.held_harmonics[-1]
         rows.append(("boost limit", f"holds back {len(line.held_harmonics)} harmonics, {first} to {last}"))
     return rows
+
+
+def _hold(line: LinePlan) -> str:
+    """How the compensation of the converter's hold changes the harmonics."""
+    codes = line.program.phase.ticks
+    text = f"{5e5 / (float(line.rate) * codes):.6g} us ahead, half of what a code holds"
+    if line.program.hold > 1:
+        return text
+    raised = 20.0 * log10(float(np.hypot(*hold_inverse(line.series.harmonics, codes, steps=False))[-1]))
+    return text if raised < 0.001 else f"{text}; the highest harmonic raised by {raised:.2g} dB"
 
 
 def _branches(line: LinePlan) -> str:
@@ -109,6 +124,18 @@ def _percent(value: float) -> str:
     return f"{value:.3g}" if abs(value) >= 0.0005 else "0.000"
 
 
+def _windows(plan: Plan) -> list[str]:
+    """Which ticks are imaged, and how far apart trace and retrace are for that alone."""
+    schedule = plan.schedule
+    text = f"imaged are ticks {schedule.forward.first}..{schedule.forward.stop - 1}"
+    if not schedule.backward.count:
+        return [text]
+    text += f" and {schedule.backward.first}..{schedule.backward.stop - 1}"
+    return [
+        f"{text}; a pixel's places in trace and retrace are up to {_percent(apart_percent(plan))} % of the line apart"
+    ]
+
+
 def notes(plan: Plan) -> list[str]:
     """What a user should know before trusting the image, in sentences."""
     schedule, found = plan.schedule, []
@@ -120,6 +147,8 @@ def notes(plan: Plan) -> list[str]:
             f"a pixel is {float(per_pixel):.4g} ticks, so its start is rounded to the tick; "
             f"line rates near {' or '.join(rates)} make it {' or '.join(map(str, whole))} whole ticks"
         )
+    if apart := apart_note(plan):
+        found.append(apart)
     found.append(
         f"a frame images {schedule.pixels} x {schedule.up.count}"
         + (f" + {schedule.down.count}" if schedule.down.count else "")
@@ -136,11 +165,15 @@ def summary(plan: Plan, certificates: dict[str, Certificate]) -> list[str]:
     schedule = plan.schedule
     lines = [
         f"{schedule.ticks} ticks a line, {schedule.lines} lines a frame, "
-        f"{rate(schedule.line_rate)} lines, {rate(schedule.frame_rate)} frames, {schedule.pixels} pixels"
+        f"{rate(schedule.line_rate)} lines, {rate(schedule.frame_rate)} frames, {schedule.pixels} pixels",
+        *_windows(plan),
     ]
     for line in plan.lines:
         lines += ["", f"{line.axis} drive"]
         lines += [f"  {label:<18}{value}" for label, value in drive_lines(line)]
         lines += [f"{line.axis} certificate"]
         lines += [f"  {label:<18}{value}" for label, value in certificate_lines(certificates[line.axis])]
+        found = excess(certificates[line.axis].scaling)
+        for i, text in enumerate([] if found is None else found.text(line.axis).split("; ")):
+            lines.append(f"  {'' if i else 'warning':<18}{text}")
     return lines

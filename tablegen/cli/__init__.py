@@ -5,12 +5,13 @@ Commands import what they need when they run, so that ``--version`` and ``--help
 
 import sys
 from importlib import import_module
-from io import TextIOWrapper
 
 import click
 
 from tablegen.cli.common import Failure
 from tablegen.cli.exit_status import ExitStatus
+from tablegen.cli.terminal import guard_streams
+from tablegen.interruption import endings_interrupt
 from tablegen.version import __version__
 
 # Commands by name: the module in this folder, and the command in it.
@@ -74,7 +75,7 @@ Exit status of all commands:
     8 no answer from the device
     9 refused by the device
    10 link lost, or timeout
-  130 interrupted""",
+  130 interrupted, by Ctrl-C, SIGTERM or SIGHUP""",
 )
 @click.version_option(__version__, prog_name="tablegen", message="%(prog)s %(version)s")
 def cli() -> None:
@@ -93,11 +94,11 @@ def main() -> None:
 
 
 def _run() -> int:
-    if isinstance(sys.stdout, TextIOWrapper):
-        sys.stdout.reconfigure(errors="backslashreplace")  # a name that the terminal cannot show is no reason to fail
+    guard_streams()
     stdout = sys.stdout
     try:
-        result = cli.main(standalone_mode=False)
+        with endings_interrupt():
+            result = cli.main(standalone_mode=False)
         if sys.stdout is not None:  # it is None where the caller closed it
             sys.stdout.flush()
         return int(result or 0)

@@ -4,7 +4,7 @@ import sys
 import time
 from collections.abc import Callable
 
-import click
+from tablegen.cli.terminal import erase, redraw
 
 _BAR_WIDTH = 24
 _WIDTH = 76
@@ -33,12 +33,12 @@ class Bar:
         elif now - self._shown_at < _REDRAW_S and done < total:
             return
         self._shown_at = now
-        click.echo(f"\r{self._text(now, done, total):<{_WIDTH}}", err=True, nl=False)
+        redraw(f"{self._text(now, done, total):<{_WIDTH}}")
 
     def close(self) -> None:
         """Take the line away again."""
         if self._start is not None:
-            click.echo("\r" + " " * _WIDTH + "\r", err=True, nl=False)
+            erase(_WIDTH)
             self._start = None
 
     def _text(self, now: float, done: int, total: int) -> str:
@@ -46,7 +46,7 @@ class Bar:
         full = _BAR_WIDTH * done // total
         text = f"[{'#' * full}{'.' * (_BAR_WIDTH - full)}] {done}/{total} bytes"
         if done == total:
-            return f"{text}  waiting for the start of a line"
+            return f"{text}  checked, then waiting for a line"
         seconds, first = now - self._start[0], self._start[1]
         if seconds <= 0.0 or done <= first:
             return text

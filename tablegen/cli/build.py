@@ -5,7 +5,17 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tablegen.cli.common import fail, format_option, planned, rendered, scan_argument, written
+from tablegen.cli.common import (
+    OutputFile,
+    OutputFolder,
+    fail,
+    format_option,
+    planned,
+    rendered,
+    scan_argument,
+    strict_option,
+    written,
+)
 from tablegen.cli.depfile import Depfile
 from tablegen.cli.exit_status import ExitStatus
 
@@ -20,7 +30,7 @@ _NAMES_SHOWN = 8
 @click.option(
     "-o",
     "--output",
-    type=click.Path(path_type=Path, file_okay=False),
+    type=OutputFolder(),
     default=Path("build"),
     show_default=True,
     metavar="DIR",
@@ -35,7 +45,7 @@ _NAMES_SHOWN = 8
 )
 @click.option(
     "--depfile",
-    type=click.Path(path_type=Path, dir_okay=False),
+    type=OutputFile(),
     metavar="FILE",
     help="Also write a dependency file for make, CMake or Ninja, like gcc -MD -MP. FILE is removed first and written "
     "last, so it exists only after a successful build.",
@@ -45,6 +55,7 @@ _NAMES_SHOWN = 8
     metavar="NAME",
     help="Target name in the dependency file, like gcc -MT.  [default: DIR/manifest.json]",
 )
+@strict_option
 @click.option("-q", "--quiet", is_flag=True, help="Do not print the certificate.")
 def build(
     scan: Path,
@@ -53,12 +64,16 @@ def build(
     only_check: bool,
     depfile: Path | None,
     depfile_target: str | None,
+    strict: bool,
     quiet: bool,
 ) -> int:
     """Write the tables, constants and sequencer of a scan in C and Verilog, and manifest.json with the certificate.
 
     The same input gives the same bytes on every machine. A file that is up to date is not written again. If the input
     has an error, no file is written. Files of an earlier build that this build no longer makes are removed.
+
+    A scaling error above 1 %, or above that of the uncompensated line, is a warning on stderr, with its cause and with
+    remedies that were tried.
 
     \b
     Examples:
@@ -68,7 +83,7 @@ def build(
 
     \b
     Exit status: 0 done, 1 DIR is not up to date (--check), 2 wrong input, 3 a limit of the
-    certificate is exceeded, 4 cannot write.
+    certificate is exceeded (with --strict: or there is a warning), 4 cannot write.
 
     `tablegen paths` prints the include files that run this command from make or CMake.
     """
@@ -77,13 +92,13 @@ def build(
     if depfile is not None and only_check:
         raise click.UsageError("--check cannot be used with --depfile")
     rule = Depfile(depfile, depfile_target or str(output / "manifest.json"), scan) if depfile is not None else None
-    built = planned(scan, list(formats) or None)
+    built = planned(scan, list(formats) or None, strict)
     files = rendered(built)
-    outdated, leftovers = built.outdated(output), built.leftovers(output)
     if only_check:
         from tablegen.cli.difference import differences
 
         found = differences(output, files)
+        outdated, leftovers = built.outdated(output), built.leftovers(output)
         found += [f"{output / name}: left over from an earlier build" for name in outdated]
         found += [_leftover(output / name) for name in leftovers]
         if not found:
@@ -93,18 +108,25 @@ def build(
         fail([f"{output} is stale; run: tablegen build {scan} -o {output}{again}"], ExitStatus.STALE)
     if rule is not None:
         rule.note(built.setup.files, built.formats)
-    changed = written(output, files, outdated)
+    removed: list[str] = []
+    kept: list[str] = []
+
+    def outdated_now() -> list[str]:
+        removed[:], kept[:] = built.outdated(output), built.leftovers(output)  # by the manifest that is replaced then
+        return removed
+
+    changed = written(output, files, outdated_now)
     if rule is not None:
         rule.write()
-    for name in leftovers:
+    for name in kept:
         click.echo(f"note: {_leftover(output / name)}", err=True)
     if not quiet:
         from tablegen.cli.report import certificate_table
 
         click.echo("\n".join(certificate_table(built.plan, built.certificates)))
         click.echo(f"\n{output}: {_state(built, changed)}")
-        if outdated:
-            click.echo(f"{output}: removed files of an earlier build: {_few(outdated)}")
+        if removed:
+            click.echo(f"{output}: removed files of an earlier build: {_few(removed)}")
     return ExitStatus.OK
 
 

@@ -59,7 +59,8 @@ def calibrate() -> None:
     standard errors, and the scan error that remains. Outliers are reported, and never removed.
 
     With --write, the command updates the scanner file, and adds a comment that names the data files and their SHA-256.
-    Without --write, it changes no file. Numbers in parentheses, such as (22), are equations of the paper.
+    Without --write, it changes no file. A fit that says nothing, such as a parameter below two standard errors, is not
+    written; --force writes it. Numbers in parentheses, such as (22), are equations of the paper.
     """
 
 
@@ -350,7 +351,13 @@ def frequency(common: Common, data: Path, reference_hz: float | None, from_hz: f
 @_data
 @_from_hz
 @_to_hz
-def resonance(common: Common, data: Path, from_hz: float, to_hz: float) -> int:
+@click.option(
+    "--points",
+    is_flag=True,
+    help="With --write, write the measured response as a CSV file beside the scanner file, and name it there, instead "
+    "of the fitted resonance.",
+)
+def resonance(common: Common, data: Path, from_hz: float, to_hz: float, points: bool) -> int:
     """Fit frequency_hz, quality and delay_s to a frequency response that covers the resonance.
 
     \b
@@ -365,4 +372,4 @@ def resonance(common: Common, data: Path, from_hz: float, to_hz: float) -> int:
 
     table = within(read_columns(data, [FREQUENCY, GAIN], [PHASE]), from_hz, to_hz)
     phase = table.columns.get(PHASE.name)
-    return finish(common, [table], lambda: fit_resonance(table[FREQUENCY], table[GAIN], phase))
+    return finish(common, [table], lambda: fit_resonance(table[FREQUENCY], table[GAIN], phase), points)

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from tablegen.cli.common import fail, require, written
+from tablegen.cli.common import OutputFile, fail, require, written
 from tablegen.cli.exit_status import ExitStatus
+from tablegen.reading import CONFIGURATION, RESPONSE, read_bytes, read_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,7 +19,8 @@ if TYPE_CHECKING:
     from tablegen.calibration.columns import Column
     from tablegen.calibration.estimate import Fit
     from tablegen.calibration.image_files import ScanImage
-    from tablegen.calibration.table import MeasuredTable
+    from tablegen.calibration.resonance import ResonanceFit
+    from tablegen.calibration.table import MeasuredTable, Source
     from tablegen.compensation.size import SizeLaw
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -33,6 +35,7 @@ class Common:
     scanner: Path | None
     v_max: float | None
     write: bool
+    force: bool
     plot: Path | None
     as_json: bool
 
@@ -43,7 +46,7 @@ def shared_options(command: F) -> F:
         click.option("--axis", type=click.Choice(("x", "y")), required=True, help="The axis that was measured."),
         click.option(
             "--scanner",
-            type=click.Path(path_type=Path, dir_okay=False),
+            type=OutputFile(),
             metavar="FILE",
             help="Scanner file. The command reads v_max from it.",
         ),
@@ -58,9 +61,10 @@ def shared_options(command: F) -> F:
             is_flag=True,
             help="Update the scanner file. With --v-max, create it if it does not exist.",
         ),
+        click.option("--force", is_flag=True, help="With --write, write a fit even if it is meaningless."),
         click.option(
             "--plot",
-            type=click.Path(path_type=Path, dir_okay=False),
+            type=OutputFile(),
             metavar="FILE",
             help="Plot the data and the fit to FILE: .png, .svg or .pdf.",
         ),
@@ -72,19 +76,22 @@ def shared_options(command: F) -> F:
         scanner: Path | None,
         v_max: float | None,
         write: bool,
+        force: bool,
         plot: Path | None,
         as_json: bool,
         **rest: Any,
     ) -> Any:
         if write and scanner is None:
             raise click.UsageError("--write needs --scanner FILE")
+        if force and not write:
+            raise click.UsageError("--force is for --write")
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the fits are small, and its threads would only spin
         require(*_REQUIRED_MODULES, extra="calibrate")
         if plot is not None:
             if plot.suffix not in (".png", ".svg", ".pdf"):
                 raise click.UsageError(f"--plot {plot}: the name has to end in .png, .svg or .pdf")
             require("matplotlib", extra="plot")
-        return command(common=Common(axis, scanner, v_max, write, plot, as_json), **rest)
+        return command(common=Common(axis, scanner, v_max, write, force, plot, as_json), **rest)
 
     run.__doc__, run.__name__ = command.__doc__, command.__name__
     for option in reversed(options):
@@ -194,7 +201,11 @@ def size_law(common: Common, v_max: float, size_v: float) -> "SizeLaw":
 def finish(
     common: Common, tables: "Sequence[MeasuredTable | ScanImage]", run: "Callable[[], Fit]", points: bool = False
 ) -> int:
-    """Fit, print, draw and write; with ``points`` hysteresis as measured."""
+    """Fit, print, draw and write; with ``points`` hysteresis, or a response, as measured.
+
+    A fit that says nothing is printed with its doubts, and not written unless forced.
+    """
+    from tablegen.calibration.doubts import doubts
     from tablegen.calibration.summary import record
     from tablegen.cli.calibration_text import calibration_text
     from tablegen.problems import Unphysical
@@ -207,28 +218,42 @@ def finish(
     if common.as_json:
         click.echo(json.dumps(record(fit, common.axis, sources), indent=2, allow_nan=False))
     else:
-        click.echo("\n".join(calibration_text(fit, common.axis, tables)))
+        click.echo("\n".join(calibration_text(fit, common.axis, tables, points)))
     if common.plot is not None:
         from tablegen.calibration.figure import draw
 
         kind: Any = common.plot.suffix[1:]
         written(common.plot.parent, {common.plot.name: draw(fit.curves, kind)})
     if common.write:
-        _write(common, fit, tables, points)
+        meaningless = doubts(fit, points)
+        if meaningless and not common.force:
+            where = f"{common.scanner}: {common.axis}"
+            advice = "nothing was written; correct the measurement, or write it all the same with --force"
+            fail([*(f"{where}: {doubt}" for doubt in meaningless), f"{where}: {advice}"], ExitStatus.WRONG_INPUT)
+        _write(common, fit, tables, points, bool(meaningless))
     return ExitStatus.OK
 
 
-def _write(common: Common, fit: "Fit", tables: "Sequence[MeasuredTable | ScanImage]", points: bool) -> None:
+def _write(
+    common: Common, fit: "Fit", tables: "Sequence[MeasuredTable | ScanImage]", points: bool, forced: bool
+) -> None:
+    from tablegen.calibration.resonance import ResonanceFit
     from tablegen.calibration.scanner_file import new_file, updated
     from tablegen.calibration.summary import change
     from tablegen.problems import Rejected, Unphysical
 
     assert common.scanner is not None
     name = str(common.scanner)
+    sources = list(dict.fromkeys(table.source for table in tables))
+    response = Path()
+    beside: dict[str, bytes] = {}
+    if points and isinstance(fit, ResonanceFit):
+        response = common.scanner.with_name(f"{common.scanner.stem}_{common.axis}_response.csv")
+        beside[response.name] = _response(fit, response, sources)
     try:
         path = common.scanner.resolve()
-        text = path.read_bytes().decode("utf-8") if path.exists() else new_file(path.stem, full_scale(common))
-        put = change(fit, list(dict.fromkeys(table.source for table in tables)), points)
+        text = read_text(path, CONFIGURATION) if path.exists() else new_file(path.stem, full_scale(common))
+        put = change(fit, sources, points, response.name, forced)
         content = updated(text, name, common.axis, put).encode("utf-8")
     except Rejected as rejected:
         fail(rejected.problems, ExitStatus.WRONG_INPUT)
@@ -238,5 +263,21 @@ def _write(common: Common, fit: "Fit", tables: "Sequence[MeasuredTable | ScanIma
         fail([f"{name}: is not UTF-8"], ExitStatus.WRONG_INPUT)
     except OSError as error:
         fail([f"{name}: {error.strerror or error}"], ExitStatus.WRONG_INPUT)
-    changed = written(path.parent, {path.name: content})
+    changed = written(response.parent, beside) if beside else []  # before the file that names it
+    changed += written(path.parent, {path.name: content})
     click.echo(f"{name}: {common.axis}.{put.kind} {'written' if changed else 'up to date'}", err=common.as_json)
+
+
+def _response(fit: "ResonanceFit", path: Path, sources: "Sequence[Source]") -> bytes:
+    """The measured response as the scanner file names it; a file of somebody else is not written over."""
+    from tablegen.calibration.response_csv import MARK, response_csv
+    from tablegen.problems import Unphysical
+
+    try:
+        if path.exists() and not read_bytes(path, RESPONSE).startswith(MARK.encode("ascii")):
+            fail([f"{path}: was not written by tablegen calibrate; move it away"], ExitStatus.WRONG_INPUT)
+        return response_csv(fit, sources)
+    except Unphysical as reason:
+        fail([f"--points: {reason}"], ExitStatus.WRONG_INPUT)
+    except OSError as error:
+        fail([f"{path}: {error.strerror or error}"], ExitStatus.WRONG_INPUT)

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from math import floor, isfinite, log10
 
 from tablegen.calibration.branch import AmplitudeFit, MeasuredBranch
+from tablegen.calibration.doubts import doubts
 from tablegen.calibration.estimate import Estimate, Fit
 from tablegen.calibration.hysteresis import HysteresisFit
 from tablegen.calibration.image_files import ScanImage
@@ -17,14 +18,16 @@ _TRACE_HEAD = ("turn", "V_scan", "rate [Hz]", "periods", "noise [%]", "drift [%]
 _IMAGE_HEAD = ("turn", "V_scan", "periods", "noise [%]", "drift [%]", "apart [%]")
 
 
-def calibration_text(fit: Fit, axis: str, tables: Sequence[MeasuredTable | ScanImage]) -> list[str]:
-    """Lines of text; ``tables`` are what was fitted, for the places of outliers."""
+def calibration_text(
+    fit: Fit, axis: str, tables: Sequence[MeasuredTable | ScanImage], points: bool = False
+) -> list[str]:
+    """Lines of text; ``tables`` are what was fitted, for the places of outliers, ``points`` what would be written."""
     hysteresis = isinstance(fit, HysteresisFit)
     rows = [(name, *figures(estimate), meaning) for name, estimate, meaning in parameters(fit)]
     widths = [max(len(row[i]) for row in rows) for i in range(3)]
     files = ", ".join(table.source.name for table in tables)
-    points = "pixels" if isinstance(tables[0], ScanImage) else "samples" if hysteresis else "points"
-    lines = [f"{change(fit, []).kind} of {axis}, {fit.points} {points} of {files}", ""]
+    counted = "pixels" if isinstance(tables[0], ScanImage) else "samples" if hysteresis else "points"
+    lines = [f"{change(fit, []).kind} of {axis}, {fit.points} {counted} of {files}", ""]
     lines += [
         f"{name:<{widths[0]}}  {value:>{widths[1]}} {error:<{widths[2]}}  {meaning}"
         for name, value, error, meaning in rows
@@ -45,7 +48,8 @@ def calibration_text(fit: Fit, axis: str, tables: Sequence[MeasuredTable | ScanI
         lines.append(
             f"outlier: {place}: far from the other points, but used. Remove the row if the measurement was wrong"
         )
-    return lines + [f"note: {remark}" for remark in fit.remarks]
+    lines += [f"note: {remark}" for remark in fit.remarks]
+    return lines + [f"warning: {doubt}" for doubt in doubts(fit, points)]
 
 
 def _traces(fit: HysteresisFit) -> list[str]:

@@ -4,20 +4,24 @@ from pathlib import Path
 
 import click
 
-from tablegen.cli.common import planned, scan_argument
+from tablegen.cli.common import planned, scan_argument, strict_option
 
 
 @click.command(short_help="Check a scan file and its scanner file.")
 @scan_argument
-def check(scan: Path) -> None:
+@strict_option
+def check(scan: Path, strict: bool) -> None:
     """Check a scan file and its scanner file: syntax, physical limits, and the limits of the certificate.
 
-    Prints nothing if both are correct. Otherwise it prints all errors to stderr, each as file:line: key: why.
+    Prints nothing if both are correct. Otherwise it prints all errors to stderr, each as file:line: key: why. A
+    scaling error above 1 %, or above that of the uncompensated line, is a warning, with remedies that were tried; so is
+    a pixel whose places in trace and retrace are more than a quarter of a pixel apart.
 
     \b
     Example:
       tablegen check annexin_200nm.toml
 
-    Exit status: 0 correct, 2 wrong input, 3 a limit of the certificate is exceeded.
+    Exit status: 0 correct, 2 wrong input, 3 a limit of the certificate is exceeded, or, with
+    --strict, there is a warning.
     """
-    planned(scan)
+    planned(scan, strict=strict)

@@ -2,19 +2,19 @@
 
 import importlib.util
 import os
-import signal
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
 from tablegen.cli.exit_status import ExitStatus
 from tablegen.cli.progress import Progress
 from tablegen.installation import install_advice
+from tablegen.reading import other_than_file
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from tablegen.api.build import Build
 
@@ -29,6 +29,34 @@ format_option = click.option(
     help="Output format; repeat the option for several formats. `tablegen formats` lists them.  [default: emit.formats "
     "of the scan file, or c and verilog]",
 )
+
+
+class OutputFile(click.Path):
+    """A file to write: a new one, or one that is replaced; never a pipe, a device or a directory."""
+
+    def __init__(self) -> None:
+        super().__init__(path_type=Path)
+
+    def convert(self, value: Any, parameter: click.Parameter | None, context: click.Context | None) -> Path:
+        """The path; a usage error names what stands there."""
+        path = Path(os.fsdecode(super().convert(value, parameter, context)))
+        if other := other_than_file(path):
+            self.fail(f"'{path}' is {other}, where a file has to go.", parameter, context)
+        return path
+
+
+class OutputFolder(click.Path):
+    """A directory to write into: a new one, or one that is there."""
+
+    def __init__(self) -> None:
+        super().__init__(path_type=Path, file_okay=False)
+
+    def convert(self, value: Any, parameter: click.Parameter | None, context: click.Context | None) -> Path:
+        """The path; a usage error names what stands there."""
+        path = Path(os.fsdecode(super().convert(value, parameter, context)))
+        if (other := other_than_file(path)) not in (None, "a directory"):
+            self.fail(f"'{path}' is {other}, where a directory has to go.", parameter, context)
+        return path
 
 
 def finite(_context: click.Context, _option: click.Parameter, value: float | None) -> float | None:
@@ -70,8 +98,18 @@ def fail(lines: "Sequence[object]", status: ExitStatus) -> NoReturn:
     raise Failure(lines, status)
 
 
-def planned(scan: Path, formats: "Sequence[str] | None" = None) -> "Build":
-    """Load, plan and certify a scan; every failure ends the command with its status."""
+strict_option = click.option(
+    "--strict",
+    is_flag=True,
+    help="Treat warnings as errors: exit with status 3, and write nothing.",
+)
+
+
+def planned(scan: Path, formats: "Sequence[str] | None" = None, strict: bool = False) -> "Build":
+    """Load, plan and certify a scan; every failure ends the command with its status.
+
+    Warnings go to stderr; with ``strict`` they end the command too.
+    """
     # No linear algebra library is used, and its threads would only spin: a good part of what importing numpy costs.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from tablegen.api.build import BrokenLimit, build
@@ -79,11 +117,19 @@ def planned(scan: Path, formats: "Sequence[str] | None" = None) -> "Build":
 
     try:
         with Progress() as progress:
-            return build(scan, formats=formats, progress=progress.now)
+            built = build(scan, formats=formats, progress=progress.now)
+            progress.now("looking for remedies")
+            warnings = built.warnings
     except BrokenLimit as broken:
         fail(broken.problems, ExitStatus.BROKEN_LIMIT)
     except Rejected as rejected:
         fail(rejected.problems, ExitStatus.WRONG_INPUT)
+    lines = [f"warning: {warning}" for warning in warnings]
+    if lines and strict:
+        fail(lines, ExitStatus.BROKEN_LIMIT)
+    for line in lines:
+        click.echo(line, err=True)
+    return built
 
 
 def rendered(built: "Build") -> "dict[str, bytes]":
@@ -98,19 +144,23 @@ def rendered(built: "Build") -> "dict[str, bytes]":
         fail(rejected.problems, ExitStatus.WRONG_INPUT)
 
 
-def written(folder: Path, files: "Mapping[str, bytes]", outdated: "Sequence[str]" = ()) -> list[str]:
+def written(
+    folder: Path, files: "Mapping[str, bytes]", outdated: "Sequence[str] | Callable[[], Sequence[str]]" = ()
+) -> list[str]:
     """Write files and return the names of those that changed; a failure or an interruption ends the command.
 
-    Files that are ``outdated`` are removed.
+    Files that are ``outdated`` are removed; a function is asked for them when no other build writes.
 
     An interruption waits until all files are in place, so that none is left half renamed; a second one does not wait.
     """
-    from tablegen.emit.write import CannotWrite, write_files
-    from tablegen.interruption import held
+    from tablegen.emit.write import CannotWrite, NoPlace, write_files
+    from tablegen.interruption import ENDINGS, held
 
     try:
-        with held(signal.SIGINT) as came:
+        with held(*ENDINGS) as came:
             names = write_files(folder, files, outdated)
+    except NoPlace as error:
+        fail([error], ExitStatus.WRONG_INPUT)
     except CannotWrite as error:
         fail([error], ExitStatus.CANNOT_WRITE)
     except OSError as error:

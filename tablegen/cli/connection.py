@@ -11,14 +11,15 @@ import click
 
 from tablegen.cli.common import fail, planned
 from tablegen.cli.exit_status import ExitStatus
+from tablegen.reading import KEY, read_text
 
 if TYPE_CHECKING:
     from tablegen.link.device import Device
     from tablegen.link.prepare import PreparedScan
 
 Command = TypeVar("Command", bound=Callable[..., Any])
-INTERRUPTED = "interrupted; the device continues as before"
 _KEY_BYTES = range(16, 33)
+_OF_OTHERS = 0o077  # what a group or others may do with a file
 
 baud_option = click.option(
     "--baud",
@@ -58,10 +59,11 @@ def timeout_option(what: str) -> Callable[[Command], Command]:
 
 
 @contextmanager
-def connected(
-    port: str, baud: int, key_file: Path | None, interrupted: Callable[[], str] = lambda: INTERRUPTED
-) -> "Iterator[Device]":
-    """A device, until the end of the block; whatever goes wrong there ends the command with its status."""
+def connected(port: str, baud: int, key_file: Path | None, goes_on: str = "as before") -> "Iterator[Device]":
+    """A device, until the end of the block; whatever goes wrong there ends the command with its status.
+
+    ``goes_on`` is how a device goes on of which nothing was asked before the command was interrupted.
+    """
     key = None if key_file is None else _read_key(key_file)
     from tablegen.link import errors
     from tablegen.link.device import Device
@@ -77,24 +79,51 @@ def connected(
         (errors.NotPlaying, ExitStatus.MISMATCH),
         (errors.LinkError, ExitStatus.LINK_LOST),
     )
+    known: Device | None = None
     try:
         with Device(port, baud=baud, key=key) as device:
+            known = device
             yield device
     except errors.LinkError as error:
         fail([error], next(status for kind, status in statuses if isinstance(error, kind)))
     except KeyboardInterrupt:
-        fail([interrupted()], ExitStatus.INTERRUPTED)
+        fail([f"interrupted; {_left_behind(known, goes_on)}"], ExitStatus.INTERRUPTED)
+
+
+def _left_behind(device: "Device | None", goes_on: str) -> str:
+    """What is known of a device when a command is interrupted."""
+    from tablegen.link.messages import Request
+
+    upload = None if device is None else device.upload_state
+    if upload is not None and upload.committed:
+        return "everything was sent, and the new scan may become active: see `tablegen status`"
+    if upload is not None and upload.confirmed:
+        return (
+            f"the device plays its old scan and keeps {upload.confirmed} of {upload.total} bytes: run the same command "
+            "to continue the upload"
+        )
+    acts = [] if device is None else [act.name for act in device.acts if act != Request.COMMIT]
+    if acts:
+        return f"the device may have carried out {' and '.join(dict.fromkeys(acts))}: see `tablegen status`"
+    return f"the device continues {goes_on}"
 
 
 def _read_key(path: Path) -> bytes:
     try:
-        key = binascii.unhexlify("".join(path.read_text("ascii").split()))
+        key = binascii.unhexlify("".join(read_text(path, KEY, "ascii").split()))
+        mode = path.stat().st_mode
     except OSError as error:
         fail([f"{path}: cannot be read: {error.strerror or error}"], ExitStatus.WRONG_INPUT)
     except ValueError:  # also raised for text that is not ASCII
         fail([f"{path}: the file must contain 32 to 64 hexadecimal digits and nothing else"], ExitStatus.WRONG_INPUT)
     if len(key) not in _KEY_BYTES:
         fail([f"{path}: the key has {len(key)} bytes; 16 to 32 are needed"], ExitStatus.WRONG_INPUT)
+    if os.name == "posix" and mode & _OF_OTHERS:
+        click.echo(
+            f"warning: {path}: others can read the key (mode {mode & 0o777:04o}): run `chmod 600 {path}`, and give "
+            "device and host a new key if somebody may have read this one",
+            err=True,
+        )
     return key
 
 

@@ -1,6 +1,8 @@
 """``tablegen park``, ``trigger`` and ``clear``: what a scan in a device does."""
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -8,8 +10,13 @@ from tablegen.cli.common import fail
 from tablegen.cli.connection import baud_option, connected, key_option, port_option, timeout_option
 from tablegen.cli.exit_status import ExitStatus
 
+if TYPE_CHECKING:
+    from tablegen.link.device import Device
+    from tablegen.link.messages import DeviceStatus
+
 _PARK_WAIT_S = 60.0
 _START_WAIT_S = 1.0
+_LOOKS = 20  # at the status, until a request that was passed on shows there: it acts on the next tick
 
 
 @click.command(short_help="Stop the scan of a device and ramp to the park codes.")
@@ -26,8 +33,8 @@ def park(port: str, baud: int, key_file: Path | None, wait: bool, timeout: float
       tablegen park --wait --port /dev/ttyUSB0
 
     \b
-    Exit status: 0 done, 6 pyserial is missing, 7 no port, 8 no answer, 9 refused, 10 link lost
-    or timeout.
+    Exit status: 0 done, 6 pyserial is missing, 7 no port, 8 no answer, 9 refused, or it still
+    plays, 10 link lost or timeout.
     """
     from tablegen.link.messages import DeviceState
 
@@ -35,8 +42,29 @@ def park(port: str, baud: int, key_file: Path | None, wait: bool, timeout: float
         device.park()
         if wait:
             device.wait_for(DeviceState.PARKED, _PARK_WAIT_S if timeout is None else timeout)
-    click.echo("parked" if wait else "ramping to the park codes")
+        status = _look(device, lambda status: status.state != DeviceState.PLAYING)
+    if status.state == DeviceState.PLAYING:
+        fail(
+            ["the device took the request to park, but still plays; see `tablegen status`, and try again"],
+            ExitStatus.REFUSED,
+        )
+    said = {
+        DeviceState.NO_PROGRAM: "the device has no scan yet, and nothing to park",
+        DeviceState.PARKED: "parked",
+        DeviceState.PARKING: "ramping to the park codes",
+    }
+    click.echo(said[status.state])
     return ExitStatus.OK
+
+
+def _look(device: "Device", shows: "Callable[[DeviceStatus], bool]") -> "DeviceStatus":
+    """The first status that shows it, or the last one after some looks."""
+    status = device.status()
+    for _ in range(_LOOKS):
+        if shows(status):
+            break
+        status = device.status()
+    return status
 
 
 @click.command(short_help="Start the scan of a device.")
@@ -108,9 +136,14 @@ def clear(port: str, baud: int, key_file: Path | None) -> int:
     Example:
       tablegen clear --port /dev/ttyUSB0
 
-    Exit status: 0 done, 6 pyserial is missing, 7 no port, 8 no answer, 9 refused, 10 link lost.
+    \b
+    Exit status: 0 done, 6 pyserial is missing, 7 no port, 8 no answer, 9 refused, or faults come
+    again, 10 link lost.
     """
     with connected(port, baud, key_file) as device:
         device.clear()
+        status = _look(device, lambda status: not status.faults)
+    if status.faults:
+        fail(["the device took the request, but has faults; see `tablegen status`"], ExitStatus.REFUSED)
     click.echo("faults cleared")
     return ExitStatus.OK

@@ -60,12 +60,15 @@ def _changed_ns(path: Path) -> int:
 
 
 def _remove(path: Path, scan: Path) -> None:
+    from tablegen.emit.write import settle
+
     try:
         if not stat.S_ISREG(path.lstat().st_mode):
             fail([f"{path}: is not a regular file; --depfile needs its own file"], ExitStatus.WRONG_INPUT)
         if scan.exists() and path.samefile(scan):
             fail([f"{path}: is the scan file; --depfile needs its own file"], ExitStatus.WRONG_INPUT)
         path.unlink()
+        settle(path.parent)  # before anything else: a cut of power must not bring it back
     except FileNotFoundError:
         pass
     except OSError as error:

@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from difflib import unified_diff
 from pathlib import Path
 
+from tablegen.reading import BUILD_FILE, read_bytes
+
 _MAX_LINES = 12  # lines of each file: enough to see what changed, without whole tables
 _WIDTH = 120
 
@@ -14,7 +16,7 @@ def differences(folder: Path, files: Mapping[str, bytes]) -> list[str]:
     for name, content in files.items():
         path = folder / name
         try:
-            old = path.read_bytes()
+            old = read_bytes(path, BUILD_FILE)
         except FileNotFoundError:
             out.append(f"{path}: missing")
             continue

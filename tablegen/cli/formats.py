@@ -2,6 +2,8 @@
 
 import click
 
+from tablegen.cli.terminal import tell
+
 
 @click.command(short_help="List the output formats of build.")
 def formats() -> None:
@@ -26,4 +28,5 @@ def formats() -> None:
         except UnknownFormat as error:
             click.echo(f"{name:<16}cannot be used: {error}", err=True)
             continue
-        click.echo(f"{click.style(f'{name:<16}', bold=True)}{found.purpose}\n{'':16}{found.file_names}")
+        tell(f"{name:<16}{found.purpose}", bold=True)
+        tell(f"{'':16}{found.file_names}")

@@ -5,14 +5,14 @@ from pathlib import Path
 
 import click
 
-from tablegen.cli.common import fail, written
+from tablegen.cli.common import OutputFolder, fail, written
 from tablegen.cli.exit_status import ExitStatus
 
 _FILES = ("scanner.toml", "annexin_200nm.toml")
 
 
 @click.command(short_help="Write an example scan file and scanner file.")
-@click.argument("folder", type=click.Path(path_type=Path, file_okay=False), default=Path("."), metavar="[DIR]")
+@click.argument("folder", type=OutputFolder(), default=Path("."), metavar="[DIR]")
 @click.option("--force", is_flag=True, help="Overwrite existing files.")
 def init(folder: Path, force: bool) -> int:
     """Write an example with comments, scanner.toml and annexin_200nm.toml, to DIR.

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from types import TracebackType
 
-import click
+from tablegen.cli.terminal import erase, redraw
 
 _SHOW_AFTER_S = 1.0
 _WIDTH = 60
@@ -45,7 +45,7 @@ class Progress:
         while not self._done.wait(_SHOW_AFTER_S):
             what = self._what if isinstance(self._what, str) else self._what()
             text = f"{what} ({time.monotonic() - start:.0f} s)"
-            click.echo(f"\r{text:<{_WIDTH}}", err=True, nl=False)
+            redraw(f"{text:<{_WIDTH}}")
             shown = True
         if shown:
-            click.echo("\r" + " " * _WIDTH + "\r", err=True, nl=False)
+            erase(_WIDTH)

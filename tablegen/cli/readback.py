@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from tablegen.cli.common import fail, written
+from tablegen.cli.common import OutputFile, fail, written
 from tablegen.cli.connection import baud_option, connected, key_option, port_option, read_scan, timeout_option
 from tablegen.cli.exit_status import ExitStatus
 
@@ -17,7 +17,7 @@ from tablegen.cli.exit_status import ExitStatus
 @click.option(
     "-o",
     "--output",
-    type=click.Path(path_type=Path, dir_okay=False),
+    type=OutputFile(),
     metavar="FILE",
     help="Write the program image, as the device holds it, to FILE.",
 )

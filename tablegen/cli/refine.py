@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
-from tablegen.cli.common import fail, finite, require, scan_argument, written
+from tablegen.cli.common import OutputFile, fail, finite, require, scan_argument, written
 from tablegen.cli.exit_status import ExitStatus
+from tablegen.reading import CONFIGURATION, read_text
 
 if TYPE_CHECKING:
     from tablegen.calibration.table import MeasuredTable, Source
@@ -84,7 +85,7 @@ Exit status: 0 done, 2 wrong input, 4 cannot write, 6 a library is missing.""",
 )
 @click.option(
     "--plot",
-    type=click.Path(path_type=Path, dir_okay=False),
+    type=OutputFile(),
     metavar="FILE",
     help="Plot the errors to FILE: .png, .svg or .pdf.",
 )
@@ -155,7 +156,7 @@ def _learn(
 
     try:
         setup = load(scan)
-        text = scan.read_bytes().decode("utf-8")
+        text = read_text(scan, CONFIGURATION)
         table = _read(trace, triggered)
         from tablegen.calibration.columns import DISPLACEMENT, DRIVE, TIME
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import click
 
 from tablegen.cli.common import format_option, planned, rendered, scan_argument
+from tablegen.cli.terminal import tell
 
 
 @click.command(short_help="Show drive, rates, accuracy and plots of a scan.")
@@ -32,10 +33,9 @@ def show(scan: Path, as_json: bool, formats: tuple[str, ...], plot: bool) -> Non
     from tablegen.cli.report import plots
 
     plan = built.plan
-    click.echo(click.style(f"{plan.name} on {plan.scanner!r}", bold=True))
+    tell(f"{plan.name} on {plan.scanner!r}", bold=True)
     for text in built.summary.splitlines():
-        heading = text and not text.startswith(" ")
-        click.echo(click.style(text, bold=True) if heading else text)
+        tell(text, bold=bool(text) and not text.startswith(" "))
     if plot:
         unicode = "utf" in (getattr(sys.stdout, "encoding", None) or "").lower()
         for line in plan.lines:

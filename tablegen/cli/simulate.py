@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tablegen.cli.common import fail, finite, require, scan_argument, written
+from tablegen.cli.common import OutputFile, fail, finite, require, scan_argument, written
 from tablegen.cli.exit_status import ExitStatus
 from tablegen.cli.progress import Progress
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 @click.option(
     "--csv",
     "csv_file",
-    type=click.Path(path_type=Path, dir_okay=False),
+    type=OutputFile(),
     metavar="FILE",
     help="Write drive and displacement to FILE, for one line of x and one frame of y. Longer records than 10000 ticks "
     "are thinned.",
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 @click.option(
     "--plot",
     "plot_file",
-    type=click.Path(path_type=Path, dir_okay=False),
+    type=OutputFile(),
     metavar="FILE.png",
     help="Plot displacement, residual and scaling error to FILE.png.",
 )

@@ -20,8 +20,8 @@ from tablegen.cli.exit_status import ExitStatus
 if TYPE_CHECKING:
     from tablegen.link.device import Device
     from tablegen.link.image import ProgramImage
+    from tablegen.link.outcome import UploadResult
     from tablegen.link.prepare import Form, PreparedScan
-    from tablegen.link.upload import UploadResult
 
 _HASH_DIGITS = 12  # digits of a hash in messages
 _BEGIN_AND_COMMIT_BYTES = 60 + 16  # bytes of BEGIN and COMMIT on the wire
@@ -52,7 +52,7 @@ _BITS_PER_BYTE = 10
 @click.option(
     "--any-rate", is_flag=True, help="Accept a device whose tick rate differs from update_rate_hz of the scan."
 )
-@timeout_option("Stop after S seconds.  [default: 15 s plus 4 times the transfer time]")
+@timeout_option("Stop after S seconds.  [default: 15 s plus 4 times the transfer time, plus what answers come late]")
 def upload(
     source: Path,
     port: str | None,
@@ -88,25 +88,11 @@ def upload(
         click.echo("\n".join(_sizes(scan, baud)))
     if port is None:
         return ExitStatus.OK
-    bar, told = Bar(), [0]
-
-    def progress(done: int, total: int) -> None:
-        told[0] = done
-        bar(done, total)
-
-    def interrupted() -> str:
-        bar.close()
-        if not told[0]:
-            return "interrupted; the device continues with its old scan"
-        return (
-            f"interrupted; the device plays its old scan and keeps {told[0]} bytes: run the same command to continue "
-            "the upload (see `tablegen status`; a complete upload may still become active)"
-        )
-
+    bar = Bar()
     from tablegen.link.messages import DeviceState
     from tablegen.link.prepare import check
 
-    with connected(port, baud, key_file, interrupted) as device:
+    with connected(port, baud, key_file, goes_on="with its old scan") as device:
         limits = device.limits()
         image = scan.image(form, device.info)
         check(scan, image, device.info, limits, any_rate)
@@ -114,7 +100,7 @@ def upload(
             click.echo(_verdict(device, image))
             return ExitStatus.OK
         try:
-            result = device.upload(image, progress, force=force, timeout_s=timeout, limits=limits)
+            result = device.upload(image, bar, force=force, timeout_s=timeout, limits=limits)
         finally:
             bar.close()
         click.echo(_summary(scan, image, result))
@@ -172,4 +158,6 @@ def _summary(scan: "PreparedScan", image: "ProgramImage", result: "UploadResult"
         text += f"; the device already had {result.resumed} bytes"
     if result.retransmissions:
         text += f"; {result.retransmissions} frames retransmitted"
+    if result.slow_baud:
+        text += f"\nthe line is slow: answers come at about {result.slow_baud} baud (--baud {result.slow_baud})"
     return text

@@ -11,15 +11,22 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
-from tablegen.cli.common import fail
+from tablegen.cli.common import OutputFile, OutputFolder, fail
 from tablegen.cli.exit_status import ExitStatus
 from tablegen.cli.progress import Progress
+from tablegen.cli.terminal import tell
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from tablegen.verification.build import Report
     from tablegen.verification.checks import Check
+
+_FAILED = "FAILED"
+
+
+_MANY_CLOCKS = 200_000  # of a simulation that takes more than some seconds
+_CLOCKS_A_SECOND = 20_000  # that Icarus simulates, more or less
 
 
 @click.command(short_help="Simulate or run the sequencer of a build; check every sample.")
@@ -40,9 +47,10 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--ticks",
-    type=click.IntRange(min=1000, max=1 << 28),
+    type=click.IntRange(min=7000, max=1 << 28),
     metavar="N",
-    help="Play at most N ticks.  [default: icarus 300000, verilator 3000000, both divided by 41 with --axis serial; c "
+    help="Play at most N ticks, some 6000 of them for requests and faults.  [default: "
+    "icarus 300000, verilator 3000000, both divided by 41 with --axis serial; c "
     "3000000, cortex-m 1000000]",
 )
 @click.option(
@@ -68,13 +76,13 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--junit",
-    type=click.Path(path_type=Path, dir_okay=False),
+    type=OutputFile(),
     metavar="FILE",
     help="Also write the results as JUnit XML to FILE, one test case per check.",
 )
 @click.option(
     "--keep",
-    type=click.Path(path_type=Path, file_okay=False),
+    type=OutputFolder(),
     metavar="DIR",
     help="Run in DIR and keep its scripts, records and logs. By default they are deleted.",
 )
@@ -91,12 +99,17 @@ def verify(
 ) -> int:
     """Verify that the sequencer of the build in DIR plays the scan that its manifest describes, bit for bit.
 
-    First the command checks the SHA-256 of the files, and the constants and tables against the manifest. Then it runs
-    the sequencer of DIR with the tables of DIR: power-up, one frame and some lines, a change to a second program at a
-    random tick within a frame, park.
+    This compiles and runs what is in DIR. Do not verify a directory whose code you would not run.
+
+    First the command checks the files: that DIR has those of such a build, their SHA-256, the constants and tables
+    against the manifest, and, for a build of this version of tablegen, the sequencer against the installed one. It
+    computes the certificate again from the words. Then it runs the sequencer of DIR. Short programs play every request
+    and every fault on purpose: ramps, clamps and the slew guard in both directions, counted scans, refused writes.
+    Then the tables of DIR play one frame and some lines, with a change of programs and back within a frame, and park.
 
     Every code, marker and fault must equal the integer model. Every code must be as close to the ideal waveform as the
-    certificate states, and every code and step within its limits.
+    words of the manifest make it, and every code and step within its limits. A check that had no occasion to fail is
+    "not exercised".
 
     \b
     verilog   runs dac_*.v with the .mem files under cocotb. Needs Icarus Verilog and the
@@ -107,8 +120,9 @@ def verify(
               extra [cortex-m].
     files     checks only the files.
 
-    In C, the second program has half the amplitude and codes that clamp, so that a mixture of programs or a missing
-    limit is detected. If a frame has more ticks than --ticks, only a part of it is played, and a note reports this.
+    Icarus plays a long frame in a second process, with multiplier blocks (PLAIN_MULTIPLIER = 1), which it simulates
+    twice as fast; --ticks or --axis plays it as the device is placed. If a frame has more ticks than --ticks, only a
+    part of it is played, and a note reports this. With --fourier, rendering takes longer than all the rest.
 
     \b
     Examples:
@@ -129,6 +143,8 @@ def verify(
     from tablegen.verification.simulate import ToolMissing
 
     try:
+        if fourier and target_name in (None, "verilog") and (simulator or "icarus") == "icarus":
+            _say_how_long(folder, axis or "pipelined")
         with _terminated_as_interrupted(), Progress() as progress:
             report = verify_build(
                 folder,
@@ -148,7 +164,8 @@ def verify(
     except OSError as error:
         place = error.filename or keep or tempfile.gettempdir()
         fail([f"cannot verify: {place}: {error.strerror or error}"], ExitStatus.CANNOT_WRITE)
-    click.echo("\n".join(_table(report.checks)))
+    for line in _table(report.checks):
+        tell(line, bold=line.endswith(_FAILED))
     for note in report.notes:
         click.echo(f"note: {note}")
     written = junit is None or _write(junit, report)
@@ -163,6 +180,19 @@ def verify(
         )
     click.echo(f"\n{folder}: verified, {len(report.checks)} checks")
     return ExitStatus.OK if written else ExitStatus.CANNOT_WRITE
+
+
+def _say_how_long(folder: Path, axis: Literal["pipelined", "blocks", "serial"]) -> None:
+    """Rendering is most of what Icarus has to do: it is said before it is done."""
+    from tablegen.verification.run import rendering_clocks
+
+    clocks = rendering_clocks(folder, axis)
+    if clocks > _MANY_CLOCKS:
+        click.echo(
+            f"note: Icarus simulates {clocks} clocks in which the tables are rendered, some "
+            f"{clocks / _CLOCKS_A_SECOND:.0f} s; --sim verilator is some 40 times as fast",
+            err=True,
+        )
 
 
 @contextmanager
@@ -188,7 +218,7 @@ def _write(path: Path, report: "Report") -> bool:
 
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(junit(report.name, report.checks), "utf-8")
+        path.write_text(junit(report.name, report.checks, report.seconds), "utf-8")
     except OSError as error:
         click.echo(f"{path}: {error.strerror or error}", err=True)
         return False
@@ -197,9 +227,7 @@ def _write(path: Path, report: "Report") -> bool:
 
 def _table(checks: "Sequence[Check]") -> list[str]:
     head = ("", "against", "compared", "worst", "limit", "")
-    rows = [
-        (c.subject, c.against, c.compared, c.worst, c.limit, "ok" if c.failure is None else "FAILED") for c in checks
-    ]
+    rows = [(c.subject, c.against, c.compared, c.worst, c.limit, c.verdict) for c in checks]
     widths = [max(len(row[i]) for row in [head, *rows]) for i in range(len(head))]
     lines = []
     for row in [head, *rows]:
@@ -207,8 +235,5 @@ def _table(checks: "Sequence[Check]") -> list[str]:
             cell.rjust(width) if i in (3, 4) else cell.ljust(width)
             for i, (cell, width) in enumerate(zip(row[:-1], widths[:-1], strict=True))
         ]
-        verdict = row[-1]
-        if verdict == "FAILED":
-            verdict = click.style(verdict, bold=True)
-        lines.append(("  ".join([*cells, verdict])).rstrip())
+        lines.append(("  ".join([*cells, row[-1]])).rstrip())
     return lines

@@ -9,8 +9,7 @@ import numpy as np
 from tablegen.compensation.dynamics import Measured
 from tablegen.config.figures import shown_path
 from tablegen.problems import Unphysical
-
-_MAXIMUM_BYTES = 16 << 20
+from tablegen.reading import RESPONSE, read_bytes
 
 
 def read_response(path: Path) -> Measured:
@@ -22,12 +21,9 @@ def read_response(path: Path) -> Measured:
     if not os.path.isfile(path):  # a pipe would be waited for
         raise Unphysical(f"{name} is not a file; the path is relative to the scanner file")
     try:
-        with path.open("rb") as file:
-            content = file.read(_MAXIMUM_BYTES + 1)
+        content = read_bytes(path, RESPONSE)
     except OSError as error:
         raise Unphysical(f"{name} cannot be read: {error.strerror or error}") from None
-    if len(content) > _MAXIMUM_BYTES:
-        raise Unphysical(f"{name}: above {_MAXIMUM_BYTES} bytes, more than any response has")
     try:
         text = content.decode("utf-8-sig")  # spreadsheets write a byte order mark
     except UnicodeDecodeError as error:

@@ -320,7 +320,12 @@ class Resonance(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     frequency_hz: Annotated[Hertz, Meta(description="undamped resonance frequency")] | None = None
     quality: Annotated[float, Meta(ge=0.1, le=1e5, description="quality factor")] | None = None
-    delay_s: Annotated[float, Meta(ge=0.0, le=1.0, description="dead time of amplifier and scanner")] = 0.0
+    delay_s: Annotated[
+        float,
+        Meta(
+            ge=0.0, le=1.0, description="dead time of amplifier and scanner; the converter's half tick comes by itself"
+        ),
+    ] = 0.0
     response: (
         Annotated[
             FileName,

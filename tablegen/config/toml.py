@@ -4,15 +4,19 @@ The standard library parses and validates; it does not say where things stand, s
 the (by then known to be valid) text notes the line of each key.
 """
 
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
 
 from tablegen.problems import Document, Problem, Rejected
+from tablegen.reading import CONFIGURATION, read_text
 
 _BARE_KEY = frozenset("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_")
 _ESCAPES = {"b": "\b", "t": "\t", "n": "\n", "f": "\f", "r": "\r", '"': '"', "\\": "\\"}
-_MAXIMUM_BYTES = 4 << 20
+# Of a dotted key, whose parts take the parser memory by their square; the deepest of the schema has 7. And of all keys
+# of three parts or more, since each part takes the parser a kilobyte.
+_MAXIMUM_PARTS, _MAXIMUM_PARTS_OF_ALL = 20, 50_000
 _MAXIMUM_DIGITS = 4300  # digits of a decimal number that Python converts
 
 
@@ -22,12 +26,7 @@ def read_toml(path: Path, name: str) -> tuple[dict[str, Any], Document]:
     ``name`` is what messages call the file. Raises ``Rejected`` where it cannot be read or is not TOML.
     """
     try:
-        with path.open("rb") as file:
-            content = file.read(_MAXIMUM_BYTES + 1)  # no more: the path may be an endless device
-        if len(content) > _MAXIMUM_BYTES:
-            why = f"above {_MAXIMUM_BYTES} bytes, more than any configuration has"
-            raise Rejected([Problem(name, 0, "", why)])
-        text = content.decode("utf-8")
+        text = read_text(path, CONFIGURATION)
     except OSError as error:
         raise Rejected([Problem(name, 0, "", f"cannot be read: {error.strerror or error}")]) from None
     except UnicodeDecodeError as error:
@@ -42,6 +41,7 @@ def read_toml(path: Path, name: str) -> tuple[dict[str, Any], Document]:
 def parse_toml(text: str, name: str) -> tuple[dict[str, Any], Document]:
     """What ``read_toml`` does once it has the text."""
     text = text.replace("\r\n", "\n")
+    _refuse_long_keys(text, name)
     try:
         values = tomllib.loads(text)
         return values, Document(name, _KeyLines(text).locate())
@@ -52,6 +52,33 @@ def parse_toml(text: str, name: str) -> tuple[dict[str, Any], Document]:
     except ValueError:  # the parser does not convert the longest decimal numbers, and does not say where they are
         line, digits = _long_number(text)
         raise Rejected([Problem(name, line, "", f"a number of {digits} digits is too long")]) from None
+
+
+_PART = r"""(?:[A-Za-z0-9_-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')"""
+# Comments and texts are passed over; whatever else has dots between its parts may be a key. A text that is not closed
+# is passed over too, so that none is looked at twice.
+_KEYS = re.compile(
+    r"""#[^\n]*+|"{3}(?:[^"\\]|\\.|"(?!""))*+(?:"{3,5})?|'{3}(?:[^']|'(?!''))*+(?:'{3,5})?"""
+    rf"""|(?P<key>{_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{2,}}+)"""
+    r"""|[A-Za-z0-9_-]++|"(?:[^"\\\n]|\\[^\n])*+"?|'[^'\n]*+'?""",
+    re.DOTALL,
+)
+
+
+def _refuse_long_keys(text: str, name: str) -> None:
+    """Raise ``Rejected`` at the first key that has too many parts; the text need not be valid."""
+    total = 0
+    for match in _KEYS.finditer(text):
+        if match["key"]:
+            parts = len(re.findall(_PART, match["key"], re.DOTALL))
+            total += parts
+            if parts <= _MAXIMUM_PARTS and total <= _MAXIMUM_PARTS_OF_ALL:
+                continue
+            line = text.count("\n", 0, match.start()) + 1
+            why = f"a key of {parts} parts; at most {_MAXIMUM_PARTS} are read"
+            if parts <= _MAXIMUM_PARTS:
+                why = f"the dotted keys so far have {total} parts; at most {_MAXIMUM_PARTS_OF_ALL} are read"
+            raise Rejected([Problem(name, line, "", why)])
 
 
 def _syntax_problem(name: str, text: str, message: str) -> Problem:

@@ -78,5 +78,5 @@ class Schedule:
 
     @property
     def pixel_ticks(self) -> Fraction:
-        """Ticks per pixel of the forward sweep; pixel p starts at the tick floor(p pixel_ticks) of the window."""
+        """Ticks per pixel of the forward sweep; pixel p starts at the tick ceil(p pixel_ticks) of the window."""
         return Fraction(self.forward.count, self.pixels)

@@ -13,6 +13,7 @@ from typing import ClassVar
 
 from tablegen.emit.content import Content
 from tablegen.problems import Unphysical
+from tablegen.reading import BUILD_FILE, read_bytes
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,7 @@ class Format(ABC):
         wanted, wrong = self.files(content), []
         for name, right in wanted.items():
             try:
-                found = (folder / name).read_bytes()
+                found = read_bytes(folder / name, BUILD_FILE)
             except OSError as error:
                 wrong.append(f"{name}: cannot be read: {error.strerror or error}")
                 continue

@@ -6,6 +6,7 @@ from functools import cache
 
 from tablegen.certificate.certificate import Certificate
 from tablegen.certificate.summary import summary
+from tablegen.config.names import of_the_runtime
 from tablegen.emit.content import AxisContent, Content
 from tablegen.emit.format import Format
 from tablegen.emit.formats import UnknownFormat, chosen
@@ -13,6 +14,7 @@ from tablegen.manifest.format import MANIFEST, content_hash
 from tablegen.manifest.record import plan_record
 from tablegen.manifest.write import manifest_file
 from tablegen.planning.line_plan import LinePlan, Plan
+from tablegen.resources import resource_folder
 from tablegen.version import __version__
 
 _FILE_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]*(\.[A-Za-z0-9]+)+")  # of plain files, which manifests can list
@@ -29,10 +31,17 @@ def render(plan: Plan, certificates: dict[str, Certificate], formats: Sequence[s
     digest = content_hash(record)
     content = plan_content(plan, certificates, digest)
     files: dict[str, bytes] = {}
+    spelt: dict[str, str] = {MANIFEST: MANIFEST}
     for each in wanted:
         for name, text in {**each.files(content), **runtime_files(each)}.items():
             if not _FILE_NAME.fullmatch(name) or name == MANIFEST:
                 raise UnknownFormat(f"{each.name!r} writes {name!r}, which cannot be the name of one of its files")
+            if of_the_runtime(name) and name not in own_runtime(each):
+                raise UnknownFormat(
+                    f"{each.name!r} writes {name!r}, a name of the sequencer's files: dac_*, program_loader*"
+                )
+            if (other := spelt.setdefault(name.lower(), name)) != name:
+                raise UnknownFormat(f"{each.name!r} writes {name!r} beside {other!r}, which some disks take for one")
             if files.setdefault(name, text) != text:
                 raise UnknownFormat(f"{each.name!r} writes {name}, and so does another format, with other content")
     files[MANIFEST] = manifest_file(record, digest, [each.name for each in wanted], certificates, files)
@@ -63,3 +72,9 @@ def plan_content(plan: Plan, certificates: dict[str, Certificate], digest: str) 
 def runtime_files(of: Format) -> dict[str, bytes]:
     """What goes with a format unchanged, by name: a sequencer, or nothing."""
     return {path.name: path.read_bytes() for path in of.runtime()}
+
+
+def own_runtime(of: Format) -> set[str]:
+    """The names of those files among ``runtime_files`` that are tablegen's own, whoever's format this is."""
+    own = resource_folder("firmware_templates").resolve()
+    return {path.name for path in of.runtime() if own in path.resolve().parents}

@@ -1,57 +1,125 @@
 """One writer: a map of file name to content, put on disk whole or not at all; and what an earlier build has left."""
 
-import json
+import errno
 import os
+import re
+import stat
 import tempfile
-from collections.abc import Iterable, Mapping, Sequence
-from hashlib import sha256
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
-from tablegen.manifest.format import MANIFEST
+from tablegen.emit.directory_lock import locked
+from tablegen.manifest.format import MANIFEST, read_json
+from tablegen.reading import BUILD_FILE, file_sha256, holds, other_than_file, read_bytes
+from tablegen.reading import MANIFEST as MANIFEST_KIND
+
+_STAGED = ".tablegen-"
+_MOST_THREADS = 64
+_LITTER = re.compile(rf"{re.escape(_STAGED)}[a-z0-9_]{{8}}")  # as ``mkstemp`` names files
 
 
 class CannotWrite(Exception):
     """The output directory could not be written; what stood there before still stands."""
 
 
-def write_files(folder: Path, files: Mapping[str, bytes], outdated: Sequence[str] = ()) -> list[str]:
+class NoPlace(CannotWrite):
+    """A pipe or a device stands where a file or a directory has to go: no disk is at fault, but what was asked for."""
+
+
+def write_files(
+    folder: Path, files: Mapping[str, bytes], outdated: Sequence[str] | Callable[[], Sequence[str]] = ()
+) -> list[str]:
     """Write what changed, remove what is ``outdated``, and return the names of what was written, in order.
 
     Everything is first written beside its place and only then renamed into it, the manifest last: a full disk or
-    an interruption leaves the directory as it was, or with a manifest that ``build --check`` finds stale.
+    an interruption leaves the directory as it was, or with a manifest that ``build --check`` finds stale. So does a cut
+    of power: what was renamed has reached the disk before the manifest is. Two writers of one directory take turns, and
+    what one that was killed has left behind is removed. ``outdated`` may be a function, which is asked in one's turn.
     """
-    changed = [name for name in files if _read(folder / name) != files[name]]
-    if not changed and not outdated:
-        return []
+    if (other := other_than_file(folder)) not in (None, "a directory"):
+        raise NoPlace(f"{folder}: is {other}, where a directory has to go")
     made = [path for path in (folder, *folder.parents) if not os.path.exists(path)]
-    for name in changed:
-        if os.path.isdir(folder / name):
-            raise CannotWrite(f"{folder / name}: is a directory where a file has to go")
-    staged: dict[str, Path] = {}
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        with locked(folder), _removed_if_empty(made):
+            _remove_litter(folder)
+            return _write(folder, files, list(outdated() if callable(outdated) else outdated))
+    except OSError as error:
+        raise CannotWrite(f"{folder}: {error.strerror or error}") from error
+
+
+def _write(folder: Path, files: Mapping[str, bytes], outdated: Sequence[str]) -> list[str]:
+    changed = [name for name in files if not holds(folder / name, files[name])]
+    if not changed and not outdated:
+        return []
+    for name in changed:
+        if other := other_than_file(folder / name):
+            why = f"{folder / name}: is {other}, where a file has to go"
+            raise CannotWrite(why) if other == "a directory" else NoPlace(why)
+    staged: dict[str, Path] = {}
+    try:
         for name in changed:
-            handle, temporary = tempfile.mkstemp(prefix=".tablegen-", dir=folder)
+            handle, temporary = tempfile.mkstemp(prefix=_STAGED, dir=folder)
             staged[name] = Path(temporary)
             with os.fdopen(handle, "wb") as file:
                 file.write(files[name])
             os.chmod(temporary, 0o666 & ~_umask())
+        _settle_files(list(staged.values()))
         for name in sorted(changed, key=lambda name: name == MANIFEST):
             if name == MANIFEST:  # which no longer lists them
                 _remove(folder, outdated)
+                settle(folder)
             os.replace(staged[name], folder / name)
             del staged[name]
         _remove(folder, outdated)
-    except OSError as error:
-        raise CannotWrite(f"{folder}: {error.strerror or error}") from error
+        settle(folder)
     finally:
         for temporary_path in staged.values():
             temporary_path.unlink(missing_ok=True)
-        for path in made:  # the innermost first; what holds something stays
+    return changed
+
+
+@contextmanager
+def _removed_if_empty(made: Sequence[Path]) -> Iterator[None]:
+    """Directories that were made, the innermost first, go again at the end if nothing came to stand in them."""
+    try:
+        yield
+    finally:
+        for path in made:
             if not os.path.isdir(path) or any(path.iterdir()):
                 break
             path.rmdir()
-    return changed
+
+
+def _settle_files(paths: Sequence[Path]) -> None:
+    """Let the content of files reach the disk: all at once, which takes a disk hardly longer than one of them."""
+    from concurrent.futures import ThreadPoolExecutor  # here: nothing else needs it, and most builds change nothing
+
+    def sync(path: Path) -> None:
+        handle = os.open(path, os.O_RDWR)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+    with ThreadPoolExecutor(max(min(len(paths), _MOST_THREADS), 1)) as pool:
+        list(pool.map(sync, paths))
+
+
+def settle(folder: Path) -> None:
+    """Let what was renamed and removed in a directory reach the disk, where the system can."""
+    try:
+        handle = os.open(folder, os.O_RDONLY)
+    except OSError:  # Windows opens no directories
+        return
+    try:
+        os.fsync(handle)
+    except OSError as error:
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP, errno.EBADF):  # a file system that has no such thing
+            raise
+    finally:
+        os.close(handle)
 
 
 def outdated_files(folder: Path, files: Iterable[str]) -> list[str]:
@@ -90,10 +158,10 @@ def leftover_files(folder: Path, files: Iterable[str]) -> list[str]:
 def _listed(folder: Path, files: Iterable[str]) -> dict[str, str]:
     """What the manifest in a folder lists beyond these files, with digests; nothing where it cannot be read."""
     try:
-        found = json.loads(_read(folder / MANIFEST) or b"{}")
+        found = read_json(read_bytes(folder / MANIFEST, MANIFEST_KIND))
         listed = found["files"] if isinstance(found, dict) else {}
         pairs = listed.items() if isinstance(listed, dict) else ()
-    except (ValueError, KeyError, RecursionError):
+    except (OSError, ValueError, KeyError):
         return {}
     mine = {*files, MANIFEST}
     return {
@@ -108,15 +176,17 @@ def _remove(folder: Path, names: Iterable[str]) -> None:
         (folder / name).unlink(missing_ok=True)
 
 
+def _remove_litter(folder: Path) -> None:
+    """Remove what a writer that was killed has left; the directory is locked, so that none of it is somebody's."""
+    for path in folder.iterdir():
+        if _LITTER.fullmatch(path.name) and stat.S_ISREG(path.lstat().st_mode):
+            path.unlink(missing_ok=True)
+
+
 def _digest(path: Path) -> str | None:
-    content = _read(path)
-    return None if content is None else sha256(content).hexdigest()
-
-
-def _read(path: Path) -> bytes | None:
     try:
-        return path.read_bytes()
-    except (OSError, ValueError):  # ValueError: no file can have such a name
+        return file_sha256(path, BUILD_FILE)
+    except OSError:
         return None
 
 

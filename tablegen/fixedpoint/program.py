@@ -3,10 +3,14 @@
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
 from tablegen.fixedpoint.interpolation import direct, guard_bits, index_bits_of, interpolate
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.phase import RationalPhase
 from tablegen.numerics.arrays import Ints, freeze
+
+_CHUNK_TICKS = 1 << 14  # ticks that are worked out together, in the cache
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,4 +55,7 @@ class Program:
 
     def codes(self, k: Ints) -> Ints:
         """Codes at ticks k in [0, ticks), before the slew guard."""
-        return self.output.code(self.samples(k))
+        if len(k) <= _CHUNK_TICKS:
+            return self.output.code(self.samples(k))
+        chunks = range(0, len(k), _CHUNK_TICKS)
+        return np.concatenate([self.output.code(self.samples(k[first : first + _CHUNK_TICKS])) for first in chunks])

@@ -23,21 +23,35 @@ class Runs:
     @property
     def lengths(self) -> Ints:
         """Ticks of each run."""
+        if self.by_tick:
+            return np.broadcast_to(np.int64(1), (self.ticks,))
         return np.diff(self.starts, append=self.ticks)
+
+    def lengths_of(self, which: slice) -> Ints:
+        """Ticks of some runs; ``which`` begins at a run and may end beyond the last one."""
+        after = which.stop if which.stop is not None and which.stop < len(self.starts) else None
+        return np.diff(self.starts[which], append=self.ticks if after is None else self.starts[after])
+
+    @property
+    def by_tick(self) -> bool:
+        """Whether every run is a single tick."""
+        return len(self.starts) == self.ticks
 
     @property
     def lasts(self) -> Ints:
         """The last tick of each run."""
-        return self.starts + self.lengths - 1
+        return self.starts if self.by_tick else np.append(self.starts[1:], self.ticks) - 1
 
     def at(self, k: Ints) -> Ints:
         """The codes at ticks k."""
-        if len(self.starts) == self.ticks:
+        if self.by_tick:
             return self.codes[k]
         return self.codes[np.searchsorted(self.starts, k, side="right") - 1]
 
     def split_at(self, k: Ints) -> "Runs":
         """The same playback with runs that begin at ascending ticks k as well."""
+        if self.by_tick:
+            return self
         starts = merged(self.starts, k)
         return Runs(starts, self.at(starts), self.ticks)
 

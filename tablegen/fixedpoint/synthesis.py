@@ -94,8 +94,15 @@ def synthesize(words: FourierWords, length: int, bits: int) -> Ints:
         value = sine(np.arange(length) / length + 0.25) * float(1 << SINE_FRACTION_BITS)
         cosines = np.where(value < 0.0, -round_half_up(-value), round_half_up(value))
     accumulator = np.full(length, words.a0 << SINE_FRACTION_BITS, dtype=np.int64)
-    k = np.arange(length, dtype=np.int64)
+    # Word length - k has the cosines of word k, and its sines with the other sign.
+    k = np.arange(length // 2 + 1, dtype=np.int64)
+    even, odd = np.zeros_like(k), np.zeros_like(k)
+    at = np.zeros_like(k)
     for n in range(1, words.harmonics + 1):
-        at = (n * k) % length
-        accumulator += words.a[n - 1] * cosines[at] + words.b[n - 1] * sines[at]
+        at += k  # n k modulo the length
+        at -= length * (at >= length)
+        even += words.a[n - 1] * cosines[at]
+        odd += words.b[n - 1] * sines[at]
+    accumulator[k] += even + odd
+    accumulator[length - k[1 : (length + 1) // 2]] += (even - odd)[1 : (length + 1) // 2]
     return saturate(shift_round(accumulator, FRACTION_BITS + SINE_FRACTION_BITS - (bits - 1)), bits)

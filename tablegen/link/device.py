@@ -10,8 +10,8 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from tablegen.link.errors import NotPlaying, NotUnderstood, OutOfTime, Refused
-from tablegen.link.exchange import LATENCY_S
 from tablegen.link.messages import (
+    DATA_BYTES,
     AxisLimits,
     DeviceInfo,
     DeviceState,
@@ -19,11 +19,13 @@ from tablegen.link.messages import (
     Reason,
     Request,
 )
+from tablegen.link.outcome import ProgressCall, UploadResult, UploadState
+from tablegen.link.pace import LATENCY_S, Deadline
 from tablegen.link.readback import read_back
 from tablegen.link.reasons import Limits
 from tablegen.link.session import LinkSession
 from tablegen.link.transport import Opener, Transport, byte_s, open_port
-from tablegen.link.upload import ProgressCall, Uploader, UploadResult
+from tablegen.link.upload import Uploader
 
 if TYPE_CHECKING:
     from tablegen.link.image import ProgramImage
@@ -31,6 +33,8 @@ if TYPE_CHECKING:
 TIMEOUT_S = 5.0  # timeout of a request
 _UPLOAD_MARGIN_S = 15.0  # margin on top of the transfer time of an upload
 _UPLOAD_TIME_FACTOR = 4.0  # factor on the transfer time of an upload
+_MAX_LATE_S = 5.0  # by which answers may be late, in what is allowed
+_MAX_TRIES = 8  # for which there is time where answers are late
 _POLL_S = 0.05
 _HELLO_FRESH_S = 0.25  # a HELLO so young need not be repeated: an upload sees for itself what is not so any more
 _MAX_READINGS = 3
@@ -59,7 +63,8 @@ class Device:
         """Open a port and say HELLO.
 
         ``port`` is a port or URL of pyserial, a function that opens a ``Transport`` (again and again), or an open one.
-        ``key`` has 16 to 32 bytes. ``latency_s`` is that of bridges on the way, ``timeout_s`` that of a request.
+        ``key`` has 16 to 32 bytes. ``latency_s`` is that of bridges on the way, ``timeout_s`` that of a request (plus
+        8 times what answers come late, by 5 s at most).
         ``random`` and ``sleep`` are for tests.
 
         Raises ``NoPort``, ``NoAnswer``, ``Refused`` (the device speaks another version), ``SerialMissing``.
@@ -75,6 +80,7 @@ class Device:
         chance = random if random is not None else random_module.SystemRandom()
         self._session = LinkSession(transport, opener, key, latency_s, chance, sleep)
         self._timeout_s = timeout_s
+        self._uploader: Uploader | None = None
         try:
             self._session.hello(self._until(None))
         except BaseException:
@@ -103,6 +109,16 @@ class Device:
         """What it did at first, or at the end of the last upload; ``status`` asks again."""
         return self._session.status
 
+    @property
+    def acts(self) -> tuple[Request, ...]:
+        """Requests that were sent and change what the device does: it may have carried them out."""
+        return tuple(self._session.acts)
+
+    @property
+    def upload_state(self) -> UploadState | None:
+        """What is known of the last upload, for the time when it is interrupted; None if there was none."""
+        return None if self._uploader is None else self._uploader.state
+
     def status(self) -> DeviceStatus:
         """What it does now."""
         payload = self._session.ask(Request.STATUS, b"", DeviceStatus.LAYOUT.size, self._until(None))
@@ -129,17 +145,18 @@ class Device:
         Raises ``Refused``, ``LinkLost``, ``OutOfTime``, ``NotPlaying``. The old scan plays on then, and the device
         keeps what it has received: the same upload again goes on from there.
         """
-        deadline = self._until(self.upload_time_s(image) if timeout_s is None else timeout_s)
         session = self._session
+        deadline = Deadline(session.now(), lambda: self.upload_time_s(image) if timeout_s is None else timeout_s)
         if session.now() - session.status_at > _HELLO_FRESH_S:
-            session.greet(deadline)
+            session.greet(deadline.at)
         status = session.status
         if status.hash == image.info.hash and not force:
             status = self.status()  # the device may have been reset since
         if status.hash == image.info.hash and not force:
             return UploadResult(True, status.generation, None, len(image.data), 0, 0, 0, 0.0)
         session.status_at = -math.inf  # whatever comes of it, that will have changed
-        result = Uploader(session, image, deadline, progress, limits).run()
+        self._uploader = Uploader(session, image, deadline, progress, limits)
+        result = self._uploader.run()
         playing = self.status()
         session.status, session.status_at = playing, session.now()
         if playing.hash not in (image.info.hash, _NO_HASH):
@@ -150,14 +167,18 @@ class Device:
         return result
 
     def upload_time_s(self, image: "ProgramImage") -> float:
-        """What is allowed for an upload by default, in seconds: many times what it takes, and two long lines."""
+        """What is allowed for an upload by default, in seconds: many times what it takes, and two long lines.
+
+        Answers that come late, through a long way or a slow line, add to it, each by at most 5 s.
+        """
         rate = self.info.update_rate_hz
         line_s = int.from_bytes(image.data[:4], "little") / rate if rate else 0.0  # line_ticks is the first word
-        return (
-            _UPLOAD_MARGIN_S
-            + _UPLOAD_TIME_FACTOR * len(image.data) * byte_s(self._session.exchange.transport.baud)
-            + 2.0 * line_s
-        )
+        return self._transfer_time_s(len(image.data)) + 2.0 * line_s
+
+    def _transfer_time_s(self, size: int) -> float:
+        exchange, info = self._session.exchange, self.info
+        late_s = -(-size // (info.window * DATA_BYTES)) * self._late_s()
+        return _UPLOAD_MARGIN_S + _UPLOAD_TIME_FACTOR * (size * byte_s(exchange.transport.baud) + late_s)
 
     def readback(self, *, timeout_s: float | None = None) -> bytes:
         """The image of the scan that plays, as bytes.
@@ -165,8 +186,9 @@ class Device:
         Raises ``Refused`` where the device does not hold it: a scan that came with the firmware, or memory in use.
         """
         size = self.info.image_bytes
-        allowed = _UPLOAD_MARGIN_S + _UPLOAD_TIME_FACTOR * size * byte_s(self._session.exchange.transport.baud)
-        deadline = self._until(allowed if timeout_s is None else timeout_s)
+        deadline = Deadline(
+            self._session.now(), lambda: self._transfer_time_s(size) if timeout_s is None else timeout_s
+        )
         for _ in range(_MAX_READINGS):
             before = self.status()
             image = read_back(self._session, deadline)
@@ -238,7 +260,14 @@ class Device:
         return self._session.act(kind, payload, answer_bytes, self._until(None), tagged=not plain)
 
     def _until(self, timeout_s: float | None) -> float:
-        return self._session.now() + (self._timeout_s if timeout_s is None else timeout_s)
+        """A deadline. That of a request leaves time for several tries through a long way."""
+        if timeout_s is None:
+            timeout_s = self._timeout_s + _MAX_TRIES * self._late_s()
+        return self._session.now() + timeout_s
+
+    def _late_s(self) -> float:
+        """By which answers are late."""
+        return min(self._session.exchange.pace.late_s, _MAX_LATE_S)
 
 
 def _limits(payload: bytes) -> Limits:

@@ -3,16 +3,12 @@
 from dataclasses import dataclass
 from random import Random
 
-from tablegen.link.frames import OVERHEAD, Frame, FrameReader
+from tablegen.link.frames import MAXIMUM_FRAME, Frame, FrameReader
 from tablegen.link.messages import ANSWER, REFUSAL, Refusal, Request
-from tablegen.link.transport import Transport, byte_s
+from tablegen.link.pace import Pace
+from tablegen.link.transport import Transport
 
-LATENCY_S = 0.016  # latency of a USB bridge, which forwards bytes 60 times a second
-_DEVICE_DELAY_S = 0.02  # a device has other things to do
-_LATENESS_MARGIN = 1.5
 _FRAME_END = b"\0"  # in front of a frame, it ends a frame that noise began
-_LATENESS_DECAY = 0.8  # factor per answer
-_MAX_LATENESS_S = 0.25  # more is a stall, which says nothing of the next answer
 _ANSWERED_AT_LINE_START = (Request.COMMIT, Request.ABORT)  # their answers tell nothing about the latency
 
 
@@ -36,25 +32,26 @@ class Exchange:
     def __init__(self, transport: Transport, latency_s: float, random: Random) -> None:
         self.transport = transport
         self.session = 0
-        self._latency_s = latency_s
+        self.pace = Pace(latency_s)
         self._random = random
         self._reader = FrameReader()
         self._free = random.randrange(256)
         self._number = random.randrange(256)
-        self._line_free = 0.0  # when what was written has left
-        self._expected: dict[tuple[int, int], float | None] = {}  # when; None: of what was sent twice nobody knows
-        self._late_s = 0.0  # by which answers came later than line and latency explain: the most, fading
+        self._strange_bytes = self._bad_before = 0  # bytes since the last frame; bad frames up to the last answer
         self.bytes_sent = 0
-        self.frames_heard = 0
-        self.noise = False  # bytes came that are no frames
         self.new_session()
 
     def use(self, transport: Transport) -> None:
         """Go on with another port, in the same session."""
         self.transport = transport
         self._reader = FrameReader()
-        self._line_free = 0.0
-        self._expected.clear()
+        self._strange_bytes = self._bad_before = 0
+        self.pace.forget()
+
+    @property
+    def noise(self) -> bool:
+        """Whether bytes have come since the last answer that are no frames."""
+        return self._reader.bad_frames > self._bad_before or self._strange_bytes > MAXIMUM_FRAME
 
     def new_session(self) -> None:
         """Choose another session; HELLO tells the device."""
@@ -75,32 +72,27 @@ class Exchange:
         return self._number
 
     def send(self, kind: int, seq: int, payload: bytes = b"", answer_bytes: int = 16, again: bool = False) -> float:
-        """Send a request; returns when its answer, of so many bytes of payload at most, should have come.
-
-        What answers take longer than line and latency explain, a busy device or a way through a network, is learned.
-        """
+        """Send a request; returns when its answer, of so many bytes of payload at most, should have come."""
         wire = Frame(kind, seq, self.session, payload).encode()
         if again:
             wire = _FRAME_END + wire
         self.transport.write(wire)
-        now, one = self.now(), byte_s(self.transport.baud)
-        self._line_free = max(self._line_free, now) + one * len(wire)
         self.bytes_sent += len(wire)
-        way = self._line_free - now + one * (answer_bytes + OVERHEAD) + self._latency_s
-        if kind not in _ANSWERED_AT_LINE_START:
-            self._expected[kind, seq] = None if (kind, seq) in self._expected else now + way
-        return now + _LATENESS_MARGIN * (way + self._late_s) + _DEVICE_DELAY_S
+        now, learn = self.now(), kind not in _ANSWERED_AT_LINE_START
+        return now + self.pace.sent((kind, seq), now, self.transport.baud, (len(wire), answer_bytes), learn)
 
     def receive(self, until: float) -> list[Answer]:
-        """Answers of this session that have come, or come first until then."""
+        """Answers of this session that have come, or come first until then, whatever else is on the line."""
         found: list[Answer] = []
         while not found:
-            left = until - self.now()
-            data = self.transport.read(max(left, 0.0))
-            for frame in self._reader.feed(data):
+            data = self.transport.read(max(until - self.now(), 0.0))
+            frames = self._reader.feed(data)
+            for frame in frames:
                 found += self._answer(frame)
-            self.noise = self.noise or self._reader.bad_frames > 0
-            if not data and self.now() >= until:
+            self._strange_bytes = 0 if frames else self._strange_bytes + len(data)
+            if found:
+                self._bad_before = self._reader.bad_frames
+            if self.now() >= until:
                 break
         return found
 
@@ -108,7 +100,6 @@ class Exchange:
         """An answer of this session; nothing where it is another's, or an echo of a request."""
         if frame.session != self.session or not frame.type & ANSWER:
             return []
-        self.frames_heard += 1
         answer = Answer(frame.type & ~ANSWER, frame.seq, frame.payload)
         if frame.type == REFUSAL:
             try:
@@ -116,11 +107,5 @@ class Exchange:
             except ValueError:
                 return []
             answer = Answer(refusal.type, frame.seq, b"", refusal.reason, refusal.detail)
-        self._learn(answer)
+        self.pace.answered((answer.kind, answer.seq), self.now(), len(frame.payload))
         return [answer]
-
-    def _learn(self, answer: Answer) -> None:
-        expected = self._expected.pop((answer.kind, answer.seq), None)
-        if expected is not None:
-            late = min(self.now() - expected, _MAX_LATENESS_S)
-            self._late_s = max(late, _LATENESS_DECAY * self._late_s)

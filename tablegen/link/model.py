@@ -39,6 +39,8 @@ _PAYLOAD_BYTES: dict[int, int] = {  # bytes of a payload without its tag
     Request.LIMITS: 2 * AxisLimits.LAYOUT.size,
 }
 _MAX_FRAMES = 1 << 31
+CHALLENGE_MS = 10_000  # how long a nonce may be used
+IDENTITY_BYTES = range(4, 33)
 
 
 @dataclass
@@ -73,8 +75,10 @@ def tag(key: bytes, nonce: bytes, request: Frame, image: bytes | None = None) ->
 class ModelDevice:
     """A device with this ``info`` in front of ``player``; ``boot_hash`` is that of the program it starts with.
 
-    ``key``: 16 to 32 bytes, with the feature KEY. ``staged``: the image is kept, as in Verilog, and not its tables.
-    ``checking``: ticks that the checks take. ``nonces`` makes those of CHALLENGE, by default from key and boot.
+    ``key``: 16 to 32 bytes, with the feature KEY; nonces then come from ``identity``, of 4 to 32 bytes, ``boot`` and a
+    counter, or from ``nonces``, and may be used for ``CHALLENGE_MS`` of the clock ``milliseconds``. ``reboot`` counts
+    ``boot`` on, as a device does that keeps its count without power. ``staged``: the image is kept, as in Verilog, and
+    not its tables. ``checking``: ticks that the checks take.
     ``most_frames`` limits ARM. ``permits`` is the interlock, ``memory`` the image being uploaded, which COMMIT checks.
     """
 
@@ -86,7 +90,9 @@ class ModelDevice:
         key: bytes = b"",
         boot: int = 0,
         boot_hash: bytes = bytes(messages.HASH_BYTES),
+        identity: bytes = b"a model",
         nonces: Callable[[], bytes] | None = None,
+        milliseconds: Callable[[], int] = lambda: 0,
         staged: bool = False,
         checking: int = 0,
         most_frames: int = _MAX_FRAMES,
@@ -95,7 +101,10 @@ class ModelDevice:
             raise ValueError("a key and the feature go together")
         self.info, self.player, self.boot = info, player, boot
         self.permits = True
-        self._key, self._boot_hash = key, boot_hash
+        if key and len(identity) not in IDENTITY_BYTES:
+            raise ValueError(f"an identity of {len(identity)} bytes; a key needs one of 4 to 32")
+        self._key, self._identity, self._boot_hash = key, identity, boot_hash
+        self._milliseconds = milliseconds
         self._bank = Bank(info, player, staged)
         self._nonces = nonces or self._counted_nonce
         self._checking, self._most_frames = checking, most_frames
@@ -126,6 +135,7 @@ class ModelDevice:
         self._session: int | None = None
         self._last: _Remembered | None = None
         self._nonce: bytes | None = None
+        self._challenged_at = 0
         self._at_work: _AtWork | None = None
         self._aborts: list[_AtWork] = []
         self._challenges = 0
@@ -250,7 +260,7 @@ class ModelDevice:
 
     def _use_nonce(self) -> bytes | None:
         nonce, self._nonce = self._nonce, None
-        return nonce
+        return nonce if self._milliseconds() - self._challenged_at < CHALLENGE_MS else None
 
     def _check_tag(self, frame: Frame, nonce: bytes | None, image: bytes | None = None) -> None:
         if not self._key:
@@ -358,12 +368,13 @@ class ModelDevice:
 
     def _challenge(self, frame: Frame) -> bytes:
         self._nonce = self._nonces()
+        self._challenged_at = self._milliseconds()
         assert len(self._nonce) == NONCE_BYTES
         return self._nonce
 
     def _counted_nonce(self) -> bytes:
         self._challenges += 1
-        count = struct.pack("<II", self.boot, self._challenges)
+        count = bytes([len(self._identity)]) + self._identity + struct.pack("<II", self.boot, self._challenges)
         return hashlib.blake2s(count, key=self._key, digest_size=NONCE_BYTES).digest()
 
 

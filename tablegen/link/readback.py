@@ -3,79 +3,115 @@
 import struct
 
 from tablegen.link.errors import LinkLost, NotUnderstood, OutOfTime, Silent
+from tablegen.link.exchange import Answer
 from tablegen.link.frames import MAXIMUM_FRAME
 from tablegen.link.messages import DATA_BYTES, DeviceInfo, Reason, Request
+from tablegen.link.pace import Deadline, back_off
 from tablegen.link.reasons import refused
-from tablegen.link.session import LinkSession
+from tablegen.link.session import LinkSession, SessionEnded
 
 _REQUEST = struct.Struct("<IB")
 _OFFSET = struct.Struct("<I")
 _PROGRAM_BYTES = 192  # as tablegen.link.image has it, without numpy
 _WORD_BYTES = 4  # at most, bytes per word
+_MAX_IN_VAIN = 8  # rounds of requests without one answer
+_MAX_RESTARTS = 4
 
 
-def read_back(session: LinkSession, deadline: float) -> bytes:
+def read_back(session: LinkSession, deadline: Deadline) -> bytes:
     """The whole image.
 
     Raises ``Refused`` where the device does not hold it, ``OutOfTime``, and what lines raise.
     """
-    most = _most(session.info)
-    parts: dict[int, bytes] = {}
-    end, first = most, 0
-    while first < end:
-        wanted = range(first, end, DATA_BYTES)[: session.info.window]
-        parts |= _some(session, wanted, deadline)
-        for at in wanted:
-            if len(parts[at]) < DATA_BYTES:
-                end = min(end, at + len(parts[at]))
-        first = wanted[-1] + DATA_BYTES
-    return b"".join(parts[at] for at in sorted(parts))[:end]
+    return _ImageReader(session, deadline).read()
+
+
+class _ImageReader:
+    """Pieces of an image that have come, and requests for others that may still be answered, however late."""
+
+    def __init__(self, session: LinkSession, deadline: Deadline) -> None:
+        self._session, self._until = session, deadline
+        self._found: dict[int, bytes] = {}
+        self._asked: dict[int, int] = {}  # offsets by seq
+        self._window = session.info.window
+        self._in_vain = 0
+
+    def read(self) -> bytes:
+        """All pieces, up to the first that is short."""
+        restarts = 0
+        while missing := [at for at in range(0, self._end(), DATA_BYTES) if at not in self._found]:
+            if self._session.now() >= self._deadline:
+                raise self._out_of_time()
+            try:
+                self._some(missing[: self._window])
+            except Silent:
+                raise
+            except LinkLost as lost:
+                self._session.reopen(self._deadline, lost)
+                self._asked.clear()
+            except SessionEnded:
+                restarts += 1
+                if restarts > _MAX_RESTARTS:
+                    raise self._session.contested() from None
+                self._session.greet(self._deadline, anew=True)
+                self._asked.clear()
+        return b"".join(self._found[at] for at in sorted(self._found))[: self._end()]
+
+    @property
+    def _deadline(self) -> float:
+        return self._until.at
+
+    def _end(self) -> int:
+        """Bytes of the image, as far as is known: the first piece that is short is its last."""
+        ends = [at + len(piece) for at, piece in self._found.items() if len(piece) < DATA_BYTES]
+        return min(ends, default=_most(self._session.info))
+
+    def _out_of_time(self) -> OutOfTime:
+        exchange = self._session.exchange
+        slow = exchange.pace.slow_baud(exchange.transport.baud)
+        why = f"the line is slow, answers come at about {slow} baud: give --baud {slow}" if slow else "it takes long"
+        have = sum(map(len, self._found.values()))
+        return OutOfTime(f"timeout: {have} bytes of the image were read; {why}, or increase --timeout")
+
+    def _some(self, wanted: list[int]) -> None:
+        """So many pieces at once; fewer the next time if some did not come."""
+        exchange = self._session.exchange
+        now = due = exchange.now()
+        for count, at in enumerate(wanted):
+            seq = exchange.seq()
+            ahead = count * MAXIMUM_FRAME  # bytes of answers
+            due = exchange.send(
+                Request.READBACK, seq, _REQUEST.pack(at, DATA_BYTES), ahead + 4 + DATA_BYTES, self._in_vain > 0
+            )
+            self._asked[seq] = at
+        until = min(now + back_off(due - now, self._in_vain), self._deadline)
+        heard = False
+        while exchange.now() < until and not all(at in self._found for at in wanted):
+            for answer in exchange.receive(until):
+                heard = self._take(answer) or heard
+        if not all(at in self._found for at in wanted):
+            self._window = max(self._window // 2, 1)
+        self._in_vain = 0 if heard else self._in_vain + 1
+        if self._in_vain >= _MAX_IN_VAIN:
+            raise self._session.silent()
+
+    def _take(self, answer: Answer) -> bool:
+        """Whether it is the answer to one of the requests."""
+        if answer.kind != Request.READBACK or answer.seq not in self._asked:
+            return False
+        at = self._asked.pop(answer.seq)
+        if answer.reason == Reason.SESSION:
+            raise SessionEnded
+        if answer.reason:
+            raise refused(answer.kind, answer.reason, answer.detail, self._session.info)
+        self._found[at] = _piece(answer.payload, at)
+        return True
 
 
 def _most(info: DeviceInfo) -> int:
     """Bytes that no image exceeds: tables may be longer than what was uploaded for them."""
     tables = sum(_WORD_BYTES << axis.index_bits for axis in (info.x, info.y))
     return max(info.image_bytes, _PROGRAM_BYTES + tables)
-
-
-def _some(session: LinkSession, wanted: range, deadline: float) -> dict[int, bytes]:
-    """So many pieces at once, and what was lost of them one by one."""
-    try:
-        found = _at_once(session, wanted, deadline)
-    except Silent:
-        raise
-    except LinkLost as lost:
-        session.reopen(deadline, lost)
-        found = {}
-    for at in wanted:
-        if at in found:
-            continue
-        if session.now() >= deadline:
-            raise OutOfTime("timeout: reading back takes as long as an upload; increase --timeout")
-        payload = session.ask(Request.READBACK, _REQUEST.pack(at, DATA_BYTES), 4 + DATA_BYTES, deadline)
-        found[at] = _piece(payload, at)
-    return found
-
-
-def _at_once(session: LinkSession, wanted: range, deadline: float) -> dict[int, bytes]:
-    """As far as they come."""
-    exchange, found = session.exchange, dict[int, bytes]()
-    waiting: dict[int, int] = {}
-    until = session.now()
-    for at in wanted:
-        seq = exchange.seq()
-        until = exchange.send(Request.READBACK, seq, _REQUEST.pack(at, DATA_BYTES), 16 + len(wanted) * MAXIMUM_FRAME)
-        waiting[seq] = at
-    until = min(until, deadline)
-    while waiting and session.now() < until:
-        for answer in exchange.receive(until):
-            if answer.kind == Request.READBACK and answer.seq in waiting:
-                at = waiting.pop(answer.seq)
-                if not answer.reason:
-                    found[at] = _piece(answer.payload, at)
-                elif answer.reason != Reason.SESSION:  # `ask` begins a new session
-                    raise refused(answer.kind, answer.reason, answer.detail, session.info)
-    return found
 
 
 def _piece(payload: bytes, at: int) -> bytes:

@@ -53,6 +53,12 @@ def refused(
     return Refused(request, reason, detail, f"the device refused {asked} ({name}): {sentence}")
 
 
+def keyless(request: Request) -> Refused:
+    """The error where a device has a key and the host has none; nothing was sent."""
+    why = f"the device has a key, and refuses {request.name} without it; give the key of this device (--key-file FILE)"
+    return Refused(request, Reason.KEY, 0, why)
+
+
 def explain(
     reason: int,
     detail: int,
@@ -80,7 +86,7 @@ def explain(
 
 
 def _key(detail: int, info: DeviceInfo | None) -> str:
-    return "the tag is missing or wrong; give the key of this device (--key-file FILE)"
+    return "the tag is missing, wrong or too late; give the key of this device (--key-file FILE)"
 
 
 def _version(detail: int, info: DeviceInfo | None) -> str:

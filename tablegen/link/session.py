@@ -16,14 +16,18 @@ from tablegen.link.messages import (
     Reason,
     Request,
 )
-from tablegen.link.reasons import refused
+from tablegen.link.pace import back_off
+from tablegen.link.reasons import keyless, refused
 from tablegen.link.transport import Opener, Transport
 
 HELLO_BYTES = DeviceInfo.LAYOUT.size + DeviceStatus.LAYOUT.size
-_MAX_TRIES = 12  # tries of a request, the wait doubling up to 8 times the first: seconds, at usual rates
-_MAX_DOUBLINGS = 3
+_MAX_TRIES = 12  # tries of a request, the wait doubling: seconds, at usual rates
 _MAX_RESTARTS = 4  # new sessions or challenges for one request
 _REOPEN_INTERVAL_S = 0.25
+
+
+class SessionEnded(Exception):
+    """The device knows another session, or none: the next request has to be HELLO. For use within the client."""
 
 
 class LinkSession:
@@ -43,6 +47,7 @@ class LinkSession:
         self.info: DeviceInfo
         self.status: DeviceStatus  # when HELLO was answered last, at the time
         self.status_at = 0.0
+        self.acts: dict[Request, None] = {}  # requests that act which were sent, in order, each once
         self._opener = opener
         self._sleep = sleep
         self._heard = False
@@ -127,6 +132,7 @@ class LinkSession:
             try:
                 if body is None:
                     body = payload + (self.tag(kind, number, payload, deadline) if tagged else b"")
+                self.acts[kind] = None
                 return self._repeat(kind, number, body, answer_bytes, deadline)
             except Silent:
                 raise
@@ -142,19 +148,19 @@ class LinkSession:
                     raise
         raise last
 
-    def tag(self, kind: int, number: int, payload: bytes, deadline: float) -> bytes:
+    def tag(self, kind: Request, number: int, payload: bytes, deadline: float) -> bytes:
         """The tag of a request, after a CHALLENGE; nothing for a device without a key."""
-        if not self.needs_key():
+        if not self.needs_key(kind):
             return b""
         nonce = self.ask(Request.CHALLENGE, b"", NONCE_BYTES, deadline)
         return self.tag_of(nonce, kind, number, payload, b"")
 
-    def needs_key(self) -> bool:
-        """Whether the device has one; raises ``Refused`` where none was given."""
+    def needs_key(self, kind: Request) -> bool:
+        """Whether a request that acts needs a tag; raises ``Refused`` where no key was given."""
         if not self.info.features & Feature.KEY:
             return False
         if self.key is None:
-            raise refused(Request.COMMIT, Reason.KEY, 0)
+            raise keyless(kind)
         return True
 
     def tag_of(self, nonce: bytes, kind: int, number: int, payload: bytes, digest: bytes) -> bytes:
@@ -172,6 +178,11 @@ class LinkSession:
 
     def silent(self) -> LinkError:
         """The error where nobody answers."""
+        if self._heard and self.exchange.noise:
+            return Silent(
+                "the device no longer answers, and bytes come that are not its frames: does its console write to the "
+                "same line, or did it restart with another baud rate?"
+            )
         if self._heard:
             return Silent("the device no longer answers; is it still on?")
         if self.exchange.noise:
@@ -192,7 +203,7 @@ class LinkSession:
             sent.add(seq)
             due = self.exchange.send(kind, seq, payload, answer_bytes, again)
             now = self.now()
-            until = min(now + (due - now) * (1 << min(count, _MAX_DOUBLINGS)), deadline)
+            until = min(now + back_off(due - now, count), deadline)
             while self.now() < until:
                 for answer in self.exchange.receive(until):
                     if answer.kind == kind and answer.seq in sent:

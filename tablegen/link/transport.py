@@ -53,7 +53,12 @@ def open_port(url: str, baud: int = 115200) -> Transport:
     write_s = None if url.lower().startswith("rfc2217:") else _WRITE_TIMEOUT_S
     try:
         # Two programs on one port would take each other's answers.
-        port = serial.serial_for_url(url, baud, timeout=_POLL_S, write_timeout=write_s, exclusive=True)
+        port = serial.serial_for_url(
+            url, baud, timeout=_POLL_S, write_timeout=write_s, exclusive=True, do_not_open=True
+        )
+        # pyserial empties a connection as it opens it, which has no end where the other end never falls silent.
+        port.reset_input_buffer = lambda: None
+        port.open()
     except (OSError, ValueError, OverflowError, NotImplementedError) as error:  # SerialException is an OSError
         raise NoPort(_why_not(url, error)) from None
     return SerialTransport(port, url, baud)
@@ -113,4 +118,6 @@ class SerialTransport:
         return time.monotonic()
 
     def _lost(self, error: Exception) -> LinkLost:
+        if "timeout" in type(error).__name__.lower():
+            return LinkLost(f"{self._name}: the other end took no bytes for {_WRITE_TIMEOUT_S:g} s; is it still on?")
         return LinkLost(f"{self._name}: the port disappeared: {error}; is the cable connected, and the device on?")

@@ -7,6 +7,18 @@ from typing import Any
 MANIFEST = "manifest.json"
 
 
+def read_json(content: bytes) -> Any:
+    """What a manifest holds. Raises ``ValueError`` for all that is no JSON, or nested as no manifest is."""
+    try:
+        return json.loads(content, parse_constant=_no_number)
+    except RecursionError:
+        raise ValueError("nested too deeply for a manifest") from None
+
+
+def _no_number(text: str) -> float:
+    raise ValueError(f"{text} is no number of JSON")
+
+
 def content_hash(record: dict[str, Any]) -> str:
     """SHA-256 of a plan's record in canonical JSON."""
     canonical = json.dumps(record, sort_keys=True, separators=(",", ":"), ensure_ascii=True, allow_nan=False)

@@ -1,9 +1,9 @@
 """A build read back from its ``manifest.json``: the programs that the model plays, and the floats they came from."""
 
-import json
 from dataclasses import dataclass
 from fractions import Fraction
 from hashlib import sha256
+from math import isfinite
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -11,6 +11,7 @@ import msgspec
 import numpy as np
 from msgspec import Meta, Struct
 
+from tablegen.config.names import why_not_a_name
 from tablegen.config.schema import DEFAULT_FORMATS
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.schedule import MAXIMUM_LINE_TICKS, Schedule, Window
@@ -19,8 +20,11 @@ from tablegen.fixedpoint.output import GAIN_BITS, UNIT_GAIN_BITS, Output
 from tablegen.fixedpoint.phase import MAXIMUM_TICKS, RationalPhase
 from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.rounding import signed_limits
-from tablegen.manifest.format import MANIFEST, content_hash
+from tablegen.manifest.format import MANIFEST, content_hash, read_json
 from tablegen.numerics.arrays import Floats, Ints
+from tablegen.problems import shortened
+from tablegen.reading import MANIFEST as MANIFEST_KIND
+from tablegen.reading import other_than_file, read_bytes
 
 _CHUNK_PRODUCTS = 1 << 22  # products of harmonics and ticks that are worked out at a time
 
@@ -36,14 +40,45 @@ Word = Annotated[int, Meta(ge=-(1 << 31), lt=1 << 31)]
 Bits = Annotated[int, Meta(ge=8, le=24)]
 Pair = tuple[Natural, Natural]
 Digest = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
-FileName = Annotated[str, Meta(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$")]  # never outside the directory
+# Never outside the directory.
+FileName = Annotated[str, Meta(max_length=200, pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]*\Z")]
+Version = Annotated[str, Meta(max_length=64, pattern=r"^[A-Za-z0-9][A-Za-z0-9.+!-]*\Z")]
+Number = Annotated[int, Meta(ge=-(1 << 43), lt=1 << 43)]
+Volts = Annotated[float, Meta(ge=-1e9, le=1e9)]
+Coefficient = Annotated[float, Meta(ge=-1e3, le=1e3)]  # of a waveform from 0 to 1
+LEAST_V_PER_CODE = 1e-15  # a range of 1 mV in 24 bits, behind an amplifier of 1e-4, is 6e-15 V
+
+
+class ManifestBranch(Struct):
+    """Hysteresis of one branch: the peak of its residual, and where that is."""
+
+    beta: float
+    u_peak: float
+
+
+class ManifestResonance(Struct):
+    """Where the response is largest, and half its width there."""
+
+    hz: float
+    half_width_hz: float
 
 
 class ManifestDrive(Struct):
-    """Volts at the piezo."""
+    """Volts at the piezo, and the shape that they follow."""
 
-    v_offset: float
-    v_amplitude: float
+    v_offset: Volts
+    v_amplitude: Volts
+    v_scan: Volts
+    v_scan_normalised: Annotated[float, Meta(gt=0.0)]
+    m: float
+    g: float
+    size_nm: float
+    window_nm: float
+    turn: Annotated[float, Meta(gt=0.0, lt=1.0)]
+    model: str
+    forward: ManifestBranch
+    backward: ManifestBranch
+    resonance: ManifestResonance | None = None
 
 
 class ManifestLine(Struct):
@@ -53,18 +88,37 @@ class ManifestLine(Struct):
     hold_ticks: Positive
     phase_step: Annotated[int, Meta(ge=0, le=1 << 32)]
     phase_remainder: Natural
+    rate_hz: float
+    requested_hz: float
+    rate_exact: tuple[int, Positive]
+
+
+class ManifestSeries(Struct):
+    """A waveform w(t) in float64; a layer has no mean."""
+
+    a: list[float]
+    b: list[float]
+    a0: float = 0.0
 
 
 class ManifestFourier(Struct):
-    """w(t) in float64; of the words only how many there are."""
+    """w(t) in float64, its words, and what the piezo is to follow where dynamics or a layer make that another one."""
 
     harmonics: Annotated[int, Meta(ge=1, le=4096)]
-    a0: float
-    a: list[float]
-    b: list[float]
+    a0: Coefficient
+    a: list[Coefficient]
+    b: list[Coefficient]
     a0_word: Word
     a_words: list[Word]
     b_words: list[Word]
+    band_limit: Literal["truncate", "lanczos", "window"]
+    q_format: Literal["Q2.30"]
+    window: tuple[float, float]
+    directions: Literal["forward", "both"]
+    held_harmonics: list[Positive] = []
+    held_factors: list[float] = []
+    target: ManifestSeries | None = None
+    refinement: ManifestSeries | None = None
 
 
 class ManifestTable(Struct):
@@ -72,33 +126,47 @@ class ManifestTable(Struct):
 
     mode: Literal["interpolated", "direct"]
     bits: Bits
-    guard_bits: int
+    guard_bits: Number
+    scale: Annotated[float, Meta(gt=0.0, le=1e9)]
     words: Annotated[list[Annotated[int, Meta(ge=-(1 << 23), lt=1 << 23)]], Meta(min_length=1, max_length=1 << 20)]
 
 
 class ManifestOutput(Struct):
     """The output stage, and volts of its codes."""
 
-    gain_word: int
-    gain_q: int
+    gain_word: Number
+    gain_q: Number
     offset_word: Annotated[int, Meta(gt=-(1 << 43), lt=1 << 43)]
-    offset_code: int
+    offset_code: Number
     code_min: Code
     code_max: Code
     max_step: Annotated[int, Meta(ge=1, lt=1 << 24)]
     park_code: Code
-    v_zero: float
-    v_per_code: float
+    v_zero: Volts
+    v_per_code: Volts
     dac_bits: Bits
-    coding: str
-    align: str
-    word_bits: int
+    coding: Literal["offset-binary", "twos-complement"]
+    align: Literal["right", "left"]
+    word_bits: Annotated[int, Meta(ge=8, le=32)]
 
 
 class ManifestCertificate(Struct):
     """What the build promised of an axis."""
 
     max_error_lsb: Annotated[float, Meta(ge=0.0)]
+    ticks: int | None = None
+    rms_error_lsb: float | None = None
+    lowest_code: int | None = None
+    highest_code: int | None = None
+    headroom_low: int | None = None
+    headroom_high: int | None = None
+    largest_step: int | None = None
+    max_step: int | None = None
+    peak_slew_v_per_s: float | None = None
+    beyond_cutoff_db: float | None = None
+    at_resonance_db: float | None = None
+    scaling_error_percent: dict[str, dict[str, float]] | None = None
+    refinement_percent: dict[str, dict[str, float]] | None = None
 
 
 class ManifestAxis(Struct):
@@ -206,7 +274,7 @@ class ManifestAxes(Struct):
 class Manifest(Struct):
     """What is read of a manifest; keys that were added since are passed over."""
 
-    tablegen: str
+    tablegen: Version
     hash: Digest
     name: FileName
     files: dict[FileName, Digest]
@@ -247,25 +315,33 @@ def read_build(folder: str | Path) -> StoredBuild:
     """The build in a directory. Raises ``NotABuild`` for a manifest that is missing, damaged or cannot be played."""
     path = Path(folder) / MANIFEST
     try:
-        content = path.read_bytes()
+        content = read_bytes(path, MANIFEST_KIND)
     except OSError as error:
         raise NotABuild(
             f"{path}: cannot be read: {error.strerror or error}; the directory is the one of `tablegen build -o DIR`"
         ) from None
     try:
-        plain: Any = json.loads(content)
+        plain: Any = read_json(content)
     except ValueError as error:
-        raise NotABuild(f"{path}: is damaged: {error}; build it again") from None
+        raise NotABuild(f"{path}: is damaged: {shortened(str(error))}; build it again") from None
     if not isinstance(plain, dict) or not {"tablegen", "hash", "axes"} <= plain.keys():
         raise NotABuild(f"{path}: is not a manifest of tablegen")
     try:
         manifest = msgspec.convert(plain, Manifest)
         program = DualProgram(manifest.axes.x.program, manifest.axes.y.program, manifest.sequence.schedule)
-    except (msgspec.ValidationError, ValueError) as error:
-        raise NotABuild(f"{path}: is damaged: {error}; build it again") from None
-    if wrong := [*_wrong_schedule(manifest.sequence), *_wrong_axes(manifest)]:
+    except (msgspec.ValidationError, ValueError, RecursionError) as error:
+        raise NotABuild(f"{path}: is damaged: {shortened(str(error))}; build it again") from None
+    if wrong := [*_wrong_names(manifest), *_wrong_schedule(manifest.sequence), *_wrong_axes(manifest)]:
         raise NotABuild("\n".join(f"{path}: is damaged: {why}; build it again" for why in wrong))
+    for name in manifest.files:  # simulators and compilers open them too, and would wait for a pipe
+        if other := other_than_file(path.parent / name):
+            raise NotABuild(f"{path.parent / name}: is {other}, where a file of the build has to be")
     return StoredBuild(manifest, program, _hash(plain))
+
+
+def _wrong_names(manifest: Manifest) -> list[str]:
+    why = why_not_a_name(manifest.name)
+    return [] if why is None else [f"name: {why}"]
 
 
 def _hash(plain: dict[str, Any]) -> str:
@@ -273,11 +349,13 @@ def _hash(plain: dict[str, Any]) -> str:
     record = {key: value for key, value in plain.items() if key not in ("tablegen", "hash", "formats", "files")}
     record["axes"] = {
         axis: {key: value for key, value in content.items() if key != "certificate"}
+        if isinstance(content, dict)
+        else content
         for axis, content in plain["axes"].items()
     }
     try:
         return content_hash(record)
-    except ValueError:  # NaN, which no build writes
+    except (ValueError, RecursionError):  # infinity or a depth that no build writes
         return sha256(b"").hexdigest()
 
 
@@ -293,6 +371,17 @@ def _wrong_schedule(sequence: ManifestSequence) -> list[str]:
         if first + count > whole:
             wrong.append(f"sequence.{key} ends at {first + count}, beyond {whole}")
     return wrong
+
+
+def _finite(value: Any) -> bool:
+    """Whether all floats below a value are finite: JSON as Python reads it knows NaN."""
+    if isinstance(value, Struct):
+        return all(_finite(getattr(value, name)) for name in value.__struct_fields__)
+    if isinstance(value, dict):
+        return all(map(_finite, value.values()))
+    if isinstance(value, list | tuple):
+        return all(map(_finite, value))
+    return not isinstance(value, float) or isfinite(value)
 
 
 def _wrong_axes(manifest: Manifest) -> list[str]:
@@ -329,7 +418,8 @@ def _wrong_axes(manifest: Manifest) -> list[str]:
                 output.code_min <= output.park_code <= output.code_max < 1 << output.dac_bits,
                 "output.code_min, park_code, code_max are not in order within the converter",
             ),
-            (output.v_per_code != 0.0, "output.v_per_code is 0"),
+            (abs(output.v_per_code) >= LEAST_V_PER_CODE, f"output.v_per_code is {output.v_per_code:g}"),
+            (_finite(axis), "holds a number that is not finite"),
             (
                 {len(found) for found in (fourier.a, fourier.b, fourier.a_words, fourier.b_words)}
                 == {fourier.harmonics},

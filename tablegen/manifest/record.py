@@ -4,9 +4,13 @@ from collections.abc import Mapping
 from decimal import ROUND_CEILING, Context, Decimal
 from typing import Any
 
+import numpy as np
+
 from tablegen.certificate.certificate import Certificate
 from tablegen.certificate.line_errors import Refined, ScalingError
+from tablegen.compensation.dynamics import capped_inverse
 from tablegen.device.schedule import Schedule, Window
+from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, Plan
 
 
@@ -76,6 +80,32 @@ def _layer(line: LinePlan) -> dict[str, Any]:
     return {"refinement": {"harmonics": line.layer.harmonics, "a": line.layer.a.tolist(), "b": line.layer.b.tolist()}}
 
 
+def _followed(line: LinePlan) -> dict[str, Any]:
+    """What the piezo is to follow, where the played series does not tell; and what the boost limit left of it."""
+    response = line.drive.response
+    if response is None:
+        return {}
+    target = {"a0": line.target.a0, "a": line.target.a.tolist(), "b": line.target.b.tolist()}
+    held = np.array(line.held_harmonics, dtype=np.float64)
+    asked, given = response.inverse(held * float(line.rate)), _capped(line, held)
+    # The phase is kept, so that the ratio is real.
+    factors = np.sqrt((given[0] ** 2 + given[1] ** 2) / (asked[0] ** 2 + asked[1] ** 2)) if len(held) else held
+    return {"target": target, "held_factors": factors.tolist()}
+
+
+def _capped(line: LinePlan, harmonics: Floats) -> tuple[Floats, Floats]:
+    """What these harmonics are multiplied by in place of the inverse response."""
+    assert line.drive.response is not None
+    return capped_inverse(line.drive.response, harmonics * float(line.rate), line.drive.max_boost_db)[:2]
+
+
+def _resonance(line: LinePlan) -> dict[str, Any]:
+    response = line.drive.response
+    if response is None:
+        return {}
+    return {"resonance": {"hz": response.resonance_hz, "half_width_hz": response.half_width_hz}}
+
+
 def _axis(line: LinePlan) -> dict[str, Any]:
     drive, program, output = line.drive, line.program, line.program.output
     return {
@@ -93,6 +123,7 @@ def _axis(line: LinePlan) -> dict[str, Any]:
             "backward": {"beta": drive.backward.beta, "u_peak": drive.backward.u_peak},
             "turn": drive.turn,
             "model": drive.model,
+            **_resonance(line),
         },
         "line": {
             "ticks": program.ticks,
@@ -116,6 +147,7 @@ def _axis(line: LinePlan) -> dict[str, Any]:
             "a0_word": line.fourier.a0,
             "a_words": line.fourier.a.tolist(),
             "b_words": line.fourier.b.tolist(),
+            **_followed(line),
             **_layer(line),
         },
         "table": {

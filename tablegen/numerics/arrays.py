@@ -11,6 +11,8 @@ Ints: TypeAlias = npt.NDArray[np.int64]
 Bools: TypeAlias = npt.NDArray[np.bool_]
 FloatsLike: TypeAlias = float | Sequence[float] | npt.NDArray[np.floating] | Ints
 
+_BLOCK = 1 << 15  # values that are summed together, in the cache
+
 
 def freeze(*arrays: npt.NDArray[np.generic]) -> None:
     """Make arrays read-only: what a plan holds cannot change any more."""
@@ -20,6 +22,15 @@ def freeze(*arrays: npt.NDArray[np.generic]) -> None:
 
 def tree_sum(values: Floats) -> Floats:
     """Sum along the last axis by halving, an order that every machine shares."""
+    rows = max(_BLOCK // max(values.shape[-1], 1), 1)
+    flat = values.reshape(-1, values.shape[-1])
+    if len(flat) <= rows:
+        return _tree_sum(values)
+    sums = np.concatenate([_tree_sum(flat[first : first + rows]) for first in range(0, len(flat), rows)])
+    return sums.reshape(values.shape[:-1])
+
+
+def _tree_sum(values: Floats) -> Floats:
     size = 1 << max(values.shape[-1] - 1, 0).bit_length()
     padded = np.zeros((*values.shape[:-1], size))
     padded[..., : values.shape[-1]] = values

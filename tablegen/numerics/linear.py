@@ -4,6 +4,14 @@ import numpy as np
 
 from tablegen.numerics.arrays import Floats
 
+_PANEL = 32  # columns that are worked out together
+_ROWS, _COLUMNS = 32, 256  # of a tile, which then has 64 KiB
+
+
+def _subtract(work: Floats, j: int, top: int, begin: int, end: int) -> None:
+    """Take column j's part out of rows ``top`` on of columns ``begin`` to ``end``."""
+    work[top:, begin:end] -= work[top:, j, None] * work[None, begin:end, j]
+
 
 class Cholesky:
     """The factor L of A = L L^T for a symmetric positive definite A of shape (n, n).
@@ -14,13 +22,26 @@ class Cholesky:
     def __init__(self, matrix: Floats) -> None:
         work = np.array(matrix, dtype=np.float64)
         size = len(work)
-        for j in range(size):
-            pivot = work[j, j]
-            if not pivot > 0.0:
-                raise ArithmeticError(f"pivot {j} of {size} is {pivot:g}")
-            work[j:, j] /= np.sqrt(pivot)
-            column = work[j + 1 :, j]
-            work[j + 1 :, j + 1 :] -= column[:, None] * column[None, :]
+        for first in range(0, size, _PANEL):
+            last = min(first + _PANEL, size)
+            for j in range(first, last):
+                pivot = work[j, j]
+                if not pivot > 0.0:
+                    raise ArithmeticError(f"pivot {j} of {size} is {pivot:g}")
+                work[j:, j] /= np.sqrt(pivot)
+                _subtract(work, j, j + 1, j + 1, last)
+            # The same products leave the same elements in the same order as column by column, and stay in the cache.
+            columns = np.ascontiguousarray(work[:, first:last].T)
+            for begin in range(last, size, _COLUMNS):
+                end = min(begin + _COLUMNS, size)
+                for top in range(begin, size, _ROWS):
+                    tile = work[top : top + _ROWS, begin:end]
+                    block = np.ascontiguousarray(tile)
+                    product = np.empty_like(block)
+                    for column in columns:
+                        np.multiply(column[top : top + _ROWS, None], column[None, begin:end], out=product)
+                        np.subtract(block, product, out=block)
+                    tile[...] = block
         self._factor = work
         self._size = size
 

@@ -13,6 +13,7 @@ from tablegen.numerics.arrays import Floats, FloatsLike
 # Taylor series about 0: at pi/4 the first omitted terms are 4e-20 (sine) and 8e-21 (cosine).
 _SINE_TERMS = 9
 _COSINE_TERMS = 10
+_BLOCK = 1 << 13  # angles that are worked out together, in the cache
 
 
 def _reciprocal_factorials(first: int, terms: int) -> list[float]:
@@ -32,23 +33,35 @@ _COSINE = _reciprocal_factorials(0, _COSINE_TERMS)
 def _horner(coefficients: list[float], square: Floats) -> Floats:
     value = np.full_like(square, coefficients[-1])
     for coefficient in reversed(coefficients[:-1]):
-        value = value * square + coefficient
+        value *= square
+        value += coefficient
     return value
 
 
 def sine_and_cosine(turns: FloatsLike) -> tuple[Floats, Floats]:
     """Return (sin(2 pi turns), cos(2 pi turns)), of the argument's shape."""
     x = np.asarray(turns, dtype=np.float64)
+    if x.size <= _BLOCK:
+        return _sine_and_cosine(x)
+    flat, sines, cosines = x.reshape(-1), np.empty(x.size), np.empty(x.size)
+    for first in range(0, x.size, _BLOCK):
+        block = slice(first, first + _BLOCK)
+        sines[block], cosines[block] = _sine_and_cosine(flat[block])
+    return sines.reshape(x.shape), cosines.reshape(x.shape)
+
+
+def _sine_and_cosine(x: Floats) -> tuple[Floats, Floats]:
     x = x - np.rint(x)
     quadrant = np.rint(4.0 * x)
     angle = (x - 0.25 * quadrant) * tau
     square = angle * angle
     sine = angle * _horner(_SINE, square)
     cosine = _horner(_COSINE, square)
-    odd = quadrant.astype(np.int64) & 1 == 1
-    wrapped = quadrant.astype(np.int64) & 3
+    odd = np.abs(quadrant) == 1.0  # a quadrant is -2..2
     sine, cosine = np.where(odd, cosine, sine), np.where(odd, sine, cosine)
-    return np.where(wrapped >= 2, -sine, sine), np.where((wrapped == 1) | (wrapped == 2), -cosine, cosine)
+    lower = (np.abs(quadrant) == 2.0) | (quadrant == -1.0)
+    left = (np.abs(quadrant) == 2.0) | (quadrant == 1.0)
+    return np.where(lower, -sine, sine), np.where(left, -cosine, cosine)
 
 
 def sine(turns: FloatsLike) -> Floats:

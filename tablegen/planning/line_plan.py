@@ -9,6 +9,7 @@ import numpy as np
 
 from tablegen.compensation.drive import Drive, compensate
 from tablegen.compensation.dynamics import capped_inverse
+from tablegen.compensation.hold import hold_inverse
 from tablegen.config.load import Setup
 from tablegen.config.schema import DEFAULT_FORMATS, BandLimit, FastAxis, Limits, SlowAxis
 from tablegen.device.dual_program import DualProgram
@@ -33,9 +34,11 @@ _PEAK_GRID = 1024
 class LinePlan:
     """One axis: what was asked for in volts, the waveform, and the integers that play it.
 
-    ``target`` is the band-limited w that the piezo is to follow, ``series`` the w that is played: the same with
-    each harmonic divided by the dynamics. ``held_harmonics`` are those at which the boost limit held that back.
-    ``layer`` is what of the target was learnt from a measurement, and lies over the model's shape.
+    ``target`` is the band-limited w that the piezo is to follow. ``drive_series`` is the w that has to arrive at the
+    piezo for that: each harmonic divided by the dynamics; ``held_harmonics`` are those at which the boost limit held
+    that back. ``series`` is the w that is played, ahead of that by the converter's hold: the code of advance k of N is
+    that of ``series`` at k / N. ``layer`` is what of the target was learnt from a measurement, and lies over the
+    model's shape.
     """
 
     axis: Literal["x", "y"]
@@ -45,6 +48,7 @@ class LinePlan:
     converter: Converter
     band_limit: BandLimit
     target: FourierSeries
+    drive_series: FourierSeries
     series: FourierSeries
     held_harmonics: tuple[int, ...]
     scale: float
@@ -161,11 +165,12 @@ def _line_plan(setup: Setup, axis: Literal["x", "y"], schedule: Schedule, proble
         target = band_limited(drive.shape, scan.band_limit, harmonics, layer)
     if target is None:
         return None
-    series: FourierSeries = target
+    at_piezo: FourierSeries = target
     held: tuple[int, ...] = ()
     if drive.response is not None:
         with problems.at(setup.scanner_file, f"{axis}.resonance.response"):
-            series, held = _through_inverse(target, drive, float(rate))
+            at_piezo, held = _through_inverse(target, drive, float(rate))
+    series = at_piezo.times(*hold_inverse(harmonics, period, steps=hold > 1))
 
     converter = Converter.of(setup.scan.dac, setup.scan.amplifier)
     w = series.on_grid(32 * harmonics)
@@ -193,6 +198,7 @@ def _line_plan(setup: Setup, axis: Literal["x", "y"], schedule: Schedule, proble
         converter=converter,
         band_limit=scan.band_limit,
         target=target,
+        drive_series=at_piezo,
         series=series,
         held_harmonics=held,
         scale=scale,

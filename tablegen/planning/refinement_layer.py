@@ -23,9 +23,12 @@ WINDOW_REACH = 0.02  # share of the line beyond the measured window
 
 
 def model_digest(setup: Setup, axis: str, drive: Drive) -> str:
-    """What the layer lies over: 16 hexadecimal digits of hysteresis and dynamics as the scanner file has them."""
+    """What the layer lies over: 16 hexadecimal digits of hysteresis and dynamics as the scanner file has them.
+
+    And of the converter's hold, since builds undo it: layers from before may have learnt it.
+    """
     scanner: ScannerAxis = getattr(setup.scanner, axis)
-    below = [_given(msgspec.to_builtins(part)) for part in (scanner.hysteresis, scanner.resonance)]
+    below = ["hold", *(_given(msgspec.to_builtins(part)) for part in (scanner.hysteresis, scanner.resonance))]
     if isinstance(drive.response, Measured):  # the content of the file that it names
         below += [drive.response.f_hz.tolist(), drive.response.gain.tolist(), drive.response.phase_turns.tolist()]
     plain = json.dumps(below, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
@@ -52,7 +55,8 @@ def learnt_layer(
         why = f"{len(refinement.a)} harmonics, and the band limit passes {harmonics}"
         faults.append(("a", why))
     if refinement.model is not None and refinement.model != model_digest(setup, axis, drive):
-        faults.append(("model", f"learnt over another {axis}.hysteresis or {axis}.resonance of the scanner file"))
+        why = f"learnt over another {axis}.hysteresis or {axis}.resonance of the scanner file"
+        faults.append(("model", f"{why}, or by tablegen before 0.3.0, which left the converter's hold to the layer"))
     for key, why in faults:
         problems.add(setup.scan_file, f"{axis}.refinement.{key}", f"{why}; {_remedy(axis)}")
     return None if faults else FourierSeries(0.0, np.array(refinement.a), np.array(refinement.b))

@@ -3,7 +3,6 @@
 All of it is decided in exact fractions: a window edge at 0.1 of the line is 1/10, not the float beside it.
 """
 
-from collections.abc import Callable
 from fractions import Fraction
 from math import ceil, floor, gcd
 
@@ -12,6 +11,7 @@ from tablegen.config.load import Setup
 from tablegen.config.schema import FastAxis, Timing
 from tablegen.device.schedule import MAXIMUM_LINE_TICKS, Schedule, Window
 from tablegen.fixedpoint.phase import MAXIMUM_TICKS
+from tablegen.planning.windows import line_windows
 from tablegen.problems import Problems
 
 
@@ -29,8 +29,10 @@ def make_schedule(setup: Setup, problems: Problems) -> Schedule | None:
     ticks = _line_ticks(setup, rate, problems)
     if len(problems.found) > before:
         return None
-    forward, backward = _windows(scan.x, ticks, ceil, ceil)
-    up, down = _windows(scan.y, timing.lines, ceil, floor)
+    low, high = (exact(edge) for edge in scan.x.band_limit.window)
+    both = scan.x.band_limit.directions == "both"
+    forward, backward = line_windows(exact(scan.x.turn), low, high, both, ticks, timing.pixels)
+    up, down = _lines_inside(scan.y, timing.lines)
     _check_pixels(setup, rate, ticks, forward, backward, problems)
     _check_lines(setup, up, down, problems)
     if len(problems.found) > before:
@@ -148,18 +150,16 @@ def _width(axis: FastAxis) -> Fraction:
     return exact(high) - exact(low)
 
 
-def _windows(
-    axis: FastAxis, period: int, start: Callable[[Fraction], int], stop: Callable[[Fraction], int]
-) -> tuple[Window, Window]:
-    """The imaging windows of both sweeps, in ticks (or lines) of a period; the backward one runs from high to low."""
+def _lines_inside(axis: FastAxis, lines: int) -> tuple[Window, Window]:
+    """The lines that lie inside the window of y, going up and coming back; a line lasts from its number to the next."""
     low, high = (exact(edge) for edge in axis.band_limit.window)
     turn = exact(axis.turn)
 
     def between(begin: Fraction, end: Fraction) -> Window:
-        first = start(begin * period)
-        return Window(first, max(stop(end * period) - first, 0))
+        first = ceil(begin * lines)
+        return Window(first, max(floor(end * lines) - first, 0))
 
-    forward = between(turn * low, turn * high)
+    up = between(turn * low, turn * high)
     if axis.band_limit.directions == "forward":
-        return forward, Window(0, 0)
-    return forward, between(turn + (1 - turn) * (1 - high), turn + (1 - turn) * (1 - low))
+        return up, Window(0, 0)
+    return up, between(turn + (1 - turn) * (1 - high), turn + (1 - turn) * (1 - low))

@@ -43,14 +43,16 @@ def phase_by_trigger(line: LinePlan, time_s: Floats, period_s: float | None, del
 
 
 def phase_by_drive(line: LinePlan, time_s: Floats, drive_v: Floats, delay_s: float) -> Phase:
-    """Period and start of the drive at the piezo (V), by fitting the waveform that the plan plays.
+    """Period and start of the drive at the piezo (V), by fitting the waveform that the plan's codes make there.
 
-    ``delay_s`` is that of the sensor against the drive. Raises ``Unphysical`` where the drive is not that of the plan.
+    What the converter holds is that waveform, with ripple at the update rate: a code stands for the middle of its tick,
+    and periods are counted from the beginning of tick 0, as by a trigger. ``delay_s`` is that of the sensor against the
+    drive. Raises ``Unphysical`` where the drive is not that of the plan.
     """
     nominal = 1.0 / float(line.rate)
     _check_times(time_s, nominal)
-    period, start = _first_guess(line.series, time_s, drive_v, nominal)
-    w, slope = _tabled(line.series, 0), _tabled(line.series, 1)
+    period, start = _first_guess(line.drive_series, time_s, drive_v, nominal)
+    w, slope = _tabled(line.drive_series, 0), _tabled(line.drive_series, 1)
     amplitude, middle = line.drive.v_amplitude, line.drive.v_offset
 
     def turns(x: Floats) -> Floats:
@@ -162,7 +164,7 @@ def _check_layer(line: LinePlan, turns: Floats, left: Floats) -> None:
     inside = (x >= low) & (x <= high) & ((t < turn) | (line.band_limit.directions == "both"))
     columns = np.column_stack(
         # Offset, amplitude and start were fitted, and took a part of it.
-        [_at(_tabled(line.layer, 0), t), np.ones_like(t), *(_at(_tabled(line.series, n), t) for n in (0, 1))],
+        [_at(_tabled(line.layer, 0), t), np.ones_like(t), *(_at(_tabled(line.drive_series, n), t) for n in (0, 1))],
     )[inside]
     found, left_over, rank, _ = np.linalg.lstsq(columns, left[inside], rcond=None)
     if rank < 4 or not len(left_over):

@@ -13,6 +13,7 @@ from tablegen.verification.simulate import Compiled, Design, SimulationFailed, c
 from tablegen.verification.stream import Mismatch, Script, Words, compare, read_capture
 
 TEST_MODULE = "tablegen.verification.cocotb_stream"
+STREAM_BENCH = Path(str(files("tablegen.verification"))) / "stream_bench.v"
 SCRIPT, CAPTURE = "script.hex", "capture.hex"  # in the folder of a bench
 
 
@@ -84,13 +85,12 @@ class SequencerBench:
         self.folder = folder.resolve()
         self.folder.mkdir(parents=True, exist_ok=True)
         self._script, self._capture = self.folder / SCRIPT, self.folder / CAPTURE
-        bench = Path(str(files("tablegen.verification"))) / "stream_bench.v"
         runtime = verilog_runtime() if sources is None else list(sources)
         self._most_counted = (1 << int((parameters or {}).get("COUNT_BITS", 32))) - 1
         self._design: Compiled = compile_design(
             simulator,
             Design(
-                [*runtime, bench],
+                [*runtime, STREAM_BENCH],
                 top,
                 {
                     **shape.parameters(),
@@ -121,13 +121,16 @@ class SequencerBench:
     def run(self, clocks: int) -> dict[str, Any]:
         """Play the script that stands in the folder, of so many clocks; the counters of the bench by name."""
         self._capture.unlink(missing_ok=True)
-        status_file = self.folder / "status.json"
-        status_file.unlink(missing_ok=True)
-        timeout = (clocks + 1000) * 10 // 1000 + 10
-        tests, _ = self._design.run(
-            TEST_MODULE, {"TABLEGEN_STATUS": str(status_file), "TABLEGEN_TIMEOUT_US": str(timeout)}
-        )
-        if tests != 1 or not status_file.exists():
-            raise SimulationFailed("the bench did not play its script to the end")
-        status: dict[str, Any] = json.loads(status_file.read_text("ascii"))
-        return status
+        return run_bench(self._design, self.folder, clocks)
+
+
+def run_bench(design: Compiled, folder: Path, clocks: int) -> dict[str, Any]:
+    """Play the script of so many clocks that a compiled bench reads; the counters of the bench by name."""
+    status_file = folder / "status.json"
+    status_file.unlink(missing_ok=True)
+    timeout = (clocks + 1000) * 10 // 1000 + 10
+    tests, _ = design.run(TEST_MODULE, {"TABLEGEN_STATUS": str(status_file), "TABLEGEN_TIMEOUT_US": str(timeout)})
+    if tests != 1 or not status_file.exists():
+        raise SimulationFailed("the bench did not play its script to the end")
+    status: dict[str, Any] = json.loads(status_file.read_text("ascii"))
+    return status

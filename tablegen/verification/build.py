@@ -1,17 +1,21 @@
 """Verify a build in its directory: its files, then what its own sequencer plays of its own numbers."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from time import monotonic
 from typing import Protocol
 
-from tablegen.emit.format import Comparison
-from tablegen.emit.formats import UnknownFormat, get
+from tablegen.emit.content import Content
+from tablegen.emit.format import Comparison, Format
 from tablegen.emit.stored import stored_content
 from tablegen.manifest.read import NotABuild, StoredBuild, read_build
 from tablegen.problems import Unphysical
+from tablegen.verification.certificate_checks import check_certificates
 from tablegen.verification.checks import Check
+from tablegen.verification.derived import wrong_derived
 from tablegen.verification.directory import some, wrong_files
+from tablegen.verification.listing import known_formats, listed_files, unlike_installed
 from tablegen.verification.session import BuildSession, needed_ticks
 from tablegen.version import __version__
 
@@ -25,6 +29,8 @@ class Outcome:
     checks: list[Check]
     session: BuildSession | None = None
     difference: str | None = None  # the first tick that differs
+    whole_frame: bool = False  # a frame was played apart from the session
+    notes: list[str] = field(default_factory=list)
 
 
 class Target(Protocol):
@@ -40,10 +46,21 @@ class Target(Protocol):
     def refuse(self, folder: Path, stored: StoredBuild) -> None:
         """Raise ``NotABuild`` for a build that it cannot play."""
 
-    def play(
-        self, folder: Path, work: Path, stored: StoredBuild, most_ticks: int, seed: int, progress: Progress
-    ) -> Outcome:
-        """Play the build in ``folder``, in the directory ``work``, and check what comes."""
+    def play(self, job: "PlayJob") -> Outcome:
+        """Play the build, and check what comes."""
+
+
+@dataclass(frozen=True)
+class PlayJob:
+    """The build in ``folder`` is played in the directory ``work``; ``limits`` of x and y are in LSB."""
+
+    folder: Path
+    work: Path
+    stored: StoredBuild
+    limits: dict[str, float]
+    most_ticks: int
+    seed: int
+    progress: Progress
 
 
 @dataclass(frozen=True, repr=False)
@@ -54,6 +71,7 @@ class Report:
     checks: list[Check]
     difference: str | None
     notes: list[str]
+    seconds: float = 0.0
 
     def __repr__(self) -> str:
         failed = len(self.failures)
@@ -79,41 +97,83 @@ def verify_build(folder: Path, work: Path, target: Target, most_ticks: int, seed
         )
     target.refuse(folder, stored)
     target.require()
+    watch = Stopwatch()
     progress("hashing the files")
-    notes: list[str] = []
-    checks = [*_file_checks(folder, stored), *_format_checks(folder, stored, notes)]
-    outcome = target.play(folder, work, stored, most_ticks, seed, progress)
-    if stored.manifest.tablegen != __version__:
-        notes.append(f"built by tablegen {stored.manifest.tablegen}, verified by {__version__}")
+    same = stored.manifest.tablegen == __version__
+    known, unknown = known_formats(stored)
+    notes = [f"{why}; only the SHA-256 of its files was checked" for why in unknown]
+    content = stored_content(stored)
+    checks = watch.timed(_manifest_checks(folder, stored))
+    checks += watch.timed(_file_checks(folder, stored, content, known, same))
+    checks += watch.timed(_format_checks(folder, content, known))
+    progress("measuring the certificate")
+    certificates = check_certificates(stored, same)
+    checks += watch.timed(certificates.checks)
+    outcome = target.play(PlayJob(folder, work, stored, certificates.limits, most_ticks, seed, progress))
+    checks += watch.timed(outcome.checks)
+    if not same:
+        notes.append(
+            f"built by tablegen {stored.manifest.tablegen}, verified by {__version__}: its runtime was not compared "
+            "with the installed one, nor its scaling errors with the words"
+        )
     if outcome.session is not None:
-        notes += _coverage(stored, outcome.session)
-    return Report(stored.manifest.name, checks + outcome.checks, outcome.difference, notes)
+        notes += _coverage(stored, outcome)
+    return Report(stored.manifest.name, checks, outcome.difference, notes + outcome.notes, watch.seconds)
 
 
-def _file_checks(folder: Path, stored: StoredBuild) -> list[Check]:
-    manifest = stored.manifest
+class Stopwatch:
+    """Seconds, spread over the checks that they were spent on."""
+
+    def __init__(self) -> None:
+        self._begun = self._last = monotonic()
+
+    @property
+    def seconds(self) -> float:
+        """All of them."""
+        return monotonic() - self._begun
+
+    def timed(self, checks: list[Check]) -> list[Check]:
+        """These checks, with the seconds since the last call."""
+        now, last = monotonic(), self._last
+        self._last = now
+        return [replace(check, seconds=(now - last) / len(checks)) for check in checks]
+
+
+def _manifest_checks(folder: Path, stored: StoredBuild) -> list[Check]:
     hashed = None
-    if stored.own_hash != manifest.hash:
+    if stored.own_hash != stored.manifest.hash:
         hashed = "manifest: edited: its plan does not match its hash; build it again"
-    wrong = wrong_files(folder, stored)
+    count, wrong = wrong_derived(stored)
     return [
         Check("manifest", "its own hash", "1 plan", failure=hashed),
-        differing_check("files", "SHA-256 in the manifest", f"{len(manifest.files)} files", wrong),
+        differing_check("manifest", "its own numbers", f"{count} numbers", wrong),
     ]
 
 
-def _format_checks(folder: Path, stored: StoredBuild, notes: list[str]) -> list[Check]:
+def _file_checks(folder: Path, stored: StoredBuild, content: Content, formats: list[Format], same: bool) -> list[Check]:
+    """The files that a build has, their digests, and those that are the same in every build of a version."""
+    files = stored.manifest.files
+    count, unlisted = listed_files(folder, stored, content, formats, same, len(formats) == len(stored.formats))
+    checks = [
+        differing_check("files", "its formats", f"{count} files", unlisted),
+        differing_check("files", "SHA-256 in the manifest", f"{len(files)} files", wrong_files(folder, stored)),
+    ]
+    if same:
+        compared, unlike = unlike_installed(folder, content, formats)
+        if compared:
+            checks.append(differing_check("files", f"tablegen {__version__}", f"{compared} files", unlike))
+    return checks
+
+
+def _format_checks(folder: Path, content: Content, formats: list[Format]) -> list[Check]:
     """What each format of the build finds in its files."""
-    content, checks = stored_content(stored), []
-    for name in stored.formats:
+    checks = []
+    for one in formats:
         try:
-            found = get(name).check(folder, content)
-        except UnknownFormat as error:
-            notes.append(f"{error}; only the SHA-256 of its files was checked")
-            continue
+            found = one.check(folder, content)
         except Unphysical as error:  # no build has such a manifest
             found = [Comparison("files", "0 files", [str(error)])]
-        checks += [differing_check(f"{name} {one.subject}", "manifest", one.compared, one.wrong) for one in found]
+        checks += [differing_check(f"{one.name} {it.subject}", "manifest", it.compared, it.wrong) for it in found]
     return checks
 
 
@@ -123,11 +183,13 @@ def differing_check(subject: str, against: str, compared: str, wrong: list[str])
     return Check(subject, against, compared, f"{len(wrong)} differ", "0", failure)
 
 
-def _coverage(stored: StoredBuild, session: BuildSession) -> list[str]:
+def _coverage(stored: StoredBuild, outcome: Outcome) -> list[str]:
     """What the ticks did not suffice for."""
+    session = outcome.session
+    assert session is not None
     needed = needed_ticks(stored.program)
     notes = []
-    if not session.whole_frame:
+    if not (session.whole_frame or outcome.whole_frame):
         ticks = stored.program.schedule.frame_ticks
         notes.append(f"not a whole frame of {ticks} ticks was played; --ticks {needed} plays one")
     if not session.swapped_in_frame:
@@ -135,4 +197,4 @@ def _coverage(stored: StoredBuild, session: BuildSession) -> list[str]:
     return notes
 
 
-__all__ = ["NotABuild", "Outcome", "Progress", "Report", "Target", "differing_check", "verify_build"]
+__all__ = ["NotABuild", "Outcome", "PlayJob", "Progress", "Report", "Target", "differing_check", "verify_build"]

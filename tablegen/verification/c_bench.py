@@ -1,10 +1,11 @@
 """The C sequencer under the scripts of the Verilog one: compiled with a compiler of this machine, run as a process."""
 
+import re
 import shlex
 import shutil
 import subprocess
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -14,21 +15,36 @@ from tablegen.numerics.arrays import Ints
 from tablegen.resources import c_runtime
 from tablegen.verification.bench import SequencerShape
 from tablegen.verification.simulate import SimulationFailed, ToolMissing
-from tablegen.verification.stream import Script, Words
+from tablegen.verification.stream import FAULTS, STATE_WORDS, Script, Words
 
 _HERE = Path(__file__).parent
 BENCH = (_HERE / "stream_bench.c", _HERE / "stream_bench.h")
 HOST = _HERE / "stream_bench_host.c"
 _SHAPE, _SINE = 5 << 60, 2 << 60 | 5 << 48
+HASH_DIGITS = 64
 OPTIONS = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wsign-conversion", "-Werror")
 
 
 @dataclass(frozen=True)
 class CPlayed:
-    """What a script made: the ticks, and how often each fault was seen."""
+    """What a script made: the ticks, how often each fault was seen, and the words of the states it asked for.
+
+    ``constants`` are those of an emitted header that was compiled into the bench.
+    """
 
     capture: Words
     counts: list[int]
+    states: list[int] = field(default_factory=list)
+    constants: list[int] = field(default_factory=list)
+
+    @classmethod
+    def of(cls, capture: Words, script: str, constants: int = 0) -> "CPlayed":
+        """What the bench wrote while it played a script: after the ticks come counts, states, constants."""
+        states = STATE_WORDS * len(re.findall(r"^6", script, re.MULTILINE))
+        ticks = len(capture) - len(FAULTS) - states - constants
+        tail = capture[ticks:].astype(np.int64).tolist()
+        counted, told = len(FAULTS), len(FAULTS) + states
+        return cls(capture[:ticks], tail[:counted], tail[counted:told], tail[told:])
 
 
 def storage_bits(bits: int) -> int:
@@ -44,6 +60,12 @@ def defines(shape: SequencerShape, fill: int = 0) -> dict[str, int]:
         "DAC_OUTPUT_STORAGE_BITS": storage_bits(shape.dac_bits),
     }
     return chosen | ({"BENCH_FILL": fill} if fill else {})
+
+
+def constants_written(chosen: Mapping[str, int] | None) -> int:
+    """How many numbers a bench writes of the header that was compiled into it: its constants, and its hash."""
+    constants = (chosen or {}).get("BENCH_CONSTANTS")
+    return 0 if constants is None else constants + HASH_DIGITS
 
 
 def script_words(script: Script, shape: SequencerShape, sine: Ints | None = None) -> str:
@@ -92,6 +114,7 @@ class CBench:
         runtime = list(c_runtime() if sources is None else sources)
         folder.mkdir(parents=True, exist_ok=True)
         self.shape, self.program = shape, folder / "stream_bench"
+        self._constants = constants_written(chosen)
         line = [
             *command,
             *options,
@@ -120,4 +143,4 @@ class CBench:
         if done.returncode:
             raise SimulationFailed(done.stderr.strip() or f"the bench ended with status {done.returncode}")
         capture = np.frombuffer(bytes.fromhex(done.stdout), dtype=">u8").astype(np.uint64)
-        return CPlayed(capture[:-4], [int(count) for count in capture[-4:]])
+        return CPlayed.of(capture, words, self._constants)

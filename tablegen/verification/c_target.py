@@ -12,29 +12,35 @@ from typing import Any, Literal
 
 import numpy as np
 
+from tablegen.emit.constants import scan_constants
+from tablegen.emit.content import Content
 from tablegen.emit.formats.c import arrays_file
 from tablegen.emit.stored import stored_content
 from tablegen.fixedpoint.output import Output
+from tablegen.fixedpoint.program import Program
 from tablegen.manifest.read import NotABuild, StoredBuild
 from tablegen.verification import worker
 from tablegen.verification.bench import CAPTURE, SCRIPT, SequencerShape
-from tablegen.verification.build import Outcome, Progress
+from tablegen.verification.build import Outcome, PlayJob, differing_check
 from tablegen.verification.c_bench import CBench, CPlayed, require_compiler, script_words, storage_bits
+from tablegen.verification.capture import make_capture
 from tablegen.verification.checks import (
     Check,
     check_codes,
     check_faults,
     check_filled,
     check_no_faults,
+    check_states,
+    check_waveform,
     first_difference,
-    make_capture,
 )
 from tablegen.verification.directory import copies, some
 from tablegen.verification.placement import Placement
 from tablegen.verification.session import make_session
 from tablegen.verification.simulate import SimulationFailed
-from tablegen.verification.stream import Words, read_capture
+from tablegen.verification.stream import Script, Words, read_capture, read_states
 
+_UNTOLD = ("armed", "running")  # what the status of the C sequencer does not tell
 _MAX_TABLE_WORDS = 1 << 17  # words of a direct table that dac_sequencer_load() accepts
 _MAX_FILL_TICKS = 600  # ticks per call
 _MIN_TICKS_PER_SECOND = 5000  # a slower program is taken for hanging
@@ -70,22 +76,21 @@ class CTarget:
                 f"{folder}: both tables are direct, and no device renders those; verify it without --fourier"
             )
 
-    def play(
-        self, folder: Path, work: Path, stored: StoredBuild, most_ticks: int, seed: int, progress: Progress
-    ) -> Outcome:
+    def play(self, job: PlayJob) -> Outcome:
         """One session by steps, and the same by fills."""
+        stored, work, progress = job.stored, job.work, job.progress
         player = _compiler() if self.machine == "c" else "arm-none-eabi-gcc, Cortex-M4"
-        sources, absent = _sources(folder, work, stored, self.fourier)
+        sources, absent = _sources(job.folder, work, stored, self.fourier)
         if absent:
             return Outcome([Check("program", player, "nothing", failure="program: " + some(absent))])
 
         progress("playing the integer model")
-        session = make_session(stored.program, None, most_ticks, seed, Placement())
+        session = make_session(stored.program, None, job.most_ticks, job.seed, Placement())
+        script = session.script
         shape = SequencerShape.of((stored.program.x, stored.program.y))
-        (work / SCRIPT).write_text(script_words(session.script, shape), "ascii")  # which ends the script
-        expected, ticks = session.script.expected, len(session.script.expected)
-        counts = [*session.script.counts, 0, 0]  # nothing here has overruns
-        job = {
+        (work / SCRIPT).write_text(script_words(script, shape), "ascii")  # which ends the script
+        ticks = len(script.expected)
+        wanted = {
             "machine": self.machine,
             "shape": asdict(shape),
             "sources": [str(path) for path in sources],
@@ -94,21 +99,39 @@ class CTarget:
         }
         try:
             progress(f"compiling and playing {ticks} ticks, one a call")
-            words, counted = _played(work, {**job, "fill": 0})
+            step = _played(work, {**wanted, "fill": 0})
         except (SimulationFailed, OSError, ValueError) as error:
             return Outcome([Check("program", player, f"{ticks} ticks", failure=f"program: {error}")])
-        capture = make_capture(stored, expected, _packed(words, stored), session.own)
-        sent = {"x": words[::2] & np.uint64(0xFFFFFFFF), "y": words[::2] >> np.uint64(32)}
-        checks = check_codes(capture, stored, {axis: part.astype(np.int64) for axis, part in sent.items()})
-        checks += [check_no_faults(capture, stored), check_faults(capture, stored, counted, counts)]
+        capture = make_capture(stored, script, _packed(step.capture, stored))
+        sent = {"x": step.capture[::2] & np.uint64(0xFFFFFFFF), "y": step.capture[::2] >> np.uint64(32)}
+        checks = [
+            self._header(stored, step),
+            *check_codes(capture, stored, {axis: part.astype(np.int64) for axis, part in sent.items()}),
+            *check_waveform(capture, stored, job.limits),
+            check_no_faults(capture),
+            check_faults(capture, step.counts, script.all_counts),
+            _states(script, step),
+        ]
         try:
             progress(f"compiling and playing {ticks} ticks, many a call")
-            words, counted = _played(work, {**job, "fill": _MAX_FILL_TICKS})
-            filled = make_capture(stored, expected, _packed(words, stored), session.own)
-            checks.append(check_filled(filled, stored, counted, counts))
+            fill = _played(work, {**wanted, "fill": _MAX_FILL_TICKS})
+            filled = make_capture(stored, script, _packed(fill.capture, stored))
+            checks.append(check_filled(filled, _states(script, fill), fill.counts, script.all_counts))
         except (SimulationFailed, OSError, ValueError) as error:
             checks.append(Check("fill", "integer model", f"{ticks} ticks", failure=f"fill: {error}"))
-        return Outcome(checks, session, first_difference(capture, stored))
+        return Outcome(checks, session, first_difference(capture))
+
+    @staticmethod
+    def _header(stored: StoredBuild, step: CPlayed) -> Check:
+        """The constants of the header as the compiler reads them."""
+        content = stored_content(stored)
+        wanted = header_constants(content)
+        wrong = [
+            f"{content.name}.h: {name} is {value} to the compiler, it is {right} in the manifest"
+            for (name, right), value in zip(wanted.items(), step.constants, strict=True)
+            if value != right
+        ]
+        return differing_check("c header", "manifest, by the compiler", f"{len(wanted)} constants", wrong)
 
     def _defines(self, stored: StoredBuild) -> dict[str, int]:
         """What a firmware for this build is compiled with, and what the bench is."""
@@ -118,8 +141,25 @@ class CTarget:
             "DAC_TABLE_STORAGE_BITS": storage_bits(max(axis.table.bits for axis in axes)),
             "DAC_OUTPUT_STORAGE_BITS": storage_bits(max(axis.output.word_bits for axis in axes)),
             "BENCH_EMITTED": 1,
-            "BENCH_TABLE_WORDS": max(rendered, default=1),
+            "BENCH_TABLE_WORDS": max([*rendered, *map(_variation_words, (stored.program.x, stored.program.y))]),
+            "BENCH_CONSTANTS": len(scan_constants(stored_content(stored))),
         }
+
+
+def header_constants(content: Content) -> dict[str, int]:
+    """What the emitted header defines, by whole names; of the hash each character is a number."""
+    own = {f"{content.name.upper()}_{key}": value for key, value in scan_constants(content).items()}
+    digits = {f"{content.name.upper()}_HASH[{at}]": ord(digit) for at, digit in enumerate(content.hash)}
+    return own | digits
+
+
+def _variation_words(own: Program) -> int:
+    """Words that the table of a variation may have."""
+    return len(own.words) if own.mode == "interpolated" else max(len(own.words), 8)
+
+
+def _states(script: Script, played: CPlayed) -> Check:
+    return check_states(script.states, read_states(played.states), (1 << 32) - 1, _UNTOLD)
 
 
 def play_job(folder: Path, job: dict[str, Any]) -> dict[str, Any]:
@@ -138,13 +178,13 @@ def play_job(folder: Path, job: dict[str, Any]) -> dict[str, Any]:
         bench = CBench(shape, place, _compiler(), _options(os.environ.get("CFLAGS", "")), sources, fill, defines)
         played = bench.run(text, timeout=60.0 + job["ticks"] / _MIN_TICKS_PER_SECOND)
     (folder / _record_of(fill)).write_text(played.capture.astype(">u8").tobytes().hex("\n", 8) + "\n", "ascii")
-    return {"counts": played.counts}
+    return {"counts": played.counts, "states": played.states, "constants": played.constants}
 
 
-def _played(work: Path, job: dict[str, Any]) -> tuple[Words, list[int]]:
-    """What the bench stored, two words a tick, and the counts of faults."""
+def _played(work: Path, job: dict[str, Any]) -> CPlayed:
+    """What the bench stored, two words a tick, counts of faults, states, and the constants of the header."""
     status = worker.run(work, __name__, job)
-    return read_capture(work / _record_of(job["fill"])), [int(count) for count in status["counts"]]
+    return CPlayed(read_capture(work / _record_of(job["fill"])), **status)
 
 
 def _sources(folder: Path, work: Path, stored: StoredBuild, fourier: bool) -> tuple[list[Path], list[str]]:
@@ -194,11 +234,16 @@ def _bench_program(stored: StoredBuild, fourier: bool) -> str:
         words = f"{name}_{axis}_fourier, {of}_HARMONICS" if rendered[-1] else "NULL, 0"
         lines += [
             f"const dac_converter bench_{axis}_converter = DAC_CONVERTER({of}, 0);",
-            f"const bench_axis bench_{axis} = {{{words}, {of}_OFFSET_CODE}};",
+            f"const bench_axis bench_{axis} = {{{words}}};",
         ]
     lines += [
         f"const int32_t *const bench_sine = {f'{name}_sine' if any(rendered) else 'NULL'};",
         f"const unsigned bench_sine_index_bits = {f'{capital}_SINE_INDEX_BITS' if any(rendered) else '0'};",
+        "",
+        "const int64_t bench_constants[BENCH_CONSTANTS] = {",
+        *(f"    {capital}_{constant}," for constant in scan_constants(stored_content(stored))),
+        "};",
+        f"const char bench_hash[BENCH_HASH_DIGITS + 1] = {capital}_HASH;",
     ]
     return "\n".join(lines) + "\n"
 

@@ -1,4 +1,4 @@
-"""What was stored against the integer model, the float waveform, and the limits of the program."""
+"""What was stored against the integer model, the float waveform, and the limits of the programs that played."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -7,18 +7,19 @@ from typing import Any, Literal
 import numpy as np
 
 from tablegen.manifest.read import ManifestAxis, StoredBuild
-from tablegen.numerics.arrays import Bools, Floats, Ints
-from tablegen.verification.stream import FLAGS, Sample, Words
+from tablegen.numerics.arrays import Floats, Ints
+from tablegen.verification.capture import UNDEFINED, Capture, part, without_faults
+from tablegen.verification.stream import FAULTS, FLAGS, STATES, Sample, StoredState
 
-_UNDEFINED = np.uint64((1 << 64) - 1)  # how a capture is read where the simulator has an unknown bit
-_MASK = {"x": (0, 0xFFFFFF), "y": (24, 0xFFFFFF), "markers": (48, 0xFF), "faults": (56, 0xFF)}
-_FAULTS = ("slew", "clamp", "overrun", "underrun")
-_FLOAT_TOLERANCE_LSB = 1e-9  # the last bits of two ways to evaluate the float waveform
+_FLOAT_TOLERANCE_LSB = 1e-6  # the last bits of two ways to evaluate the float waveform
 
 
 @dataclass(frozen=True)
 class Check:
-    """A row of the table: what was held against what, how much of it, the worst of it, its limit, and why it fails."""
+    """A row of the table: what was held against what, how much of it, the worst of it, its limit, and why it fails.
+
+    What was not ``exercised`` says nothing, though it did not fail. ``seconds`` is its part of the time.
+    """
 
     subject: str
     against: str
@@ -26,91 +27,51 @@ class Check:
     worst: str = ""
     limit: str = ""
     failure: str | None = None
+    exercised: bool = True
+    seconds: float = 0.0
+
+    @property
+    def verdict(self) -> str:
+        """As the last column of the table has it."""
+        return "FAILED" if self.failure is not None else "ok" if self.exercised else "not exercised"
 
 
-@dataclass(frozen=True, eq=False)
-class Capture:
-    """The words that left the device, those of the model, and where in its program the model was.
-
-    ``place`` is the tick of the frame, -1 where nothing plays; ``steady`` says where the output had caught up with the
-    program of the build. From tick ``own`` on a variation of it plays.
-    """
-
-    got: Words
-    wanted: Words
-    place: Ints
-    steady: Bools
-    own: int
-    lost: int  # ticks that the model has and the capture has not, or the other way round
-
-
-def _part(subject: str, words: Words) -> Ints:
-    """A field of stored words."""
-    shift, mask = _MASK[subject]
-    return (words >> np.uint64(shift) & np.uint64(mask)).astype(np.int64)
-
-
-def make_capture(stored: StoredBuild, expected: list[int], got: Words, own: int | None = None) -> Capture:
-    """Line capture and model up; ``own`` ticks are of the program of the build, all if not given."""
-    wanted = np.array(expected, dtype=np.uint64)
-    flags = {name: (wanted >> np.uint64(48 + i) & np.uint64(1)).astype(np.bool_) for i, name in enumerate(FLAGS)}
-    index = np.arange(len(wanted))
-    frames = np.maximum.accumulate(np.where(flags["frame"], index, -1))
-    place = np.where(flags["playing"], index - frames, -1)
-    # A program begins where a frame does and the tick before was not the last of one.
-    frame_ticks = stored.program.schedule.frame_ticks
-    begins = flags["frame"] & (np.concatenate([[-1], place[:-1]]) != frame_ticks - 1)
-    reached = place >= 0
-    for axis, program in (("x", stored.program.x), ("y", stored.program.y)):
-        reached[reached] = program.codes(place[reached] % program.ticks) == _part(axis, wanted)[reached]
-    begun = np.maximum.accumulate(np.where(begins, index, 0))
-    # Caught up is for good: one right tick since the program began, this one included, is enough.
-    steady = (place >= 0) & (np.maximum.accumulate(np.where(reached, index, -1)) >= begun)
-    own = len(wanted) if own is None else own
-    steady[own:] = False
-    length = min(len(wanted), len(got))
-    return Capture(got[:length], wanted[:length], place[:length], steady[:length], own, abs(len(wanted) - len(got)))
-
-
-def first_difference(capture: Capture, stored: StoredBuild) -> str | None:
+def first_difference(capture: Capture) -> str | None:
     """The first tick at which anything differs, with all that was expected and got."""
     differs = np.flatnonzero(capture.got != capture.wanted)
     if not len(differs):
         return f"{capture.lost} ticks are missing or too many at the end of the capture" if capture.lost else None
     at = int(differs[0])
     wanted, got = _sample(capture.wanted[at]), _sample(capture.got[at])
-    return f"{_where(capture, stored, at)}\n  expected  {wanted}\n  got       {got}"
+    return f"{_where(capture, at)}\n  expected  {wanted}\n  got       {got}"
 
 
-def check_codes(capture: Capture, stored: StoredBuild, sent: Mapping[str, Ints] | None = None) -> list[Check]:
-    """Codes against model, waveform and limits, converter words that were ``sent``, and markers against the model."""
+def check_codes(capture: Capture, stored: StoredBuild, sent: Mapping[str, Ints]) -> list[Check]:
+    """Codes against model and limits, converter words that were ``sent``, and markers against the model."""
     checks = []
     for axis, content in stored.axes:
-        checks += [_model(capture, stored, axis), _float(capture, stored, axis, content)]
-        checks += _bounds(capture, axis, content)
-        if sent is not None:
-            checks.append(_converter(capture, stored, axis, content, sent[axis]))
-    return [*checks, _model(capture, stored, "markers")]
+        checks += [_model(capture, axis), _slew(capture, axis, content), _clamp(capture, axis)]
+        checks.append(_converter(capture, axis, content, sent[axis]))
+    return [*checks, _model(capture, "markers")]
 
 
-def _model(capture: Capture, stored: StoredBuild, subject: str) -> Check:
-    got, wanted = _part(subject, capture.got), _part(subject, capture.wanted)
+def _model(capture: Capture, subject: str) -> Check:
+    got, wanted = part(subject, capture.got), part(subject, capture.wanted)
     differs = np.flatnonzero(got != wanted)
     failure = None
     worst = "0"
     if len(differs):
         at = int(differs[0])
-        undefined = capture.got[at] == _UNDEFINED
+        undefined = capture.got[at] == UNDEFINED
         if subject == "markers":
             expected, found = _markers(int(wanted[at])), _markers(int(got[at]))
             worst = f"{len(differs)} differ"
         else:
             expected, found = str(wanted[at]), str(got[at])
-            known = capture.got != _UNDEFINED
-            worst = str(int(np.max(np.abs(got - wanted)[known], initial=0)))
+            worst = str(int(np.max(np.abs(got - wanted)[capture.known], initial=0)))
         failure = (
             f"{subject}: {len(differs)} of {len(got)} ticks differ from the model, the first at "
-            f"{_where(capture, stored, at)}: expected {expected}, got {'undefined' if undefined else found}"
+            f"{_where(capture, at)}: expected {expected}, got {'undefined' if undefined else found}"
         )
     elif capture.lost:
         failure = f"{subject}: {capture.lost} ticks are missing or too many at the end of the capture"
@@ -118,9 +79,14 @@ def _model(capture: Capture, stored: StoredBuild, subject: str) -> Check:
     return Check(subject, "integer model", f"{len(got)} {unit}", worst, "0", failure)
 
 
-def _float(capture: Capture, stored: StoredBuild, axis: Literal["x", "y"], content: ManifestAxis) -> Check:
-    at = np.flatnonzero(capture.steady & (capture.got != _UNDEFINED))
-    period, limit = content.line.ticks, content.certificate.max_error_lsb
+def check_waveform(capture: Capture, stored: StoredBuild, limits: Mapping[str, float]) -> list[Check]:
+    """Codes of the build's program against the float waveform; ``limits`` of x and y in LSB."""
+    return [_float(capture, axis, content, limits[axis]) for axis, content in stored.axes]
+
+
+def _float(capture: Capture, axis: Literal["x", "y"], content: ManifestAxis, limit: float) -> Check:
+    at = np.flatnonzero(capture.own & capture.steady & capture.known)
+    period = content.line.ticks
     k = capture.place[at] % period
     covered = len(np.unique(k)) / period
     name = "line" if axis == "x" else "frame"
@@ -129,127 +95,195 @@ def _float(capture: Capture, stored: StoredBuild, axis: Literal["x", "y"], conte
     if not len(at):
         why = f"{axis}: the output did not reach the waveform within {len(capture.got)} ticks; play more --ticks"
         return Check(axis, "float waveform", "no code", "", f"{limit:.3f} LSB", why)
-    error: Floats = _part(axis, capture.got)[at] - content.asked(k)
+    error: Floats = part(axis, capture.got)[at] - content.asked(k)
     largest = int(np.argmax(np.abs(error)))
     worst = float(np.abs(error[largest]))
     failure = None
     if worst > limit + _FLOAT_TOLERANCE_LSB:
         failure = (
-            f"{axis}: {worst:.3f} LSB from the float waveform, the certificate promises {limit:.3f}; "
-            f"at {_where(capture, stored, int(at[largest]))}"
+            f"{axis}: {worst:.3f} LSB from the float waveform, the words of the manifest make at most {limit:.3f}; "
+            f"at {_where(capture, int(at[largest]))}"
         )
     return Check(axis, "float waveform", compared, f"{worst:.3f} LSB", f"{limit:.3f} LSB", failure)
 
 
-def _bounds(capture: Capture, axis: str, content: ManifestAxis) -> list[Check]:
-    """Slew guard and clamp on every tick, whatever the state."""
-    output = content.output
-    codes = _part(axis, capture.got)[capture.got != _UNDEFINED]
-    step = int(np.max(np.abs(np.diff(codes)), initial=0))
-    low, high = int(np.min(codes, initial=output.code_max)), int(np.max(codes, initial=output.code_min))
-    inside = output.code_min <= low and high <= output.code_max
-    return [
-        Check(
-            axis,
-            "slew guard",
-            f"{max(len(codes) - 1, 0)} steps",
-            str(step),
-            str(output.max_step),
-            None if step <= output.max_step else f"{axis}: steps by {step} codes a tick, above {output.max_step}",
-        ),
-        Check(
-            axis,
-            "clamp",
-            f"{len(codes)} codes",
-            f"{low}..{high}",
-            f"{output.code_min}..{output.code_max}",
-            None if inside else f"{axis}: codes {low}..{high} leave {output.code_min}..{output.code_max}",
-        ),
-    ]
+def _slew(capture: Capture, axis: str, content: ManifestAxis) -> Check:
+    """The slew guard on every tick, whatever plays; exercised where the model held codes back, up and down."""
+    known = capture.known
+    steps, most = np.diff(part(axis, capture.got)), capture.limits(axis, "max_step")[1:]
+    beyond = np.flatnonzero((np.abs(steps) > most) & known[1:] & known[:-1])
+    # A program of the build takes no step as large as its guard; one that is held back takes nothing else.
+    model = np.diff(part(axis, capture.wanted))
+    up, down = (int(np.sum((model == sign * most) & (most > 0))) for sign in (1, -1))
+    failure = None
+    if len(beyond):
+        at = int(beyond[np.argmax(np.abs(steps[beyond]) - most[beyond])])
+        failure = f"{axis}: steps by {abs(int(steps[at]))} codes a tick, above {most[at]}; at {_where(capture, at + 1)}"
+    compared = f"{len(steps)} steps, held {up} up, {down} down"
+    largest = int(np.max(np.abs(steps)[capture.own[1:] & known[1:] & known[:-1]], initial=0))
+    limit = str(content.output.max_step)
+    return Check(axis, "slew guard", compared, str(largest), limit, failure, exercised=up > 0 and down > 0)
 
 
-def check_no_faults(capture: Capture, stored: StoredBuild) -> Check:
+def _clamp(capture: Capture, axis: str) -> Check:
+    """No code leaves the limits of its program; exercised where the model clamps on both sides."""
+    codes, model = part(axis, capture.got), part(axis, capture.wanted)
+    low, high = capture.limits(axis, "code_min"), capture.limits(axis, "code_max")
+    steady = capture.steady & capture.known
+    outside = np.flatnonzero(((codes < low) | (codes > high)) & steady)
+    clamps = part("faults", capture.wanted) >> FAULTS.index("clamp") & 1 > 0
+    below, above = (int(np.sum((model == limit) & steady & clamps)) for limit in (low, high))
+    failure = None
+    if len(outside):
+        at = int(outside[0])
+        failure = f"{axis}: code {codes[at]} leaves {low[at]}..{high[at]}; at {_where(capture, at)}"
+    compared = f"{int(np.sum(steady))} codes, {below} at the lower limit, {above} at the upper"
+    own = codes[capture.own & steady]
+    span = f"{own.min()}..{own.max()}" if len(own) else ""
+    limits = capture.own & steady
+    allowed = f"{low[limits][0]}..{high[limits][0]}" if len(own) else ""
+    return Check(axis, "clamp", compared, span, allowed, failure, exercised=below > 0 and above > 0)
+
+
+def check_no_faults(capture: Capture) -> Check:
     """The program of the build raises no fault."""
-    flags = _part("faults", capture.got)[: capture.own]
-    wrong = np.flatnonzero(flags)
+    flags = part("faults", capture.got)
+    wrong = np.flatnonzero((flags != 0) & capture.own)
     failure = None
     if len(wrong):
         at = int(wrong[0])
-        failure = f"faults: {_raised(int(flags[at]))}, at {_where(capture, stored, at)}"
-    return Check("faults", "none to occur", f"{len(flags)} ticks", str(len(wrong)), "0", failure)
+        failure = f"faults: {_raised(int(flags[at]))}, at {_where(capture, at)}"
+    count = int(np.sum(capture.own))
+    return Check("faults", "none in the build's program", f"{count} ticks", str(len(wrong)), "0", failure)
 
 
-def check_faults(capture: Capture, stored: StoredBuild, counted: list[int], counts: list[int]) -> Check:
-    """Faults of a variation equal the model's, tick for tick, and so do their ``counted`` numbers."""
-    got, wanted = _part("faults", capture.got), _part("faults", capture.wanted)
+def check_faults(capture: Capture, counted: list[int], counts: list[int]) -> Check:
+    """Faults on purpose equal the model's, tick for tick, and so do their ``counted`` numbers at the end."""
+    got, wanted = part("faults", capture.got), part("faults", capture.wanted)
     wrong = np.flatnonzero(got != wanted)
     failure = None
     if len(wrong):
         at = int(wrong[0])
         failure = (
             f"faults: {len(wrong)} of {len(got)} ticks differ from the model, the first at "
-            f"{_where(capture, stored, at)}: expected {_raised(int(wanted[at]))}, got {_raised(int(got[at]))}"
+            f"{_where(capture, at)}: expected {_raised(int(wanted[at]))}, got {_raised(int(got[at]))}"
         )
     elif counted != counts:
         failure = f"faults: expected are {_counts(counts)}; counted are {_counts(counted)}"
-    return Check("faults", "integer model", f"{len(got)} ticks", f"{len(wrong)} differ", "0", failure)
+    seen = [name for bit, name in enumerate(FAULTS) if np.any(wanted >> bit & 1)]
+    return Check(
+        "faults", "integer model", f"{len(got)} ticks: {', '.join(seen)}", f"{len(wrong)} differ", "0", failure
+    )
 
 
-def check_nothing_counted(
-    capture: Capture, stored: StoredBuild, counted: list[int], counts: list[int], refused: bool
+def check_states(
+    wanted: list[tuple[str, StoredState]], got: list[StoredState], most_counted: int, untold: tuple[str, ...] = ()
 ) -> Check:
-    """No fault is to be seen, none to be counted, by device or model, no write to be refused."""
-    failure = check_no_faults(capture, stored).failure
-    if failure is None and (any(counted) or any(counts) or refused):
-        failure = f"faults: counted are {_counts(counted)}; writes were {'' if refused else 'not '}refused"
-    return Check("faults", "none to occur", f"{len(capture.got)} ticks", str(sum(counted)), "0", failure)
+    """What the device says of itself after each request; it does not tell what is ``untold``."""
+    wrong = []
+    for (when, state), found in zip(wanted, got, strict=False):
+        right, found = state.limited(most_counted, untold), found.limited(most_counted, untold)
+        if right == found:
+            continue
+        expected, told = (_told(one) for one in (right, found))
+        different = [(mine, other) for mine, other in zip(expected, told, strict=True) if mine != other]
+        texts = (", ".join(pair[side] for pair in different) for side in (0, 1))
+        wrong.append("requests: {}: expected {}; got {}".format(when, *texts))
+    if len(got) != len(wanted):
+        wrong.append(f"requests: {len(got)} states were stored in place of {len(wanted)}")
+    compared = f"{len(wanted)} states"
+    return Check("requests", "integer model", compared, f"{len(wrong)} differ", "0", wrong[0] if wrong else None)
 
 
-def _converter(capture: Capture, stored: StoredBuild, axis: str, content: ManifestAxis, words: Ints) -> Check:
+def _told(state: StoredState) -> list[str]:
+    flags = [name if flag else f"not {name}" for name, flag in zip(STATES, state.flags, strict=True)]
+    return [*flags, f"faults {_raised(state.faults)}", *_counts(list(state.counts)).split(", ")]
+
+
+def _converter(capture: Capture, axis: str, content: ManifestAxis, words: Ints) -> Check:
     """What the converter is sent: coding and alignment of the model's codes."""
-    output = content.program.output
-    codes, which = np.unique(_part(axis, capture.wanted), return_inverse=True)
-    wanted = np.array([output.word(code) for code in codes.tolist()], dtype=np.int64)[which.reshape(-1)]
+    wanted = coded(part(axis, capture.wanted), content)
     words = words[: len(wanted)]
-    differs = np.flatnonzero(words != wanted)
+    differs = np.flatnonzero(words != wanted[: len(words)])
     failure = None
     if len(differs):
         at = int(differs[0])
         failure = (
             f"{axis}: {len(differs)} of {len(words)} converter words differ from the model's, the first at "
-            f"{_where(capture, stored, at)}: expected 0x{wanted[at]:x}, got 0x{words[at]:x}"
+            f"{_where(capture, at)}: expected 0x{wanted[at]:x}, got 0x{words[at]:x}"
         )
-    return Check(axis, "converter", f"{len(words)} words", f"{len(differs)} differ", "0", failure)
+    elif len(words) < len(wanted):
+        failure = f"{axis}: {len(words)} converter words came in place of {len(wanted)}"
+    return Check(axis, "converter word", f"{len(words)} words", f"{len(differs)} differ", "0", failure)
 
 
-def check_filled(capture: Capture, stored: StoredBuild, counted: list[int], counts: list[int]) -> Check:
-    """The same session played many ticks at a time: codes and markers; of faults only how many there were."""
-    mask = ~np.uint64(_MASK["faults"][1] << _MASK["faults"][0])
-    got, wanted = capture.got & mask, capture.wanted & mask
-    differs = np.flatnonzero(got != wanted)
+def coded(codes: Ints, content: ManifestAxis) -> Ints:
+    """Converter words of codes, by the coding and the alignment that the manifest has."""
+    output = content.program.output
+    values, which = np.unique(codes, return_inverse=True)
+    return np.array([output.word(code) for code in values.tolist()], dtype=np.int64)[which.reshape(-1)]
+
+
+def check_wires(capture: Capture, stored: StoredBuild, sent: Mapping[int, int], least: int) -> Check:
+    """Words that a serial converter got, by the number of their sample, at least so many."""
+    x, y = (coded(part(axis, capture.wanted), content) for axis, content in stored.axes)
+    numbers = [number for number in sent if number < len(x)]
+    wrong = [number for number in numbers if sent[number] != int(y[number]) << 32 | int(x[number])]
+    failure = None
+    if wrong:
+        at = wrong[0]
+        failure = (
+            f"serial: {len(wrong)} of {len(numbers)} samples differ on the wires, the first at {_where(capture, at)}: "
+            f"expected x 0x{x[at]:x}, y 0x{y[at]:x}, got x 0x{sent[at] & 0xFFFFFFFF:x}, y 0x{sent[at] >> 32:x}"
+        )
+    elif len(numbers) < max(least, len(sent)):
+        failure = f"serial: {len(numbers)} samples came over the wires, {max(least, len(sent))} were sent"
+    return Check("serial", "converter word", f"{len(numbers)} samples", f"{len(wrong)} differ", "0", failure)
+
+
+def check_whole(subject: str, capture: Capture, how: str) -> Check:
+    """Codes, markers and faults of all ticks at once."""
+    differs = np.flatnonzero(capture.got != capture.wanted)
     failure = None
     if len(differs):
         at = int(differs[0])
         failure = (
-            f"fill: {len(differs)} of {len(got)} ticks differ from the model, the first at "
-            f"{_where(capture, stored, at)}:\n  expected  {_sample(wanted[at])}\n  got       {_sample(got[at])}"
+            f"{subject}: {len(differs)} of {len(capture.got)} ticks differ from the model, the first at "
+            f"{_where(capture, at)}:\n  expected  {_sample(capture.wanted[at])}\n  got       "
+            f"{_sample(capture.got[at])}"
         )
     elif capture.lost:
-        failure = f"fill: {capture.lost} ticks are missing or too many at the end of the capture"
-    elif counted != counts:
+        failure = f"{subject}: {capture.lost} ticks are missing or too many at the end of the capture"
+    compared = f"{len(capture.got)} ticks{how}"
+    return Check(subject, "integer model", compared, f"{len(differs)} differ", "0", failure)
+
+
+def check_filled(capture: Capture, states: Check, counted: list[int], counts: list[int]) -> Check:
+    """The same session played many ticks at a time: codes and markers; of faults how many there were, and states."""
+    check = check_whole("fill", _with(capture, without_faults(capture.got), without_faults(capture.wanted)), "")
+    failure = check.failure
+    if failure is None and counted != counts:
         failure = f"fill: faults expected are {_counts(counts)}; counted are {_counts(counted)}"
-    return Check("fill", "integer model", f"{len(got)} ticks", f"{len(differs)} differ", "0", failure)
+    if failure is None and states.failure is not None:
+        failure = f"fill: {states.failure}"
+    return Check(check.subject, check.against, check.compared, check.worst, check.limit, failure)
+
+
+def _with(capture: Capture, got: Any, wanted: Any) -> Capture:
+    from dataclasses import replace
+
+    return replace(capture, got=got, wanted=wanted)
 
 
 def _raised(flags: int) -> str:
-    return " ".join(name for i, name in enumerate(_FAULTS) if flags >> i & 1) or "none"
+    return " ".join(name for i, name in enumerate(FAULTS) if flags >> i & 1) or "none"
 
 
 def _counts(counted: list[int]) -> str:
-    return ", ".join(f"{name} {count}" for name, count in zip(_FAULTS, counted, strict=True))
+    return ", ".join(f"{name} {count}" for name, count in zip(FAULTS, counted, strict=True))
 
 
-def check_timing(capture: Capture, status: dict[str, Any]) -> Check:
+def check_timing(capture: Capture, status: Mapping[str, Any]) -> Check:
     """A strobe for every tick, always as many clocks after it."""
     jitter, ticks, strobes = (int(status[key]) for key in ("jitter", "ticks", "strobes"))
     failure = None
@@ -262,10 +296,13 @@ def check_timing(capture: Capture, status: dict[str, Any]) -> Check:
     return Check("timing", "constant delay", compared, f"{jitter} differ", "0", failure)
 
 
-def _where(capture: Capture, stored: StoredBuild, at: int) -> str:
-    place, ticks = int(capture.place[at]), stored.program.schedule.ticks
-    where = f"line {place // ticks}, tick {place % ticks} of it" if place >= 0 else "while no line plays"
-    return f"tick {at} ({where})"
+def _where(capture: Capture, at: int) -> str:
+    place, program = int(capture.place[at]), capture.programs[int(capture.which[at])]
+    if place < 0 or program is None:
+        return f"tick {at} (while no line plays)"
+    of = "" if capture.own[at] else " of a variation"
+    ticks = program.schedule.ticks
+    return f"tick {at} (line {place // ticks}{of}, tick {place % ticks} of it)"
 
 
 def _markers(flags: int) -> str:
@@ -273,7 +310,7 @@ def _markers(flags: int) -> str:
 
 
 def _sample(word: np.uint64) -> str:
-    if word == _UNDEFINED:
+    if word == UNDEFINED:
         return "undefined"
     sample = Sample.of(int(word))
     return f"x {sample.x}, y {sample.y}, markers {' '.join(sample.flags) or 'none'}, faults {sample.faults:04b}"

@@ -1,10 +1,10 @@
 """The files of a build against its manifest: their digests; and words and copies for what plays them."""
 
 import shutil
-from hashlib import sha256
 from pathlib import Path
 
 from tablegen.manifest.read import StoredBuild
+from tablegen.reading import BUILD_FILE, file_sha256, read_text
 
 _MAX_SHOWN = 5
 
@@ -14,11 +14,11 @@ def wrong_files(folder: Path, stored: StoredBuild) -> list[str]:
     wrong = []
     for name, digest in stored.manifest.files.items():
         try:
-            content = (folder / name).read_bytes()
+            found = file_sha256(folder / name)
         except OSError as error:
             wrong.append(f"{name}: {'missing' if isinstance(error, FileNotFoundError) else error.strerror or error}")
             continue
-        if sha256(content).hexdigest() != digest:
+        if found != digest:
             wrong.append(f"{name}: stale or edited: its SHA-256 is not that of the manifest")
     return wrong
 
@@ -26,7 +26,7 @@ def wrong_files(folder: Path, stored: StoredBuild) -> list[str]:
 def memory_words(path: Path, count: int) -> list[int]:
     """The words of a memory file as a device gets them; ``ValueError`` says what is wrong with it."""
     try:
-        lines = path.read_text("ascii").split()
+        lines = read_text(path, BUILD_FILE, "ascii").split()
         words = [int(line, 16) for line in lines]
     except FileNotFoundError:
         raise ValueError(f"{path.name} is missing") from None

@@ -17,7 +17,7 @@ import numpy as np
 from tablegen.installation import install_advice
 from tablegen.resources import c_runtime
 from tablegen.verification.bench import SequencerShape
-from tablegen.verification.c_bench import BENCH, OPTIONS, CPlayed, defines, script_words, sine_of
+from tablegen.verification.c_bench import BENCH, OPTIONS, CPlayed, constants_written, defines, script_words, sine_of
 from tablegen.verification.elf import Executable, read_executable
 from tablegen.verification.simulate import SimulationFailed, ToolMissing
 from tablegen.verification.stream import Script
@@ -35,7 +35,7 @@ _SLICE_US = 500_000  # so that an interruption is seen
 
 @dataclass(frozen=True)
 class Core:
-    """A processor, by the names that gcc and unicorn have for it."""
+    """A processor, by the names that gcc and unicorn have for it: ``model`` is a model of Arm, a mode of RISC-V."""
 
     architecture: Literal["arm", "riscv"]
     options: tuple[str, ...]
@@ -49,8 +49,12 @@ CORES = {
         ("cortex-m3", "UC_CPU_ARM_CORTEX_M3"),
         ("cortex-m4", "UC_CPU_ARM_CORTEX_M4"),
         ("cortex-m7", "UC_CPU_ARM_CORTEX_M7"),
+        ("cortex-m33", "UC_CPU_ARM_CORTEX_M33"),
     )
-} | {"riscv64": Core("riscv", ("-march=rv64imac", "-mabi=lp64", "-mcmodel=medany"))}
+} | {
+    "riscv32": Core("riscv", ("-march=rv32imac", "-mabi=ilp32"), "UC_MODE_RISCV32"),
+    "riscv64": Core("riscv", ("-march=rv64imac", "-mabi=lp64", "-mcmodel=medany"), "UC_MODE_RISCV64"),
+}
 COMPILERS = {"arm": "arm-none-eabi-gcc", "riscv": "riscv64-unknown-elf-gcc"}
 _PACKAGES = {"arm-none-eabi-gcc": "gcc-arm-none-eabi", "riscv64-unknown-elf-gcc": "gcc-riscv64-unknown-elf"}
 
@@ -134,7 +138,7 @@ class Processor:
         from unicorn import arm_const, riscv_const
 
         if self.core.architecture == "riscv":
-            uc = unicorn.Uc(unicorn.UC_ARCH_RISCV, unicorn.UC_MODE_RISCV64)
+            uc = unicorn.Uc(unicorn.UC_ARCH_RISCV, getattr(unicorn, str(self.core.model)))
             self._sp, self._lr, self._pc = (getattr(riscv_const, f"UC_RISCV_REG_{name}") for name in ("SP", "RA", "PC"))
             self._arguments = [getattr(riscv_const, f"UC_RISCV_REG_A{number}") for number in range(8)]
             self._thumb = 0
@@ -249,6 +253,7 @@ class CortexMBench:
     ) -> None:
         runtime = list(c_runtime() if sources is None else sources)
         self.shape, self.core = shape, core
+        self._constants = constants_written(chosen)
         self.executable = compile_bare(
             folder / "stream_bench.elf",
             [*runtime, *BENCH, MEMORY],
@@ -283,7 +288,7 @@ class CortexMBench:
                 processor.write("bench_script_words", len(part).to_bytes(4, "little"))
             processor.resume("bench_exchange")
         capture = np.concatenate(captures).astype(np.uint64)
-        return CPlayed(capture[:-4], [int(count) for count in capture[-4:]])
+        return CPlayed.of(capture, words, self._constants)
 
     def _check(self, processor: Processor) -> None:
         at = int.from_bytes(processor.read("bench_refused"), "little")

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tablegen.manifest.read import StoredBuild
-from tablegen.verification.build import Outcome, Progress
+from tablegen.verification.build import Outcome, PlayJob
 
 
 @dataclass(frozen=True)
@@ -19,8 +19,6 @@ class FilesTarget:
     def refuse(self, folder: Path, stored: StoredBuild) -> None:
         """No build is refused."""
 
-    def play(
-        self, folder: Path, work: Path, stored: StoredBuild, most_ticks: int, seed: int, progress: Progress
-    ) -> Outcome:
+    def play(self, job: PlayJob) -> Outcome:
         """Nothing is played."""
         return Outcome([])

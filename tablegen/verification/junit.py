@@ -9,15 +9,23 @@ from tablegen.verification.checks import Check
 _NOT_XML = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
-def junit(name: str, checks: Sequence[Check]) -> str:
+def junit(name: str, checks: Sequence[Check], seconds: float = 0.0) -> str:
     """One test case a check; the message of a failure is its first line, the text all of it."""
     failures = sum(check.failure is not None for check in checks)
-    suite = f'name={quoteattr(f"tablegen verify {name}")} tests="{len(checks)}" failures="{failures}" errors="0"'
+    skipped = sum(check.failure is None and not check.exercised for check in checks)
+    suite = (
+        f'name={quoteattr(f"tablegen verify {name}")} tests="{len(checks)}" failures="{failures}" errors="0" '
+        f'skipped="{skipped}" time="{seconds:.3f}"'
+    )
     lines = ['<?xml version="1.0" encoding="UTF-8"?>', "<testsuites>", f"  <testsuite {suite}>"]
     for check in checks:
-        case = f"classname={quoteattr(f'{name}.{check.subject}')} name={quoteattr(_plain(check.against))}"
+        case = (
+            f"classname={quoteattr(f'{name}.{check.subject}')} name={quoteattr(_plain(check.against))} "
+            f'time="{check.seconds:.3f}"'
+        )
         if check.failure is None:
-            lines.append(f"    <testcase {case}/>")
+            empty = f"    <testcase {case}/>"
+            lines.append(empty if check.exercised else f'{empty[:-2]}><skipped message="not exercised"/></testcase>')
             continue
         text = _plain(check.failure)
         lines += [

@@ -36,7 +36,7 @@ def verify(
     nothing can be written.
     """
     folder = Path(folder)
-    chosen, most_ticks = _target(target or default_target(folder), simulator, axis, fourier)
+    chosen, most_ticks = _target(target or default_target(folder), simulator, axis, fourier, ticks is None)
     with _work_folder(None if keep is None else Path(keep)) as work:
         return verify_build(folder, work, chosen, most_ticks if ticks is None else ticks, seed, progress)
 
@@ -47,13 +47,26 @@ def default_target(folder: Path) -> TargetName:
     return "verilog" if "verilog" in formats else "c" if "c" in formats else "files"
 
 
+def rendering_clocks(folder: Path, axis: Literal["pipelined", "blocks", "serial"]) -> int:
+    """Clocks in which the Verilog of a build renders its tables once. Raises ``NotABuild``."""
+    from tablegen.verification.placement import Placement
+
+    stored, placement = read_build(folder), Placement(axis, fourier=True)
+    tables = [
+        (len(one.words), content.fourier.harmonics if placement.renders(one) else 0)
+        for one, (_, content) in zip((stored.program.x, stored.program.y), stored.axes, strict=True)
+    ]
+    return placement.commit_clocks(*tables)
+
+
 def _target(
     name: TargetName,
     simulator: Literal["icarus", "verilator"],
     axis: Literal["pipelined", "blocks", "serial"],
     fourier: bool,
+    as_usual: bool,
 ) -> tuple[Target, int]:
-    """What plays, and how many ticks of it are soon over."""
+    """What plays, and how many ticks of it are soon over; ``as_usual`` a long frame is played apart."""
     if name == "files":
         return FilesTarget(), DEFAULT_TICKS[name]
     if name != "verilog":
@@ -64,7 +77,8 @@ def _target(
     from tablegen.verification.verilog_target import VerilogTarget
 
     placement = Placement(axis, fourier)
-    return VerilogTarget(simulator, placement), DEFAULT_TICKS[simulator] // placement.tick_clocks
+    apart = simulator == "icarus" and axis == "pipelined" and not fourier and as_usual
+    return VerilogTarget(simulator, placement, apart), DEFAULT_TICKS[simulator] // placement.tick_clocks
 
 
 @contextmanager

@@ -1,30 +1,25 @@
-"""What is played to verify a build: power-up, a start, frames, a swap in mid-frame, and a park."""
+"""What is played to verify a build: requests and faults on short programs, then frames of the build's own.
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+The own program follows a variation of it in mid-line, plays a frame and more, gives way to a variation in mid-frame,
+takes over again, and parks.
+"""
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from tablegen.device.dual_program import DualProgram
-from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS
+from tablegen.verification.loading import Loader, Memories
 from tablegen.verification.placement import Placement
-from tablegen.verification.stream import FLAGS, PROGRAM, X_FOURIER, X_TABLE, Y_TABLE, Script
+from tablegen.verification.requests import Requests
+from tablegen.verification.stream import Script
 
-_REQUEST_SPACING_TICKS = 8  # ticks between the requests of the beginning
-VARIATION = 1  # as the argument of a commit: which program
-_SWAPPED_BIT = 48 + FLAGS.index("swapped")  # bit of a captured tick
 _CATCH_UP_STRIDE = 64  # ticks after which it is seen whether an output has caught up
-
-
-@dataclass(frozen=True)
-class Memories:
-    """The words of a bank as they stand in the memory files: of x and y the table, or what it is rendered from."""
-
-    program: Sequence[int]
-    x: Sequence[int]
-    y: Sequence[int]
-    x_harmonics: int = 0  # where x has Fourier words
-    y_harmonics: int = 0
+_POWER_UP_STEPS = 20  # of max_step, from the codes of power-up to the park codes
+WIRED_TICKS = 24  # ticks so far apart that a serial converter gets each of them
+WIRED_CLOCKS = 240  # clocks between them
+_LONG_LINES_TICKS = 150_000  # more than the long lines take that are played in C
+REQUEST_TICKS = 6500  # more than the requests take, and the words of the program after them
 
 
 @dataclass(frozen=True)
@@ -34,7 +29,7 @@ class BuildSession:
     script: Script
     whole_frame: bool
     swapped_in_frame: bool
-    own: int | None  # so many ticks are of the program itself, then a variation of it plays; None if it never does
+    wired_ticks: int  # at least so many samples came slowly enough for a serial converter
 
 
 def needed_ticks(program: DualProgram) -> int:
@@ -45,111 +40,150 @@ def needed_ticks(program: DualProgram) -> int:
     )
     lines = 2 * schedule.settle_lines + 8
     return (
-        4 * _REQUEST_SPACING_TICKS
+        REQUEST_TICKS
         + schedule.frame_ticks
         + lines * schedule.ticks
         + 3 * (min(ramp, schedule.frame_ticks) + _CATCH_UP_STRIDE)
     )
 
 
-def varied(program: DualProgram) -> DualProgram:
-    """Half the amplitude, and a limit in its middle: a program that differs everywhere and clamps.
+def power_up_codes(program: DualProgram) -> tuple[int, int]:
+    """Codes of converters at power-up from which the first ramp leads up in x and down in y, where there is room."""
+    x, y = program.x.output, program.y.output
+    top = (1 << x.dac_bits) - 1
+    return (
+        max(x.park_code - _POWER_UP_STEPS * x.max_step - 1, 0),
+        min(y.park_code + _POWER_UP_STEPS * y.max_step + 1, top),
+    )
 
-    The park code stays inside the limits. ``stream_bench.c`` varies the emitted program in the same way.
-    """
-    axes = []
-    for axis in (program.x, program.y):
-        output, middle = axis.output, axis.output.offset_code
-        gain = abs(output.gain_word) // 2 * (1 if output.gain_word >= 0 else -1)  # towards 0, as C divides
-        below = output.park_code <= middle
-        limited = replace(output, code_max=middle) if below else replace(output, code_min=middle)
-        axes.append(replace(axis, output=replace(limited, gain_word=gain)))
-    return DualProgram(axes[0], axes[1], program.schedule)
+
+class _Own:
+    """The part of a session that is the build's own program."""
+
+    def __init__(self, script: Script, loader: Loader, most: int, seed: int, pace: int) -> None:
+        self.script, self.loader, self.most = script, loader, most
+        self.random, self.pace = np.random.default_rng(seed), pace
+
+    @property
+    def played(self) -> int:
+        return len(self.script.expected)
+
+    def take_over(self) -> None:
+        """Commit it while a variation plays, in mid-line, or after a rest where it has to be rendered."""
+        script, rendered = self.script, self.loader.own_commit_clocks > 8
+        variation = script.model.playing
+        assert variation is not None
+        self.loader.load_own()
+        script.pace(self.pace, self.pace)
+        if rendered:
+            script.tick_every(0)
+            self.loader.commit_own()
+            script.wait(self.loader.own_commit_clocks - 8)
+            script.pace(self.pace, self.pace)
+            script.wait_ticks(8 + 2 * variation.schedule.ticks)
+            return
+        script.wait_ticks((variation.schedule.ticks // 2 - script.model.tick) % variation.schedule.ticks + 1)
+        self.loader.commit_own()
+        script.wait_ticks(variation.schedule.ticks)  # a line start is among them
+
+    def catch_up(self, until: int) -> None:
+        """Until the output is at the waveform, or so many ticks of the session are over."""
+        while self.script.model.catching_up and self.played < until:
+            self.script.wait_ticks(min(_CATCH_UP_STRIDE, until - self.played))
+
+    def play_until(self, ticks: int) -> None:
+        self.script.wait_ticks(max(ticks - self.played, 0))
 
 
 def make_session(
-    program: DualProgram, memories: Memories | None, most: int, seed: int, placement: Placement
+    program: DualProgram,
+    memories: Memories | None,
+    most: int,
+    seed: int,
+    placement: Placement,
+    requests: bool = True,
 ) -> BuildSession:
-    """At most ``most`` ticks of a program whose words come from ``memories``; the model plays ``program``.
+    """At most some ``most`` ticks of a program whose words come from ``memories``; the model plays ``program``.
 
-    The device powers up at the park codes, takes the program, and plays a frame and some lines more, or what there are
-    ticks for. At a random tick the same program is committed again from the other bank: it is taken at the next
-    line start, in mid-frame, and plays while it settles and a line longer, with a tick every one to three clocks. Then
-    it parks.
-
-    Without memories the device has the program already, so nothing is written, and can make a variation of it: that is
-    what is committed in mid-frame.
+    Without memories the device has the program already, as the C of a build does, and a driver reports overruns.
+    Without ``requests`` the own program alone is played. A swap in mid-frame comes at a random tick, ticks then come
+    every one to three clocks, and the end is played so slowly that a serial converter gets every sample.
     """
-    random, schedule = np.random.default_rng(seed), program.schedule
-    parks = program.x.output.park_code, program.y.output.park_code
-    harmonics = (memories.x_harmonics, memories.y_harmonics) if memories else (0, 0)
-    commit_clocks = placement.commit_clocks((len(program.x.words), harmonics[0]), (len(program.y.words), harmonics[1]))
-    script = Script(power_up=parks, drain=48 + placement.tick_clocks, commit_clocks=commit_clocks)
-    pace = placement.tick_clocks
-    most -= 2  # a script ends with one or two ticks of its own
+    pace, schedule = placement.tick_clocks, program.schedule
+    codes = power_up_codes(program)
+    script = Script(power_up=codes, drain=48 + pace, commit_clocks=placement.commit_clocks())
+    loader = Loader(script, program, memories, placement)
+    own = _Own(script, loader, most - WIRED_TICKS, seed, pace)
 
-    def played() -> int:
-        return len(script.expected)
-
-    def catch_up(until: int) -> None:
-        while script.model.catching_up and played() < until:
-            script.wait_ticks(min(_CATCH_UP_STRIDE, until - played()))
-
-    if memories:
-        _load(script, memories)
-    script.request("commit", program=program)
-    script.wait(commit_clocks)
-    script.tick_every(pace)
-    script.wait_ticks(min(_REQUEST_SPACING_TICKS, most))
-    script.tick_every(0)
-    if memories:
-        _load(script, memories)
-    script.tick_every(pace)
-    script.request("arm")
-    script.request("trigger")
-
-    first_part = most if most >= needed_ticks(program) else most * 7 // 10
-    script.wait_ticks(1)
-    catch_up(first_part)
-    wished = schedule.frame_ticks + int(random.integers(schedule.ticks, 2 * schedule.ticks, endpoint=True))
-    script.wait_ticks(max(min(wished, first_part - played()), 0))
-    whole = played() - _REQUEST_SPACING_TICKS >= schedule.frame_ticks
-
-    if placement.fourier:  # rendering takes longer than any frame: the ticks wait for all but its end
-        script.tick_every(0)
-        script.request("commit", program=program)
-        script.wait(commit_clocks - 8)
-        script.tick_every(pace)
-    elif memories:
-        script.request("commit", program=program)
+    if requests:
+        in_c = memories is None
+        Requests(script, loader, placement, in_c, in_c and most >= needed_ticks(program) + _LONG_LINES_TICKS).play()
+        script.request("arm", "trigger")
+        script.wait_ticks(2)
+        own.take_over()
     else:
-        script.request("commit", program=varied(program), frames=VARIATION)
-    swaps = script.swaps
-    script.wait_ticks(
-        max(min(schedule.ticks, most - played() - _REQUEST_SPACING_TICKS), 0)
-    )  # a line start is among them
-    in_frame = script.swaps > swaps
-    script.tick_every(0)
-    script.wait(int(random.integers(1, 100)))  # ticks may stop, and come at another rate
-    script.tick_every(pace * int(random.integers(1, 3, endpoint=True)))
-    before_park = most - most // 20
-    catch_up(before_park)
-    script.wait_ticks(max(min((schedule.settle_lines + 1) * schedule.ticks, before_park - played()), 0))
+        loader.load_own()
+        loader.commit_own()
+        script.pace(pace, pace)
+        script.wait_ticks(2)
+        script.request("arm", "trigger")
+
+    begun = own.played
+    first_part = own.most if most >= needed_ticks(program) else begun + max(own.most - begun, 0) * 7 // 10
+    own.catch_up(first_part)
+    wished = begun + schedule.frame_ticks + int(own.random.integers(schedule.ticks, 2 * schedule.ticks, endpoint=True))
+    own.play_until(min(wished, first_part))
+    whole = own.played - begun >= schedule.frame_ticks
+    in_frame = requests and _swap_and_back(own, schedule.ticks, schedule.settle_lines)
+
     script.request("park")
-    while not script.model.parked and played() < most:
-        script.wait_ticks(min(_CATCH_UP_STRIDE, most - played()))
-    swaps_at = [at for at, word in enumerate(script.expected) if word >> _SWAPPED_BIT & 1]
-    own = None if memories or len(swaps_at) < 2 else swaps_at[1]
-    return BuildSession(script, whole, in_frame, own)
+    script.pace(pace, pace)
+    while not script.model.parked and own.played < own.most:
+        script.wait_ticks(min(_CATCH_UP_STRIDE, own.most - own.played))
+    if requests:
+        _slowly(own)
+    script.state("at the end")
+    return BuildSession(script, whole, in_frame, WIRED_TICKS if requests else 0)
 
 
-def _load(script: Script, memories: Memories) -> None:
-    """Write a bank, word for word as the files have it."""
-    script.wait_writable()
-    assert script.writable
-    script.write(PROGRAM, list(memories.program))
-    for axis, region, page in (("x", X_TABLE, 1), ("y", Y_TABLE, 2)):
-        words, harmonics = list(getattr(memories, axis)), getattr(memories, f"{axis}_harmonics")
-        script.write(X_FOURIER + region - X_TABLE if harmonics else region, words)
-        if harmonics:  # 0 in the file, which is for uploaded tables
-            script.write(PROGRAM, [harmonics], first=page * PAGE_WORDS + AXIS_WORDS.index("harmonics"))
+def _slowly(own: _Own) -> None:
+    """A start, with ticks so far apart that a serial converter gets every sample."""
+    script = own.script
+    script.request("arm", "trigger")
+    script.tick_every(0)
+    script.wait(WIRED_CLOCKS)
+    script.pace(max(WIRED_CLOCKS, own.pace), own.pace)
+    script.wait_ticks(WIRED_TICKS)
+    script.tick_every(0)
+    script.wait(WIRED_CLOCKS)
+    script.request("park")
+    script.pace(own.pace, own.pace)
+    script.wait_ticks(1)
+
+
+def _swap_and_back(own: _Own, line: int, settle_lines: int) -> bool:
+    """A variation in mid-frame, and the own program again; whether both came in mid-frame."""
+    script = own.script
+    variation = own.loader.load("free")
+    script.pace(own.pace, own.pace)
+    swaps = script.swaps
+    own.loader.commit(variation)
+    budget = own.most - own.most // 20
+    script.wait_ticks(max(min(line, budget - own.played), 0))  # a line start is among them
+    if script.swaps == swaps:
+        script.request("withdraw")
+        script.wait_ticks(1)
+        return False
+    script.wait_ticks(variation.schedule.frame_ticks)
+    script.state("with a variation in mid-frame")
+    script.pace(own.pace, own.pace)
+    if own.loader.own_commit_clocks > 8:  # rendered once is enough: it takes longer than all the rest
+        script.request("park")
+        return True
+    own.take_over()
+    script.tick_every(0)
+    script.wait(int(own.random.integers(1, 100)))  # ticks may stop, and come at another rate
+    script.pace(own.pace * int(own.random.integers(1, 3, endpoint=True)), own.pace)
+    own.catch_up(budget)
+    script.wait_ticks(max(min((settle_lines + 1) * line, budget - own.played), 0))
+    return True

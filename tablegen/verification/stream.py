@@ -17,11 +17,16 @@ from tablegen.device.sequencer import Fault, Sequencer, Tick
 from tablegen.fixedpoint.synthesis import FourierWords
 from tablegen.numerics.arrays import Ints
 
-_WAIT, _WRITE, _REQUEST, _PERIOD = (op << 60 for op in (1, 2, 3, 4))
+_WAIT, _WRITE, _REQUEST, _PERIOD, _STATE, _EXTRA = (op << 60 for op in (1, 2, 3, 4, 6, 7))
 PROGRAM, X_TABLE, Y_TABLE, X_FOURIER, Y_FOURIER = range(5)
 _REQUESTS = ("reset", "commit", "withdraw", "arm", "trigger", "park", "clear_faults", "underrun")
 _DRAIN_CLOCKS = 200  # more than any sample takes
 FLAGS = ("line", "frame", "pixel", "backward", "valid", "swapped", "playing", "parked")
+FAULTS = ("slew", "clamp", "overrun", "underrun")
+_VALID = 1 << 48 + FLAGS.index("valid")
+_FAULTS_AT = 56
+STATES = ("writable", "refused", "committed", "armed", "running", "busy")
+STATE_WORDS = 3  # 64-bit words of a stored state
 
 Words = NDArray[np.uint64]
 
@@ -48,6 +53,27 @@ class Sample:
         return cls(word & 0xFFFFFF, word >> 24 & 0xFFFFFF, flags, word >> 56 & 0xF)
 
 
+@dataclass(frozen=True)
+class StoredState:
+    """What a device says of itself while nothing is on its way: its flags, its faults and their counts."""
+
+    flags: tuple[bool, ...]  # in the order of STATES
+    faults: int
+    counts: tuple[int, ...]  # in the order of FAULTS
+
+    @classmethod
+    def of(cls, words: list[int]) -> "StoredState":
+        """The state of its stored words."""
+        flags = tuple(bool(words[0] >> bit & 1) for bit in range(len(STATES)))
+        counts = tuple(word >> shift & 0xFFFFFFFF for word in words[1:] for shift in (0, 32))
+        return cls(flags, words[0] >> 8 & 0xF, counts)
+
+    def limited(self, most_counted: int, ignored: tuple[str, ...] = ()) -> "StoredState":
+        """As a device has it whose counters end at ``most_counted``, and that does not tell the ``ignored`` flags."""
+        flags = tuple(flag and name not in ignored for name, flag in zip(STATES, self.flags, strict=True))
+        return StoredState(flags, self.faults, tuple(min(count, most_counted) for count in self.counts))
+
+
 @dataclass
 class Script:
     """Commands, and the ticks that the model says they make.
@@ -62,18 +88,31 @@ class Script:
     expected: list[int] = field(default_factory=list)
     taken: list[DualProgram] = field(default_factory=list)  # programs, one a swap
     refused: bool = False  # a write was to be refused, and nobody has cleared that
+    states: list[tuple[str, StoredState]] = field(default_factory=list)  # when each was asked for, and what it is
+    programs: list[tuple[int, DualProgram | None]] = field(default_factory=list)  # from which tick on which one plays
 
     def __post_init__(self) -> None:
         self.model = Sequencer(None, codes=self.power_up)
         self.clocks = 0
-        self._period = self._until = 0
+        self._period = self._until = self._ticked_at = 0
         self._commits: DualProgram | None = None
         self._commits_at = self._writable_at = 0
+        self._reported = {"overrun": 0, "underrun": 0}  # the model has no clock, and no faults of it
+        self.programs.append((0, None))
 
     def tick_every(self, clocks: int) -> None:
         """Ticks every so many clocks from the next clock on; 0 for none."""
         self._command(_PERIOD | clocks)
         self._period, self._until = clocks, 0
+
+    def pace(self, clocks: int, least: int) -> None:
+        """Ticks every so many clocks, if they do not come so already; none less than ``least`` after the last one."""
+        if self._period == clocks:
+            return
+        if self._period:
+            self.tick_every(0)
+        self.wait(max(self._ticked_at + least - self.clocks - 1, 0))
+        self.tick_every(clocks)
 
     def wait(self, clocks: int) -> None:
         """Let so many clocks pass."""
@@ -130,6 +169,7 @@ class Script:
         # In the order of their precedence; they act after a tick of the same clock, a commit one clock later or more.
         if {"clear_faults", "reset"} & set(names):
             self.refused = False
+            self._reported = dict.fromkeys(self._reported, 0)
         if {"withdraw", "reset"} & set(names):
             self._commits = None  # what was to be committed later
         for name, act in (
@@ -143,11 +183,43 @@ class Script:
             if name in names:
                 act()
         if "underrun" in names:
-            raise NotImplementedError("the model has no clock")
+            assert not self._period, "samples that are on their way would have it too"
+            self._reported["underrun"] += 1
         if "commit" in names and not {"withdraw", "reset"} & set(names):
             assert program is not None, "a commit needs its program"
             self._commits = program
             self._commits_at = self.clocks + (commit_clocks or self.commit_clocks)
+
+    def come_to_rest(self) -> None:
+        """Stop the ticks, and wait until all samples have left."""
+        self.tick_every(0)
+        self.wait(self.drain)
+
+    def state(self, when: str) -> None:
+        """Store what the device says of itself; ticks stop. A commit has to have come through."""
+        self.come_to_rest()
+        assert self._commits is None, "a commit is on its way"
+        model = self.model
+        flags = (self.writable, self.refused, model.idle is not None, model.armed, model.running, False)
+        reported = sum(1 << FAULTS.index(name) for name, count in self._reported.items() if count)
+        counts = (*self.counts, *self._reported.values())
+        self.states.append((when, StoredState(flags, int(model.faults) | reported, counts)))
+        self._command(_STATE)
+
+    def lost_tick(self, under_way: bool) -> None:
+        """A tick that comes too early: while the last sample is ``under_way``, or reported by a driver at rest."""
+        assert not self._period
+        self._reported["overrun"] += 1
+        if under_way:
+            self.expected[-1] = self._with_reported(self.expected[-1])
+        self._command(_EXTRA)
+
+    def _with_reported(self, word: int) -> int:
+        """A tick of the model with the faults that the model has not."""
+        for name, count in self._reported.items():
+            if count:
+                word = word & ~_VALID | 1 << _FAULTS_AT + FAULTS.index(name)
+        return word
 
     def text(self) -> str:
         """The script as the bench reads it; it ends with the ticks, and what is on its way then."""
@@ -180,12 +252,14 @@ class Script:
         while self.clocks + self._until < end:
             self.clocks += self._until + 1
             self._until = self._period - 1
+            self._ticked_at = self.clocks
             tick = self.model.step()
             if tick.swapped:
                 assert self.model.playing is not None
                 self.taken.append(self.model.playing)
+                self.programs.append((len(self.expected), self.model.playing))
                 self._writable_at = self.clocks + self.drain
-            self.expected.append(pack(tick))
+            self.expected.append(self._with_reported(pack(tick)))
         self._until -= end - self.clocks
         self.clocks = end
 
@@ -195,9 +269,19 @@ class Script:
         return len(self.taken)
 
     @property
+    def all_counts(self) -> list[int]:
+        """Counts of all faults, in the order of FAULTS."""
+        return [*self.counts, *self._reported.values()]
+
+    @property
     def counts(self) -> list[int]:
         """Counts of the faults of the model: slew, clamp."""
         return [self.model.fault_counts[fault] for fault in (Fault.SLEW, Fault.CLAMP)]
+
+
+def read_states(words: list[int]) -> list[StoredState]:
+    """The states of their stored words, one after the other."""
+    return [StoredState.of(words[at : at + STATE_WORDS]) for at in range(0, len(words), STATE_WORDS)]
 
 
 def read_capture(path: Path) -> Words:

@@ -4,18 +4,21 @@
  * both sides of the sequencer. Where it runs is the business of whoever gives it words and takes its captures: bench_read(),
  * bench_write() are theirs. With BENCH_FILL ticks are played by dac_sequencer_fill() as far as a command lets them; a
  * capture then has no faults, since a fill tells them only at its end. With BENCH_EMITTED the program is that of an emitted
- * header, scripts write nothing, and a tick is two captures: converter words of up to 32 bits, then markers and faults.
+ * header, unless a commit says that it is another, which the script wrote; and a tick is two captures: converter words
+ * of up to 32 bits, then markers and faults. After the ticks come the counts of faults, then the states that the script
+ * asked for, three captures each, and with BENCH_EMITTED the constants of the header.
  */
 #include "dac_sequencer.h"
 #include "stream_bench.h"
 
-enum { END, WAIT, WRITE, REQUEST, PERIOD, SHAPE };                            /* commands */
+enum { END, WAIT, WRITE, REQUEST, PERIOD, SHAPE, STATE, EXTRA };              /* commands */
 enum { PROGRAM, X_TABLE, Y_TABLE, X_FOURIER, Y_FOURIER, SINE, REGIONS };      /* regions of a write */
 enum { RESET = 1, COMMIT = 2, WITHDRAW = 4, ARM = 8, TRIGGER = 16, PARK = 32, CLEAR_FAULTS = 64, UNDERRUN = 128 };
 enum { PAGE = 16, SCAN = 0, X = PAGE, Y = 2 * PAGE };                         /* pages of the registers */
+enum { STATES = 64, STATE_WORDS = 3, WRITABLE = 1, REFUSED = 2, COMMITTED = 4 };  /* states */
 
 static dac_sequencer sequencer;
-static dac_word x_table[2][BENCH_TABLE_WORDS], y_table[2][BENCH_TABLE_WORDS];
+static dac_word x_table[2][BENCH_TABLE_WORDS + 1], y_table[2][BENCH_TABLE_WORDS + 1];
 
 static uint32_t period, until, ticks_due, commits_in;
 
@@ -81,6 +84,13 @@ static void pass(uint32_t clocks)
     }
 }
 
+static uint32_t registers[3 * PAGE];
+static dac_converter x_converter, y_converter;
+static unsigned x_bits, x_index_bits, y_bits, y_index_bits;
+static uint64_t states[STATES * STATE_WORDS];
+static unsigned states_stored;
+static bool refused; /* a program was refused since another one waits */
+
 #ifdef BENCH_EMITTED
 
 static const dac_word *rendered(const dac_axis_program *p, const bench_axis *axis, dac_word *table)
@@ -88,19 +98,119 @@ static const dac_word *rendered(const dac_axis_program *p, const bench_axis *axi
     if (axis->fourier == NULL)
         return p->table;
     bench_check(p->length <= BENCH_TABLE_WORDS, "a table of this length");
-    bench_check(dac_synthesize(table, p->index_bits, p->bits, axis->fourier, axis->harmonics, bench_sine,
-                               bench_sine_index_bits), "dac_synthesize");
+    bench_check(dac_synthesize(table, BENCH_TABLE_WORDS + 1, p->index_bits, p->bits, axis->fourier, axis->harmonics,
+                               bench_sine, bench_sine_index_bits), "dac_synthesize");
     return table;
 }
 
-/* Half the amplitude, and a limit in its middle: a program that differs everywhere and clamps. */
-static void vary(dac_axis_program *p, const bench_axis *axis)
+static void emitted(dac_program *p, unsigned idle)
 {
-    p->gain_word /= 2;
-    if (p->park_code <= axis->offset_code)
-        p->code_max = axis->offset_code;
-    else
-        p->code_min = axis->offset_code;
+    *p = bench_program;
+    p->x.table = rendered(&p->x, &bench_x, x_table[idle]);
+    p->y.table = rendered(&p->y, &bench_y, y_table[idle]);
+}
+
+static void shape(uint64_t word)
+{
+    (void)word;
+    x_converter = bench_x_converter;
+    y_converter = bench_y_converter;
+    x_bits = bench_program.x.bits;
+    x_index_bits = bench_program.x.index_bits;
+    y_bits = bench_program.y.bits;
+    y_index_bits = bench_program.y.index_bits;
+}
+
+#else
+
+static int32_t x_fourier[BENCH_FOURIER_WORDS], y_fourier[BENCH_FOURIER_WORDS], sine[BENCH_SINE_WORDS];
+static uint32_t sine_words;
+
+static void render(dac_word *table, unsigned index_bits, unsigned bits, const int32_t *fourier, unsigned harmonics)
+{
+    unsigned sine_index_bits = 0;
+    while (UINT32_C(5) << sine_index_bits < 4 * sine_words)
+        sine_index_bits++;
+    bench_check(dac_synthesize(table, BENCH_TABLE_WORDS + 1, index_bits, bits, fourier, harmonics, sine,
+                               sine_index_bits), "synthesize");
+}
+
+/* Converter and tables, before anything else. */
+static void shape(uint64_t word)
+{
+    x_converter.bits = x_converter.word_bits = (uint8_t)(word & 31);
+    y_converter = x_converter;
+    x_bits = word >> 5 & 31;
+    x_index_bits = word >> 10 & 31;
+    y_bits = word >> 15 & 31;
+    y_index_bits = word >> 20 & 31;
+}
+
+#endif
+
+static void power_up(uint64_t word)
+{
+    x_converter.power_up_code = (int32_t)(word & 0xffffff);
+    y_converter.power_up_code = (int32_t)(word >> 24 & 0xffffff);
+    dac_sequencer_init(&sequencer, &x_converter, &y_converter);
+}
+
+static dac_window window(unsigned at)
+{
+    const dac_window w = {registers[at], registers[at + 1]};
+    return w;
+}
+
+static dac_axis_program axis(unsigned page, dac_word *table, const dac_converter *converter, unsigned bits,
+                             unsigned index_bits)
+{
+    const uint32_t *const r = registers + page;
+    dac_axis_program p;
+
+    p.table = table;
+    p.storage_bits = DAC_TABLE_STORAGE_BITS;
+    p.bits = (uint8_t)bits;
+    p.index_bits = (uint8_t)index_bits;
+    p.phase_period = r[2];
+    p.length = index_bits ? UINT32_C(1) << index_bits : r[2];
+    p.hold_ticks = page == Y && registers[13] ? registers[0] : 1;
+    p.gain_word = (int32_t)r[3];
+    p.offset_word = (int64_t)(int32_t)r[5] * (INT64_C(1) << 18) + r[4];
+    p.gain_q = (uint8_t)(16 + bits + (bits > 21 ? 25 - bits : 4) - converter->bits);
+    p.code_min = (int32_t)r[6];
+    p.code_max = (int32_t)r[7];
+    p.max_step = (int32_t)r[8];
+    p.park_code = (int32_t)r[9];
+    p.dac_bits = converter->bits;
+    p.word_bits = converter->word_bits;
+    p.twos_complement = converter->twos_complement;
+    p.left_aligned = converter->left_aligned;
+    return p;
+}
+
+static void written(dac_program *p, unsigned idle)
+{
+    p->schedule.line_ticks = registers[0];
+    p->schedule.frame_lines = registers[1];
+    p->schedule.settle_lines = registers[2];
+    p->schedule.turn_tick = registers[3];
+    p->schedule.forward = window(4);
+    p->schedule.backward = window(6);
+    p->schedule.up = window(8);
+    p->schedule.down = window(10);
+    p->schedule.pixels = registers[12];
+    p->x = axis(X, x_table[idle], &x_converter, x_bits, x_index_bits);
+    p->y = axis(Y, y_table[idle], &y_converter, y_bits, y_index_bits);
+    if (p->x.length <= BENCH_TABLE_WORDS && p->y.length <= BENCH_TABLE_WORDS) {
+        x_table[idle][p->x.length] = x_table[idle][0];
+        y_table[idle][p->y.length] = y_table[idle][0];
+    }
+#ifndef BENCH_EMITTED
+    if (registers[X + 10] != 0)
+        render(x_table[idle], x_index_bits, x_bits, x_fourier, registers[X + 10]);
+    if (registers[Y + 10] != 0)
+        render(y_table[idle], y_index_bits, y_bits, y_fourier, registers[Y + 10]);
+#endif
 }
 
 static void load(uint32_t variation)
@@ -109,104 +219,33 @@ static void load(uint32_t variation)
         "", "load: DAC_BUSY", "load: DAC_OTHER_CONVERTER",
         "load: DAC_BAD_SCHEDULE", "load: DAC_BAD_TABLE",
         "load: DAC_BAD_PERIOD", "load: DAC_BAD_OUTPUT",
+        "load: DAC_OTHER_STORAGE",
     };
-    dac_program p = bench_program;
+    dac_program p;
     const unsigned idle = dac_sequencer_idle(&sequencer);
 
-    p.x.table = rendered(&p.x, &bench_x, x_table[idle]);
-    p.y.table = rendered(&p.y, &bench_y, y_table[idle]);
-    if (variation) {
-        vary(&p.x, &bench_x);
-        vary(&p.y, &bench_y);
-    }
+#ifdef BENCH_EMITTED
+    if (!variation)
+        emitted(&p, idle);
+    else
+#endif
+        written(&p, idle);
+    (void)variation;
     const dac_loaded outcome = dac_sequencer_load(&sequencer, &p);
     bench_check(outcome == DAC_LOADED, outcomes[outcome]);
 }
 
-static void write(unsigned region, uint32_t address, uint32_t data)
-{
-    (void)region;
-    (void)address;
-    (void)data;
-    bench_check(false, "a write");
-}
-
-static void shape(uint64_t word)
-{
-    (void)word;
-}
-
-static void power_up(uint64_t word)
-{
-    dac_converter x = bench_x_converter, y = bench_y_converter;
-    x.power_up_code = (int32_t)(word & 0xffffff);
-    y.power_up_code = (int32_t)(word >> 24 & 0xffffff);
-    dac_sequencer_init(&sequencer, &x, &y);
-}
-
-#else
-
-static uint32_t registers[3 * PAGE];
-static int32_t x_fourier[BENCH_FOURIER_WORDS], y_fourier[BENCH_FOURIER_WORDS], sine[BENCH_SINE_WORDS];
-static uint32_t sine_words;
-static dac_converter converter;
-static unsigned x_bits, x_index_bits, y_bits, y_index_bits;
-
-static dac_window window(unsigned at)
-{
-    const dac_window w = {registers[at], registers[at + 1]};
-    return w;
-}
-
-static dac_axis_program axis(unsigned page, dac_word *table, const int32_t *fourier, unsigned bits, unsigned index_bits)
-{
-    const uint32_t *const r = registers + page;
-    dac_axis_program p;
-
-    p.table = table;
-    p.bits = (uint8_t)bits;
-    p.index_bits = (uint8_t)index_bits;
-    p.phase_period = r[2];
-    p.length = index_bits ? UINT32_C(1) << index_bits : r[2];
-    p.hold_ticks = page == Y && registers[13] ? registers[0] : 1;
-    p.gain_word = (int32_t)r[3];
-    p.offset_word = (int64_t)(int32_t)r[5] * (INT64_C(1) << 18) + r[4];
-    p.gain_q = (uint8_t)(16 + bits + (bits > 21 ? 25 - bits : 4) - converter.bits);
-    p.code_min = (int32_t)r[6];
-    p.code_max = (int32_t)r[7];
-    p.max_step = (int32_t)r[8];
-    p.park_code = (int32_t)r[9];
-    p.dac_bits = converter.bits;
-    p.word_bits = converter.word_bits;
-    p.twos_complement = converter.twos_complement;
-    p.left_aligned = converter.left_aligned;
-    if (r[10] != 0) {
-        unsigned sine_index_bits = 0;
-        while (UINT32_C(5) << sine_index_bits < 4 * sine_words)
-            sine_index_bits++;
-        bench_check(dac_synthesize(table, index_bits, bits, fourier, r[10], sine, sine_index_bits), "synthesize");
-    }
-    return p;
-}
-
-static void load(uint32_t variation)
+/* What waits is not to be replaced: a host would be told that the sequencer is busy. */
+static void refuse(void)
 {
     dac_program p;
-    const unsigned idle = dac_sequencer_idle(&sequencer);
 
-    (void)variation;
-    p.schedule.line_ticks = registers[0];
-    p.schedule.frame_lines = registers[1];
-    p.schedule.settle_lines = registers[2];
-    p.schedule.turn_tick = registers[3];
-    p.schedule.forward = window(4);
-    p.schedule.backward = window(6);
-    p.schedule.up = window(8);
-    p.schedule.down = window(10);
-    p.schedule.pixels = registers[12];
-    p.x = axis(X, x_table[idle], x_fourier, x_bits, x_index_bits);
-    p.y = axis(Y, y_table[idle], y_fourier, y_bits, y_index_bits);
-    bench_check(dac_sequencer_load(&sequencer, &p) == DAC_LOADED, "load");
+    written(&p, dac_sequencer_idle(&sequencer));
+    p.x.table = x_table[0];
+    p.y.table = y_table[0];
+    p.x.park_code = p.x.code_min;
+    if (dac_sequencer_load(&sequencer, &p) == DAC_BUSY)
+        refused = true;
 }
 
 static void write(unsigned region, uint32_t address, uint32_t data)
@@ -214,52 +253,56 @@ static void write(unsigned region, uint32_t address, uint32_t data)
     play();
     if (!dac_sequencer_writable(&sequencer))
         dac_sequencer_answer(&sequencer); /* no ticks come that would */
-    if (!dac_sequencer_writable(&sequencer))
+    if (!dac_sequencer_writable(&sequencer)) {
+        refuse();
         return;
+    }
     const unsigned idle = dac_sequencer_idle(&sequencer);
     switch (region) {
     case PROGRAM:
         registers[address] = data;
         break;
     case X_TABLE:
+        bench_check(address < BENCH_TABLE_WORDS, "a table of this length");
         x_table[idle][address] = (dac_word)data;
         break;
     case Y_TABLE:
+        bench_check(address < BENCH_TABLE_WORDS, "a table of this length");
         y_table[idle][address] = (dac_word)data;
         break;
+#ifndef BENCH_EMITTED
     case X_FOURIER:
         x_fourier[address] = (int32_t)data;
         break;
     case Y_FOURIER:
         y_fourier[address] = (int32_t)data;
         break;
-    default:
+    case SINE:
         sine[address] = (int32_t)data;
         if (sine_words <= address)
             sine_words = address + 1;
+        break;
+#endif
+    default:
+        bench_check(false, "a write");
     }
 }
 
-/* Converter and tables, before anything else. */
-static void shape(uint64_t word)
+/* What the sequencer says of itself; that of a state that was not there before it is 0. */
+static void state(void)
 {
-    converter.bits = converter.word_bits = (uint8_t)(word & 31);
-    x_bits = word >> 5 & 31;
-    x_index_bits = word >> 10 & 31;
-    y_bits = word >> 15 & 31;
-    y_index_bits = word >> 20 & 31;
-}
+    play();
+    dac_sequencer_answer(&sequencer);
+    const dac_status status = dac_sequencer_status(&sequencer);
+    const bool writable = dac_sequencer_writable(&sequencer);
+    uint64_t *const words = states + STATE_WORDS * states_stored;
 
-static void power_up(uint64_t word)
-{
-    dac_converter y;
-    converter.power_up_code = (int32_t)(word & 0xffffff);
-    y = converter;
-    y.power_up_code = (int32_t)(word >> 24 & 0xffffff);
-    dac_sequencer_init(&sequencer, &converter, &y);
+    bench_check(states_stored < STATES, "so many states");
+    words[0] = (uint64_t)status.faults << 8 | (refused ? REFUSED : 0) | (writable ? WRITABLE : COMMITTED);
+    words[1] = (uint64_t)status.fault_counts[1] << 32 | status.fault_counts[0];
+    words[2] = (uint64_t)status.fault_counts[3] << 32 | status.fault_counts[2];
+    states_stored++;
 }
-
-#endif
 
 static void request(unsigned mask, uint32_t frames)
 {
@@ -268,6 +311,8 @@ static void request(unsigned mask, uint32_t frames)
         commits_in = 0;
     if (mask & WITHDRAW)
         bench_check(dac_sequencer_withdraw(&sequencer), "withdraw");
+    if (mask & (CLEAR_FAULTS | RESET))
+        refused = false;
     if (mask & CLEAR_FAULTS)
         bench_check(dac_sequencer_clear_faults(&sequencer), "clear_faults");
     if (mask & ARM)
@@ -287,7 +332,8 @@ static void request(unsigned mask, uint32_t frames)
     }
 }
 
-/* The first two words are the shape and the codes at power-up; then commands. After them come four captures: counts of faults. */
+/* The first two words are the shape and the codes at power-up; then commands. After them come four captures, the counts of faults, and
+ * those of states. */
 void bench_play(void)
 {
     uint64_t word;
@@ -308,6 +354,15 @@ void bench_play(void)
             pass(1);
             request(word >> 16 & 255, word & 0xffff);
             break;
+        case STATE:
+            pass(1);
+            state();
+            break;
+        case EXTRA:
+            pass(1);
+            play();
+            dac_sequencer_report(&sequencer, DAC_FAULT_OVERRUN);
+            break;
         default:
             pass(1);
             period = (uint32_t)word;
@@ -318,4 +373,12 @@ void bench_play(void)
     const dac_status status = dac_sequencer_status(&sequencer);
     for (int i = 0; i < DAC_FAULTS; i++)
         bench_write(status.fault_counts[i]);
+    for (unsigned i = 0; i < STATE_WORDS * states_stored; i++)
+        bench_write(states[i]);
+#ifdef BENCH_EMITTED
+    for (unsigned i = 0; i < BENCH_CONSTANTS; i++)
+        bench_write((uint64_t)bench_constants[i]);
+    for (unsigned i = 0; i < BENCH_HASH_DIGITS; i++)
+        bench_write((unsigned char)bench_hash[i]);
+#endif
 }

@@ -25,17 +25,20 @@ void bench_play(void);
 #ifdef BENCH_EMITTED
 #include "dac_sequencer.h"
 
-/* What stands in an emitted header, and is played in place of what a script writes: tablegen.verification.emitted makes the file that
- * holds it. Where `fourier` is NULL the table is played as it was emitted, elsewhere it is rendered. */
+/* What stands in an emitted header, and is played in place of what a script writes: tablegen.verification.c_target makes the file
+ * that holds it. Where `fourier` is NULL the table is played as it was emitted, elsewhere it is rendered. */
 typedef struct {
     const int32_t *fourier;
     unsigned harmonics;
-    int32_t offset_code;
 } bench_axis;
 
 extern const dac_program bench_program;
 extern const dac_converter bench_x_converter, bench_y_converter;
 extern const bench_axis bench_x, bench_y;
+/* The constants of the header, and the characters of its hash. */
+enum { BENCH_HASH_DIGITS = 64 };
+extern const int64_t bench_constants[BENCH_CONSTANTS];
+extern const char bench_hash[BENCH_HASH_DIGITS + 1];
 extern const int32_t *const bench_sine;
 extern const unsigned bench_sine_index_bits;
 #endif

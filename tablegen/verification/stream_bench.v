@@ -1,8 +1,9 @@
 // Bench of dac_sequencer: plays a script of writes and requests, one a clock, and captures what leaves with every
 // strobe.
 //
-// The script is a text file of 64-bit words in hexadecimal (tablegen/verify/stream.py writes it), the capture a text
-// file of 64-bit words: faults, flags, y code, x code. `finished` rises at the end of the script, after the last
+// The script is a text file of 64-bit words in hexadecimal (tablegen/verification/stream.py writes it), the capture a
+// text file of 64-bit words: faults, flags, y code, x code. STATES, if given, gets three words for every state that the
+// script asks for: flags and faults, and the four counts. `finished` rises at the end of the script, after the last
 // sample.
 
 `timescale 1ns / 1ps
@@ -11,6 +12,7 @@
 module stream_bench #(
     parameter SCRIPT = "",
     parameter CAPTURE = "",
+    parameter STATES = "",
     parameter DAC_BITS = 16,
     parameter X_INTERPOLATED = 1,
     parameter X_INDEX_BITS = 11,
@@ -30,7 +32,7 @@ module stream_bench #(
     parameter X_POWER_UP_CODE = 0,
     parameter Y_POWER_UP_CODE = 0
 );
-    localparam END = 4'd0, WAIT = 4'd1, WRITE = 4'd2, REQUEST = 4'd3, PERIOD = 4'd4;
+    localparam END = 4'd0, WAIT = 4'd1, WRITE = 4'd2, REQUEST = 4'd3, PERIOD = 4'd4, STATE = 4'd6, EXTRA = 4'd7;
 
     reg clock = 0;
     reg [63:0] command;
@@ -38,7 +40,8 @@ module stream_bench #(
     reg write = 0;
     reg [7:0] requests = 0;  // underrun, clear_faults, park, trigger, arm, withdraw, commit, reset
     reg tick = 0;
-    integer script, capture, fields;
+    reg extra = 0;  // a tick that is to be lost
+    integer script, capture, states, fields;
 
     reg finished = 0;
     integer strobes = 0, ticks = 0;
@@ -66,7 +69,7 @@ module stream_bench #(
         .write(write), .write_region(command[50:48]), .write_address(command[47:32]), .write_data(command[31:0]),
         .writable(writable), .refused(refused), .commit(requests[1]), .withdraw(requests[2]), .committed(committed),
         .arm(requests[3]), .arm_frames(command[15:0]), .trigger(requests[4]), .park(requests[5]),
-        .clear_faults(requests[6]), .armed(armed), .running(running), .tick(tick), .underrun(requests[7]), .busy(busy),
+        .clear_faults(requests[6]), .armed(armed), .running(running), .tick(tick || extra), .underrun(requests[7]), .busy(busy),
         .strobe(strobe), .x_code(x_code), .y_code(y_code), .line_marker(line_marker), .frame_marker(frame_marker),
         .pixel_marker(pixel_marker), .backward_marker(backward_marker), .valid_marker(valid_marker),
         .swapped_marker(swapped_marker), .playing(playing), .parked(parked), .faults(faults), .fault_counts(counts)
@@ -83,10 +86,12 @@ module stream_bench #(
             $display("ERROR: cannot open %0s or %0s", SCRIPT, CAPTURE);
             $finish;
         end
+        if (STATES != "") states = $fopen(STATES, "w");
         while (!finished) begin
             // What the inputs are for the next clock; they change while it is low.
             write = 0;
             requests = 0;
+            extra = 0;
             tick = period != 0 && until_tick == 0;
             if (period != 0) until_tick = until_tick == 0 ? period - 1 : until_tick - 1;
             if (wait_left != 0)
@@ -102,6 +107,11 @@ module stream_bench #(
                         period = command[31:0];
                         until_tick = 0;
                     end
+                    STATE: if (STATES != "")
+                        $fwrite(states, "%016x\n%016x\n%016x\n",
+                                {52'd0, faults, 2'd0, busy, running, armed, committed, refused, writable},
+                                {clamps, slews}, {underruns, overruns});
+                    EXTRA: extra = 1;
                     default: begin
                         finished = 1;
                         tick = 0;
@@ -124,6 +134,7 @@ module stream_bench #(
             if (latency > 0 && strobe != history[latency-1]) jitter = jitter + 1;
         end
         $fclose(capture);
+        if (STATES != "") $fclose(states);
         $fclose(script);
     end
 endmodule

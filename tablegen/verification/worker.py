@@ -1,6 +1,6 @@
 """Playing in a process group of its own, so that an interruption ends simulator, compiler and program with it.
 
-``run`` starts this module as a process and waits for it; what it does and finds is passed in files of its folder.
+``run_all`` starts this module as processes and waits for them; what it does and finds is passed in files of its folder.
 """
 
 import json
@@ -8,7 +8,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
@@ -25,31 +25,46 @@ def run(folder: Path, module: str, job: Mapping[str, Any]) -> dict[str, Any]:
 
     Raises ``ToolMissing`` and ``SimulationFailed`` as it does.
     """
+    return run_all(module, [(folder, job)])[0]
+
+
+def run_all(module: str, jobs: Sequence[tuple[Path, Mapping[str, Any]]]) -> list[dict[str, Any]]:
+    """The same for several jobs at once, each with a folder of its own; the first that fails is raised."""
+    processes: list[subprocess.Popen[bytes]] = []
+    try:
+        with held(signal.SIGINT, signal.SIGTERM) as came:  # inside Popen nobody could end what it has started
+            for folder, job in jobs:
+                processes.append(_started(folder, module, job))
+        deliver(came)
+        for process in processes:
+            process.wait()
+    finally:
+        for process in processes:
+            with suppress(ProcessLookupError, PermissionError):
+                os.killpg(process.pid, signal.SIGKILL)  # all that it started, whether it ended or was interrupted
+            process.wait()
+    return [_found(folder) for folder, _ in jobs]
+
+
+def _started(folder: Path, module: str, job: Mapping[str, Any]) -> subprocess.Popen[bytes]:
     (folder / _JOB).write_text(json.dumps({"module": module, "job": job}), "utf-8")
-    outcome = folder / _OUTCOME
-    outcome.unlink(missing_ok=True)
+    (folder / _OUTCOME).unlink(missing_ok=True)
     scratch = folder / "tmp"  # compilers that are ended leave theirs behind
     scratch.mkdir(exist_ok=True)
     path = os.pathsep.join(os.path.abspath(entry) for entry in sys.path if entry)
-    process = None
     with (folder / _LOG).open("wb") as log:
-        try:
-            with held(signal.SIGINT, signal.SIGTERM) as came:  # inside Popen nobody could end what it has started
-                process = subprocess.Popen(
-                    [sys.executable, "-P", "-m", "tablegen.verification.worker", str(folder)],
-                    stdin=subprocess.DEVNULL,
-                    stdout=log,
-                    stderr=subprocess.STDOUT,
-                    env={**os.environ, "PYTHONPATH": path, "TMPDIR": str(scratch)},
-                    start_new_session=True,
-                )
-            deliver(came)
-            process.wait()
-        finally:
-            if process is not None:
-                with suppress(ProcessLookupError, PermissionError):
-                    os.killpg(process.pid, signal.SIGKILL)  # all that it started, whether it ended or was interrupted
-                process.wait()
+        return subprocess.Popen(
+            [sys.executable, "-P", "-m", "tablegen.verification.worker", str(folder)],
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            stderr=subprocess.STDOUT,
+            env={**os.environ, "PYTHONPATH": path, "TMPDIR": str(scratch)},
+            start_new_session=True,
+        )
+
+
+def _found(folder: Path) -> dict[str, Any]:
+    outcome = folder / _OUTCOME
     if not outcome.is_file():
         raise SimulationFailed((folder / _LOG).read_text("utf-8", "replace").strip() or "the simulation was killed")
     found = json.loads(outcome.read_text("utf-8"))

@@ -73,8 +73,12 @@ X_TARGETS = paper_targets(0.53, (-0.86, 0.0, 0.86), (0.92, 1.0, 1.25), 100.0)
 Y_TARGETS = paper_targets(0.60, (-1.0, 0.0, 1.0), (0.90, 1.0, 1.22), 1.0)
 
 
-def identify(targets: Targets) -> Identified:
-    """Fit hysteresis and sensitivity to the targets."""
+def identify(targets: Targets, elsewhere: Sequence[tuple[float, float]] = ELSEWHERE) -> Identified:
+    """Fit hysteresis and sensitivity to the targets.
+
+    ``elsewhere`` are the sizes and middles, shares of v_max, at which one m(p) shall serve: a choice, which nothing in
+    the paper asks for. Without it the scanner is another one with the same printed numbers.
+    """
     units = _units()
     rows: list[Floats] = []
     wanted: list[Floats] = []
@@ -100,7 +104,7 @@ def identify(targets: Targets) -> Identified:
 
     # A build asks for m times the drive, whatever the size: m of the offset's images has to serve the others.
     small = targets.size.size_nm(OFFSET_SIZE)
-    for v, middle in ELSEWHERE:
+    for v, middle in elsewhere:
         m = targets.offset.factor(2.0 * middle - 1.0)
         if max(0.5 * m * v, 0.5 * m * OFFSET_SIZE) > min(middle, 1.0 - middle):
             continue

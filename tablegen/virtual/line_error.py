@@ -80,29 +80,36 @@ def about_window_line(error: LineError, directions: Sequence[str] = ("forward", 
     return LineError(error.size_nm * grown, branch(error.forward), branch(error.backward))
 
 
-def ideal_triangle(ticks: int, turn: float) -> Floats:
-    """The ideal position at every tick of a period, equation (14)."""
-    t = np.arange(ticks) / ticks
+def ideal_triangle(ticks: int, turn: float, first: float = 0.0) -> Floats:
+    """The ideal position at every tick of a period, equation (14); ``first`` is when the first one is, in ticks."""
+    t = (np.arange(ticks) + first) / ticks
     return np.where(t <= turn, t / turn, (1.0 - t) / (1.0 - turn))
 
 
 def line_error(
-    displacement_nm: Floats, turn: float, window: tuple[float, float] = (0.1, 0.9), ideal: Floats | None = None
+    displacement_nm: Floats,
+    turn: float,
+    window: tuple[float, float] = (0.1, 0.9),
+    ideal: Floats | None = None,
+    first: float = 0.0,
 ) -> LineError:
     """Compare one period of a settled displacement, shape (ticks,), with the ideal line.
+
+    ``first`` is when the first value is, in ticks: 0 for a drive that has value k at time k, 0.5 for one that holds it
+    from there on.
 
     ``ideal`` is the position that was asked for at every tick, 0..1, rounded where the line turns; by default the
     triangle. The displacement's extremes are taken for those of ``ideal``: those of a triangle are the line's ends.
     """
     ticks = len(displacement_nm)
-    asked = ideal_triangle(ticks, turn) if ideal is None else ideal
+    asked = ideal_triangle(ticks, turn, first) if ideal is None else ideal
     low, high = float(np.min(displacement_nm)), float(np.max(displacement_nm))
     size = (high - low) / (float(np.max(asked)) - float(np.min(asked)))
     if not size > 0.0:
         raise ValueError("the displacement does not move")
     reached = (displacement_nm - low) / size + float(np.min(asked))
     x = np.linspace(0.0, 1.0, POINTS)
-    times = np.arange(ticks) / ticks
+    times = (np.arange(ticks) + first) / ticks
 
     def branch(at: Floats) -> BranchError:
         y = np.interp(at, times, reached, period=1.0)

@@ -1,7 +1,7 @@
 """Linear dynamics as a sum of first-order terms, exact for a drive that is held from tick to tick.
 
-H(s) = direct + sum of r / (s - p), each complex pole standing for its conjugate as well. Values belong to the end of
-their tick, just before the next one begins: a scanner without inertia is then where its drive has been put.
+H(s) = direct + sum of r / (s - p), each complex pole standing for its conjugate as well. A value is the mean over its
+tick, which is what a pixel shows, and belongs to the middle of it: half a tick after the drive was put there.
 """
 
 from dataclasses import dataclass
@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from tablegen.numerics.arrays import Floats, FloatsLike
 
+Complex = npt.NDArray[np.complex128]
 _BLOCK_TICKS = 64  # ticks that are computed as one product of matrices
 
 
@@ -23,7 +24,7 @@ class Modes:
     poles: tuple[complex, ...] = ()
     residues: tuple[complex, ...] = ()
 
-    def response(self, f_hz: FloatsLike) -> npt.NDArray[np.complex128]:
+    def response(self, f_hz: FloatsLike) -> Complex:
         """H at frequencies in Hz, one for each."""
         s = 2j * pi * np.asarray(f_hz, dtype=np.float64)
         out = np.full(s.shape, complex(self.direct))
@@ -40,26 +41,26 @@ class Modes:
         # The response of each recursion, taken at the harmonics of the period: the steady state without waiting for it.
         z = np.exp(2j * pi * np.arange(len(drive) // 2 + 1) / len(drive))
         factor = np.full(z.shape, complex(self.direct))
-        change, weight = self._held(tick_s)
-        for gone, w, p in zip(-change, weight, self.poles, strict=True):
-            factor += w * z / (z - 1.0 + gone)
+        change, weight, kept, at_once = self._held(tick_s)
+        for gone, w, m, now, p in zip(-change, weight, kept, at_once, self.poles, strict=True):
+            factor += now + m * w / (z - 1.0 + gone)
             if p.imag:
-                factor += np.conj(w) * z / (z - 1.0 + np.conj(gone))
+                factor += np.conj(now) + np.conj(m * w) / (z - 1.0 + np.conj(gone))
         return np.fft.irfft(np.fft.rfft(drive) * factor, len(drive))
 
     def follow(self, drive: Floats, tick_s: float, at_rest: float | None = None) -> Floats:
         """The response to a drive that follows a long rest at ``at_rest``, or at its own first value."""
         if not self.poles:
             return self.direct * drive
-        change, weight = self._held(tick_s)
+        change, weight, kept, at_once = self._held(tick_s)
         decay = 1.0 + change
         doubled = np.where(np.array(self.poles).imag != 0.0, 2.0, 1.0)  # a pole and its conjugate
         ticks = len(drive)
         blocks = np.pad(drive, (0, -ticks % _BLOCK_TICKS)).reshape(-1, _BLOCK_TICKS)
         k = np.arange(_BLOCK_TICKS)
         powers = decay[:, None] ** k
-        impulse = np.sum((doubled * weight)[:, None] * powers, axis=0).real
-        impulse[0] += self.direct
+        later = np.sum((doubled * kept * weight)[:, None] * powers, axis=0).real
+        impulse = np.append(self.direct + np.sum(doubled * at_once).real, later[:-1])
         kernel = np.where(k[:, None] <= k, impulse[np.maximum(k - k[:, None], 0)], 0.0)
         fed = blocks @ powers[:, ::-1].T
         state = (drive[0] if at_rest is None else at_rest) / -change
@@ -68,14 +69,16 @@ class Modes:
         for i, feed in enumerate(fed):
             states[i] = state
             state = over * state + feed
-        carried = (states @ ((doubled * weight * decay)[:, None] * powers)).real
+        carried = (states @ ((doubled * kept * weight)[:, None] * powers)).real
         return (blocks @ kernel + carried).reshape(-1)[:ticks]
 
-    def _held(self, tick_s: float) -> tuple[npt.NDArray[np.complex128], npt.NDArray[np.complex128]]:
-        """For each term over a tick: the share by which its state changes, and the weight of the drive held."""
+    def _held(self, tick_s: float) -> tuple[Complex, Complex, Complex, Complex]:
+        """For each term over a tick: the share by which its state changes, and the weight of the drive held; and in the
+        mean over the tick the share of the state that it began with, and of the drive held."""
         p, r = np.array(self.poles, dtype=np.complex128), np.array(self.residues, dtype=np.complex128)
         change = np.expm1(p * tick_s)
-        return change, r * change / p
+        kept = change / (p * tick_s)
+        return change, r * change / p, kept, r * (kept - 1.0) / p
 
 
 def low_pass(bandwidth_hz: float) -> Modes:

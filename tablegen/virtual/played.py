@@ -14,7 +14,10 @@ MAX_TICKS = 1 << 20
 
 @dataclass(frozen=True, eq=False)
 class PlayedDrive:
-    """One period of an axis: codes, and volts at the piezo, at ``tick`` numbers that are ``tick_s`` apart."""
+    """One period of an axis: codes, and volts at the piezo, held for ``tick_s`` each; ``tick`` are their numbers.
+
+    Of a period that is too long ``tick`` are evenly spread, each the middle of those that it stands for.
+    """
 
     tick: Ints
     tick_s: float
@@ -24,15 +27,20 @@ class PlayedDrive:
 
     @property
     def time_s(self) -> Floats:
-        """When each code is put out."""
-        return self.period_s * np.arange(len(self.codes)) / len(self.codes)
+        """The middle of what each code is held for."""
+        return self.period_s * self.turns
+
+    @property
+    def turns(self) -> Floats:
+        """The same in periods."""
+        return (np.arange(len(self.codes)) + 0.5) / len(self.codes)
 
 
 def played(line: LinePlan, most_ticks: int = MAX_TICKS) -> PlayedDrive:
     """What an undisturbed period of one axis puts out: a line of x, a frame of y."""
     period = line.program.ticks
     count = min(period, most_ticks)
-    tick = np.arange(count, dtype=np.int64) * period // count
+    tick = (2 * np.arange(count, dtype=np.int64) + 1) * period // (2 * count)
     codes = line.program.codes(tick)
     period_s = 1.0 / float(line.rate)
     volts = line.converter.v_zero + line.converter.v_per_code * codes.astype(np.float64)
@@ -40,9 +48,7 @@ def played(line: LinePlan, most_ticks: int = MAX_TICKS) -> PlayedDrive:
 
 
 def intended(line: LinePlan, drive: PlayedDrive) -> Floats:
-    """The position, 0..1, that the scan file's model asks for at each of these ticks: rounded where the line turns."""
-    shape = line.drive.shape
-    k = np.arange(len(drive.codes), dtype=np.int64)
-    t = k / len(k)
-    w = Sampler(line.described, len(k)).at(k)
+    """The position, 0..1, that the scan file's model asks for in the middle of each tick: rounded where it turns."""
+    shape, t = line.drive.shape, drive.turns
+    w = Sampler(line.described, 2 * len(t)).at(2 * np.arange(len(t), dtype=np.int64) + 1)
     return np.where(t <= shape.turn, shape.forward.inverse(w), 1.0 - shape.backward.inverse(1.0 - w))

@@ -127,8 +127,8 @@ def csv(stages: Sequence[SimulationStage]) -> str:
 def _write_ticks(out: io.StringIO, start: str, one: AxisRun) -> None:
     ticks = len(one.displacement_nm)
     thin = slice(None, None, -(-ticks // _MAX_CSV_ROWS))
-    position = ideal_triangle(ticks, one.turn)[thin]
-    rising = (np.arange(ticks) / ticks <= one.turn)[thin]
+    position = ideal_triangle(ticks, one.turn, 0.5)[thin]
+    rising = (one.drive.turns <= one.turn)[thin]
     forward, backward = one.error.forward, one.error.backward
     residual = np.where(
         rising,

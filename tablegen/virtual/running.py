@@ -21,16 +21,16 @@ def running_trace(
 ) -> dict[str, Floats]:
     """``time_s``, ``drive_v``, ``displacement_nm`` of the emitted integers, played for ever before.
 
-    ``samples`` a period, of ``periods`` from ``start`` (in periods) on. The recorder's clock is fast by ``clock``, its
-    time 0 the line start before the record; the sensor is late by ``delay_s``.
+    ``samples`` a period, of ``periods`` from ``start`` (in periods) on; time 0 is the line start before the record. The
+    recorder averages over a tick about each of them, its clock is fast by ``clock``, and the sensor is late by
+    ``delay_s``.
     """
     drive = played(line)
     moved = axis.settled(drive.volts, drive.tick_s)
     turns = start + np.arange(round(periods * samples)) / samples
-    at = np.arange(len(moved)) / len(moved)
     true_s = turns * drive.period_s
-    place = np.floor(turns % 1.0 * len(moved) + 1e-6).astype(np.int64) % len(moved)
-    displacement = np.interp(turns - delay_s / drive.period_s, at, moved, period=1.0)
-    time = true_s * (1.0 + clock)
+    # What a converter holds, averaged over a tick, is linear between the middles of its ticks.
+    volts = np.interp(turns, drive.turns, drive.volts, period=1.0)
+    displacement = np.interp(turns - delay_s / drive.period_s, drive.turns, moved, period=1.0)
     reading = (sensor or Sensor()).read(displacement, true_s)
-    return {"time_s": time, "drive_v": drive.volts[place], "displacement_nm": reading}
+    return {"time_s": true_s * (1.0 + clock), "drive_v": volts, "displacement_nm": reading}

@@ -47,13 +47,13 @@ class VirtualAxis:
         )
 
     def settled(self, volts: Floats, tick_s: float) -> Floats:
-        """Where the axis is at the end of every tick of a period that has been played for ever."""
+        """Where the axis is, as a mean over each tick, in a period that has been held tick by tick for ever."""
         drive = self._normalised(self.amplifier.settled(volts, tick_s))
         moved = self._sensitivity(float(np.mean(volts))) * self.hysteresis.settled(drive)
         return self.resonance.settled(self.creep.settled(moved, tick_s), tick_s)
 
     def follow(self, volts: Floats, tick_s: float, mean_v: float | None = None) -> Floats:
-        """Where the axis is at the end of every tick of a drive that begins after a long rest at its first voltage.
+        """The same of a drive that begins after a long rest at its first voltage.
 
         The sensitivity is that at ``mean_v``, by default the mean of this drive; it does not change meanwhile.
         """

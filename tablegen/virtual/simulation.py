@@ -55,7 +55,7 @@ def run_line(line: LinePlan, axis: VirtualAxis) -> AxisRun:
     """Play one axis until it has settled."""
     drive = played(line)
     displacement = axis.settled(drive.volts, drive.tick_s)
-    error = line_error(displacement, line.drive.turn, line.band_limit.window, intended(line, drive))
+    error = line_error(displacement, line.drive.turn, line.band_limit.window, intended(line, drive), 0.5)
     directions = ("forward", "backward") if line.band_limit.directions == "both" else ("forward",)
     return AxisRun(
         axis=line.axis,

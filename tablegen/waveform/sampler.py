@@ -13,6 +13,7 @@ from tablegen.waveform.series import FourierSeries
 _TAYLOR_ORDER = 6
 # Half a block of the highest harmonic is then pi/64 of angle, and its seventh power over 7! is 1e-13.
 _BLOCKS_PER_HARMONIC = 64
+_CHUNK_TICKS = 1 << 14  # ticks that are worked out together, in the cache
 
 
 class Sampler:
@@ -40,10 +41,17 @@ class Sampler:
         """w(k / count) for any k in [0, count)."""
         if not self._blocks:
             return self._samples[k]
+        if len(k) <= _CHUNK_TICKS:
+            return self._expanded(k)
+        chunks = range(0, len(k), _CHUNK_TICKS)
+        return np.concatenate([self._expanded(k[first : first + _CHUNK_TICKS]) for first in chunks])
+
+    def _expanded(self, k: Ints) -> Floats:
         block = (k * self._blocks + self._count // 2) // self._count
         h = (k * self._blocks - block * self._count) * (1.0 / (self._count * float(self._blocks)))
         block = block & (self._blocks - 1)
         total: Floats = self._terms[-1][block]
         for term in reversed(self._terms[:-1]):
-            total = total * h + term[block]
+            total *= h
+            total += term[block]
         return total

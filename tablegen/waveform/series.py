@@ -1,12 +1,15 @@
 """A real, periodic, band-limited waveform: w(t) = a0 + sum_n a_n cos(2 pi n t) + b_n sin(2 pi n t)."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import tau
 
 import numpy as np
 
 from tablegen.numerics.arrays import Floats, FloatsLike, freeze
 from tablegen.numerics.turns import sine_and_cosine
+
+_BLOCK = 1 << 12  # times that are worked out together
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,24 +30,22 @@ class FourierSeries:
 
     def value(self, t: FloatsLike, derivative: int = 0) -> Floats:
         """w, or its derivative with respect to t, at times in periods; of the shape of ``t``."""
-        t = np.asarray(t, dtype=np.float64)
-        total = np.full(t.shape, self.a0 if derivative == 0 else 0.0)
-        for n in range(1, self.harmonics + 1):
-            s, c = sine_and_cosine(n * t)
-            total = total + self._term(n, derivative, s, c)
-        return total
+        return values(t, (self, derivative))[0]
 
     def on_grid(self, count: int, derivative: int = 0) -> Floats:
         """As ``value`` at k / count for k in [0, count), by one table of sines for all harmonics."""
         s, c = sine_and_cosine(np.arange(count) / count)
         k = np.arange(count)
         total = np.full(count, self.a0 if derivative == 0 else 0.0)
+        at = np.zeros_like(k)
         for n in range(1, self.harmonics + 1):
-            at = (n * k) % count
-            total = total + self._term(n, derivative, s[at], c[at])
+            at += k  # n k modulo count
+            at -= count * (at >= count)
+            total += self.term(n, derivative, s[at], c[at])
         return total
 
-    def _term(self, n: int, derivative: int, s: Floats, c: Floats) -> Floats:
+    def term(self, n: int, derivative: int, s: Floats, c: Floats) -> Floats:
+        """Harmonic n, or its derivative, where sine and cosine of 2 pi n t are s and c."""
         a, b = float(self.a[n - 1]), float(self.b[n - 1])
         for _ in range(derivative % 4):  # d/dt turns (a, b) into 2 pi n (b, -a)
             a, b = b, -a
@@ -53,6 +54,10 @@ class FourierSeries:
 
     def peak_slope(self) -> float:
         """max |w'| per period, on a grid of 32 points per period of the highest harmonic."""
+        return self._peak_slope
+
+    @cached_property
+    def _peak_slope(self) -> float:
         return float(np.max(np.abs(self.on_grid(32 * self.harmonics, 1))))
 
     def peak_acceleration(self) -> float:
@@ -75,3 +80,22 @@ class FourierSeries:
     def times(self, real: Floats, imaginary: Floats) -> "FourierSeries":
         """The series with harmonic n multiplied by real[n - 1] + i imaginary[n - 1]; the mean stays."""
         return FourierSeries(self.a0, self.a * real + self.b * imaginary, self.b * real - self.a * imaginary)
+
+
+def values(t: FloatsLike, *asked: tuple[FourierSeries, int]) -> tuple[Floats, ...]:
+    """Values of several series or of their derivatives at the same times, each of the shape of ``t``.
+
+    The sines are worked out once for all of them.
+    """
+    t = np.asarray(t, dtype=np.float64)
+    totals = tuple(np.full(t.shape, series.a0 if derivative == 0 else 0.0) for series, derivative in asked)
+    harmonics = max(series.harmonics for series, _ in asked)
+    for first in range(0, t.size, _BLOCK):  # a block stays in the cache through all harmonics
+        block = t.reshape(-1)[first : first + _BLOCK]
+        parts = [total.reshape(-1)[first : first + _BLOCK] for total in totals]
+        for n in range(1, harmonics + 1):
+            s, c = sine_and_cosine(n * block)
+            for part, (series, derivative) in zip(parts, asked, strict=True):
+                if n <= series.harmonics:
+                    part += series.term(n, derivative, s, c)
+    return totals

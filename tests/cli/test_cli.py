@@ -525,7 +525,7 @@ def happened(what):
     if what.startswith(wanted):
         count -= 1
         if count == 0:
-            os.kill(os.getpid(), signal.SIGINT)
+            os.kill(os.getpid(), signal.SIGINT)  # or another one
 sys.argv = ["tablegen", *sys.argv[3:]]
 from tablegen.cli import main
 sys.addaudithook(lambda event, arguments: happened(f"{event} {arguments}"))
@@ -534,9 +534,11 @@ main()
 """
 
 
-def interrupted(event: str, count: int, *arguments: str | Path) -> subprocess.CompletedProcess[str]:
+def interrupted(
+    event: str, count: int, *arguments: str | Path, number: str = "SIGINT"
+) -> subprocess.CompletedProcess[str]:
     """The command line, interrupted as an audit event or a call happens for the so-manieth time."""
-    command = [sys.executable, "-c", INTERRUPTED, event, str(count), *map(str, arguments)]
+    command = [sys.executable, "-c", INTERRUPTED.replace("SIGINT", number), event, str(count), *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, check=False, timeout=PATIENCE_S)
 
 
@@ -578,38 +580,59 @@ def test_an_interruption_before_writing_leaves_the_build_that_was_there(scan: Pa
 
 @pytest.mark.common
 @pytest.mark.parametrize(
-    ("event", "count"), [("tempfile.mkstemp", 1), ("tempfile.mkstemp", 5), ("os.rename", 1), ("os.rename", 4)]
+    ("event", "count", "number"),
+    [
+        *(("tempfile.mkstemp", 1, "SIGINT"), ("tempfile.mkstemp", 5, "SIGTERM")),
+        *(("os.rename", 1, "SIGINT"), ("os.rename", 4, "SIGTERM"), ("os.rename", 3, "SIGHUP")),
+    ],
 )
-def test_an_interruption_while_writing_waits_for_the_last_file(scan: Path, event: str, count: int) -> None:
+def test_an_interruption_while_writing_waits_for_the_last_file(scan: Path, event: str, count: int, number: str) -> None:
     out = scan.parent / "out"
     run("build", scan, "-o", out)
     scan.write_text(LONG, encoding="utf-8")
     run("build", scan, "-o", scan.parent / "wanted")
-    done = interrupted(event, count, "build", scan, "-o", out)
+    done = interrupted(event, count, "build", scan, "-o", out, number=number)
     assert done.returncode == 130
     assert done.stderr.strip() == f"interrupted, after the files of {out} had been written"
     assert contents(out) == contents(scan.parent / "wanted")
     assert run("build", scan, "-o", out, "--check").status == 0
 
 
-def test_a_signal_from_outside_interrupts_a_build(scan: Path) -> None:
-    """The build waits at a pipe: that it has opened it is known, since until then our own end does not open."""
-    pipe, out = scan.parent / "pipe.toml", scan.parent / "out"
-    os.mkfifo(pipe)
-    with (
-        subprocess.Popen(
-            [sys.executable, "-m", "tablegen", "build", pipe, "-o", out],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        ) as process,
-        pipe.open("wb"),
-    ):
-        process.send_signal(signal.SIGINT)
+WAITING = """
+import signal, sys
+import tablegen.api.build
+def wait(*_):
+    print("planning", flush=True)
+    while True:
+        signal.pause()
+tablegen.api.build.make_plan = wait
+from tablegen.cli import main
+main()
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_from_outside_interrupts_a_build(scan: Path, number: signal.Signals) -> None:
+    out = scan.parent / "out"
+    command = [sys.executable, "-c", WAITING, "build", scan, "-o", out]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "planning\n"
+        process.send_signal(number)
         printed, told = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 130
     assert (printed, told.strip()) == ("", "interrupted; the output directory was left as it was")
     assert not out.exists()
+
+
+def test_what_is_ignored_stays_ignored(scan: Path) -> None:
+    """As ``nohup`` wants it: the signal comes first, and the build is there all the same."""
+    shell = 'trap "" HUP; exec "$@"'
+    hooked = INTERRUPTED.replace("SIGINT", "SIGHUP")
+    command = ["/bin/sh", "-c", shell, "sh", sys.executable, "-c", hooked, "call certify", "1", "build", scan, "-q"]
+    done = subprocess.run(command, cwd=scan.parent, capture_output=True, text=True, check=False, timeout=PATIENCE_S)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (scan.parent / "build" / "manifest.json").exists()
 
 
 def test_a_scanner_that_is_a_pipe_is_refused_and_not_waited_for(scan: Path) -> None:

@@ -8,6 +8,7 @@ from unittest.mock import patch
 
 import pytest
 from building import Variant, build
+from client_line import VirtualLine
 from client_rig import BOOT, KEY, Bench, info_for, model
 from editing import run
 from link_programs import INFO
@@ -185,8 +186,11 @@ def test_trigger_and_park(bench: Bench, folder: Path) -> None:
     counted = bench.run("trigger", "--frames", "2")
     assert (counted.status, counted.out) == (9, "")
     assert "`tablegen park --wait` first" in counted.err
+    bench.options["tick_hz"] = 200  # some ticks of ramp, and a few ms from PARK to STATUS
     assert bench.run("park").out == "ramping to the park codes\n"
+    bench.options["tick_hz"] = 500_000
     assert bench.run("park", "--wait").out == "parked\n"
+    assert bench.run("park").out == "parked\n"
     assert bench.run("trigger", "--frames", "2").out == "plays 2 frames\n"
     assert bench.run("park", "--wait", "--timeout", "5").out == "parked\n"
     bench.options["tick_hz"] = 500_000_000
@@ -205,6 +209,49 @@ def test_trigger_without_a_scan_or_a_clock(info: DeviceInfo) -> None:
     stopped = Bench(model(info), tick_hz=0).run("trigger")
     assert stopped.status == 9
     assert "the device does not play" in stopped.err
+
+
+def test_park_without_a_scan(info: DeviceInfo) -> None:
+    parked = Bench(model(info, boot=None)).run("park")
+    assert (parked.status, parked.out) == (0, "the device has no scan yet, and nothing to park\n")
+
+
+def test_what_a_device_was_asked_is_not_said_to_be_done(bench: Bench) -> None:
+    """Its clock stands still: it passes requests on, and nothing comes of them. STATUS shows that."""
+    bench.run("trigger")
+    bench.options["tick_hz"] = 0
+    still = bench.run("park")
+    assert (still.status, still.out) == (9, "")
+    assert "took the request to park, but still plays" in still.err
+    bench.device.player.faults = 1  # type: ignore[misc]
+    faulty = bench.run("clear")
+    assert (faulty.status, faulty.out) == (9, "")
+    assert "but has faults" in faulty.err
+
+
+@pytest.mark.parametrize(("command", "request_"), [("park", "PARK"), ("trigger", "ARM"), ("clear", "CLEAR")])
+def test_without_a_key_the_request_is_named_that_needs_it(info: DeviceInfo, command: str, request_: str) -> None:
+    outcome = Bench(model(info, KEY)).run(command)
+    assert (outcome.status, outcome.out) == (9, "")
+    assert outcome.err == (
+        f"the device has a key, and refuses {request_} without it; give the key of this device (--key-file FILE)\n"
+    )
+
+
+def test_a_slow_line_is_named(info: DeviceInfo, folder: Path) -> None:
+    class Slow(VirtualLine):
+        """At an eighth of the rate that it was opened with."""
+
+        @property
+        def _byte_s(self) -> float:
+            return 8 * super()._byte_s
+
+    bench = Bench(model(info, boot=BOOT))
+    with patch("client_rig.VirtualLine", Slow):
+        shown = bench.run("upload", folder, "--as", "table", "--baud", "76800")
+    assert shown.status == 0
+    assert shown.out.splitlines()[2] == "the line is slow: answers come at about 9600 baud (--baud 9600)"
+    assert "baud" not in bench.run("upload", folder, "--as", "table", "--force").out
 
 
 def test_park_that_does_not_come_about(bench: Bench) -> None:
@@ -258,6 +305,7 @@ def test_a_key_opens_what_is_locked(tmp_path: Path, folder: Path, info: DeviceIn
     bench = Bench(model(info, KEY))
     path = tmp_path / "key"
     path.write_text(KEY.hex()[:16] + "\n" + KEY.hex()[16:] + "\n", "ascii")
+    path.chmod(0o600)
     for command in (("upload", folder), ("park",)):
         outcome = bench.run(*command)
         assert (outcome.status, outcome.out) == (9, "")
@@ -265,6 +313,22 @@ def test_a_key_opens_what_is_locked(tmp_path: Path, folder: Path, info: DeviceIn
         assert bench.run(*command, "--key-file", path).status == 0
     path.write_text(bytes(16).hex(), "ascii")
     assert bench.run("upload", folder, "--force", "--key-file", path).status == 9
+
+
+def test_a_key_that_others_can_read_is_warned_of(tmp_path: Path, info: DeviceInfo) -> None:
+    bench = Bench(model(info, KEY))
+    path = tmp_path / "key"
+    path.write_text(KEY.hex(), "ascii")
+    for mode, warned in ((0o600, False), (0o400, False), (0o640, True), (0o604, True), (0o644, True), (0o620, True)):
+        path.chmod(mode)
+        outcome = bench.run("park", "--key-file", path)
+        assert outcome.status == 0
+        assert (
+            outcome.err.startswith(f"warning: {path}: others can read the key (mode {mode:04o}): run `chmod 600 ")
+            == warned
+        )
+        assert warned or outcome.err == ""
+        assert KEY.hex() not in outcome.out + outcome.err
 
 
 def test_ports_are_listed() -> None:
@@ -325,7 +389,7 @@ def test_the_bar_shows_rate_and_time_left(monkeypatch: pytest.MonkeyPatch) -> No
         "",
         "[........................] 0/8000 bytes",
         "[######..................] 2000/8000 bytes  1.0 kB/s  6.0 s left",
-        "[########################] 8000/8000 bytes  waiting for the start of a line",
+        "[########################] 8000/8000 bytes  checked, then waiting for a line",
         "",
         "",
     ]

@@ -539,14 +539,14 @@ DRIVE = [
     case(
         "x.offset_v = 5.0",
         says=(
-            "scan.toml:23: x.size_nm: the drive spans -3.8956..13.8807 V, 3.896 V outside the driver's 0..100 "
+            "scan.toml:23: x.size_nm: the drive spans -3.8956..13.8805 V, 3.896 V outside the driver's 0..100 "
             "V; an offset of 9 to 88.6 V fits, or at this offset a line of about 106 nm"
         ),
     ),
     case(
         "x.offset_v = 97.0",
         says=(
-            "scan.toml:23: x.size_nm: the drive spans 85.1095..108.8705 V, 8.871 V outside the driver's 0..100 "
+            "scan.toml:23: x.size_nm: the drive spans 85.1095..108.8703 V, 8.87 V outside the driver's 0..100 "
             "V; an offset of 9 to 88.6 V fits, or at this offset a line of about 46.4 nm"
         ),
     ),
@@ -563,7 +563,7 @@ DRIVE = [
         "- x.offset_v",
         "x.offset_nm = 40",
         says=(
-            "scan.toml:24: x.size_nm: the drive spans -5.2132..12.5581 V, 5.213 V outside the driver's 0..100 "
+            "scan.toml:24: x.size_nm: the drive spans -5.2132..12.5579 V, 5.213 V outside the driver's 0..100 "
             "V; an offset of 9 to 88.6 V fits, or at this offset a line of about 77.2 nm"
         ),
     ),
@@ -577,7 +577,7 @@ DRIVE = [
         "x.size_v = 20",
         "x.offset_v = 5.0",
         says=(
-            "scan.toml:23: x.size_v: the drive spans -3.8956..13.8807 V, 3.896 V outside the driver's 0..100 "
+            "scan.toml:23: x.size_v: the drive spans -3.8956..13.8805 V, 3.896 V outside the driver's 0..100 "
             "V; an offset of 9 to 88.6 V fits, or at this offset about 11.1 V"
         ),
     ),
@@ -585,7 +585,7 @@ DRIVE = [
         "x.size_of = 'window'",
         "x.offset_v = 5.0",
         says=(
-            "scan.toml:24: x.size_nm: the drive spans -5.8845..15.8608 V, 5.885 V outside the driver's 0..100 "
+            "scan.toml:24: x.size_nm: the drive spans -5.8844..15.8608 V, 5.884 V outside the driver's 0..100 "
             "V; an offset of 11 to 86.2 V fits, or at this offset a window of about 85.2 nm"
         ),
     ),
@@ -603,7 +603,7 @@ DRIVE = [
         "x.size_nm = 1200.0",
         "x.offset_v = 70.0",
         says=(
-            "scan.toml:23: x.size_nm: the drive spans 20.2874..119.3443 V, 19.34 V outside the driver's 0..100 "
+            "scan.toml:23: x.size_nm: the drive spans 20.2876..119.3434 V, 19.34 V outside the driver's 0..100 "
             "V; an offset of 45.4 to 53.7 V fits, or at this offset a line of about 674 nm"
         ),
     ),
@@ -618,7 +618,7 @@ DRIVE = [
         "amplifier.gain = 1.0",
         says=[
             (
-                "scan.toml:13: amplifier.gain: the x drive of 40.3346..59.6492 V needs -9.6654..9.6492 V of the "
+                "scan.toml:13: amplifier.gain: the x drive of 40.3346..59.6491 V needs -9.6654..9.6491 V of the "
                 "converter, 4.665 V beyond its -5..4.99985 V; a gain of 1.932 with a bias_v of 49.992 V would "
                 "carry it, or scan less"
             ),
@@ -634,7 +634,7 @@ DRIVE = [
         "y.size_nm = 20.0",
         says=[
             (
-                "scan.toml:13: amplifier.gain: the x drive of 40.3346..59.6492 V needs 4.0335..5.9649 V of the "
+                "scan.toml:13: amplifier.gain: the x drive of 40.3346..59.6491 V needs 4.0335..5.9649 V of the "
                 "converter, 0.9651 V beyond its -5..4.99985 V; a gain of 1.932 with a bias_v of 49.992 V would "
                 "carry it, or scan less"
             ),
@@ -650,7 +650,7 @@ DRIVE = [
         "amplifier.bias_v = 45.0",
         says=[
             (
-                "scan.toml:13: amplifier.gain: the x drive of 40.3346..59.6492 V needs -14.6492..4.6654 V of the "
+                "scan.toml:13: amplifier.gain: the x drive of 40.3346..59.6491 V needs -14.6491..4.6654 V of the "
                 "converter, 9.649 V beyond its -5..4.99985 V; a gain of -1.932 with a bias_v of 49.9917 V would "
                 "carry it, or scan less"
             ),
@@ -678,7 +678,7 @@ DRIVE = [
     case(
         "amplifier.max_slew_v_per_s = 9e3",
         says=(
-            "scan.toml:20: timing.line_rate_hz: the x drive slews at 17773.3 V/s, 1.975 times the amplifier's "
+            "scan.toml:20: timing.line_rate_hz: the x drive slews at 17773.2 V/s, 1.975 times the amplifier's "
             "9000 V/s; about 167.91 Hz or a line of 79.28 nm would fit"
         ),
     ),
@@ -693,11 +693,11 @@ DRIVE = [
         "amplifier.max_slew_v_per_s = 100.0",
         says=[
             (
-                "scan.toml:20: timing.line_rate_hz: the x drive slews at 17773.3 V/s, 177.7 times the amplifier's "
+                "scan.toml:20: timing.line_rate_hz: the x drive slews at 17773.2 V/s, 177.7 times the amplifier's "
                 "100 V/s; about 1.1252 Hz or a line of 0.5088 nm would fit"
             ),
             (
-                "scan.toml:20: timing.line_rate_hz: the y drive slews at 493.068 V/s, 4.931 times the amplifier's "
+                "scan.toml:20: timing.line_rate_hz: the y drive slews at 493.067 V/s, 4.931 times the amplifier's "
                 "100 V/s; about 40.562 Hz or a line of 18.32 nm would fit"
             ),
         ],
@@ -720,7 +720,7 @@ DRIVE = [
         "amplifier.max_slew_v_per_s = 9e3",
         "timing.ticks_per_line = 1250",
         says=(
-            "scan.toml:18: timing.ticks_per_line: the x drive slews at 17773.3 V/s, 1.975 times the "
+            "scan.toml:18: timing.ticks_per_line: the x drive slews at 17773.2 V/s, 1.975 times the "
             "amplifier's 9000 V/s; about 2978 ticks_per_line or a line of 79.28 nm would fit"
         ),
     ),
@@ -729,7 +729,7 @@ DRIVE = [
         "timing.ticks_per_pixel = 5",
         "timing.pixels = 100",
         says=(
-            "scan.toml:18: timing.ticks_per_pixel: the x drive slews at 17773.3 V/s, 1.975 times the "
+            "scan.toml:18: timing.ticks_per_pixel: the x drive slews at 17773.2 V/s, 1.975 times the "
             "amplifier's 9000 V/s; about 12 ticks_per_pixel or a line of 79.28 nm would fit"
         ),
     ),
@@ -1231,7 +1231,7 @@ LIMITS = [
     case(
         "limits.max_error_lsb = 0.6",
         says=(
-            "scan.toml:55: limits.max_error_lsb: the y axis errs by up to 0.7488 LSB, above 0.6; lengthen or "
+            "scan.toml:55: limits.max_error_lsb: the y axis errs by up to 0.7406 LSB, above 0.6; lengthen or "
             "widen y.table"
         ),
         status=3,
@@ -1240,11 +1240,11 @@ LIMITS = [
         "limits.max_scaling_error_percent = 0.3",
         says=[
             (
-                "scan.toml:56: limits.max_scaling_error_percent: the x axis has a scaling error of 0.3088 %, above "
+                "scan.toml:56: limits.max_scaling_error_percent: the x axis has a scaling error of 0.3104 %, above "
                 "0.3 %; most of it is quantisation: more dac.bits, or an amplifier whose range fits the x scan"
             ),
             (
-                "scan.toml:56: limits.max_scaling_error_percent: the y axis has a scaling error of 0.3518 %, above "
+                "scan.toml:56: limits.max_scaling_error_percent: the y axis has a scaling error of 0.3498 %, above "
                 "0.3 %; most of it is quantisation: more dac.bits, or an amplifier whose range fits the y scan"
             ),
         ],
@@ -1262,10 +1262,10 @@ LIMITS = [
     case(
         "timing.line_rate_hz = 900.0",
         "x.band_limit.harmonics = 64",
-        "limits.max_scaling_error_percent = 0.35",
+        "limits.max_scaling_error_percent = 0.34",
         says=(
-            "scan.toml:56: limits.max_scaling_error_percent: the y axis has a scaling error of 0.3515 %, above "
-            "0.35 %; most of it is quantisation: more dac.bits, or an amplifier whose range fits the y scan"
+            "scan.toml:56: limits.max_scaling_error_percent: the y axis has a scaling error of 0.3436 %, above "
+            "0.34 %; most of it is quantisation: more dac.bits, or an amplifier whose range fits the y scan"
         ),
         status=3,
     ),
@@ -1530,7 +1530,9 @@ def test_what_a_message_on_the_scanner_advises_helps(
     assert found
     write_pair(here, scan, edited(scanner, remedy.format(found[1])))
     after = run("check", "scan.toml")
-    assert (after.status, after.messages) == (0, [])
+    assert after.status == 0
+    # At the edge of what can be built a branch all but stands still somewhere, which is a warning.
+    assert all(message.startswith("warning: ") for message in after.messages)
 
 
 def refused(folder: Path, scan: str) -> str:

@@ -5,6 +5,7 @@ with C++20's, Verilog-2005 and SystemVerilog-2017 (annex B), VHDL-2008 (15.10). 
 for the names that are accepted.
 """
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,7 +13,8 @@ import pytest
 from building import run
 from sets import by_tool
 
-from tablegen.config.names import why_not_a_name
+from tablegen.config.names import of_the_runtime, why_not_a_name
+from tablegen.resources import c_link, c_runtime, verilog_runtime
 
 C = """
 auto break case char const continue default do double else enum extern float for goto if inline int long register
@@ -169,3 +171,48 @@ def test_the_compiler_refuses_a_bad_shape(compiler: str, tmp_path: Path) -> None
 def test_a_name_does_not_hide_a_header_of_the_library() -> None:
     """``stdint.h`` in the build folder would include itself instead of what it needs."""
     assert [name for name in LIBRARY_HEADERS.split() if why_not_a_name(name) is None] == []
+
+
+# Names of the sequencer: its files are in every build, and its identifiers in every program that includes one.
+
+OF_THE_SEQUENCER = [
+    "dac_link",
+    "dac_axis",
+    "DAC_LINK",
+    "dac_word",
+    "dac_program",
+    "Dac_Sequencer",
+    "dac",
+    "DAC",
+    "dac_x",
+]
+
+
+@pytest.mark.parametrize("name", [*OF_THE_SEQUENCER, "program_loader", "Program_Loader"])
+def test_names_of_the_sequencer_are_refused_in_any_case(name: str) -> None:
+    assert why_not_a_name(name)
+
+
+@pytest.mark.parametrize("name", ["dacs", "dac1_scan", "my_dac", "da_c", "x_dac_link"])
+def test_names_that_only_resemble_them_are_accepted(name: str) -> None:
+    assert why_not_a_name(name) is None
+
+
+def test_no_scan_can_be_called_as_a_file_or_identifier_of_the_sequencer_begins() -> None:
+    """What is emitted is called NAME or begins with NAME_; so no such beginning of a name of the sequencer is free."""
+    files = [*c_runtime(), *c_link(), *verilog_runtime()]
+    words = {path.stem for path in files}
+    for path in files:
+        text = path.read_text("utf-8")
+        if path.suffix == ".v":
+            words |= set(re.findall(r"^\s*module\s+(\w+)", text, re.MULTILINE))
+        elif path.suffix == ".h":
+            words |= set(re.findall(r"^#\s*define\s+(\w+)", text, re.MULTILINE))
+            words |= set(re.findall(r"^(?:struct |enum |union )?\w[\w \*]*?\b(\w+)\(", text, re.MULTILINE))
+    assert len(words) > 100
+    assert {"dac_link", "DAC_LINK_H", "program_loader"} <= words
+    parts = {word: word.split("_") for word in words}
+    beginnings = {"_".join(split[:n]) for split in parts.values() for n in range(1, len(split) + 1)}
+    free = {name for name in beginnings if re.fullmatch("[A-Za-z][A-Za-z0-9_]*", name) and why_not_a_name(name) is None}
+    assert free <= {"program"}  # program_loader alone is a name of the sequencer, and no scan emits a module
+    assert {path.name for path in files} == {path.name for path in files if of_the_runtime(path.name)}

@@ -421,10 +421,36 @@ def test_a_huge_decimal_number_is_reported_on_its_line(folder: Path, text: str, 
 
 
 def test_an_oversized_file_is_not_even_parsed(folder: Path) -> None:
-    assert refused(folder, b"#" * ((4 << 20) + 1)) == (
-        "scan.toml: above 4194304 bytes, more than any configuration has"
+    assert refused(folder, b"#" * ((1 << 20) + 1)) == (
+        "scan.toml: cannot be read: above 1 MiB, which is the most that a scan or scanner file may have"
     )
-    assert located(folder, b"#" * (4 << 20)) == {}
+    assert located(folder, b"#" * (1 << 20)) == {}
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("b = 1\n" + "a." * 20 + "a = 1", "scan.toml:2: a key of 21 parts; at most 20 are read"),
+        ("[" + "'a' . " * 20_000 + "a]", "scan.toml:1: a key of 20001 parts; at most 20 are read"),
+        ('y = { a = """x"""", ' + '"\\"" .' * 20 + "a = 1 }", "scan.toml:1: a key of 21 parts; at most 20 are read"),
+        ("x = ''''a'''''\n" + "a." * 20 + "a = [", "scan.toml:2: a key of 21 parts; at most 20 are read"),
+        (
+            "".join(f"[k{i}.b.c]\n" for i in range(17_000)),
+            "scan.toml:16667: the dotted keys so far have 50001 parts; at most 50000 are read",
+        ),
+    ],
+)
+def test_keys_that_would_fill_the_memory_are_refused(folder: Path, text: str, said: str) -> None:
+    assert refused(folder, text) == said
+
+
+@pytest.mark.parametrize("quoted", ['"{}"', "'{}'", '"""\n{}"""', "'''{}'''", '"\\"{}"', '""\n# {}', '"""a"""" # {}'])
+def test_dots_in_texts_and_comments_make_no_key(folder: Path, quoted: str) -> None:
+    assert located(folder, "a = " + quoted.format("a." * 30 + "a") + "\nb = 1.5\n").keys() == {"a", "b"}
+
+
+def test_twenty_parts_are_read(folder: Path) -> None:
+    assert len(located(folder, "a." * 19 + "a = 1")) == 20
 
 
 def test_a_missing_file_and_a_folder_are_named(folder: Path) -> None:
@@ -437,7 +463,7 @@ def test_a_missing_file_and_a_folder_are_named(folder: Path) -> None:
 def test_an_endless_device_is_given_up() -> None:
     with pytest.raises(Rejected) as caught:
         read_toml(Path("/dev/zero"), "scan.toml")
-    assert str(caught.value) == "scan.toml: above 4194304 bytes, more than any configuration has"
+    assert str(caught.value) == "scan.toml: cannot be read: a device, where a regular file is needed"
 
 
 def test_values_are_those_of_the_standard_library(folder: Path) -> None:

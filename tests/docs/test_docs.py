@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from building import REPOSITORY
 from click.testing import CliRunner
-from editing import SCAN, edited, write_pair
+from editing import SCAN, edited, run, write_pair
 from scaling import SECTION_8, worst
 
 from tablegen.certificate.certificate import certify
@@ -45,6 +45,17 @@ def test_the_errors_are_what_the_readme_shows(tmp_path: Path, monkeypatch: pytes
         with pytest.raises(Rejected) as caught:
             make_plan(load(f"{name}.toml"))
         assert [str(p) for p in caught.value.problems] == block(f"tablegen check {name}.toml").splitlines()
+
+
+def test_the_warning_is_what_the_readme_shows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_pair(tmp_path, edited(SCAN, "- [limits]", "x.size_nm = 20.0")).replace(tmp_path / "small.toml")
+    shown = " ".join(block("tablegen check small.toml").split())
+    (said,) = run("check", "small.toml").messages
+    number = re.compile(r"\d+(?:\.\d+)?")
+    assert number.sub("#", said) == number.sub("#", shown)
+    for one, other in zip(number.findall(said), number.findall(shown), strict=True):
+        assert float(one) == pytest.approx(float(other), rel=0.05, abs=1e-3)
 
 
 def test_the_accuracy_table_is_measured(tmp_path: Path) -> None:

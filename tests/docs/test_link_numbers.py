@@ -2,6 +2,7 @@
 
 import importlib.util
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
@@ -9,16 +10,39 @@ import pytest
 from building import REPOSITORY
 
 
-@pytest.fixture(scope="module")
-def link() -> ModuleType:
-    """The benchmark, which is no package."""
-    spec = importlib.util.spec_from_file_location("link_benchmark", REPOSITORY / "benchmarks" / "link.py")
+def benchmark(name: str) -> ModuleType:
+    """A benchmark, which is no package."""
+    spec = importlib.util.spec_from_file_location(f"{name}_benchmark", REPOSITORY / "benchmarks" / f"{name}.py")
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module
     spec.loader.exec_module(module)
     return module
+
+
+@pytest.fixture(scope="module")
+def link() -> ModuleType:
+    """What an upload takes."""
+    return benchmark("link")
+
+
+@pytest.mark.common
+def test_long_ways_slow_lines_and_lost_frames_cost_what_the_page_says() -> None:
+    """In virtual time: the same on every machine. Of the lines that lose frames some uploads."""
+    slow = benchmark("slow_link")
+    scan = slow.PreparedScan.of_plan(slow.make_plan(slow.load(slow.EXAMPLE)))
+    page = (REPOSITORY / "docs" / "upload.md").read_text("utf-8")
+    for way in slow.WAYS:
+        if way.uploads == 1:
+            found = slow.cost(scan, way)
+            assert slow.row(way, found) in page
+            assert found.proportion < 2.0
+        else:
+            assert f"| {way.name} | " in page
+    fifteen = next(way for way in slow.WAYS if way.lose == 0.15)
+    some = slow.cost(scan, replace(fifteen, uploads=12))
+    assert (some.finished, some.mean < 2.0) == (12, True)
 
 
 @pytest.mark.common

@@ -174,6 +174,27 @@ def test_reasons_are_for_rows_that_differ() -> None:
     assert "show more digits" in rounded
 
 
+def test_a_number_that_is_its_own_source_is_not_called_the_same() -> None:
+    for source in Source:
+        met = Row("5g", "peak", exactly("-3", "%"), -3.0, source)
+        assert met.verdict == ("made so" if source in (Source.IDENTIFIED, Source.INPUT) else "same")
+        assert replace(met, ours=-3.3, why="a reason").verdict == "a reason"
+
+
+def test_the_page_begins_with_the_evidence(rows: dict[str, list[Row]]) -> None:
+    """The numbers that follow from others, and how many of them agree; nothing that was put in is called the same."""
+    text = PAGE.read_text(encoding="utf-8")
+    first = text.split("\n## ")[1]
+    evidence = [r for found in rows.values() for r in found if r.source is Source.SIMULATED]
+    agree = sum(r.same for r in evidence)
+    assert first.startswith(f"What is evidence: {agree} of {len(evidence)}\n")
+    assert first.count("| simulation |") == len(evidence)
+    assert first.count("| simulation | same |") == agree
+    assert not re.search(r"\| (simulation, identified|input) \| same \|", text)
+    every = sum(map(len, rows.values()))
+    assert f"There are {len(evidence)} of them, of {every}; {agree} agree\n" in first
+
+
 def test_the_page_refuses_a_row_without_a_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     wrong = [Row("5g", "peak", exactly("-3", "%"), -3.3, Source.LAW)]
     monkeypatch.setattr(page, "SECTIONS", (("title", "text", lambda: wrong, {}),))
@@ -282,7 +303,7 @@ def test_growth_and_rate_by_hand(row: Callable[[str, str], Row]) -> None:
     ("model", "figures"), [("triangle", ("5a, 5c", "5e")), ("sinusoidal", ("5d", "5f")), ("harmonic", ("5i", "5j"))]
 )
 def test_played_lines_by_hand(row: Callable[[str, str], Row], model: str, figures: tuple[str, str]) -> None:
-    """Residual and scaling error from displacements at ticks, without interpolation; the codes fill 16 bits."""
+    """Residual and scaling error from displacements in the middle of ticks; the codes fill 16 bits."""
     line = measured.full_scale(model)  # type: ignore[arg-type]
     codes, moved = line.drive.codes, line.displacement_nm
     assert np.issubdtype(codes.dtype, np.integer)
@@ -291,8 +312,8 @@ def test_played_lines_by_hand(row: Callable[[str, str], Row], model: str, figure
     y = (moved - moved.min()) / (moved.max() - moved.min())
     half = len(y) // 2
     name = model if model == "triangle" else f"{model} model"
-    for side, branch in (("forward", y[: half + 1]), ("backward", np.append(y[half:], y[0])[::-1])):
-        x = np.arange(half + 1) / half
+    for side, branch in (("forward", y[:half]), ("backward", y[half:][::-1])):
+        x = (np.arange(half) + 0.5) / half
         inside = (x >= 0.1) & (x <= 0.9)
         residual = float(np.max(np.abs((branch - x)[inside])))
         chord = half // 20

@@ -92,6 +92,9 @@ def c_constants(manifest: Mapping[str, Any]) -> dict[str, int]:
     """Those that both languages have, and what C has for the sine: a period and a quarter of the longest table's."""
     found = constants(manifest)
     index_bits = max(found["X_INDEX_BITS"], found["Y_INDEX_BITS"])
+    axes = manifest["axes"].values()
+    for kind, part, key in (("TABLE", "table", "bits"), ("OUTPUT", "output", "word_bits")):
+        found[f"{kind}_STORAGE_BITS"] = 16 if max(axis[part][key] for axis in axes) <= 16 else 32
     return found | ({"SINE_INDEX_BITS": index_bits, "SINE_LENGTH": 5 << index_bits >> 2} if index_bits else {})
 
 
@@ -126,7 +129,8 @@ def test_constants_and_tables_equal_the_manifest(built: Build) -> None:
     expected = list(names.values())
     for axis in manifest["axes"].values():
         fourier = axis["fourier"]
-        expected += [*axis["table"]["words"], fourier["a0_word"], *fourier["a_words"], *fourier["b_words"]]
+        words = axis["table"]["words"]
+        expected += [*words, words[0], fourier["a0_word"], *fourier["a_words"], *fourier["b_words"]]
     if "SINE_LENGTH" in names:
         expected += sines(names["SINE_INDEX_BITS"], names["SINE_LENGTH"])
     assert digest == manifest["hash"]
@@ -208,6 +212,7 @@ DAMAGES: dict[str, tuple[str, Callable[[str], str]]] = {
     "length": ("x_table_length", defined_as("X_TABLE_LENGTH", lambda length: 2 * length)),
     "index bits": ("x_length_is_power_of_two", defined_as("X_INDEX_BITS", lambda bits: bits + 1)),
     "word bits": ("x_words_fit", defined_as("X_TABLE_BITS", lambda bits: 17)),
+    "storage": ("x_words_fit", defined_as("TABLE_STORAGE_BITS", lambda bits: 48 - bits)),
     "phase step": ("y_phase_is_coherent", defined_as("Y_PHASE_STEP", lambda step: step + 1)),
     "phase remainder": ("x_phase_is_coherent", defined_as("X_PHASE_REMAINDER", lambda rest: rest - 1)),
     "period": ("y_period", defined_as("Y_HOLD_TICKS", lambda hold: 2)),

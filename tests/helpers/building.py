@@ -5,6 +5,7 @@ variants keep the example's name, so that one player in C and one in Verilog ser
 """
 
 import json
+import re
 import shutil
 import subprocess
 import tomllib
@@ -39,6 +40,7 @@ PACKAGES = {
     "gcov": "gcc",
     "mips-linux-gnu-gcc": "gcc-mips-linux-gnu",
     "ninja": "ninja-build",
+    "node": "nodejs",
     "srec_cat": "srecord",
     "nm": "binutils",
     "qemu-mips": "qemu-user",
@@ -296,10 +298,16 @@ def run(
     return subprocess.run(arguments, cwd=folder, env=environment, capture_output=True, text=True, check=False)
 
 
+_OF_A_SCAN = re.compile(r"^warning: \S+\.toml:\d+: .*\n", re.MULTILINE)
+
+
 def run_clean(command: Sequence[str | Path], folder: Path | None = None) -> str:
-    """Run a tool that has to succeed and to have nothing to say on stderr; return its stdout."""
+    """Run a tool that has to succeed and to have nothing to say on stderr; return its stdout.
+
+    What a build in it says of the errors of a scan is no fault of the tool: short scans of tests have large ones.
+    """
     result = run(command, folder)
     shown = f"{' '.join(map(str, command))}\n{result.stdout[-4000:]}{result.stderr[-4000:]}"
     assert result.returncode == 0, shown
-    assert result.stderr == "", shown
+    assert _OF_A_SCAN.sub("", result.stderr) == "", shown
     return result.stdout

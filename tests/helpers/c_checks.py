@@ -9,9 +9,12 @@ from pathlib import Path
 from c_devices import Check, Libraries
 from c_library import Library
 from c_loading import (
+    converters_that_do_not_fit,
     offsets_that_overflow,
     other_converters,
     refusals,
+    requests_that_do_not_fit,
+    the_first_word_again,
     the_largest_schedules,
     words_too_wide_for_their_storage,
 )
@@ -26,14 +29,24 @@ from c_playing import (
     several_programs,
 )
 from c_requests import answers, banks, commits, lines_of_the_status, reports, status_of_power_up, the_queue
-from c_runs import limits, no_run_beyond_a_limit, positions, rounding, runs_and_what_ends_them, runs_take_place
+from c_runs import (
+    jumps_that_32_bits_do_not_tell,
+    limits,
+    no_run_beyond_a_limit,
+    positions,
+    rounding,
+    runs_and_what_ends_them,
+    runs_take_place,
+)
 
 CHECKS: tuple[Check, ...] = (
     layout, converter_words, converter_words_of_runs, several_programs, a_fill_that_wants_no_markers,
     markers_known_again, status_of_power_up, the_queue, answers, banks, commits, reports, refusals,
-    the_largest_schedules, offsets_that_overflow, other_converters, words_too_wide_for_their_storage,
-    lines_of_the_status, one_buffer_for_both,
-    runs_and_what_ends_them, rounding, no_run_beyond_a_limit, limits, runs_take_place, positions, renderings,
+    the_largest_schedules, the_first_word_again, offsets_that_overflow, other_converters,
+    converters_that_do_not_fit, requests_that_do_not_fit,
+    words_too_wide_for_their_storage, lines_of_the_status, one_buffer_for_both,
+    runs_and_what_ends_them, rounding, no_run_beyond_a_limit, limits, runs_take_place,
+    jumps_that_32_bits_do_not_tell, positions, renderings,
 )  # fmt: skip
 
 

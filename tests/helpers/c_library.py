@@ -22,7 +22,7 @@ HERE = Path(__file__).parent
 PROBE = HERE / "c_probe.c"
 OPTIONS = ("-std=c99", "-O1")
 SLEW, CLAMP, OVERRUN, UNDERRUN = 1, 2, 4, 8
-LOADED, BUSY, OTHER_CONVERTER, BAD_SCHEDULE, BAD_TABLE, BAD_PERIOD, BAD_OUTPUT = range(7)
+LOADED, BUSY, OTHER_CONVERTER, BAD_SCHEDULE, BAD_TABLE, BAD_PERIOD, BAD_OUTPUT, OTHER_STORAGE = range(8)
 MARKER = {name: 1 << bit for bit, name in enumerate(FLAGS)}
 NOTHING_PLAYS = 2
 
@@ -35,6 +35,7 @@ class AxisProgram(Structure):
     _fields_ = (
         ("table", c_void_p),
         ("length", c_uint32),
+        ("storage_bits", c_uint8),
         ("bits", c_uint8),
         ("index_bits", c_uint8),
         ("phase_period", c_uint32),
@@ -149,6 +150,7 @@ class Library:
         for name in REQUESTS:
             getattr(self.dll, f"dac_sequencer_{name}").restype = c_bool
         self.dll.dac_sequencer_arm.restype = c_bool
+        self.dll.dac_sequencer_init.restype = c_bool
         self.dll.dac_sequencer_writable.restype = c_bool
         self.dll.dac_sequencer_status.restype = Status
         self.dll.dac_synthesize.restype = c_bool
@@ -158,14 +160,15 @@ class Library:
         self.output = np.dtype(f"u{self.output_bytes}")
 
     def axis(self, program: Program) -> CAxis:
-        """An axis as C has it; its table has just the words that it needs."""
-        words = (ctypes.c_int16 if self.word_bytes == 2 else c_int32) * len(program.words)
-        table = words(*program.words.tolist())
+        """An axis as C has it; its table has just the words that it needs, and the first one again."""
+        words = (ctypes.c_int16 if self.word_bytes == 2 else c_int32) * (len(program.words) + 1)
+        table = words(*program.words.tolist(), int(program.words[0]))
         output = program.output
         return CAxis(
             AxisProgram(
                 table=ctypes.addressof(table),
                 length=len(program.words),
+                storage_bits=8 * self.word_bytes,
                 bits=program.bits,
                 index_bits=program.index_bits,
                 phase_period=program.phase.ticks,

@@ -1,6 +1,7 @@
 """Which programs the C sequencer takes, and why it refuses others; checks of ``c_checks``."""
 
 from collections.abc import Iterator
+from ctypes import addressof, byref, c_int32
 from dataclasses import replace
 
 from c_devices import Libraries, device_for, flat
@@ -11,6 +12,7 @@ from c_library import (
     BAD_TABLE,
     LOADED,
     OTHER_CONVERTER,
+    OTHER_STORAGE,
     Converter,
     CProgram,
     Device,
@@ -35,9 +37,12 @@ def _axis_refusals(axis: str, length: int) -> Iterator[tuple[int, str, object]]:
         ("dac_bits", 15), ("word_bits", 15), ("twos_complement", True),
     ))  # fmt: skip
     yield from ((BAD_TABLE, f"{axis}.{key}", value) for key, value in (
-        ("table", None), ("bits", 7), ("bits", 17), ("bits", 25), ("index_bits", 2), ("index_bits", 17),
+        ("table", None), ("bits", 7), ("index_bits", 2), ("index_bits", 17),
         ("index_bits", 0),
         ("length", length - 1), ("length", length + 1), ("length", 0),
+    ))  # fmt: skip
+    yield from ((OTHER_STORAGE, f"{axis}.{key}", value) for key, value in (
+        ("bits", 17), ("bits", 25), ("storage_bits", 0), ("storage_bits", 8), ("storage_bits", 32),
     ))  # fmt: skip
     yield from ((BAD_PERIOD, f"{axis}.{key}", value) for key, value in (
         ("phase_period", 0), ("phase_period", 1), ("phase_period", 99), ("hold_ticks", 0), ("hold_ticks", 2),
@@ -115,6 +120,8 @@ def the_largest_schedules(libraries: Libraries) -> None:
         program.schedule.frame_lines, program.y.phase_period = lines, ticks * lines
         assert device.load(program) == result, (ticks, lines)
         device.alive.append(axes)
+    blank = (c_int32 * ((1 << 17) + 2))()
+    device.alive.append(blank)
     for interpolated, index_bits, bits, length, result in (
         (1, 16, 24, 65536, LOADED), (1, 16, 25, 65536, BAD_TABLE), (1, 3, 8, 8, LOADED),
         (0, 0, 24, 131072, LOADED), (0, 0, 24, 131073, BAD_TABLE),
@@ -123,10 +130,23 @@ def the_largest_schedules(libraries: Libraries) -> None:
         ticks = 32 if interpolated else length
         program, axes = library.program(flat(1, replace(flat(1).schedule, ticks=ticks, lines=1, pixels=1, **none)))
         program.x.index_bits, program.x.length, program.x.bits = index_bits, length, bits
+        program.x.table = addressof(blank)
         program.x.gain_q = 16 + bits + min(4, 25 - bits) - 16
         program.x.offset_word = 0
         assert device.load(program) == result, (interpolated, index_bits, bits, length)
         device.alive.append(axes)
+
+
+def the_first_word_again(libraries: Libraries) -> None:
+    """A table is refused without the word that runs and steps read behind the last one."""
+    for library in libraries:
+        device = device_for(library, flat(1))
+        for axis in (0, 1):
+            for last, result in ((1, BAD_TABLE), (-1, BAD_TABLE), (0, LOADED)):
+                program, axes = library.program(flat(1))
+                axes[axis].words[len(axes[axis].words) - 1] = axes[axis].words[0] + last
+                assert device.load(program) == result, (axis, last)
+                device.alive.append(axes)
 
 
 def offsets_that_overflow(libraries: Libraries) -> None:
@@ -167,6 +187,36 @@ def other_converters(libraries: Libraries) -> None:
         axis: replace(getattr(left, axis), output=replace(getattr(left, axis).output, align="left")) for axis in "xy"
     })  # fmt: skip
     assert device.load(left) == LOADED
+
+
+def converters_that_do_not_fit(libraries: Libraries) -> None:
+    """Those that the runtime cannot serve are refused at the start, on either axis, and then no program is loaded."""
+    for library in libraries:
+        most = 8 * library.output_bytes
+        good = Converter(16, 16, False, False, 0)
+        refused = [
+            (7, 16, 0), (25, 32, 0), (0, 0, 0), (16, 15, 0), (16, most + 1, 0), (16, 16, -1), (16, 16, 1 << 16),
+            (8, 16, 256),
+        ]  # fmt: skip
+        accepted = [(16, 16, 65535), (8, 16, 255), (8, 8, 0), (12, most, 4095), (min(most, 24), most, 0)]
+        for bits, word_bits, code in (*refused, *accepted):
+            other = Converter(bits, word_bits, True, True, code)
+            for pair in ((other, good), (good, other)):
+                device = Device(library, good, good)
+                result = library.dll.dac_sequencer_init(device.state, *map(byref, pair))
+                assert result == ((bits, word_bits, code) in accepted), (bits, word_bits, code)
+                if not result:
+                    assert device.load(flat(1)) == OTHER_CONVERTER
+                    assert device.steps(3)[0].tolist() == [0, 0, 0]
+
+
+def requests_that_do_not_fit(libraries: Libraries) -> None:
+    """More frames than a count holds are refused; of a reported fault only the bits that there are become one."""
+    device = device_for(libraries.narrow, flat(1))
+    assert [device.arm(frames) for frames in (1 << 31, (1 << 31) + 1, (1 << 32) - 1)] == [True, False, False]
+    device.report(0xF4)
+    device.steps(1)
+    assert device.status().faults == 4
 
 
 def words_too_wide_for_their_storage(libraries: Libraries) -> None:

@@ -30,7 +30,7 @@ from tablegen.verification.stream import Script, compare
 
 HERE = Path(__file__).parent
 OPTIONS = ("-std=c99", "-O1", "-DDAC_WAIT=0")  # as many runs as can be
-CHECKS = {"checks": (), "checks small": ("-DDAC_SMALL=1",), "checks split": ("-DDAC_LONG_MULTIPLY=0",)}
+CHECKS = {"checks": (), "checks small": ("-DDAC_SMALL=1",), "checks short": ("-DDAC_LONG_MULTIPLY=0",)}
 PLAY_S, CHECK_S = 20, 120  # of CPU time: what does not hang takes a second of it, and two
 _PROGRAMS = 3000  # between two threads
 
@@ -49,8 +49,6 @@ class Mutant(mutants.Mutant):
 @cache
 def scripts(where: str) -> tuple[tuple[Script, SequencerShape], ...]:
     """What the benches play; the same every time."""
-    if where == "split wide":
-        return ((long_play("dac_24_words_8", 20_000), LONG["dac_24_words_8"][0]),)
     if where == "wide":
         names = ("bits_20", "bits_24", "dac_24_words_8")
         long = [(long_play(name, 9000), LONG[name][0]) for name in names]
@@ -105,11 +103,9 @@ def _check(paths: tuple[Path, ...]) -> Verdict:
 
 def _play(where: str, folder: Path, runtime: list[Path]) -> Verdict:
     fill = 0 if where == "step" else FILL
-    playing = scripts(where if where != "step" else "fill")
-    chosen = defines(playing[0][1], fill) | ({"DAC_LONG_MULTIPLY": 0} if where == "split wide" else {})
-    # A shift by a negative count shows nowhere else.
-    options = (*OPTIONS, "-fsanitize=undefined", "-fno-sanitize-recover=all") if where == "split wide" else OPTIONS
-    bench = CBench(playing[0][1], folder, "gcc", options, runtime, chosen=chosen)
+    playing = scripts("wide" if where == "wide" else "fill")
+    chosen = defines(playing[0][1], fill) | ({"DAC_LONG_MULTIPLY": 0} if where == "short" else {})
+    bench = CBench(playing[0][1], folder, "gcc", OPTIONS, runtime, chosen=chosen)
     bench.program = program_within(PLAY_S, bench.program)
     for script, shape in playing:
         words = words_of(script, shape)
@@ -161,14 +157,18 @@ def _axis() -> Iterator[Mutant]:
         ("there is no guard downwards", "rise < -most ? -most : rise", "rise", "step"),
         ("the guard is one off downwards", "rise < -most ? -most", "rise < -most ? 1 - most", "step"),
         ("a code is always there", "return axis->code == target;", "return true;", "step"),
-        ("the last word goes on to the one behind it", "index != bank->last ? index + 1 : 0", "index + 1", "step"),
-        ("the word before the last goes on to the first", "index != bank->last ?", "index < bank->last - 1 ?", "step"),
+        ("a converter of 7 bits", "c->bits >= 8 && ", "", "checks"),
+        ("a converter of 25 bits", "c->bits <= 24 && ", "", "checks"),
+        ("a converter whose word is too short", "c->bits <= c->word_bits && ", "", "checks"),
         (
-            "the last word is the end",
-            "index != bank->last ? index + 1 : 0",
-            "index != bank->last ? index + 1 : index",
-            "step",
+            "a converter too wide for its storage",
+            "c->word_bits <= DAC_OUTPUT_STORAGE_BITS\n        && ",
+            "true\n        && ",
+            "checks",
         ),
+        ("a code below zero at power-up", "c->power_up_code >= 0 && ", "", "checks"),
+        ("a code too high at power-up", " && c->power_up_code < INT32_C(1) << c->bits", "", "checks"),
+        ("a step reads no next word", "bank->table[index + 1]", "bank->table[index]", "step"),
         ("nothing is held at code_min", "code < bank->code_min ? bank->code_min : code >", "code >", "step"),
         ("nothing is held at code_max", ": code > bank->code_max ? bank->code_max : code;", ": code;", "step"),
         (
@@ -194,19 +194,19 @@ def _axis() -> Iterator[Mutant]:
         ),
         (
             "a run's window reaches below the limit",
-            "(uint32_t)(base - bank->code_min) > (uint32_t)bank->run_room",
-            "base > bank->code_min + bank->run_room",
+            "(uint32_t)(base - bank->code_min) <= (uint32_t)bank->run_room",
+            "base <= bank->code_min + bank->run_room",
         ),
         (
             "a run's window reaches above the limit",
-            "> (uint32_t)bank->run_room)",
-            "> (uint32_t)bank->run_room + 1)",
+            "<= (uint32_t)bank->run_room;",
+            "<= (uint32_t)bank->run_room + 1;",
             "checks",
         ),
         (
             "runs do not heed the limits",
-            "if ((uint32_t)(base - bank->code_min) > (uint32_t)bank->run_room)",
-            "if (false)",
+            "(uint32_t)(base - bank->code_min) <= (uint32_t)bank->run_room",
+            "true",
         ),
         ("runs do not heed the slew guard", "if (strayed >> bank->run_bits != 0)", "if (false)"),
         (
@@ -214,13 +214,17 @@ def _axis() -> Iterator[Mutant]:
             "if (strayed >> bank->run_bits != 0)",
             "if (strayed >> (bank->run_bits + 1) != 0)",
         ),
-        ("only the last code of a run counts", "strayed |=", "strayed ="),
+        (
+            "only the last code of a run counts",
+            "strayed |= (uint32_t)(code - base)",
+            "strayed = (uint32_t)(code - base)",
+        ),
         (
             "a run begins where the last one was refused",
             "axis->code = code;\n        done += length;",
             "done += length;",
         ),
-        ("a run that ends early is a whole one", "ticks - done < DAC_RUN ? ticks - done : DAC_RUN;\n", "DAC_RUN;\n"),
+        ("a run that ends early is a whole one", "ticks < DAC_RUN ? ticks : DAC_RUN", "DAC_RUN"),
         (
             "runs step by steps rounded down",
             "(uint64_t)bank->step.high << 32 | bank->step.low >> 32) + 1",
@@ -228,16 +232,6 @@ def _axis() -> Iterator[Mutant]:
             "checks",
         ),
         ("runs move y while it is held", "step = bank->holds ? 0 : ", "step = "),
-        (
-            "a run meets the last word",
-            "(at + (most - 1) * step) >> 47 >= bank->last",
-            "(at + (most - 1) * step) >> 47 > bank->last",
-        ),
-        (
-            "a run's last tick meets the last word",
-            "(at + (most - 1) * step) >> 47",
-            "(at + (most - 1) * step - step / 2) >> 47",
-        ),
         ("the position does not follow a run", "        dac_axis_skip(axis, bank, played);\n", ""),
         (
             "runs are as long as one likes",
@@ -259,23 +253,32 @@ def _axis() -> Iterator[Mutant]:
         ),
         ("a skip loses its lowest bits", "second << 32 | (first & 0xffffffffu)", "second << 32", "checks"),
         (
-            "halves: the upper one loses a bit",
-            "(((sample) >> DAC_SPLIT) * gain +",
-            "(((sample) >> DAC_SPLIT) * gain + 1 +",
-            "checks split",
+            "short: the sample is rounded down",
+            "(UINT32_C(1) << (ABOVE - 1)) - (origin << ABOVE)",
+            "0u - (origin << ABOVE)",
+            "short",
+        ),
+        ("short: a wide rise is not seen", " || risen > 2 * spread - 1", "", "checks short"),
+        ("short: only the last rise counts", "    risen |= rise; ", "    risen = rise; ", "checks short"),
+        ("short: only the last code counts", "    strayed |= last; ", "    strayed = last; ", "short"),
+        ("short: the slew guard is not heeded", "strayed >> gain_q >> bank->run_bits != 0 || ", "", "short"),
+        (
+            "short: a window is twice as wide",
+            "strayed >> gain_q >> bank->run_bits != 0",
+            "strayed >> gain_q >> bank->run_bits > 1",
+            "short",
         ),
         (
-            "halves: the lower one is not masked",
-            "((sample) & ((1 << DAC_SPLIT) - 1)) * gain",
-            "(sample) * gain",
-            "checks split",
+            "short: a run may begin anywhere",
+            "if ((uint32_t)((int32_t)code - axis->code + bank->run_half) >> bank->run_bits != 0)",
+            "if (false)",
+            "checks short",
         ),
-        (
-            "halves: the offset's low bits are lost",
-            "* gain + low) >> DAC_SPLIT)",
-            "* gain) >> DAC_SPLIT)",
-            "checks split",
-        ),
+        ("short: two words for all ticks", "(at + block) >> 47 == at >> 47", "true", "short"),
+        ("short: two words for too many ticks", "(DAC_RUN - 1) * step", "DAC_RUN / 2 * step", "short"),
+        ("short: the first of two words is lost", "            low += (uint32_t)here << 15;\n", "", "short"),
+        ("short: the offset is lost", "+ (uint32_t)bank->offset - ", "- ", "short"),
+        ("short: codes follow no run", "        axis->code = (int32_t)last;\n", "", "short"),
     )
 
 
@@ -306,10 +309,17 @@ def _program() -> Iterator[Mutant]:
         ("backward is not looked at", "&& inside(&p->backward, p->line_ticks)", "", "checks"),
         ("up is not looked at", "inside(&p->up, p->frame_lines) && ", "", "checks"),
         ("down is not looked at", "&& inside(&p->down, p->frame_lines)", "", "checks"),
-        ("no table", "p->table == NULL || ", "", "checks"),
-        ("words of 7 bits", "p->bits < 8", "p->bits < 7", "checks"),
-        ("words of 25 bits", "p->bits > 24 || ", "", "checks"),
-        ("words that their storage does not hold", " || p->bits > DAC_TABLE_STORAGE_BITS", "", "checks"),
+        ("no table", "p->table != NULL && ", "", "checks"),
+        ("words of 7 bits", "p->bits >= 8", "p->bits >= 7", "checks"),
+        ("words of 25 bits", "p->bits <= 24 && ", "", "checks"),
+        (
+            "any word behind the last one",
+            "good_length(p) && p->table[p->length] == p->table[0]",
+            "good_length(p)",
+            "checks",
+        ),
+        ("words of another storage", "p->storage_bits == DAC_TABLE_STORAGE_BITS && ", "", "checks"),
+        ("words that their storage does not hold", " && p->bits <= DAC_TABLE_STORAGE_BITS", "", "checks"),
         ("a direct table of any length", "return p->length == p->phase_period && ", "return ", "checks"),
         ("a direct table that is too long", " && p->length <= UINT32_C(1) << 17", "", "checks"),
         ("4 words", "p->index_bits >= 3", "p->index_bits >= 2", "checks"),
@@ -359,11 +369,13 @@ def _program() -> Iterator[Mutant]:
             "b->run_offset = b->offset * ((int64_t)1 << (left - 1))",
             "checks",
         ),
+        ("short: a rise may be twice as wide", "b->run_spread = 31;", "b->run_spread = 32;", "checks short"),
+        ("short: a gain below zero", "p->gain_word < 0 ? -p->gain_word : p->gain_word", "p->gain_word", "checks short"),
         (
-            "halves: runs where the lower half is too short",
-            "p->gain_q > 32 || p->gain_q < DAC_SPLIT",
-            "p->gain_q > 32",
-            "split wide",
+            "short: a rise of more bits than there are",
+            "if (b->run_spread > 19)\n        b->run_spread = 19;",
+            "if (b->run_spread > 21)\n        b->run_spread = 21;",
+            "checks short",
         ),
         ("runs may be wider than the slew guard", "if (widest > p->max_step)", "if (false)"),
         ("the window of runs is twice as wide", "(widest + 1) >> (b->run_bits + 1)", "(widest + 1) >> b->run_bits"),
@@ -380,8 +392,6 @@ def _program() -> Iterator[Mutant]:
         ),
         ("the fraction loses a bit", "power_divided(79u + p->index_bits", "power_divided(78u + p->index_bits", "step"),
         ("a direct table stands still", "{UINT32_C(1) << 15, 0}", "{0, 0}"),
-        ("the last word is one too far", "b->last = p->length - 1", "b->last = p->length", "step"),
-        ("the table ends early", "b->last = p->length - 1", "b->last = p->length - 2"),
         ("y is never held", "b->holds = p->hold_ticks != 1", "b->holds = 0"),
         ("wrong guard bits of wide words", "? 25u - p->bits : 4u", "? 24u - p->bits : 4u", "checks"),
         ("the code is rounded down", "+ ((int64_t)1 << (p->gain_q - 1))", "", "step"),
@@ -473,7 +483,10 @@ def _sequencer() -> Iterator[Mutant]:
             "s->fault_counts[i] = s->fault_counts[i] + 1",
             "s->fault_counts[i] = s->fault_counts[i] + 2",
         ),
-        ("faults are not sticky", "s->faults = (uint8_t)(s->faults | fault)", "s->faults = fault", "checks"),
+        ("more frames than can be counted", "frames <= UINT32_C(1) << 31 && ", "", "checks"),
+        ("a fault that there is not", "s->faults | (fault & 15u)", "s->faults | fault", "checks"),
+        ("converters are not looked at", "if (good) {", "if (true) {", "checks"),
+        ("faults are not sticky", "s->faults = (uint8_t)(s->faults | (fault & 15u))", "s->faults = fault", "checks"),
         ("the last bits of a period go on", "    axis->at.low = 0;\n", "", "step"),
         ("the place in a period goes on", "    axis->at.high = 0;\n", ""),
         ("a scan begins in mid-line", "    s->tick = 0;\n    s->line = 0;\n", "    s->line = 0;\n"),
@@ -740,6 +753,8 @@ def _fourier() -> Iterator[Mutant]:
         ),
         ("the mean is lost", "    n0.a_cos += r->mean;\n", "", "checks"),
         ("words are half as high", "r.drop = 29 - bits", "r.drop = 30 - bits", "checks"),
+        ("the first word does not stand behind the last", "    table[r.length] = table[0];\n", "", "checks"),
+        ("a table without room is rendered", "room < DAC_TABLE_ROOM(index_bits) || ", "", "checks"),
     )
 
 
@@ -794,7 +809,7 @@ EQUIVALENT: dict[Mutant, str] = {
         "threads",
     ): "The same, of two stores.",
 }
-PLACES = ("fill", "step", "wide", "split wide", *CHECKS, "threads")
+PLACES = ("fill", "step", "wide", "short", *CHECKS, "threads")
 
 
 if __name__ == "__main__":

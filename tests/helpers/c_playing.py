@@ -149,15 +149,19 @@ def renderings(libraries: Libraries) -> None:
             words = random_fourier(rng, harmonics)
             sine = sine_periods(index_bits + harmonics % 2).astype(np.int32)
             fourier = words.in_order.astype(np.int32)
-            table = np.full(1 << index_bits, -1, library.word)
+            length = 1 << index_bits
+            table = np.full(length + 1, -1, library.word)
             where = [array.ctypes.data_as(c_void_p) for array in (table, fourier, sine)]
             for wanted in (True, False):
                 if not wanted:
                     fourier[:3] = -(1 << 31)
                     table[:] = 0
                 done = library.dll.dac_synthesize(
-                    where[0], index_bits, bits, where[1], harmonics, where[2], index_bits + harmonics % 2
+                    where[0], length + 1, index_bits, bits, where[1], harmonics, where[2], index_bits + harmonics % 2
                 )
                 assert done == wanted
-                expected = synthesize(words, 1 << index_bits, bits) if wanted else np.zeros(1 << index_bits, np.int64)
-                same("words", expected, table.astype(np.int64))
+                expected = synthesize(words, length, bits) if wanted else np.zeros(length, np.int64)
+                same("words", np.append(expected, expected[0]), table.astype(np.int64))
+                assert not library.dll.dac_synthesize(
+                    where[0], length, index_bits, bits, where[1], harmonics, where[2], index_bits + harmonics % 2
+                ), "no room for the word behind the last"

@@ -20,7 +20,7 @@ void fence_check(const volatile void *words, unsigned size);
 enum { LENGTH = 8, BLOCK = 100, CODES = 60000 };
 
 static dac_sequencer sequencer;
-static dac_word x_table[2][LENGTH], y_table[2][LENGTH];
+static dac_word x_table[2][LENGTH + 1], y_table[2][LENGTH + 1];
 static int finished;
 static unsigned calls; /* of the consumer */
 static unsigned long programs, swaps_seen, lines_seen, withdrawn, late;
@@ -34,9 +34,9 @@ static unsigned dice(unsigned *state, unsigned sides)
 /* The words of program n are n, and of unit gain: 16-bit words map to 16-bit codes around the middle. */
 static dac_axis_program axis(dac_word *table, unsigned n, uint32_t period)
 {
-    const dac_axis_program p = {table, LENGTH, 16, 3, period, 1, 1 << 16, (int64_t)32768 << 20, 20, 0, 65535, 0, 65535, 16, 16,
+    const dac_axis_program p = {table, LENGTH, DAC_TABLE_STORAGE_BITS, 16, 3, period, 1, 1 << 16, (int64_t)32768 << 20, 20, 0, 65535, 0, 65535, 16, 16,
                                 false, false};
-    for (unsigned i = 0; i < LENGTH; i++)
+    for (unsigned i = 0; i <= LENGTH; i++)
         table[i] = (dac_word)((int)n - 32768);
     return p;
 }

@@ -49,7 +49,7 @@ def markers_of(tick: Tick) -> int:
 
 
 def programs_of(plan: Plan) -> tuple[DualProgram, DualProgram]:
-    """The whole scan and the half one of ``examples/firmware/cortex_m/scan.c``."""
+    """The whole scan and the half one of ``examples/firmware/common/scan.c``."""
     whole = plan.program
     return whole, replace(whole, x=_half(whole.x), y=_half(whole.y))
 

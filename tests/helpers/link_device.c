@@ -12,6 +12,19 @@ static bool permits(void)
     return permits_now;
 }
 
+/* So has a clock: one for all devices. */
+static uint32_t milliseconds_now;
+
+static uint32_t milliseconds(void)
+{
+    return milliseconds_now;
+}
+
+void device_set_clock(uint32_t now)
+{
+    milliseconds_now = now;
+}
+
 static void *place(size_t count, size_t size)
 {
     void *const memory = calloc(count, size);
@@ -30,8 +43,9 @@ static void furnish(dac_link_axis *axis, const dac_converter *converter, const u
     axis->limits.max_jump = limits[3];
     axis->word_bits = word_bits;
     axis->index_bits = index_bits;
+    axis->room = DAC_TABLE_ROOM(index_bits);
     for (unsigned i = 0; i < 2; i++)
-        axis->table[i] = place((size_t)1 << index_bits, sizeof(dac_word));
+        axis->table[i] = place(DAC_TABLE_ROOM(index_bits), sizeof(dac_word));
     axis->fourier = place(2u * harmonics + 1, sizeof(int32_t));
 }
 
@@ -53,6 +67,10 @@ device *device_new(const device_setup *setup, uint32_t boot)
     c->hash = setup->knows_hash ? d->setup.hash : NULL;
     c->permits = setup->has_interlock ? permits : NULL;
     c->random = setup->random;
+    c->identity = d->setup.identity;
+    c->identity_bytes = setup->identity_bytes;
+    c->boot_persists = setup->boot_persists;
+    c->milliseconds = milliseconds;
     d->permits = true;
     device_start(d, boot);
     return d;
@@ -75,8 +93,9 @@ void device_start(device *d, uint32_t boot)
     memset(&d->log, 0, sizeof d->log);
     d->sent = 0;
     d->boot = boot;
-    dac_sequencer_init(&d->sequencer, &d->config.x.converter, &d->config.y.converter);
-    dac_link_init(&d->link, &d->config, &d->sequencer, boot);
+    if (!dac_sequencer_init(&d->sequencer, &d->config.x.converter, &d->config.y.converter))
+        abort();
+    d->started = dac_link_init(&d->link, &d->config, &d->sequencer, boot);
     if (d->setup.boot_program == NULL)
         return;
     if (dac_sequencer_load(&d->sequencer, d->setup.boot_program) != DAC_LOADED || !dac_sequencer_commit(&d->sequencer))
@@ -177,6 +196,67 @@ void device_poke(device *d, unsigned axis, uint32_t word, int32_t value)
 void device_report(device *d, uint8_t fault)
 {
     dac_sequencer_report(&d->sequencer, fault);
+}
+
+dac_link_started device_started(const device *d)
+{
+    return d->started;
+}
+
+/* Why a link does not start whose configuration has one fault; fault 0 is none. */
+dac_link_started device_refusal(const device *d, unsigned fault)
+{
+    static dac_link link;
+    dac_link_config c = d->config;
+    dac_link_axis *const axes[] = {&c.x, &c.y};
+
+    for (unsigned i = 0; i < 2; i++) {
+        dac_link_axis *const a = axes[i];
+        const unsigned at = fault - 1 - i * AXIS_FAULTS;
+        const uint32_t codes = UINT32_C(1) << a->converter.bits;
+        switch (at) {
+        case 0: a->converter.bits = 7; break;
+        case 1: a->converter.bits = 25; break;
+        case 2: a->converter.word_bits = (uint8_t)(a->converter.bits - 1); break;
+        case 3: a->converter.word_bits = DAC_OUTPUT_STORAGE_BITS + 1; break;
+        case 4: a->converter.power_up_code = -1; break;
+        case 5: a->converter.power_up_code = (int32_t)codes; break;
+        case 6: a->limits.code_min = a->limits.code_max + 1; break;
+        case 7: a->limits.code_max = codes; break;
+        case 8: a->limits.max_step = 0; break;
+        case 9: a->word_bits = 7; break;
+        case 10: a->word_bits = 25; break;
+        case 11: a->word_bits = DAC_TABLE_STORAGE_BITS + 1; break;
+        case 12: a->index_bits = 2; break;
+        case 13: a->index_bits = 17; a->room = DAC_TABLE_ROOM(17); break;
+        case 14: a->room--; break;
+        case 15: a->table[0] = NULL; break;
+        case 16: a->table[1] = NULL; break;
+        case 17: a->table[1] = a->table[0]; break;
+        case 18: a->fourier = NULL; break;
+        case 19: c.sine_index_bits = (uint8_t)(a->index_bits - 1); break;
+        default: break;
+        }
+    }
+    switch (fault - 2 * AXIS_FAULTS) {
+    case 1: c.harmonics = 4097; break;
+    case 2: c.sine = NULL; break;
+    case 3: c.sine_index_bits = 17; break;
+    case 4: c.key_bytes = 15; break;
+    case 5: c.key_bytes = 33; break;
+    case 6: c.key = NULL; break;
+    case 7: c.identity = NULL; break;
+    case 8: c.identity_bytes = 3; break;
+    case 9: c.identity_bytes = 33; break;
+    case 10: c.random = NULL; c.boot_persists = false; break;
+    case 11: c.milliseconds = NULL; break;
+    default: break;
+    }
+    const dac_link_started started = dac_link_init(&link, &c, (dac_sequencer *)&d->sequencer, 0);
+    (void)dac_link_receive(&link, 0);
+    if (started != DAC_LINK_STARTED && dac_link_work(&link))
+        abort();
+    return started;
 }
 
 uint32_t device_lost(const device *d)

@@ -6,6 +6,7 @@
 #include "lines.h"
 
 enum { OUT = 1 << 20 };
+enum { AXIS_FAULTS = 20, FAULTS = 2 * AXIS_FAULTS + 11 }; /* of a configuration */
 
 typedef struct {
     dac_converter x_converter, y_converter;
@@ -17,6 +18,7 @@ typedef struct {
     uint8_t key_bytes, key[32];
     uint8_t knows_hash, hash[32];
     uint8_t has_interlock;
+    uint8_t identity_bytes, identity[32], boot_persists;
     void (*random)(uint8_t bytes[16]); /* or NULL */
     const int32_t *sine;
     const dac_program *boot_program; /* or NULL */
@@ -29,6 +31,7 @@ typedef struct {
     dac_link link;
     line_log log;
     uint32_t boot;
+    dac_link_started started;
     bool permits, stalled;
     size_t records, room, sent;
     line_record *record;
@@ -46,7 +49,10 @@ size_t device_take(device *d, uint8_t *bytes);
 size_t device_records(device *d, line_record *records);
 void device_poke(device *d, unsigned axis, uint32_t word, int32_t value);
 void device_report(device *d, uint8_t fault);
+dac_link_started device_started(const device *d);
+dac_link_started device_refusal(const device *d, unsigned fault);
 uint32_t device_lost(const device *d);
+void device_set_clock(uint32_t now);
 size_t device_sizes(unsigned which);
 int32_t device_table(const device *d, unsigned axis, unsigned place, uint32_t word);
 void device_stall(device *d, bool stalled);

@@ -9,14 +9,16 @@ import shutil
 import tempfile
 from collections.abc import Callable, Iterable, Sequence
 from ctypes import CFUNCTYPE, POINTER, Structure, c_bool, c_int32, c_size_t, c_uint8, c_uint16, c_uint32, c_void_p
+from enum import IntEnum
 from functools import cache
+from itertools import count
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from building import REPOSITORY
 from c_library import OPTIONS, Converter, CProgram, Library, compile_library, converter_of
-from link_talk import Talk
+from link_talk import IDENTITY, Talk, derived_nonce
 
 from tablegen.device.dual_program import DualProgram
 from tablegen.fixedpoint.output import Output
@@ -40,6 +42,18 @@ class Line(NamedTuple):
     crc: int
     markers: int
     faults: int
+
+
+class Started(IntEnum):
+    """Why a link was not started: ``dac_link_started``."""
+
+    STARTED = 0
+    BAD_AXIS = 1
+    BAD_FOURIER = 2
+    BAD_KEY = 3
+    NO_IDENTITY = 4
+    NO_RANDOM = 5
+    NO_CLOCK = 6
 
 
 class _Record(Structure):
@@ -68,6 +82,9 @@ class _Setup(Structure):
         ("knows_hash", c_uint8),
         ("hash", c_uint8 * 32),
         ("has_interlock", c_uint8),
+        ("identity_bytes", c_uint8),
+        ("identity", c_uint8 * 32),
+        ("boot_persists", c_uint8),
         ("random", _Random),
         ("sine", POINTER(c_int32)),
         ("boot_program", POINTER(CProgram)),
@@ -129,7 +146,8 @@ class HostDevice:
     """A device whose converters are those of ``like`` and which boots into ``boot``, if that is not None.
 
     ``index_bits`` of the longest tables of x and y default to those of ``like``, ``limits`` to all that its converters
-    can do, ``library`` to ``device_library()``. Nonces come from key and boot count, or from ``nonces``.
+    can do, ``library`` to ``device_library()``. Nonces are those of ``derived_nonce``, changed by what ``random``
+    gives, or ``nonces``; ``started`` is why the link was not.
     ``permits`` is the input of the interlock, if it has one.
     """
 
@@ -150,6 +168,9 @@ class HostDevice:
         boot_count: int = 0,
         power_up: tuple[int, int] = (0, 0),
         nonces: Callable[[], bytes] | None = None,
+        identity: bytes = IDENTITY,
+        random: Callable[[], bytes] | None = None,
+        boot_persists: bool = True,
     ) -> None:
         bits = 16 if max(like.x.bits, like.y.bits, like.x.output.word_bits, like.y.output.word_bits) <= 16 else 32
         self.library = library or device_library(bits)
@@ -187,10 +208,20 @@ class HostDevice:
         if boot is not None:
             program, self._axes = self.library.program(boot)
             setup.boot_program = ctypes.pointer(program)
+        setup.identity_bytes, setup.boot_persists = len(identity), boot_persists
+        setup.identity[: len(identity)] = identity
         if nonces is not None:
-            self._random = setup.random = _Random(lambda to: ctypes.memmove(to, nonces(), 16))
+            counter = count(1)  # of this boot: what makes the wanted nonce of the derived one
+
+            def random() -> bytes:
+                derived = derived_nonce(key, self.boot_count, next(counter), identity)
+                return bytes(a ^ b for a, b in zip(derived, nonces(), strict=True))
+
+        if random is not None:
+            self._random = setup.random = _Random(lambda to: ctypes.memmove(to, random(), 16))
         self._setup = setup
         self._device = c_void_p(self._dll.device_new(ctypes.byref(setup), c_uint32(boot_count)))
+        self.started = Started(self._dll.device_started(self._device))
 
     def __del__(self) -> None:
         if hasattr(self, "_device"):
@@ -263,6 +294,15 @@ class HostDevice:
         records = (_Record * max(count, 1))()
         self._dll.device_records(self._device, records)
         return [Line(*(getattr(record, name) for name in Line._fields)) for record in records[:count]]
+
+    def refusal(self, fault: int) -> Started:
+        """Why a link does not start that has a fault in its configuration; 0 is none."""
+        return Started(self._dll.device_refusal(self._device, c_uint32(fault)))
+
+    def set_clock(self, milliseconds: int) -> None:
+        """The time of all devices of the library."""
+        self._note(f"c {milliseconds}")
+        self._dll.device_set_clock(c_uint32(milliseconds))
 
     def reboot(self) -> None:
         """Reset: nothing is left but what is in the firmware, and the next boot count."""

@@ -91,11 +91,13 @@ def random_limits(rng: Generator, program: DualProgram) -> tuple[AxisLimits, Axi
     for axis in (program.x, program.y):
         output = axis.output
         slack = int(rng.choice([0, 0, 1, 1000, 1 << 24])) - (rng.random() < 0.1)
+        code_min = max(output.code_min - slack, 0) + int(rng.choice([0, 0, 40]))
+        code_max = output.code_max + slack - int(rng.choice([0, 0, 40]))
         limits.append(
             AxisLimits(
-                max(output.code_min - slack, 0) + int(rng.choice([0, 0, 40])),
-                output.code_max + slack - int(rng.choice([0, 0, 40])),
-                output.max_step + slack,
+                code_min,
+                max(min(code_max, (1 << output.dac_bits) - 1), code_min),
+                max(output.max_step + slack, 1),
                 int(rng.choice([0, 1, 1 << 24, *rng.integers(0, 1 << output.dac_bits, 4)])),
             )
         )

@@ -6,11 +6,11 @@ dac_sequencer sequencer;
 dac_link link_;
 uint8_t script[SCRIPT], sent[SCRIPT];
 volatile uint32_t script_at, sent_bytes, ticks;
-static dac_word x_table[2][32], y_table[2][16];
+static dac_word x_table[2][33], y_table[2][17];
 
 static const dac_link_config config = {
-    .x = {{16, 16, false, false, 0}, {0, 65535, 0xFFFFFF, 0xFFFFFF}, 16, 5, {x_table[0], x_table[1]}, NULL},
-    .y = {{16, 16, false, false, 0}, {0, 65535, 0xFFFFFF, 0xFFFFFF}, 16, 4, {y_table[0], y_table[1]}, NULL},
+    .x = {{16, 16, false, false, 0}, {0, 65535, 0xFFFFFF, 0xFFFFFF}, 16, 5, 33, {x_table[0], x_table[1]}, NULL},
+    .y = {{16, 16, false, false, 0}, {0, 65535, 0xFFFFFF, 0xFFFFFF}, 16, 4, 17, {y_table[0], y_table[1]}, NULL},
 };
 
 void bench_main(void);

@@ -36,7 +36,8 @@ class Line:
 
     ``baud`` paces both ways (None: bytes take no time); ``out_s`` and ``back_s`` are their latencies. What comes back
     arrives at multiples of ``batch_s``, as through a USB bridge. The device plays ``tick_hz`` samples a second. Faults
-    are of ``chances`` and ``seed``; ``on_frame`` is called with every frame as it reaches the device, before it.
+    are of ``chances`` and ``seed``; ``on_frame`` is called with every frame as it reaches the device, before it. The
+    client is told ``told_baud`` where it is not the rate of the line.
     """
 
     def __init__(
@@ -51,8 +52,9 @@ class Line:
         chances: Chances = _NO_FAULTS,
         seed: int = 0,
         on_frame: Callable[[bytes], None] | None = None,
+        told_baud: int | None = None,
     ) -> None:
-        self.device, self.baud, self.now_s = device, baud, 0.0
+        self.device, self.baud, self.now_s = device, told_baud or baud, 0.0
         self.sent = 0  # bytes that the host wrote
         self.arrived = 0  # bytes that left the host's end by now, faults aside
         self.resets = self.opened = 0
@@ -61,14 +63,18 @@ class Line:
         self.back = Spoiler(chances, random)
         self._chances, self._on_frame = chances, on_frame
         self._out_s, self._back_s, self._batch_s, self._tick_hz = out_s, back_s, batch_s, tick_hz
-        self._byte_s = BYTE_BITS / baud if baud else 0.0
+        self._line_baud = baud
         self._ticks = 0
         self._out_free = self._back_free = 0.0  # when the wire is
         self._away_until = self._deaf_until = 0.0
-        self._port: Port | None = None
+        self._port: object = None  # the one that was opened last, until it vanishes
         self._order = itertools.count()
         self._to_device: list[tuple[float, int, bytes]] = []
         self._to_host: list[tuple[float, int, bytes]] = []
+
+    @property
+    def _byte_s(self) -> float:
+        return BYTE_BITS / self._line_baud if self._line_baud else 0.0
 
     def open(self) -> "Port":
         """An opener for the client. Raises ``NoPort`` while the port is away."""
@@ -76,8 +82,9 @@ class Line:
             raise NoPort("the virtual port is away")
         self.opened += 1
         self._to_host.clear()
-        self._port = Port(self)
-        return self._port
+        port = Port(self)
+        self._port = port
+        return port
 
     def heal(self) -> None:
         """No more faults, but for what is on its way."""
@@ -103,7 +110,7 @@ class Line:
                 self._port, self._away_until = None, self.now_s + self._chances.away_s
                 self._to_device.clear()
                 return
-            for delay, piece in self.out.spoil(frame):
+            for delay, piece in self._spoil_out(frame):
                 self._out_free = max(self._out_free, self.now_s) + self._byte_s * len(piece) + delay
                 heapq.heappush(self._to_device, (self._out_free + self._out_s, next(self._order), piece))
 
@@ -138,12 +145,18 @@ class Line:
             self.resets += 1
             self._deaf_until = self.now_s + self._chances.deaf_s
 
+    def _spoil_out(self, frame: bytes) -> list[tuple[float, bytes]]:
+        return self.out.spoil(frame)
+
+    def _spoil_back(self, frame: bytes) -> list[tuple[float, bytes]]:
+        return self.back.spoil(frame)
+
     def _collect(self) -> None:
         data = self.device.transmit()
         if self._port is None:
             return  # nobody listens
         for frame in split(data):
-            for delay, piece in self.back.spoil(frame):
+            for delay, piece in self._spoil_back(frame):
                 self._back_free = max(self._back_free, self.now_s) + self._byte_s * len(piece) + delay
                 arrives = self._back_free + self._back_s
                 if self._batch_s:

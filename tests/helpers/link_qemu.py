@@ -20,7 +20,7 @@ _PTY = re.compile(rb"redirected to (/dev/pts/\d+)")
 class LinkMachine:
     """A board whose link is at ``url``, for pyserial: a socket, or a pseudo-terminal. Its log is read all the time."""
 
-    def __init__(self, machine: str, executable: Path, pty: bool = False) -> None:
+    def __init__(self, machine: str, executable: Path, pty: bool = False, semihosting: bool = False) -> None:
         self._text = b""
         self._lock = threading.Lock()
         log = socket.create_server(("127.0.0.1", 0))
@@ -32,6 +32,7 @@ class LinkMachine:
         way = "pty,id=u0" if pty else f"socket,id=u0,fd={link.fileno()},server=on,wait=off,nodelay=on"
         # Time is what instructions take, 8 ns each.
         command = [tool("qemu-system-arm"), "-M", machine, "-icount", "shift=3", "-nodefaults", "-display", "none"]
+        command += ["-semihosting"] if semihosting else []
         command += ["-chardev", way, "-serial", "chardev:u0"]
         command += ["-chardev", f"socket,id=m0,fd={monitor.fileno()},server=on,wait=on", "-mon", "chardev=m0"]
         command += ["-chardev", f"socket,id=u1,fd={log.fileno()},server=on,wait=on,nodelay=on", "-serial", "chardev:u1"]

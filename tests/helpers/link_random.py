@@ -6,9 +6,9 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from link_device import HostDevice, widest
+from link_device import HostDevice, Started, widest
 from link_images import damaged, random_image, random_limits, resealed
-from link_talk import Talk, derived_nonce
+from link_talk import IDENTITY, Talk
 from programs import random_dual
 
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS
@@ -61,6 +61,7 @@ class Dialogue:
             update_rate_hz=20000,
             **how,
         )
+        assert self.device.started is Started.STARTED, self.device.started
         if notes:
             self.device.take_notes()
         features = Feature.TABLES | Feature.FOURIER | Feature.READBACK | Feature.INTERLOCK | Feature.NARROWS
@@ -71,9 +72,16 @@ class Dialogue:
         info = DeviceInfo(
             VERSION, features | (Feature.KEY if key else 0), ring, 240, HARMONICS, most, *shapes, *limits, 20000
         )
-        self._count = 0
+        self._clock = 0
+        self.device.set_clock(0)
         self.model = ModelDevice(
-            info, SequencerPlayer(boot), key=key, boot=self.device.boot_count, boot_hash=BOOT_HASH, nonces=self._nonce
+            info,
+            SequencerPlayer(boot),
+            key=key,
+            boot=self.device.boot_count,
+            boot_hash=BOOT_HASH,
+            identity=IDENTITY,
+            milliseconds=lambda: self._clock,
         )
         self.talk = Talk(int(self.rng.integers(1, 1 << 32)), key)
         self.seen: Counter[Any] = Counter()
@@ -83,10 +91,6 @@ class Dialogue:
         self._reader = FrameReader()
         self.heard = bytearray()
         self._received = 0
-
-    def _nonce(self) -> bytes:
-        self._count += 1
-        return derived_nonce(self.key, self.model.boot, self._count)
 
     def _some_image(self) -> ProgramImage:
         kind = str(self.rng.choice(["smooth", "smooth", "tame", "wild"]))
@@ -185,6 +189,9 @@ class Dialogue:
     def _tagged(self, kind: int, payload: bytes = b"", image: bytes | None = None) -> bytes:
         if self.key and self.rng.random() < 0.9:
             self._send(self.talk.request(Request.CHALLENGE))
+            if self.rng.random() < 0.2:
+                self._clock += int(self.rng.choice([1, 9_999, 10_000, 4_000_000_000]))
+                self.device.set_clock(self._clock & 0xFFFFFFFF)
             if self.rng.random() < 0.9:
                 return self.talk.acting(kind, payload, self._nonce_given, image)
             return self.talk.acting(kind, payload + bytes(16))
@@ -248,5 +255,5 @@ class Dialogue:
     def _reboot(self) -> None:
         self.device.reboot()
         self.model.reboot()
-        self._count = self._received = 0
+        self._received = 0
         self._send(self.talk.hello())

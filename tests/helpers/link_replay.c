@@ -5,7 +5,7 @@
  *     B hex        what uploads the program that it boots with
  *     r hex        bytes from the line; f hex  the same, and the main loop does not go round
  *     w n, t n k   the main loop n times; n ticks, after each the main loop at most k times
- *     p, s, b, k   interlock, line stalled, reset with a boot count, a damaged word
+ *     p, s, b, k, c   interlock, line stalled, reset with a boot count, a damaged word, the clock
  */
 #include <inttypes.h>
 #include <stdio.h>
@@ -19,7 +19,7 @@ enum { LONGEST = 1 << 18, SINES = 5 << 14 };
 static char line[LONGEST];
 static uint8_t bytes[LONGEST];
 static int32_t sine[SINES];
-static dac_word boot_x[1 << 16], boot_y[1 << 16];
+static dac_word boot_x[(1 << 16) + 1], boot_y[(1 << 16) + 1];
 static dac_program boot;
 static char *at;
 
@@ -70,6 +70,10 @@ static uint32_t read_setup(device_setup *s)
     for (int i = 0; i < 32; i++)
         s->hash[i] = (uint8_t)number();
     s->has_interlock = (uint8_t)number();
+    s->identity_bytes = (uint8_t)number();
+    for (int i = 0; i < 32; i++)
+        s->identity[i] = (uint8_t)number();
+    s->boot_persists = (uint8_t)number();
     s->sine = sine;
     return (uint32_t)strtoul(at, &at, 10);
 }
@@ -85,6 +89,8 @@ static void keep_boot(device *d, size_t count)
     dac_link_program_of(&d->link, &boot);
     memcpy(boot_x, boot.x.table, boot.x.length * sizeof(dac_word));
     memcpy(boot_y, boot.y.table, boot.y.length * sizeof(dac_word));
+    boot_x[boot.x.length] = boot_x[0];
+    boot_y[boot.y.length] = boot_y[0];
     boot.x.table = boot_x;
     boot.y.table = boot_y;
     d->setup.boot_program = &boot;
@@ -106,6 +112,8 @@ int main(void)
             for (size_t i = 0; i < SINES && *at == ' '; i++)
                 sine[i] = (int32_t)number();
             d = device_new(&setup, count);
+            for (unsigned fault = 0; fault <= FAULTS; fault++)
+                (void)device_refusal(d, fault);
         } else if (d == NULL) {
             return 1;
         } else if (what == 'B') {
@@ -123,6 +131,8 @@ int main(void)
             device_permit(d, number() != 0);
         } else if (what == 's') {
             device_stall(d, number() != 0);
+        } else if (what == 'c') {
+            device_set_clock((uint32_t)strtoul(at, &at, 10));
         } else if (what == 'b') {
             device_start(d, (uint32_t)strtoul(at, &at, 10));
         } else if (what == 'k') {

@@ -13,9 +13,13 @@ from tablegen.link.model import tag
 SESSION = 0x1BADCAFE
 
 
-def derived_nonce(key: bytes, boot: int, count: int) -> bytes:
-    """The nonce of a C device without random numbers: of its boot, the count-th."""
-    return hashlib.blake2s(struct.pack("<II", boot, count), key=key, digest_size=16).digest()
+IDENTITY = b"device 1"
+
+
+def derived_nonce(key: bytes, boot: int, count: int, identity: bytes = IDENTITY) -> bytes:
+    """The nonce of a device without random numbers: of its boot, the count-th."""
+    message = bytes([len(identity)]) + identity + struct.pack("<II", boot, count)
+    return hashlib.blake2s(message, key=key, digest_size=16).digest()
 
 
 @dataclass

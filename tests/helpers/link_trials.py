@@ -8,6 +8,7 @@ import link_device
 import numpy as np
 import test_c_link
 import test_c_link_acceptance
+import test_c_link_key
 import test_c_link_parts
 from dialogues import dialogues
 from link_device import DeviceLibrary
@@ -38,6 +39,14 @@ def trials() -> Iterator[str]:
     parts.test_the_tag_of_a_commit_covers_the_image_in_memory()
     parts.test_every_bit_of_a_tag_counts(parts.Request.ARM)
     parts.test_nonces_are_others_after_each_start()
+    key = test_c_link_key
+    key.test_nonces_are_of_key_identity_boot_and_count()
+    key.test_a_challenge_expires()
+    for how in ({}, {"boot_persists": False, "random": key.urandom}):
+        key.test_a_recorded_trigger_is_worth_nothing_after_a_power_cycle(how)
+        key.test_it_is_worth_nothing_on_another_instrument(how)
+    yield "what is refused at the start"
+    key.test_a_configuration_with_one_fault_is_refused()
     yield "the ring"
     parts.test_no_answer_is_lost_where_nothing_can_leave()
     parts.test_what_the_ring_has_no_room_for_is_counted_and_recovered_from()
@@ -60,10 +69,10 @@ def trials() -> Iterator[str]:
             shape = test_c_link_acceptance.SHAPES.get(name) or test_c_link_acceptance.SHAPES["16 bits"]
             test_c_link_acceptance.compare(shape, state, 250, 3)
     for seed in range(3):
-        for key in (b"", KEY):
+        for secret in (b"", KEY):
             for name in ("16 bits", "12 bits", "direct"):
                 yield f"random dialogue {seed}: {name}"
-                Dialogue(test_c_link.SHAPES[name], seed, key).play(200)
+                Dialogue(test_c_link.SHAPES[name], seed, secret).play(200)
     for seed in range(2):
         yield "programs: 16 bits, playing"
         test_c_link_acceptance.compare(test_c_link_acceptance.SHAPES["16 bits"], "playing", 400, 5 + seed)

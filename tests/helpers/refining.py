@@ -90,9 +90,9 @@ class Step:
 
 
 def period(nanometres: np.ndarray) -> Displacement:
-    """One noiseless period at every tick, as if it had been measured."""
+    """One noiseless period, in the middle of every tick, as if it had been measured."""
     count = len(nanometres)
-    c = np.fft.rfft(nanometres) / count
+    c = np.fft.rfft(nanometres) / count * np.exp(-1j * np.pi * np.arange(count // 2 + 1) / count)
     few = min(512, count // 2 - 1)
     series = FourierSeries(float(c[0].real), 2.0 * c[1 : few + 1].real, -2.0 * c[1 : few + 1].imag)
     return Displacement(series, np.zeros((2 * few + 1,) * 2), 0.0, 0.0, 1.0, 1.0, count, 0)

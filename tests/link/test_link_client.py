@@ -10,7 +10,6 @@ from client_line import VirtualLine
 from client_rig import BOOT, FOURIER, KEY, LARGE, LARGE_INFO, NEW, TABLE, Watched, client, model
 from link_programs import INFO, LIMITS, make_scan
 
-from tablegen.link import exchange
 from tablegen.link.device import Device
 from tablegen.link.errors import (
     LinkError,
@@ -102,6 +101,17 @@ def test_an_upload_comes_into_force_and_can_be_read_back(image: object, window: 
     assert line.count(Request.DATA) == sum(-(-len(i.data) // 240) for i in (image, TABLE))  # type: ignore[attr-defined]
 
 
+def test_a_challenge_does_not_expire_while_an_image_is_on_its_way() -> None:
+    """An image that takes half a minute, and a nonce that lasts ten seconds: no request is refused."""
+    clock: list[VirtualLine] = []
+    line = Watched(model(LARGE_INFO, KEY, milliseconds=lambda: round(1000 * clock[0].now()) if clock else 0), baud=2400)
+    clock.append(line)
+    with client(line, key=KEY) as device:
+        assert device.upload(LARGE).generation == 2
+        assert line.now() > 30.0
+        assert (line.count(Request.CHALLENGE), line.count(Request.COMMIT)) == (1, 1)
+
+
 def test_what_waits_for_a_line_is_asked_for_and_not_sent_again() -> None:
     """The lines of the boot program last 5 s here."""
     line = Watched(model(), tick_hz=20)
@@ -189,14 +199,6 @@ def test_a_long_way_is_learned(way_s: float) -> None:
     assert line.count(Request.BEGIN) == line.count(Request.COMMIT) == 1
 
 
-def test_without_learning_a_long_way_is_never_at_its_end(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Negative control."""
-    monkeypatch.setattr(exchange, "_MAX_LATENESS_S", 0.0)
-    line = Watched(model(LARGE_INFO), out_s=0.06, back_s=0.06, tick_hz=500_000)
-    with client(line) as device, pytest.raises(OutOfTime):
-        device.upload(LARGE)
-
-
 def test_the_window_of_the_device_is_kept() -> None:
     """The device's memory for bytes is finite: never more unanswered frames on their way than it says."""
     for window in (1, 3, 8):
@@ -242,6 +244,30 @@ def test_a_device_that_falls_silent_is_lost_and_the_port_is_left_alone() -> None
                 ask()
             assert line.now() - start < 20.0
     assert line.opened == 1, "to open a port resets some devices"
+
+
+def test_a_readback_ends_when_the_device_falls_silent() -> None:
+    """Long before its time is over."""
+    line = VirtualLine(model(LARGE_INFO))
+    with client(line) as device:
+        device.upload(LARGE)
+        answers = [0]
+
+        def stop(piece: bytes) -> list[bytes]:
+            answers[0] += 1
+            return [piece] if answers[0] < 12 else []
+
+        line.spoil_back, start = stop, line.now()
+        with pytest.raises(Silent, match="no longer answers"):
+            device.readback(timeout_s=1000.0)
+        assert line.now() - start < 20.0
+
+
+def test_a_silent_device_is_given_up_when_the_time_is_over() -> None:
+    line = VirtualLine(model(), spoil_out=never_answering)
+    with pytest.raises(NoAnswer):
+        client(line, timeout_s=0.3)
+    assert line.now() == pytest.approx(0.3, abs=0.01)
 
 
 def test_a_port_that_is_not_there() -> None:

@@ -178,10 +178,31 @@ def test_status_130_interrupted(bench: Bench, folder: Path, scan: PreparedScan, 
     assert ("the device already had" in outcome.out) == (after > 0)
 
 
-def test_an_interrupted_request_is_no_upload(bench: Bench) -> None:
-    def interrupt(piece: bytes) -> list[bytes]:
-        raise KeyboardInterrupt
+INTERRUPTIONS = [
+    (("park",), Request.HELLO, "the device continues as before"),
+    (("status",), Request.STATUS, "the device continues as before"),
+    (("readback", "-o", "x.bin"), Request.READBACK, "the device continues as before"),
+    (("park",), Request.PARK, "the device may have carried out PARK: see `tablegen status`"),
+    (("trigger",), Request.TRIGGER, "the device may have carried out ARM and TRIGGER: see `tablegen status`"),
+    (("clear",), Request.CLEAR, "the device may have carried out CLEAR: see `tablegen status`"),
+    (("upload",), Request.LIMITS, "the device continues with its old scan"),
+    (("upload",), Request.COMMIT, "everything was sent, and the new scan may become active: see `tablegen status`"),
+]
 
-    bench.options["spoil_out"] = interrupt
-    outcome = bench.run("park")
-    assert (outcome.status, outcome.err) == (130, "interrupted; the device continues as before\n")
+
+@pytest.mark.parametrize(("command", "request_", "said"), INTERRUPTIONS)
+def test_an_interruption_says_what_the_device_may_do(
+    bench: Bench, folder: Path, command: tuple[str, ...], request_: Request, said: str
+) -> None:
+    """Ctrl-C while an answer is on its way; a request that acts has arrived then."""
+    if command[0] == "readback":
+        assert bench.run("upload", folder).status == 0
+
+    def interrupt(piece: bytes) -> list[bytes]:
+        if type_of(piece) == request_ | 0x80:
+            raise KeyboardInterrupt
+        return [piece]
+
+    bench.options["spoil_back"] = interrupt
+    outcome = bench.run(*command, *([folder] if command[0] == "upload" else []))
+    assert (outcome.status, outcome.err) == (130, f"interrupted; {said}\n")

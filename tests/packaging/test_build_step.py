@@ -233,6 +233,25 @@ def test_a_comment_runs_tablegen_and_compiles_nothing(project: Project, name: st
     does(project.build(), 0, set())
 
 
+def test_what_uses_a_scan_is_compiled_for_its_widths(project: Project) -> None:
+    """Words of tables and converters of more than 16 bits take 32 in memory, in every file that is compiled."""
+    project.edit(project.folder / "main.c", 'printf("\\n");', 'printf(" %d\\n", SCAN_WIDTHS);')
+    project.edit(
+        project.folder / "main.c",
+        "int main",
+        "#define SCAN_WIDTHS (DAC_TABLE_STORAGE_BITS + DAC_OUTPUT_STORAGE_BITS)\nint main",
+    )
+    does(project.build(), 0, {"main"})
+    assert project.play().endswith(" 32\n")
+    scan = project.scan.read_text("utf-8")
+    wide = scan.replace("\nbits = 16\n", "\nbits = 18\n")
+    wide = wide.replace("[dac]\nbits = 18\n", "[dac]\nbits = 16\nword_bits = 24\n")
+    assert (wide.count("\nbits = 18\n"), wide.count("word_bits")) == (2, 1)
+    project.write(project.scan, wide)
+    does(project.build(), 1, BUILT)
+    assert project.play().endswith(" 64\n")
+
+
 def test_a_number_of_the_scanner_rebuilds(project: Project) -> None:
     project.edit(project.scanner, "k_nm_per_v = 10.0                # calibrated", "k_nm_per_v = 11.0 # calibrated")
     does(project.build(), 1, {"main", NAME})

@@ -119,9 +119,20 @@ def test_each_harmonic_is_divided_by_the_dynamics(example: Plan) -> None:
     played = (line.series.a - 1j * line.series.b) / 2
     r = n * 400.0 / 40e3
     response = 1 / (1 - r**2 + 1j * r / 20.0)
-    assert played * response == pytest.approx(target, rel=1e-12, abs=1e-15)
+    held = np.exp(-1j * np.pi * n / 1250) * np.sinc(n / 1250)  # what a converter makes of samples at k / 1250
+    assert played * held * response == pytest.approx(target, rel=1e-12, abs=1e-15)
+    at_piezo = (line.drive_series.a - 1j * line.drive_series.b) / 2
+    assert at_piezo * response == pytest.approx(target, rel=1e-12, abs=1e-15)
     assert line.held_harmonics == ()
-    assert example.y.series is example.y.target
+    assert example.y.drive_series is example.y.target
+
+
+def test_an_axis_that_steps_is_in_the_middle_of_its_line_where_a_ramp_would_be(tmp_path: Path) -> None:
+    """The hold is a line long: the code of line j is what the target has at j + 1/2, and a row is at its code."""
+    ramp, step = (plan_of(tmp_path, {"y.motion": f'"{motion}"'}).y for motion in ("ramp", "step"))
+    j = np.arange(200)
+    assert step.series.value(j / 200) == pytest.approx(step.target.value((j + 0.5) / 200), abs=1e-12)
+    assert step.codes(0, 250_000)[::1250] == pytest.approx(ramp.codes(0, 250_000)[625::1250], abs=2.0)
 
 
 def test_the_boost_limit_holds_back_and_says_so(tmp_path: Path) -> None:
@@ -151,9 +162,10 @@ def test_ticks_per_pixel_choose_the_line(tmp_path: Path) -> None:
 
 
 def test_windows_are_decided_in_exact_fractions(example: Plan) -> None:
-    """0.1 of a branch of 625 ticks is tick 62.5, so that 63 is the first inside; both directions hold 500 ticks."""
+    """0.1 of a branch of 625 ticks is tick 62.5; pixels begin a quarter of a tick late on average, so that the window
+    begins at 62. Both directions hold 500 ticks."""
     schedule = example.schedule
-    assert (schedule.forward.first, schedule.forward.stop) == (63, 563)
+    assert (schedule.forward.first, schedule.forward.stop) == (62, 562)
     assert (schedule.backward.first, schedule.backward.stop) == (688, 1188)
     assert (schedule.turn_tick, schedule.turn_line) == (625, 190)
     # Lines count where they begin and end inside 0.05..0.95 of 190 lines: 9.5 to 180.5.

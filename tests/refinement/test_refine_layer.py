@@ -212,7 +212,8 @@ REFUSED = [
     ),
     (
         ['model = "0123456789abcdef"'],
-        "x.refinement.model: learnt over another x.hysteresis or x.resonance of the scanner file",
+        "x.refinement.model: learnt over another x.hysteresis or x.resonance of the scanner file, or by tablegen "
+        "before 0.3.0, which left the converter's hold to the layer",
     ),
 ]
 

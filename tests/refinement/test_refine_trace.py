@@ -39,10 +39,11 @@ def line(tmp_path_factory: pytest.TempPathFactory) -> LinePlan:
 
 
 def drive(line: LinePlan, turns: np.ndarray) -> np.ndarray:
-    """The waveform that is played, term by term."""
+    """The waveform that is played, term by term, as the converter's hold lets it arrive: half a tick later."""
     n = np.arange(1, line.series.harmonics + 1)
-    angle = 2.0 * np.pi * np.outer(turns, n)
-    w = line.series.a0 + np.cos(angle) @ line.series.a + np.sin(angle) @ line.series.b
+    angle = 2.0 * np.pi * np.outer(turns - 0.5 / line.program.ticks, n)
+    held = np.sinc(n / line.program.ticks)
+    w = line.series.a0 + np.cos(angle) @ (held * line.series.a) + np.sin(angle) @ (held * line.series.b)
     return line.drive.v_offset + line.drive.v_amplitude * (w - 0.5)
 
 

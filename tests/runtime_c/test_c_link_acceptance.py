@@ -95,7 +95,7 @@ def test_the_jump_of_y_is_the_largest_there_can_be(first: Callable[[Ints], int])
     jump = int(codes.max() - codes.min())
     assert jump > 1000
     image = make_image(program, "00" * 32)
-    everything = AxisLimits(0, 1 << 24, 1 << 24, 1 << 24)
+    everything = AxisLimits(0, (1 << 16) - 1, 1 << 24, 1 << 24)
     for most, expected in ((jump, None), (jump - 1, (Reason.JUMP, 1))):
         limits = everything, replace(everything, max_jump=most)
         bench = Bench(program, "playing", limits, SequencerShape(16, 1, 7, 16, 1, 6, 16))
@@ -121,7 +121,11 @@ def compare(shape: SequencerShape, state: str, count: int, seed: int) -> Counter
     for at in range(count):
         if at % 40 == 0:
             _, program = random_image(rng, shape)
-            limits = random_limits(rng, program) if at % 80 else (AxisLimits(0, 1 << 24, 1 << 24, 1 << 24),) * 2
+            limits = (
+                random_limits(rng, program)
+                if at % 80
+                else (AxisLimits(0, (1 << shape.dac_bits) - 1, 1 << 24, 1 << 24),) * 2
+            )
             bench = Bench(program, state, limits, shape)
         image, _ = random_image(rng, shape, HARMONICS)
         if rng.random() < 0.3:  # as what plays, so that it may be near enough

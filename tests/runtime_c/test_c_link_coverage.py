@@ -17,7 +17,7 @@ from tablegen.resources import c_link
 pytestmark = pytest.mark.common
 
 # A program that passes every check and is not loaded all the same; a source of random numbers, which no notes have.
-UNREACHABLE = ("DAC_LINK_REFUSED, (uint32_t)loaded", "l->config->random(l->nonce)")
+UNREACHABLE = ("DAC_LINK_REFUSED, (uint32_t)loaded", "c->random(some)")
 
 
 def test_every_line_was_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

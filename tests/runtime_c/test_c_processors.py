@@ -1,7 +1,7 @@
 """The C sequencer on processors that it is for, emulated: by unicorn in process, MIPS by QEMU.
 
-The scripts that the Verilog sequencer and the C one on this machine play are played by Cortex-M0+ to M7, by 64-bit
-RISC-V and by 32-bit MIPS with the other byte order.
+The scripts that the Verilog sequencer and the C one on this machine play are played by Cortex-M0+ to M33, by RISC-V of
+32 and 64 bits, and by 32-bit MIPS with the other byte order.
 """
 
 import sys
@@ -24,7 +24,8 @@ from tablegen.verification.stream import Script, compare
 
 pytestmark = pytest.mark.rest
 
-CORTEX_M = ("cortex-m0plus", "cortex-m3", "cortex-m4", "cortex-m7")
+CORTEX_M = ("cortex-m0plus", "cortex-m3", "cortex-m4", "cortex-m7", "cortex-m33")
+RISC_V = ("riscv32", "riscv64")
 SHAPE = SequencerShape(16, 1, 5, 16, 1, 4, 16)
 SHAPES = (SHAPE, SequencerShape(24, 1, 3, 8, 0, 4, 24))  # so many bits that tables and words are kept in 16, and in 32
 FILL = 40
@@ -83,11 +84,11 @@ def test_cortex_m_plays_long_lines(name: str, tmp_path: Path) -> None:
     """Those that are played many ticks at once."""
     shape, script = LONG[name][0], long_play(name, 8000)
     words = words_of(script, shape)
-    for core in ("cortex-m0plus", "cortex-m4"):
+    for core in ("cortex-m0plus", "cortex-m4", "riscv32"):
         hold(CortexMBench(shape, tmp_path, fill=200, core=core).run(words), script, 200)
 
 
-@pytest.mark.parametrize("core", [*CORTEX_M, "riscv64"])
+@pytest.mark.parametrize("core", [*CORTEX_M, *RISC_V])
 def test_tables_are_rendered_from_fourier_words(core: str, tmp_path: Path) -> None:
     shape = shape_in_c(SHAPE)
     script = renderings(shape, 12, 9)
@@ -96,9 +97,10 @@ def test_tables_are_rendered_from_fourier_words(core: str, tmp_path: Path) -> No
 
 @pytest.mark.parametrize("fill", [0, FILL], ids=["step", "fill"])
 @pytest.mark.parametrize("level", ["-O2", "-Os"])
-def test_64_bit_risc_v(sweeps: dict[SequencerShape, Script], level: str, fill: int, tmp_path: Path) -> None:
+@pytest.mark.parametrize("core", RISC_V)
+def test_risc_v(sweeps: dict[SequencerShape, Script], core: str, level: str, fill: int, tmp_path: Path) -> None:
     for shape, script in sweeps.items():
-        bench = CortexMBench(shape, tmp_path, options=options(level), fill=fill, core="riscv64")
+        bench = CortexMBench(shape, tmp_path, options=options(level), fill=fill, core=core)
         hold(bench.run(words_of(script, shape)), script, fill)
 
 

@@ -41,20 +41,27 @@ class Renderer:
     library: Library
 
     def table(self, words: Ints, index_bits: int, bits: int, harmonics: int, sine_index_bits: int) -> Ints | None:
-        """The words, or None if it was refused; nothing may be written before or behind them, or after a refusal."""
-        length = 1 << index_bits if index_bits <= 16 else 8
+        """The words, or None if it was refused; nothing may be written before or behind them, or after a refusal.
+
+        Behind the last word stands the first again.
+        """
+        length = (1 << index_bits if index_bits <= 16 else 8) + 1
         word = ctypes.c_int16 if self.library.word_bytes == 2 else ctypes.c_int32
         size = ctypes.sizeof(word)
         memory = ctypes.create_string_buffer(bytes([UNTOUCHED]) * size * (length + 2), size * (length + 2))
         fourier = (ctypes.c_int32 * len(words))(*words.tolist())
         sine = sine_of(min(sine_index_bits, 16))
         done = self.library.dll.dac_synthesize(
-            ctypes.byref(memory, size), index_bits, bits, fourier, harmonics, sine, sine_index_bits
+            ctypes.byref(memory, size), length, index_bits, bits, fourier, harmonics, sine, sine_index_bits
         )
         raw = memory.raw
         edges = raw if not done else raw[:size] + raw[-size:]
         assert set(edges) == {UNTOUCHED}
-        return np.frombuffer(raw[size:-size], self.library.word).astype(np.int64) if done else None
+        if not done:
+            return None
+        table = np.frombuffer(raw[size:-size], self.library.word).astype(np.int64)
+        assert table[-1] == table[0]
+        return table[:-1]
 
 
 @pytest.fixture(scope="module", params=by_tool(BUILDS))

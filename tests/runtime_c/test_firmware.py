@@ -1,18 +1,17 @@
 """The reference firmware on processors that it is for, emulated: unicorn in process, QEMU over its serial lines.
 
-It boots, takes commands, and every sample that it puts out is the model's. The ports to other boards are compiled, and
-the runtime plays on a simulated AVR.
+It boots, takes commands, and every sample that it puts out is the model's. The ports to other boards are compiled (they
+run in ``test_port_firmware.py``), and the runtime plays on a simulated AVR.
 """
 
 import re
 import sys
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from building import EXAMPLE, REMOVED, REPOSITORY, VARIANTS, Build, Variant, build, run, run_clean, write_variant
+from building import EXAMPLE, REMOVED, REPOSITORY, VARIANTS, Variant, build, run, run_clean, write_variant
 from emulation import BOARDS, CmsdkBoard, Firmware, Pl011Board
 from following import Differs, Follower, follow
 from qemu import Machine
@@ -274,43 +273,18 @@ def test_the_scan_of_a_port_has_its_converter_checked(tmp_path: Path) -> None:
     assert "twelve_bits_right_aligned" in done.stderr
 
 
-@pytest.fixture(scope="module")
-def sketch(tmp_path_factory: pytest.TempPathFactory) -> Build:
-    """The Arduino sketch with its build beside it."""
-    folder = tmp_path_factory.mktemp("sketch")
-    built = build(folder, SLOW_12_BITS)
-    built.folder.rename(folder / "src")
-    text = (FIRMWARE / "arduino" / "scan_player" / "scan_player.ino").read_text("utf-8")
-    (folder / "scan_player.ino").write_text(text, "utf-8")
-    return replace(built, folder=folder)
-
-
-ARDUINOS = {
-    "avr": ("avr-g++", "-std=gnu++11", "-mmcu=atmega2560", "-DF_CPU=16000000UL"),
-    "teensy": ("arm-none-eabi-g++", "-std=gnu++17", "-mcpu=cortex-m7", "-mthumb", "-ffreestanding", "-D__IMXRT1062__"),
-}
-
-
-@pytest.mark.parametrize("board", ARDUINOS)
-def test_the_arduino_sketch_compiles(sketch: Build, board: str, tmp_path: Path) -> None:
-    headers = REPOSITORY / "tests" / "helpers" / "arduino"
-    run_clean(
-        [*ARDUINOS[board], *WARNINGS, "-O2", f"-I{headers}", "-x", "c++", "-c", sketch.folder / "scan_player.ino",
-         "-o", tmp_path / "sketch.o"]
-    )  # fmt: skip
-
-
-def test_avr_plays_the_scan_in_time(sketch: Build, tmp_path: Path) -> None:
+def test_avr_plays_the_scan_in_time(tmp_path: Path) -> None:
     """Every tick is the model's, and takes fewer cycles than there are between two interrupts."""
     ticks, executable = 2600, tmp_path / "avr.elf"
-    source, sources = REPOSITORY / "tests" / "helpers" / "avr_step.c", sorted((sketch.folder / "src").glob("*.c"))
+    built = build(tmp_path, SLOW_12_BITS)
+    source, sources = REPOSITORY / "tests" / "helpers" / "avr_step.c", sorted(built.folder.glob("*.c"))
     run_clean(
         ["avr-gcc", "-std=c99", "-mmcu=atmega2560", "-O2", *WARNINGS, f"-DTICKS={ticks}",
-         f"-I{sketch.folder / 'src'}", source, *sources, "-o", executable]
+         f"-I{built.folder}", source, *sources, "-o", executable]
     )  # fmt: skip
     done = run(["simavr", "-m", "atmega2560", "-f", str(AVR_HZ), executable])
     shown = re.sub(r"\x1b\[[0-9;]*m", "", done.stdout + done.stderr)  # simavr colours, and cuts, what a UART sends
     lines = re.findall(r"[0-9a-f]{6} [0-9a-f]{6} [0-9a-f]{2} [0-9a-f]{4}", shown)
     assert len(lines) == ticks
-    follow([line[:-5] for line in lines], sketch.plan, 1)
+    follow([line[:-5] for line in lines], built.plan, 1)
     assert max(int(line[-4:], 16) for line in lines) < AVR_HZ / AVR_UPDATE_HZ / 2

@@ -32,10 +32,12 @@ from verifying import (
 from tablegen.emit.memory import memory_file
 from tablegen.fixedpoint.program import Program
 from tablegen.manifest.read import read_build
+from tablegen.version import __version__
 
-TICKS = 2000
-CHECKS = 17
-FILES = {("files", "SHA-256 in the manifest"), ("verilog memories", "manifest")}
+TICKS = 9000
+CHECKS = 28
+INSTALLED = ("files", f"tablegen {__version__}")
+FILES = {("files", "SHA-256 in the manifest"), INSTALLED, ("verilog memories", "manifest")}
 MODES = (
     "example",
     "bits_8",
@@ -134,7 +136,7 @@ def test_what_was_not_played_is_said(short: Build) -> None:
     needed = re.fullmatch(r"note: not a whole frame of 2648 ticks was played; --ticks (\d+) plays one", notes[0])
     assert needed
     assert "note:" not in verify(short.folder, ticks=int(needed[1])).out
-    assert "note: too few ticks for a program change within a frame; --ticks" in verify(short.folder, ticks=1000).out
+    assert "note: too few ticks for a program change within a frame; --ticks" in verify(short.folder, ticks=7000).out
 
 
 # What is wrong in the directory
@@ -196,7 +198,14 @@ def test_an_edited_constant_is_found(folder: Path) -> None:
     edit(folder / f"{NAME}.vh", f'{NAME.upper()}_X_TABLE_FILE = "{NAME}_x.mem";', f'{NAME.upper()}_X_TABLE_FILE = "";')
     outcome = verify(folder)
     assert outcome.status == 5
-    assert failed(outcome) == {("files", "SHA-256 in the manifest"), ("verilog header", "manifest")}
+    by_simulator = ("verilog header", "manifest, by the simulator")
+    assert failed(outcome) == {
+        ("files", "SHA-256 in the manifest"),
+        INSTALLED,
+        ("verilog header", "manifest"),
+        by_simulator,
+    }
+    assert f"{NAME.upper()}_PIXELS is 51 to the simulator, it is 50 in the manifest" in outcome.err
     assert f"{NAME}.vh: {NAME.upper()}_PIXELS is 51, it is 50 in the manifest" in outcome.err
     assert f"{NAME}.vh: {NAME.upper()}_X_TABLE_FILE is '', it is '{NAME}_x.mem' in the manifest" in outcome.err
 
@@ -309,15 +318,14 @@ def test_all_that_is_wrong_is_told_at_once(folder: Path) -> None:
 
 
 @pytest.mark.common
-def test_codes_beyond_the_certificate_are_found(folder: Path) -> None:
-    """Negative control of the float reference: a promise that is a little too good, and a waveform that is shifted."""
+@pytest.mark.parametrize("by", [-0.001, 99.0])
+def test_an_error_that_the_words_do_not_make_is_found(folder: Path, by: float) -> None:
+    """A promise that is a little too good, and one that allows everything: neither is the limit that is applied."""
     promised = json.loads((folder / "manifest.json").read_bytes())["axes"]["x"]["certificate"]["max_error_lsb"]
-    edit_manifest(folder, "axes", "x", "certificate", "max_error_lsb", value=promised - 0.001)
+    edit_manifest(folder, "axes", "x", "certificate", "max_error_lsb", value=promised + by)
     outcome = verify(folder)
-    assert failed(outcome) == {("x", "float waveform")}
-    assert re.search(
-        r"x: 0\.\d+ LSB from the float waveform, the certificate promises 0\.\d+; at tick \d+", outcome.err
-    )
+    assert failed(outcome) == {("x", "its certificate")}
+    assert re.search(r"x: axes\.x\.certificate\.max_error_lsb is [\d.]+, the words make it 0\.\d+", outcome.err)
 
 
 @pytest.mark.common
@@ -331,6 +339,8 @@ def test_a_manifest_that_was_edited_is_found(folder: Path) -> None:
     assert {
         ("manifest", "its own hash"),
         ("y", "float waveform"),
+        ("y", "its certificate"),
+        ("manifest", "its own numbers"),
         ("x", "slew guard"),
         ("verilog header", "manifest"),
     } <= found
@@ -407,6 +417,7 @@ def test_junit_has_a_case_a_check(short: Build, tmp_path: Path) -> None:
     assert outcome.status == 0
     told = read_report(report)
     assert told.counts == (str(CHECKS), "0", "0")
+    assert 0.0 < told.seconds == pytest.approx(sum(told.times), abs=0.02 * CHECKS)
     assert list(told.cases) == list(verdicts(outcome))
     assert told.failed == set()
 

@@ -32,6 +32,7 @@ from verifying import (
     with_a_long_table,
 )
 
+from tablegen.device.registers import program_words
 from tablegen.emit.formats.c import arrays_file, wrong_arrays, wrong_constants
 from tablegen.emit.stored import stored_content
 from tablegen.fixedpoint.output import Output
@@ -40,14 +41,20 @@ from tablegen.manifest.read import StoredBuild, read_build
 from tablegen.verification.bench import SequencerShape
 from tablegen.verification.c_bench import CBench, script_words
 from tablegen.verification.c_target import CTarget, _codes, _packed, _sources
+from tablegen.verification.capture import make_capture
+from tablegen.verification.checks import check_states
 from tablegen.verification.placement import Placement
-from tablegen.verification.session import make_session, varied
+from tablegen.verification.session import make_session
 from tablegen.verification.simulate import SimulationFailed
-from tablegen.verification.stream import Script
+from tablegen.verification.stream import Script, read_states
+from tablegen.verification.variation import variation
+from tablegen.version import __version__
 
 CAPITAL = NAME.upper()
-CHECKS = 20
+CHECKS = 27
 FILES = ("files", "SHA-256 in the manifest")
+INSTALLED = ("files", f"tablegen {__version__}")
+COMPILED = ("c header", "manifest, by the compiler")
 HEADER, ARRAYS, FILL = ("c header", "manifest"), ("c arrays", "manifest"), ("fill", "integer model")
 PROGRAM = ("program", "cc")
 # Words that are wider than their codes, of the widest that converters have.
@@ -165,20 +172,21 @@ def benches(short: Build, tmp_path_factory: pytest.TempPathFactory) -> Benches:
 
 @pytest.mark.common
 @settings(deadline=None, max_examples=40)
-@given(st.integers(0, 1 << 32), st.integers(1000, 6000))
+@given(st.integers(0, 1 << 32), st.integers(7000, 40_000))
 def test_sessions_of_any_seed_and_length_equal_the_model(benches: Benches, seed: int, ticks: int) -> None:
     """By steps and by fills; the ticks suffice for a whole session or end anywhere in it."""
     stored = benches.stored
     session = make_session(stored.program, None, ticks, seed, Placement())
     text = script_words(session.script, benches.step.shape)
     wanted = np.array(session.script.expected, dtype=np.uint64)
-    assert len(wanted) <= ticks
-    assert session.own is None or 0 < session.own < len(wanted)
-    assert not np.any(wanted[: session.own] >> np.uint64(56)), "the program of the build raises no fault"
+    own = make_capture(stored, session.script, wanted).own
+    assert not np.any(wanted[own] >> np.uint64(56)), "the program of the build raises no fault"
     for bench, mask in ((benches.step, (1 << 64) - 1), (benches.fill, (1 << 56) - 1)):  # fills do not record faults
         played = bench.run(text)
         assert np.array_equal(_packed(played.capture, stored), wanted & np.uint64(mask))
-        assert played.counts == [*session.script.counts, 0, 0]
+        assert played.counts == session.script.all_counts
+        told = check_states(session.script.states, read_states(played.states), (1 << 32) - 1, ("armed", "running"))
+        assert told.failure is None
 
 
 @pytest.mark.common
@@ -231,15 +239,34 @@ def test_codes_come_back_from_converter_words(bits: tuple[int, int], coding: str
     assert _codes(np.array([output.word(code)], dtype=np.uint64), output).tolist() == [code]
 
 
-def test_the_variation_differs_from_the_program_and_clamps(short: Build) -> None:
-    """Otherwise a mixture of the two, or a missing limit, would go unseen; the park code has to stay inside."""
-    program = read_build(short.folder).program
-    for own, other in ((program.x, varied(program).x), (program.y, varied(program).y)):
-        k = np.arange(own.ticks)
-        clamped = other.output.unclamped(other.samples(k)) != other.codes(k)
-        assert 0.1 < np.mean(clamped) < 0.9
-        assert np.mean(own.codes(k) != other.codes(k)) > 0.9
-        assert other.output.code_min <= other.output.park_code <= other.output.code_max
+@pytest.mark.parametrize("name", common(["short_frame"], VARIANTS))
+def test_variations_do_what_they_are_for(name: str, tmp_path: Path) -> None:
+    """Otherwise a missing limit, or a guard that is off in one direction, would go unseen; and each differs."""
+    program = read_build(build(tmp_path, VARIANTS[name]).folder).program
+    for longer in (0, 2000):
+        for bank in (0, 1):
+            made = {kind: variation(program, kind, bank, longer) for kind in ("free", "clamped", "held")}
+            for kind, one in made.items():
+                for own, other in ((program.x, one.x), (program.y, one.y)):
+                    check_variation(own, other, kind)
+            registers = [program_words(one.schedule, one.x, one.y) for one in made.values()]
+            assert len({tuple(words) for words in registers}) == 3
+
+
+def check_variation(own: Program, other: Program, kind: str) -> None:
+    k, output = np.arange(other.ticks), other.output
+    wanted = output.unclamped(other.samples(k))
+    steps = np.diff(other.codes(k), append=other.codes(k[:1]))
+    outside = np.any(wanted < output.code_min), np.any(wanted > output.code_max)
+    too_large = np.any(steps > output.max_step), np.any(steps < -output.max_step)
+    assert outside == ((True, True) if kind == "clamped" else (False, False))
+    if kind != "held":
+        assert too_large == (False, False)
+    elif output.max_step > 1 or other.hold > 1:
+        assert too_large == (True, True)
+    assert 0 <= output.code_min <= output.park_code <= output.code_max < 1 << output.dac_bits
+    assert output.gain_word != own.output.gain_word
+    assert len(other.words) <= 1 << max((len(own.words) - 1).bit_length(), 3)
 
 
 # What is wrong in the header
@@ -292,7 +319,7 @@ PLAYED = [
     ("X_MAX_STEP", lambda value: value + 1000, None),  # x never steps so far here
     ("X_PARK_CODE", lambda value: value + 1, ("x", "integer model")),
     ("Y_CODE_MAX", lambda value: value // 2 + 1000, ("y", "integer model")),
-    ("X_DAC_TWOS_COMPLEMENT", lambda value: 1 - value, ("x", "converter")),
+    ("X_DAC_TWOS_COMPLEMENT", lambda value: 1 - value, ("x", "converter word")),
     ("LINE_TICKS", lambda value: value + 1, PROGRAM),  # the header's own assertions
     ("X_GAIN_Q", lambda value: value + 1, PROGRAM),  # refused by dac_sequencer_load
     ("Y_TABLE_BITS", lambda value: value - 1, PROGRAM),
@@ -310,8 +337,9 @@ def test_a_damaged_constant_is_played_and_found(
     assert outcome.status == 5
     assert f"{NAME}.h: {CAPITAL}_{constant} is {new}, it is {old} in the manifest" in outcome.err
     assert f"files: {NAME}.h: stale or edited" in outcome.err
-    assert {HEADER, FILES} <= failed(outcome)
-    assert failed(outcome) == {HEADER, FILES} if fails is None else fails in failed(outcome)
+    static = {HEADER, FILES, INSTALLED}
+    assert static <= failed(outcome)
+    assert failed(outcome) == {*static, COMPILED} if fails is None else fails in failed(outcome)
     if fails == PROGRAM:
         assert "static assertion" in outcome.err or "size of array" in outcome.err or "DAC_BAD_" in outcome.err
     elif fails is not None:
@@ -332,7 +360,7 @@ def test_the_hash_in_the_header_is_held_against_the_manifest(folder: Path, short
     digest = short.manifest["hash"]
     edit(folder / f"{NAME}.h", f'"{digest}"', f'"{digest[::-1]}"')
     outcome = verify(folder)
-    assert failed(outcome) == {HEADER, FILES}
+    assert failed(outcome) == {HEADER, FILES, INSTALLED, COMPILED}
     assert f"{CAPITAL}_HASH is '{digest[::-1]}', it is '{digest}' in the manifest" in outcome.err
 
 
@@ -349,7 +377,7 @@ def test_a_damaged_table_is_found_at_its_first_tick(folder: Path, axis: str, at:
 
     outcome = verify(folder)
     assert outcome.status == 5
-    assert {FILES, ARRAYS, FILL, (axis, "integer model"), (axis, "converter")} <= failed(outcome)
+    assert {FILES, ARRAYS, FILL, (axis, "integer model"), (axis, "converter word")} <= failed(outcome)
     assert differs(outcome) == {axis}
     assert f"{NAME}.c: {NAME}_{axis}_table[{word}] is {new}, it is {old} in the manifest" in outcome.err
     check_first_difference(outcome, axis, heard, 331)
@@ -360,7 +388,7 @@ def test_a_damaged_table_is_found_at_its_first_tick(folder: Path, axis: str, at:
 def test_a_damaged_array_that_is_not_played_is_found(folder: Path, array: str) -> None:
     old, new = put_word(folder, array, 3, lambda value: value + 1)
     outcome = verify(folder)
-    assert failed(outcome) == {FILES, ARRAYS}
+    assert failed(outcome) == {FILES, INSTALLED, ARRAYS}
     assert f"{NAME}.c: {NAME}_{array}[3] is {new}, it is {old} in the manifest" in outcome.err
 
 
@@ -398,8 +426,8 @@ MUTANTS = [
         ("markers", "integer model"),
     ),
     ("unsticky faults", "sequencer.c", r"s->faults = [^;]*\| fault\b[^;]*;", ";", ("faults", "integer model")),
-    ("no coding", "axis.h", r"\(uint32_t\)code \^ axis->flip", "(uint32_t)code", ("x", "converter")),
-    ("other alignment", "axis.h", r"<< axis->shift\)", "<< axis->shift | 1u)", ("y", "converter")),
+    ("no coding", "axis.h", r"\(uint32_t\)code \^ axis->flip", "(uint32_t)code", ("x", "converter word")),
+    ("other alignment", "axis.h", r"<< axis->shift\)", "<< axis->shift | 1u)", ("y", "converter word")),
     ("fills", "sequencer.c", r"(void dac_sequencer_fill\([^)]*\)\n{\n)", r"\1    dac_sequencer_report(s, 2);\n", FILL),
     (
         "no program taken",
@@ -433,7 +461,7 @@ def test_an_edited_runtime_is_played_and_found(
     assert {FILES, fails} <= failed(outcome)
     assert f"files: dac_{file}: stale or edited" in outcome.err
     if fails == FILL:
-        assert failed(outcome) == {FILES, FILL}, "what only fills do wrong"
+        assert failed(outcome) == {FILES, INSTALLED, FILL}, "what only fills do wrong"
 
 
 @pytest.mark.common
@@ -513,7 +541,7 @@ def test_a_build_without_the_runtime_is_told(folder: Path, short: Build) -> None
 def test_codes_beyond_the_certificate_are_found(folder: Path, short: Build) -> None:
     promised = short.manifest["axes"]["x"]["certificate"]["max_error_lsb"]
     edit_manifest(folder, "axes", "x", "certificate", "max_error_lsb", value=promised - 0.001)
-    assert failed(verify(folder)) == {("x", "float waveform")}
+    assert failed(verify(folder)) == {("x", "its certificate")}
 
 
 @pytest.mark.common

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy import signal
+from scipy import integrate, signal
 
 from tablegen.numerics.arrays import Floats
 from tablegen.virtual.creep import logarithmic_creep
@@ -13,20 +13,23 @@ from tablegen.virtual.modes import Modes, low_pass, second_order
 CREEP = logarithmic_creep(0.03, 100.0, 1e-6, 1e3, 2)
 RESONANCE = second_order(50e3, 20.0)
 TICK = 2e-6
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(12)
+WEIGHTS = 0.5 * WEIGHTS  # of a mean over a tick
 GENERATOR = np.random.default_rng(3)
 NOISE = GENERATOR.standard_normal(300)
 
 
 def ticked(modes: Modes, drive: Floats, tick_s: float, rest: float) -> Floats:
-    """One recursion a term and tick, from the differential equation x' = p x + u."""
+    """One recursion a term and tick, from the differential equation x' = p x + u; the mean over each tick."""
     state = [rest / -p for p in modes.poles]
     out = []
     for u in drive:
         y = modes.direct * u
         for i, (p, r) in enumerate(zip(modes.poles, modes.residues, strict=True)):
-            decay = np.exp(p * tick_s)
-            state[i] = decay * state[i] + (decay - 1.0) / p * u
-            y += (2.0 if p.imag else 1.0) * (r * state[i]).real
+            at = tick_s * np.append(0.5 + 0.5 * NODES, 1.0)
+            x = np.exp(p * at) * state[i] + np.expm1(p * at) / p * u
+            state[i] = x[-1]
+            y += (2.0 if p.imag else 1.0) * (r * (x[:-1] @ WEIGHTS)).real
         out.append(y)
     return np.array(out)
 
@@ -40,14 +43,17 @@ def test_blocks_are_the_recursion(modes: Modes, ticks: int) -> None:
 
 @pytest.mark.parametrize(("frequency_hz", "quality"), [(50e3, 20.0), (3e3, 0.8), (120e3, 5.0)])
 def test_resonance_is_scipys(frequency_hz: float, quality: float) -> None:
-    """The zero-order hold of a state space, and the frequency response of its transfer function."""
+    """The zero-order hold of a state space, in parts of a tick, and the frequency response of its transfer function."""
     w = 2.0 * np.pi * frequency_hz
     modes = second_order(frequency_hz, quality)
     system = signal.TransferFunction([w * w], [1.0, w / quality, w * w])
     space = system.to_ss()
-    a, b, c, d, _ = signal.cont2discrete((space.A, space.B, space.C, space.D), TICK)
-    _, expected, _ = signal.dlsim((a, b, c, d, TICK), np.append(NOISE, 0.0))
-    assert modes.follow(NOISE, TICK, 0.0) == pytest.approx(expected[1:, 0], abs=1e-9)
+    parts = 64
+    a, b, c, d, _ = signal.cont2discrete((space.A, space.B, space.C, space.D), TICK / parts)
+    _, at, _ = signal.dlsim((a, b, c, d, TICK / parts), np.append(np.repeat(NOISE, parts), 0.0))
+    in_tick = np.arange(len(NOISE))[:, None] * parts + np.arange(parts + 1)
+    expected = integrate.simpson(at[in_tick, 0], dx=1.0 / parts)
+    assert modes.follow(NOISE, TICK, 0.0) == pytest.approx(expected, abs=1e-7)
     f = np.geomspace(1.0, 1e6, 200)
     _, h = signal.freqs([w * w], [1.0, w / quality, w * w], 2.0 * np.pi * f)
     assert modes.response(f) == pytest.approx(h, rel=1e-9)
@@ -56,8 +62,9 @@ def test_resonance_is_scipys(frequency_hz: float, quality: float) -> None:
 def test_step_of_the_resonance_is_its_closed_form() -> None:
     w, q = 2.0 * np.pi * 50e3, 20.0
     damped, rate = w * np.sqrt(1.0 - 0.25 / q**2), 0.5 * w / q
-    t = TICK * np.arange(1, 201)
-    expected = 1.0 - np.exp(-rate * t) * (np.cos(damped * t) + rate / damped * np.sin(damped * t))
+    t = TICK * (np.arange(200)[:, None] + 0.5 + 0.5 * NODES)
+    at = 1.0 - np.exp(-rate * t) * (np.cos(damped * t) + rate / damped * np.sin(damped * t))
+    expected = at @ WEIGHTS
     assert RESONANCE.follow(np.ones(200), TICK, 0.0) == pytest.approx(expected, abs=1e-10)
 
 

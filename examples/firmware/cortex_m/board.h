@@ -1,17 +1,16 @@
-/* The board functions that the firmware uses: a UART, a timer, and an output for the log of the samples. */
+/* The board functions that the firmware uses: a UART (uart.h), a timer, and an output for the log of the samples. */
 #ifndef BOARD_H
 #define BOARD_H
 
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "uart.h"
+
 #define REGISTER(address) (*(volatile uint32_t *)(uintptr_t)(address))
 
 void board_start(void);
 void board_start_timer(uint32_t hz); /* its interrupt calls player_timer() */
-
-bool board_can_put(void); /* whether board_putc() would not wait */
-void board_putc(char c);  /* received characters go to control_received() */
 
 bool board_log_ready(void); /* whether board_log_putc() would not wait */
 void board_log_putc(char c);

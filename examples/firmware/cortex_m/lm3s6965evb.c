@@ -4,8 +4,9 @@
 #include "board.h"
 #include "control.h"
 #include "player.h"
+#include "random.h"
 
-enum { CLOCK_HZ = 12000000, BAUD = 115200 };
+enum { CLOCK_HZ = 12000000 };
 enum { RECEIVE_EMPTY = 1 << 4, TRANSMIT_FULL = 1 << 5 };         /* UARTFR */
 enum { RECEIVE_INTERRUPT = 1 << 4, RECEIVE_TIMEOUT = 1 << 6 };   /* UARTIM, UARTICR */
 
@@ -70,6 +71,7 @@ void board_start_timer(uint32_t hz)
 
 void board_timer_interrupt(void)
 {
+    clock_tick();
     player_timer();
 }
 

@@ -13,8 +13,7 @@ dac_sequencer sequencer;
 
 int main(void)
 {
-    dac_sequencer_init(&sequencer, &scan_x_converter, &scan_y_converter);
-    const bool good = control_start();
+    const bool good = dac_sequencer_init(&sequencer, &scan_x_converter, &scan_y_converter) && control_start();
     board_start();
     player_start();
     board_start_timer(UPDATE_RATE_HZ);

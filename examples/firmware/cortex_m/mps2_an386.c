@@ -4,8 +4,9 @@
 #include "board.h"
 #include "control.h"
 #include "player.h"
+#include "random.h"
 
-enum { CLOCK_HZ = 25000000, BAUD = 115200 };
+enum { CLOCK_HZ = 25000000 };
 enum { TRANSMIT_FULL = 1, RECEIVE_FULL = 2 };                          /* STATE */
 enum { TRANSMIT = 1, RECEIVE = 2, RECEIVE_INTERRUPT = 8 };             /* CTRL */
 enum { RECEIVED_ONE = 2 };                                             /* INTCLEAR */
@@ -45,6 +46,7 @@ void board_start_timer(uint32_t hz)
 void board_timer_interrupt(void)
 {
     TIMER_INTCLEAR = 1;
+    clock_tick();
     player_timer();
 }
 

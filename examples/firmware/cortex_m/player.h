@@ -3,9 +3,7 @@
 #ifndef PLAYER_H
 #define PLAYER_H
 
-#include "dac_sequencer.h"
-
-extern dac_sequencer sequencer;
+#include "scan.h"
 
 void player_start(void);  /* called before the timer starts */
 void player_timer(void);  /* interrupt: a sample is due */

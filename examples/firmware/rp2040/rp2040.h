@@ -1,6 +1,6 @@
 /* The registers that this firmware uses, from Raspberry Pi's RP2040 datasheet: addresses from section 2.2 (address
  * map), offsets and bits from the lists of registers of SIO (2.3.1.7), clocks (2.15.7), XOSC (2.16.7), PLL (2.18.4),
- * resets (2.14.3), GPIO (2.19.6) and PIO (3.7). */
+ * resets (2.14.3), GPIO (2.19.6), PIO (3.7) and UART (4.2.8); interrupts from section 2.3.2. */
 #ifndef RP2040_H
 #define RP2040_H
 
@@ -10,12 +10,14 @@
 
 #define RESETS_RESET REGISTER(0x4000C000)
 #define RESETS_RESET_DONE REGISTER(0x4000C008)
-enum { RESET_IO_BANK0 = 1 << 5, RESET_PADS_BANK0 = 1 << 8, RESET_PIO0 = 1 << 10, RESET_PLL_SYS = 1 << 12 };
+enum { RESET_IO_BANK0 = 1 << 5, RESET_PADS_BANK0 = 1 << 8, RESET_PIO0 = 1 << 10, RESET_PLL_SYS = 1 << 12,
+       RESET_UART0 = 1 << 22 };
 
 #define CLK_REF_CTRL REGISTER(0x40008030)
 #define CLK_REF_SELECTED REGISTER(0x40008038)
 #define CLK_SYS_CTRL REGISTER(0x4000803C)
 #define CLK_SYS_SELECTED REGISTER(0x40008044)
+#define CLK_PERI_CTRL REGISTER(0x40008048)
 #define XOSC_CTRL REGISTER(0x40024000)
 #define XOSC_STATUS REGISTER(0x40024004)
 #define XOSC_STARTUP REGISTER(0x4002400C)
@@ -25,7 +27,20 @@ enum { RESET_IO_BANK0 = 1 << 5, RESET_PADS_BANK0 = 1 << 8, RESET_PIO0 = 1 << 10,
 #define PLL_SYS_PRIM REGISTER(0x4002800C)
 
 #define GPIO_CTRL(pin) REGISTER(0x40014004 + 8 * (pin))
-enum { FUNCTION_PIO0 = 6 };
+enum { FUNCTION_UART = 2, FUNCTION_PIO0 = 6 };
+
+#define UART0_DR REGISTER(0x40034000)
+#define UART0_FR REGISTER(0x40034018)
+#define UART0_IBRD REGISTER(0x40034024)
+#define UART0_FBRD REGISTER(0x40034028)
+#define UART0_LCR_H REGISTER(0x4003402C)
+#define UART0_CR REGISTER(0x40034030)
+#define UART0_IFLS REGISTER(0x40034034)
+#define UART0_IMSC REGISTER(0x40034038)
+#define UART0_ICR REGISTER(0x40034044)
+enum { UART_RECEIVE_EMPTY = 1 << 4, UART_TRANSMIT_FULL = 1 << 5 };       /* FR */
+enum { UART_RECEIVE = 1 << 4, UART_RECEIVE_TIMEOUT = 1 << 6 };           /* IMSC, ICR */
+enum { UART0_INTERRUPT = 20 };
 
 #define PIO0_CTRL REGISTER(0x50200000)
 #define PIO0_FSTAT REGISTER(0x50200004)
@@ -43,6 +58,7 @@ enum { FUNCTION_PIO0 = 6 };
 #define SIO_FIFO_RD REGISTER(0xD0000058)
 enum { FIFO_VALID = 1, FIFO_READY = 2 };
 
+#define NVIC_ISER REGISTER(0xE000E100)
 #define VTOR REGISTER(0xE000ED08)
 
 #endif

@@ -10,6 +10,7 @@ int main(void);
 void entry(void);
 void reset(void);
 void fault(void);
+void uart_interrupt(void);
 
 typedef union {
     void *stack;
@@ -17,11 +18,12 @@ typedef union {
 } vector;
 
 extern const vector vectors[];
-__attribute__((aligned(256), used)) const vector vectors[16] = {
+__attribute__((aligned(256), used)) const vector vectors[16 + 26] = {
     [0] = {.stack = stack_top},
     [1] = {.handler = reset},
     [2] = {.handler = fault},
     [3] = {.handler = fault},
+    [16 + UART0_INTERRUPT] = {.handler = uart_interrupt}, /* of core 0, which alone enables it */
 };
 
 /* The first instructions of the image: a stack, then C. */

@@ -1,11 +1,15 @@
 /* From reset to main(). */
 #include <stdint.h>
 
+#include "stm32f4.h"
+
 extern uint32_t data_start[], data_end[], bss_start[], bss_end[], stack_top[];
 extern const uint32_t data_load[];
 
 int main(void);
 void dma_interrupt(void);
+void receive_interrupt(void);
+void idle_interrupt(void);
 void reset(void);
 void fault(void);
 
@@ -30,7 +34,7 @@ typedef union {
     void (*handler)(void);
 } vector;
 
-__attribute__((section(".vectors"), used)) static const vector vectors[16 + 17] = {
+__attribute__((section(".vectors"), used)) static const vector vectors[16 + 40] = {
     [0] = {.stack = stack_top},
     [1] = {.handler = reset},
     [2] = {.handler = fault},
@@ -38,5 +42,7 @@ __attribute__((section(".vectors"), used)) static const vector vectors[16 + 17] 
     [4] = {.handler = fault},
     [5] = {.handler = fault},
     [6] = {.handler = fault},
-    [16 + 16] = {.handler = dma_interrupt}, /* DMA1, stream 5 */
+    [16 + DMA1_STREAM1] = {.handler = receive_interrupt},
+    [16 + DMA1_STREAM5] = {.handler = dma_interrupt},
+    [16 + USART3] = {.handler = idle_interrupt},
 };

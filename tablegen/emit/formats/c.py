@@ -15,6 +15,7 @@ from tablegen.fixedpoint.phase import PHASE_BITS
 from tablegen.fixedpoint.rounding import signed_limits
 from tablegen.fixedpoint.synthesis import sine_periods
 from tablegen.numerics.arrays import Ints
+from tablegen.reading import BUILD_FILE, read_text
 from tablegen.resources import c_link, c_runtime, resource_folder
 
 _NUMBER = re.compile(r"(?:U?INT(?:32|64)_C)?\(?(-?\d{1,40})\)?")
@@ -75,7 +76,7 @@ def wrong_constants(folder: Path, content: Content) -> tuple[int, list[str]]:
     """How many constants the C header is to have, and those that it has not, or not so."""
     name, wanted = f"{content.name}.h", _constants(content)
     try:
-        text = (folder / name).read_text("utf-8", "replace")
+        text = read_text(folder / name, BUILD_FILE, errors="replace")
     except OSError as error:
         return len(wanted), [f"{name}: cannot be read: {error.strerror or error}"]
     prefix = f"{content.name.upper()}_"
@@ -88,7 +89,7 @@ def wrong_arrays(folder: Path, content: Content) -> tuple[int, list[str]]:
     name, wanted = arrays_file(content), _arrays(content)
     count = sum(map(len, wanted.values()))
     try:
-        text = (folder / name).read_text("utf-8", "replace")
+        text = read_text(folder / name, BUILD_FILE, errors="replace")
     except OSError as error:
         return count, [f"{name}: cannot be read: {error.strerror or error}"]
     found = {array: values.split(",") for array, values in _ARRAY.findall(text)}
@@ -110,7 +111,7 @@ def wrong_arrays(folder: Path, content: Content) -> tuple[int, list[str]]:
 
 def _context(content: Content) -> dict[str, Any]:
     """What the templates see."""
-    bits, sine = max(axis.program.bits for axis in content.axes), _sine(content)
+    sine, storage = _sine(content), _storage(content)
     return {
         "version": content.version,
         "name": content.name,
@@ -123,7 +124,8 @@ def _context(content: Content) -> dict[str, Any]:
         "phase_bits": PHASE_BITS,
         "least_gain": signed_limits(GAIN_BITS)[0],
         "greatest_gain": signed_limits(GAIN_BITS)[1],
-        "word_type": "int16_t" if bits <= 16 else "int32_t",  # the type of both tables: the runtime is compiled for one
+        "storage": storage,
+        "word_type": f"int{storage['TABLE_STORAGE_BITS']}_t",
         "sine": {"constants": _sine_constants(content, sine), "rows": rows(sine)} if len(sine) else None,
         "axes": [_axis(content, axis) for axis in content.axes],
     }
@@ -136,10 +138,25 @@ def _axis(content: Content, axis: AxisContent) -> dict[str, Any]:
         "prefix": prefix,
         "PREFIX": prefix.upper(),
         "constants": axis_constants(axis.program, axis.harmonics),
-        "table_rows": rows(axis.program.words),
+        "table_rows": rows(_table(axis)),
         "fourier_rows": rows(axis.fourier_words),
         "interpolated": axis.program.mode == "interpolated",
         "lines_per_period": "1" if axis.axis == "x" else f"{content.name.upper()}_FRAME_LINES",
+    }
+
+
+def _table(axis: AxisContent) -> Ints:
+    """The array of a table: its words, and behind the last one the first one again, so that no index needs a look."""
+    words = np.asarray(axis.program.words)
+    return np.append(words, words[:1])
+
+
+def _storage(content: Content) -> dict[str, int]:
+    """Bits of the words of both tables, and of both converters, in memory: the runtime is compiled for one of each."""
+    programs = [axis.program for axis in content.axes]
+    return {
+        "TABLE_STORAGE_BITS": 16 if max(program.bits for program in programs) <= 16 else 32,
+        "OUTPUT_STORAGE_BITS": 16 if max(program.output.word_bits for program in programs) <= 16 else 32,
     }
 
 
@@ -158,6 +175,7 @@ def _constants(content: Content) -> dict[str, int | str]:
     own: dict[str, int | str] = {
         "HASH": content.hash,
         **scan_constants(content),
+        **_storage(content),
         **_sine_constants(content, _sine(content)),
     }
     return {f"{content.name.upper()}_{key}": value for key, value in own.items()}
@@ -167,7 +185,7 @@ def _arrays(content: Content) -> dict[str, Ints]:
     """What the arrays have to hold, by name."""
     arrays: dict[str, Ints] = {}
     for axis in content.axes:
-        arrays[f"{axis.axis}_table"] = np.asarray(axis.program.words)
+        arrays[f"{axis.axis}_table"] = _table(axis)
         arrays[f"{axis.axis}_fourier"] = axis.fourier_words
     if content.sine_index_bits:
         arrays["sine"] = _sine(content)

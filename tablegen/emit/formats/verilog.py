@@ -10,6 +10,7 @@ from tablegen.emit.content import AxisContent, Content
 from tablegen.emit.format import Comparison, Format, differing
 from tablegen.emit.memory import memory_files
 from tablegen.emit.templates import comment_safe, template
+from tablegen.reading import BUILD_FILE, read_text
 from tablegen.resources import resource_folder, verilog_runtime
 
 _LOCALPARAM = re.compile(r"^localparam\s[^=]*?(\w+)\s*=\s*(.*?)\s*;", re.MULTILINE)
@@ -68,7 +69,7 @@ def wrong_constants(folder: Path, content: Content) -> tuple[int, list[str]]:
     """How many constants the Verilog header is to have, and those that it has not, or not so."""
     name, wanted = f"{content.name}.vh", _constants(content)
     try:
-        text = (folder / name).read_text("utf-8", "replace")
+        text = read_text(folder / name, BUILD_FILE, errors="replace")
     except OSError as error:
         return len(wanted), [f"{name}: cannot be read: {error.strerror or error}"]
     found: dict[str, int | str] = {key: _value(value) for key, value in _LOCALPARAM.findall(text)}
@@ -82,7 +83,7 @@ def wrong_memories(folder: Path, content: Content) -> tuple[int, list[str]]:
         wanted = right.decode("ascii").split()
         count += len(wanted)
         try:
-            found = (folder / name).read_text("ascii", "replace").split()
+            found = read_text(folder / name, BUILD_FILE, "ascii", "replace").split()
         except OSError as error:
             wrong.append(f"{name}: cannot be read: {error.strerror or error}")
             continue

@@ -272,6 +272,43 @@ def test_two_that_write_the_same_file_are_told(tmp_path: Path, monkeypatch: pyte
     assert outcome.messages == [f"formats: 'words' writes {NAME}.h, and so does another format, with other content"]
 
 
+@pytest.mark.parametrize("file", ["dac_link.h", "DAC_LINK.H", "dac_mine.rs", "Program_Loader.v"])
+def test_one_that_writes_a_file_of_the_sequencer_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, file: str
+) -> None:
+    """Though no other format of the build has one of this name."""
+    package = "taking_" + file.replace(".", "_")
+    provide(tmp_path, monkeypatch, package, f"words = {package}:FORMAT", WORKING.replace("FILE", repr(file)))
+    outcome = run("build", write_pair(tmp_path), "-o", tmp_path / "out", "-f", "words")
+    assert outcome.status == 2
+    why = f"formats: 'words' writes {file!r}, a name of the sequencer's files: dac_*, program_loader*"
+    assert outcome.messages == [why]
+
+
+def test_names_that_differ_in_case_alone_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    provide(
+        tmp_path, monkeypatch, "shouting", "words = shouting:FORMAT", WORKING.replace("FILE", f"'{NAME.upper()}.H'")
+    )
+    outcome = run("build", write_pair(tmp_path), "-o", tmp_path / "out", "-f", "c", "-f", "words")
+    assert outcome.status == 2
+    assert outcome.messages == [
+        f"formats: 'words' writes '{NAME.upper()}.H' beside '{NAME}.h', which some disks take for one"
+    ]
+
+
+def test_a_format_of_others_may_bring_the_sequencer_itself(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    bringing = (
+        WORKING.replace("FILE", "'scan.count'")
+        + """
+from tablegen.resources import c_runtime
+type(FORMAT).runtime = lambda self: c_runtime()
+"""
+    )
+    provide(tmp_path, monkeypatch, "bringing", "words = bringing:FORMAT", bringing)
+    assert run("build", write_pair(tmp_path), "-o", tmp_path / "out", "-f", "words").status == 0
+    assert (tmp_path / "out" / "dac_sequencer.h").exists()
+
+
 def test_a_format_needs_no_more_than_three_words_and_files() -> None:
     """What a subclass has to have is what docs/formats.md says."""
     assert Format.__abstractmethods__ == {"files"}

@@ -1,13 +1,9 @@
-/* As much of Arduino's headers as the example's sketch uses, so that it compiles without them. */
+/* As much of Arduino's headers as the example's sketch uses, so that it compiles for a Teensy, whose core Debian does
+ * not have. */
 #ifndef ARDUINO_H
 #define ARDUINO_H
 
 #include <stdint.h>
-
-#if defined(__AVR__)
-#include <avr/interrupt.h>
-#include <avr/io.h>
-#endif
 
 enum { LOW, HIGH, OUTPUT };
 
@@ -18,17 +14,18 @@ void interrupts(void);
 
 struct SerialPort {
     void begin(unsigned long baud);
+    int available();
     int read();
+    int availableForWrite();
+    unsigned write(uint8_t byte);
     void println(const char *text);
     void println(unsigned char value);
 };
 extern SerialPort Serial;
 
-#if defined(__IMXRT1062__)
 class IntervalTimer {
 public:
     bool begin(void (*function)(), float microseconds);
 };
-#endif
 
 #endif

@@ -10,6 +10,7 @@
  *     0x63, n              n times the main loop, and no more for the bytes that follow
  *     0x64                 the interlock changes
  *     0x65                 a reset
+ *     0x66, n              100 n milliseconds
  * Frames get their tags, so that a key keeps nobody from the states behind it.
  */
 #include <stdlib.h>
@@ -32,14 +33,15 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 static dac_sequencer sequencer;
 static dac_link link_;
-static dac_word x_tables[2][X_WORDS], y_tables[2][Y_WORDS];
+static dac_word x_tables[2][X_WORDS + 1], y_tables[2][Y_WORDS + 1];
 static int32_t x_words[2 * HARMONICS + 1], y_words[2 * HARMONICS + 1];
 static int32_t sine[5 * X_WORDS / 4];
 static const uint8_t key[16] = {1, 2, 3};
-static const uint8_t hash[32] = {9};
+static const uint8_t hash[32] = {9}, identity[4] = {4, 5, 6, 7};
 static bool permits;
+static uint32_t clock_ms;
 
-static dac_word boot_x[X_WORDS], boot_y[Y_WORDS];
+static dac_word boot_x[X_WORDS + 1], boot_y[Y_WORDS + 1];
 static dac_program boot;
 static uint8_t image[DAC_LINK_PROGRAM + 2 * (X_WORDS + Y_WORDS)];
 static uint8_t fourier[DAC_LINK_PROGRAM + 8 * (2 * HARMONICS + 1)];
@@ -49,16 +51,25 @@ static bool permitted(void)
     return permits;
 }
 
+static uint32_t milliseconds(void)
+{
+    return clock_ms;
+}
+
 static dac_link_config config = {
     .x = {{16, 16, false, false, POWER_UP}, {CODE_MIN, CODE_MAX, MAX_STEP, MAX_JUMP}, 16, X_BITS,
-          {x_tables[0], x_tables[1]}, x_words},
+          X_WORDS + 1, {x_tables[0], x_tables[1]}, x_words},
     .y = {{16, 16, false, false, POWER_UP}, {CODE_MIN, CODE_MAX, MAX_STEP, MAX_JUMP}, 16, Y_BITS,
-          {y_tables[0], y_tables[1]}, y_words},
+          Y_WORDS + 1, {y_tables[0], y_tables[1]}, y_words},
     .harmonics = HARMONICS,
     .sine_index_bits = X_BITS,
     .sine = sine,
     .key = key,
     .hash = hash,
+    .identity = identity,
+    .identity_bytes = sizeof identity,
+    .boot_persists = true,
+    .milliseconds = milliseconds,
 };
 
 /* A good program and its two images, made once. */
@@ -97,6 +108,8 @@ static void furnish(void)
         boot_x[k] = (dac_word)(1500 * (k < 8 ? k : 16 - k) - 6000);
     for (int k = 0; k < Y_WORDS; k++)
         boot_y[k] = (dac_word)(1000 * k - 4000);
+    boot_x[X_WORDS] = boot_x[0];
+    boot_y[Y_WORDS] = boot_y[0];
     put_program(image, 0);
     put_program(fourier, HARMONICS);
     for (int k = 0; k < X_WORDS + Y_WORDS; k++) {
@@ -115,13 +128,14 @@ static struct {
     uint8_t markers;
     uint32_t ticks, line_ticks; /* of the line so far, and of the whole line */
     uint32_t swaps;
-    dac_word x_table[X_WORDS], y_table[Y_WORDS]; /* of the program that plays, as it was taken */
+    dac_word x_table[X_WORDS + 1], y_table[Y_WORDS + 1]; /* of the program that plays, as it was taken */
     dac_link_reader reader;
 } watched;
 
 static void keep_table(dac_word *copy, const dac_bank_axis *axis)
 {
-    memcpy(copy, axis->table, (axis->last + 1) * sizeof *copy);
+    memcpy(copy, axis->table, (axis->length + 1) * sizeof *copy);
+    REQUIRE(copy[axis->length] == copy[0]);
 }
 
 static void watch_memory(void)
@@ -130,7 +144,7 @@ static void watch_memory(void)
 
     if (bank == NULL)
         return;
-    REQUIRE(bank->x.last < X_WORDS && bank->y.last < Y_WORDS);
+    REQUIRE(bank->x.length <= X_WORDS && bank->y.length <= Y_WORDS);
     if (sequencer.swaps != watched.swaps) {
         watched.swaps = sequencer.swaps;
         REQUIRE(bank->x.code_min >= CODE_MIN && bank->x.code_max <= CODE_MAX && bank->x.max_step <= MAX_STEP);
@@ -138,8 +152,8 @@ static void watch_memory(void)
         keep_table(watched.x_table, &bank->x);
         keep_table(watched.y_table, &bank->y);
     }
-    REQUIRE(memcmp(watched.x_table, bank->x.table, (bank->x.last + 1) * sizeof(dac_word)) == 0);
-    REQUIRE(memcmp(watched.y_table, bank->y.table, (bank->y.last + 1) * sizeof(dac_word)) == 0);
+    REQUIRE(memcmp(watched.x_table, bank->x.table, (bank->x.length + 1) * sizeof(dac_word)) == 0);
+    REQUIRE(memcmp(watched.y_table, bank->y.table, (bank->y.length + 1) * sizeof(dac_word)) == 0);
 }
 
 /* `requests`: that acted before it. */
@@ -195,8 +209,9 @@ static void start(uint8_t options, uint32_t count)
 {
     config.key_bytes = options & WITH_KEY ? sizeof key : 0;
     config.permits = options & WITH_INTERLOCK ? permitted : NULL;
-    dac_sequencer_init(&sequencer, &config.x.converter, &config.y.converter);
-    dac_link_init(&link_, &config, &sequencer, count);
+    clock_ms = UINT32_MAX - 5000;
+    REQUIRE(dac_sequencer_init(&sequencer, &config.x.converter, &config.y.converter));
+    REQUIRE(dac_link_init(&link_, &config, &sequencer, count) == DAC_LINK_STARTED);
     memset(&watched, 0, sizeof watched);
     watched.x = watched.y = POWER_UP;
     permits = true;
@@ -354,6 +369,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         size--;
         if (command == 0x63) {
             work((unsigned)count);
+            continue;
+        }
+        if (command == 0x66) {
+            clock_ms += 100 * (uint32_t)count;
             continue;
         }
         count = count < size ? count : size;

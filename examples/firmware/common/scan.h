@@ -1,13 +1,23 @@
-/* The programs of this firmware: the scan of the build, and its central half. */
+/* The programs of a firmware: the scan of the build, and its central half; and the sequencer that plays them. */
 #ifndef SCAN_H
 #define SCAN_H
 
 #include "dac_sequencer.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+extern dac_sequencer sequencer; /* in the port */
 
 extern const dac_converter scan_x_converter, scan_y_converter;
 extern const dac_program scan_whole;
 
 /* The half scan. Its tables are computed here from Fourier words, into one of two places: see dac_sequencer_idle(). */
 bool scan_half(dac_program *program, unsigned place);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

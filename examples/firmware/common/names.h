@@ -1,7 +1,11 @@
-/* The names of a build: SCAN and SCAN_UPPER, SCAN_HEADER, from the Makefile. */
+/* The names of a build: SCAN and SCAN_UPPER, SCAN_HEADER. A Makefile gives them; where none can, as in Arduino's IDE,
+ * they stand in the port's own scan_names.h. */
 #ifndef NAMES_H
 #define NAMES_H
 
+#ifndef SCAN
+#include "scan_names.h"
+#endif
 #include "dac_sequencer.h"
 
 #define JOIN_(a, b) a##b

@@ -1,14 +1,14 @@
 /* The programs of a build. */
 #include "scan.h"
 
-#include SCAN_HEADER
 #include "names.h"
+#include SCAN_HEADER
 
 const dac_program scan_whole = PROGRAM(SCAN_UPPER, SCAN);
 const dac_converter scan_x_converter = CONVERTER(CONSTANT(_X));
 const dac_converter scan_y_converter = CONVERTER(CONSTANT(_Y));
 
-static dac_word x_tables[2][CONSTANT(_X_TABLE_LENGTH)], y_tables[2][CONSTANT(_Y_TABLE_LENGTH)];
+static dac_word x_tables[2][CONSTANT(_X_TABLE_LENGTH) + 1], y_tables[2][CONSTANT(_Y_TABLE_LENGTH) + 1];
 
 static bool halve(dac_axis_program *axis, dac_word *table, const int32_t *words, unsigned harmonics)
 {
@@ -16,8 +16,8 @@ static bool halve(dac_axis_program *axis, dac_word *table, const int32_t *words,
     if (axis->index_bits == 0)
         return true; /* a direct table cannot be computed here: use the table of the whole scan */
     axis->table = table;
-#ifdef SCAN_SINE
-    return dac_synthesize(table, axis->index_bits, axis->bits, words, harmonics, NAMED(_sine),
+#if CONSTANT(_SINE_LENGTH)
+    return dac_synthesize(table, axis->length + 1, axis->index_bits, axis->bits, words, harmonics, NAMED(_sine),
                           CONSTANT(_SINE_INDEX_BITS));
 #else
     (void)words;

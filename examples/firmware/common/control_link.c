@@ -1,20 +1,20 @@
 /* Commands as frames of docs/protocol.md; dac_link.c does all the work. */
-#include "board.h"
 #include "control.h"
 #include "dac_link.h"
-#include "player.h"
 #include "scan.h"
 #include "scan_link.h"
+#include "uart.h"
 
 static dac_link link;
 
-/* Not initialised, so that it survives a reset: the number only has to differ from start to start. */
+/* Not initialised, so that it survives a reset, but no power cycle: for hosts that want to know of a reset, not for the key. */
 static uint32_t boots __attribute__((section(".noinit")));
 
 bool control_start(void)
 {
-    dac_link_init(&link, scan_link(), &sequencer, ++boots);
-    return dac_sequencer_load(&sequencer, &scan_whole) == DAC_LOADED && dac_sequencer_commit(&sequencer);
+    return dac_link_init(&link, scan_link(), &sequencer, ++boots) == DAC_LINK_STARTED
+        && dac_sequencer_load(&sequencer, &scan_whole) == DAC_LOADED
+        && dac_sequencer_commit(&sequencer);
 }
 
 void control_ready(bool good)

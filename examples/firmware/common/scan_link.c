@@ -1,11 +1,16 @@
 /* The link of a build. It accepts tables as long as those of the build, and has the limits of that scan.
- * Options, with -D: LINK_X_INDEX_BITS and LINK_Y_INDEX_BITS for longer tables, LINK_HARMONICS, LINK_MAX_JUMP in codes,
- * LINK_KEY as the bytes of an array; DAC_LINK_RING.
+ * Options, with -D: LINK_X_INDEX_BITS and LINK_Y_INDEX_BITS for longer tables, LINK_HARMONICS (0: tables only),
+ * LINK_MAX_JUMP in codes, DAC_LINK_RING; LINK_KEY_HEADER, a file that defines LINK_KEY as the bytes of an array, and
+ * LINK_DEVICE, a name as a string; with a key the port has random.h.
  */
 #include "scan_link.h"
 
-#include SCAN_HEADER
 #include "names.h"
+#include SCAN_HEADER
+#ifdef LINK_KEY_HEADER
+#include LINK_KEY_HEADER
+#include "random.h"
+#endif
 
 /* A table that is not interpolated need not have 2^n words. */
 #define BITS_FOR(n) ((n) <= 8 ? 3 : (n) <= 16 ? 4 : (n) <= 32 ? 5 : (n) <= 64 ? 6 : (n) <= 128 ? 7 : (n) <= 256 ? 8 \
@@ -23,32 +28,30 @@
 #ifndef LINK_MAX_JUMP
 #define LINK_MAX_JUMP UINT32_C(0xFFFFFF)
 #endif
-#ifdef SCAN_SINE
+#if CONSTANT(_SINE_LENGTH) && LINK_HARMONICS
 #define SINE NAMED(_sine)
 #define SINE_BITS CONSTANT(_SINE_INDEX_BITS)
 #define HARMONICS LINK_HARMONICS
-#else /* a build without interpolated tables has no sine table, and cannot compute tables */
+#else /* a build without interpolated tables has no sine table, and cannot compute tables; nor can a small memory */
 #define SINE NULL
 #define SINE_BITS 0
 #define HARMONICS 0
 #endif
 
-static dac_word x_tables[2][1 << LINK_X_INDEX_BITS], y_tables[2][1 << LINK_Y_INDEX_BITS];
+static dac_word x_tables[2][DAC_TABLE_ROOM(LINK_X_INDEX_BITS)], y_tables[2][DAC_TABLE_ROOM(LINK_Y_INDEX_BITS)];
 static int32_t x_fourier[2 * HARMONICS + 1], y_fourier[2 * HARMONICS + 1];
 static uint8_t hash[32];
 #ifdef LINK_KEY
 static const uint8_t key[] = {LINK_KEY};
-#define KEY key
-#define KEY_BYTES sizeof key
-#else
-#define KEY NULL
-#define KEY_BYTES 0
+static const char device[] = LINK_DEVICE; /* no other instrument with this key has it; on hardware better a serial number */
+typedef char link_device_has_4_to_32_characters[sizeof device - 1 >= 4 && sizeof device - 1 <= 32 ? 1 : -1];
 #endif
 
 #define AXIS(NAME, bits, tables, words)                                                                               \
     {                                                                                                                 \
         CONVERTER(CONSTANT(NAME)), {CONSTANT(NAME##_CODE_MIN), CONSTANT(NAME##_CODE_MAX),                             \
-        CONSTANT(NAME##_MAX_STEP), LINK_MAX_JUMP}, CONSTANT(NAME##_TABLE_BITS), bits, {tables[0], tables[1]}, words   \
+        CONSTANT(NAME##_MAX_STEP), LINK_MAX_JUMP}, CONSTANT(NAME##_TABLE_BITS), bits, DAC_TABLE_ROOM(bits),           \
+        {tables[0], tables[1]}, words                                                                                 \
     }
 
 static const dac_link_config config = {
@@ -58,9 +61,15 @@ static const dac_link_config config = {
     .sine_index_bits = SINE_BITS,
     .sine = SINE,
     .update_rate_hz = UPDATE_RATE_HZ,
-    .key_bytes = KEY_BYTES,
-    .key = KEY,
     .hash = hash,
+#ifdef LINK_KEY
+    .key_bytes = sizeof key,
+    .key = key,
+    .identity = (const uint8_t *)device,
+    .identity_bytes = sizeof device - 1,
+    .random = random_bytes,
+    .milliseconds = clock_milliseconds,
+#endif
 };
 
 static uint8_t digit(char c)

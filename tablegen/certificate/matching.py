@@ -1,0 +1,35 @@
+"""How far apart a pixel of the trace and of the retrace are, from ticks alone, in words, and which lines have none."""
+
+from tablegen.device.schedule import MAXIMUM_LINE_TICKS
+from tablegen.planning.line_plan import Plan
+from tablegen.planning.timing import exact
+from tablegen.planning.windows import matching_lines, retrace_mismatch
+
+_MAX_PIXELS_APART = 0.25  # of a pixel; more is a warning
+
+
+def apart_percent(plan: Plan) -> float:
+    """The largest distance of a pixel's two places, in percent of the line; 0 where one direction images."""
+    return 100.0 * retrace_mismatch(plan.schedule, plan.x.drive.turn)
+
+
+def apart_note(plan: Plan) -> str:
+    """A sentence where there is a distance, with the lines that have none."""
+    apart = apart_percent(plan)
+    if not apart:
+        return ""
+    schedule, (low, high) = plan.schedule, plan.x.band_limit.window
+    asked = exact(plan.x.drive.turn), exact(low), exact(high)
+    lines = matching_lines(*asked, schedule.ticks, schedule.pixels, MAXIMUM_LINE_TICKS)
+    remedy = f"; a timing.ticks_per_line of {' or '.join(map(str, lines))} makes them match" if lines else ""
+    return (
+        f"the same pixel of trace and retrace shows places up to {apart:.2g} % of the line apart, since pixels begin "
+        f"on whole ticks{remedy}"
+    )
+
+
+def apart_warning(plan: Plan) -> str:
+    """The same sentence where the distance is more than a quarter of a pixel."""
+    low, high = plan.x.band_limit.window
+    pixel = 100.0 * (high - low) / plan.schedule.pixels
+    return apart_note(plan) if apart_percent(plan) > _MAX_PIXELS_APART * pixel * (1.0 + 1e-9) else ""

@@ -1,0 +1,207 @@
+"""What would make a scan good enough: changes of the scan file, each planned and measured before it is named.
+
+A change is searched for along one key at a time, and only along those that act on the cause. Each key takes a few
+trials, so that the search ends soon where nothing helps.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from math import ceil, copysign, log2
+from typing import Any
+
+import numpy as np
+from msgspec import structs
+
+from tablegen.certificate.certificate import scaling_errors
+from tablegen.certificate.excess import Cause, Excess, excess
+from tablegen.certificate.line_errors import EmittedPeriod
+from tablegen.config.figures import at_least, at_most
+from tablegen.config.load import Setup
+from tablegen.config.schema import FastAxis
+from tablegen.fixedpoint.phase import MAXIMUM_TICKS
+from tablegen.planning.line_plan import LinePlan, Plan, make_plan
+from tablegen.problems import Rejected
+
+_MOST_TRIALS = 6  # of one key
+_MARGIN = 1.1  # what a first guess allows for: errors of rounding do not scale exactly
+_HARDWARE = ("amplifier.", "dac.")
+_MOST_BITS = 24
+_LONGEST_TABLE = 65536
+_MOST_HARMONICS = 256  # a fit of more takes seconds
+_MARGINS = (0.02, 0.05, 0.1, 0.15, 0.2)  # of the line, outside the imaging window
+
+Change = Mapping[str, Any]  # keys of the scan file to their values; None takes a key out
+
+
+@dataclass(frozen=True)
+class Remedy:
+    """A change that was tried, what it leaves in percent, whether that is low enough, and whether all limits hold."""
+
+    text: str
+    percent: float
+    low: bool
+    within_limits: bool
+
+    @property
+    def enough(self) -> bool:
+        """Whether it can be taken."""
+        return self.low and self.within_limits
+
+    def __str__(self) -> str:
+        also = "" if self.within_limits else ", with an error above limits.max_error_lsb"
+        return f"{self.text} leaves {self.percent:.3g} %{also}"
+
+
+def tried(setup: Setup, plan: Plan, line: LinePlan, found: Excess, most: float | None = None) -> list[Remedy]:
+    """The remedies of one axis that were planned and measured, a key each: the first value that is enough, or the best.
+
+    ``found`` is what the axis exceeds, ``most`` as in ``excess``. Where a change of the scan alone is enough, no other
+    is looked for; of the hardware, both converter and amplifier are. A change that no plan can be made of is left out.
+    """
+    remedies = []
+    for changes in _WAYS[found.cause](setup, plan, line, found):
+        best: Remedy | None = None
+        for change in changes:
+            one = _trial(setup, plan, line, change, most)
+            if one is not None and (best is None or one.percent < best.percent):
+                best = one
+            if best is not None and best.low:
+                break
+        if best is not None:
+            remedies.append(best)
+            if best.enough and not best.text.startswith(_HARDWARE):
+                break
+    return remedies
+
+
+def changed(setup: Setup, change: Change) -> Setup:
+    """The setup with other values at dotted keys of the scan file; the values are not checked."""
+
+    def put(struct: Any, path: list[str], value: Any) -> Any:
+        name, *rest = path
+        return structs.replace(struct, **{name: put(getattr(struct, name), rest, value) if rest else value})
+
+    scan = setup.scan
+    for key, value in change.items():
+        scan = put(scan, key.split("."), value)
+    return replace(setup, scan=scan)
+
+
+def _trial(setup: Setup, plan: Plan, line: LinePlan, change: Change, most: float | None) -> Remedy | None:
+    """Plan and measure one change; None where it cannot be planned."""
+    try:
+        other = make_plan(changed(setup, change))
+    except Rejected:
+        return None
+    scaling = scaling_errors(other.x if line.axis == "x" else other.y)
+    left = max(max(one.total, one.band_limit, abs(one.size)) for one in scaling.values())
+    text = " with ".join(f"{key} = {_value(value)}" for key, value in change.items() if value is not None)
+    return Remedy(text, left, excess(scaling, most) is None, _keeps_the_error(plan, other))
+
+
+def _keeps_the_error(plan: Plan, other: Plan) -> bool:
+    """Whether no axis comes above ``limits.max_error_lsb`` that was not: a finer code is a smaller LSB."""
+    limit = plan.limits.max_error_lsb
+    return limit is None or all(
+        EmittedPeriod(new).largest_error() <= limit or EmittedPeriod(old).largest_error() > limit
+        for old, new in zip(plan.lines, other.lines, strict=True)
+    )
+
+
+def _value(value: object) -> str:
+    if isinstance(value, tuple):
+        return f"[{', '.join(f'{one:g}' for one in value)}]"
+    return f'"{value}"' if isinstance(value, str) else f"{value:.9g}"
+
+
+def _against_quantisation(setup: Setup, plan: Plan, line: LinePlan, found: Excess) -> Iterator[Iterator[Change]]:
+    axis, table = line.axis, line.program
+    bits = ceil(log2(_MARGIN * found.times))
+    words_per_code = 2.0**table.bits / (abs(line.codes_per_unit) * line.scale)
+    if words_per_code < 2.0:
+        yield ({f"{axis}.table.bits": b} for b in range(table.bits + bits, _MOST_BITS + 1))
+    length = len(table.words)
+    if table.mode == "interpolated" and length < 64 * line.series.harmonics:
+        yield ({f"{axis}.table.length": n} for n in (4 * length, 16 * length) if n <= _LONGEST_TABLE)
+    yield _amplifiers(setup, plan, found)
+    dac = setup.scan.dac
+    most = min(_MOST_BITS, dac.word_bits or _MOST_BITS)
+    yield ({"dac.bits": b} for b in range(dac.bits + bits, min(dac.bits + bits + 3, most + 1)))
+
+
+def _amplifiers(setup: Setup, plan: Plan, found: Excess) -> Iterator[Change]:
+    """A gain that is as much lower as is needed, or as the drives of both axes allow, about the middle of them."""
+    dac, gain = setup.scan.dac, setup.scan.amplifier.gain
+    ends = []
+    for line in plan.lines:
+        words, output = line.program.words, line.program.output
+        codes = output.code(np.array([words.min(), words.max()]) << line.program.guard)
+        ends += [line.converter.v_zero + line.converter.v_per_code * code for code in codes.tolist()]
+        park_v = getattr(setup.scan, line.axis).park_v
+        ends.append(line.drive.v_offset if park_v is None else park_v)
+    bottom, top = min(ends), max(ends)
+    highest = dac.v_max - (dac.v_max - dac.v_min) / float(1 << dac.bits)
+    tightest = float(at_least(1.01 * (top - bottom) / (highest - dac.v_min), 4))
+    wanted = float(at_most(abs(gain) / (_MARGIN * found.times), 2))
+    for size in dict.fromkeys((max(wanted, tightest), max(0.7 * wanted, tightest))):
+        if size < 0.99 * abs(gain):
+            one = float(f"{copysign(size, gain):.4g}")
+            bias_v = 0.5 * (bottom + top) - one * 0.5 * (dac.v_min + highest)
+            yield {"amplifier.gain": one, "amplifier.bias_v": float(f"{bias_v:.4g}")}
+
+
+def _against_band_limit(setup: Setup, plan: Plan, line: LinePlan, found: Excess) -> Iterator[Iterator[Change]]:
+    axis = line.axis
+    scan: FastAxis = getattr(setup.scan, axis)
+    limit, harmonics = scan.band_limit, line.series.harmonics
+    if limit.method != "window":
+        yield iter([{f"{axis}.band_limit.method": "window"}])
+    low, high = limit.window
+    windows = [(max(low, margin), min(high, round(1.0 - margin, 9))) for margin in _MARGINS]
+    narrower = ({f"{axis}.band_limit.window": window} for window in windows if window != (low, high))
+    sharp = min(low, 1.0 - high) < _MARGINS[1]  # no number of harmonics draws a sharp turn
+    if sharp:
+        yield narrower
+    most = min((line.program.phase.ticks - 1) // 2, max(_MOST_HARMONICS, harmonics))
+    if line.program.mode == "interpolated":
+        most = min(most, len(line.program.words) // 2 - 1)
+    more = [min(harmonics << i, most) for i in range(1, _MOST_TRIALS + 1)]
+    counts = [n for n in dict.fromkeys(more) if n > harmonics]
+    if limit.cutoff_hz is None:
+        yield ({f"{axis}.band_limit.harmonics": n} for n in counts)
+    else:
+        yield ({f"{axis}.band_limit.cutoff_hz": float(at_least(float(n * line.rate), 6))} for n in counts)
+        yield _slower(setup, plan)
+    if not sharp:
+        yield narrower
+
+
+def _against_model(setup: Setup, plan: Plan, line: LinePlan, found: Excess) -> Iterator[Iterator[Change]]:
+    axis = line.axis
+    limit = getattr(setup.scan, axis).band_limit
+    free = (line.held_harmonics[0] if line.held_harmonics else line.series.harmonics) - 1
+    counts = [n for n in dict.fromkeys((free, 3 * free // 4, free // 2)) if n >= 1]
+    if limit.cutoff_hz is None:
+        yield ({f"{axis}.band_limit.harmonics": n} for n in counts)
+    else:
+        yield ({f"{axis}.band_limit.cutoff_hz": float(at_least(float(n * line.rate), 6))} for n in counts)
+    yield _slower(setup, plan)
+
+
+def _slower(setup: Setup, plan: Plan) -> Iterator[Change]:
+    """Half the line rate, a quarter, and so on, by the key that sets it."""
+    timing = setup.scan.timing
+    key = next((k for k in ("ticks_per_line", "ticks_per_pixel") if getattr(timing, k) is not None), "line_rate_hz")
+    given = getattr(timing, key)
+    for i in range(1, _MOST_TRIALS + 1):
+        if plan.schedule.frame_ticks << i <= MAXIMUM_TICKS:
+            value = given / (1 << i) if key == "line_rate_hz" else given << i
+            yield {f"timing.{key}": value}
+
+
+_Way = Callable[[Setup, Plan, LinePlan, Excess], Iterator[Iterator[Change]]]
+_WAYS: dict[Cause, _Way] = {
+    "quantisation": _against_quantisation,
+    "band limit": _against_band_limit,
+    "model": _against_model,
+}

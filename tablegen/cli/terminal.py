@@ -1,0 +1,84 @@
+"""What reaches the terminal: every character that could steer it is shown, and none is obeyed.
+
+Titles of images, versions of manifests, names of files, texts of devices and messages of libraries come from others. So
+nothing of this package writes to stdout or stderr but through the streams of ``guard_streams``; only this module puts
+control characters there, for a line that is drawn again and for bold text.
+"""
+
+import re
+import sys
+from io import TextIOWrapper
+from typing import IO, Any
+
+# All controls but tab and line end; marks that reorder or hide text; separators that some take for ends of lines.
+_STEERING = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200b-\u200f\u2028-\u202e\u2060-\u2069\ufeff]")
+_BOLD, _PLAIN = "\x1b[1m", "\x1b[0m"
+
+
+def visible(text: str) -> str:
+    r"""The text with ``\u001b`` in place of an escape, and so on; as JSON writes it, so that JSON stays JSON."""
+    return _STEERING.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+
+
+class GuardedStream:
+    """A stream of text through ``visible``; all else is that of the stream itself."""
+
+    def __init__(self, stream: IO[str]) -> None:
+        self.stream = stream
+
+    def write(self, text: str) -> int:
+        """Write what can be shown."""
+        self.stream.write(visible(text))
+        return len(text)
+
+    def writelines(self, lines: list[str]) -> None:
+        """Write what can be shown of several texts."""
+        for line in lines:
+            self.write(line)
+
+    @property
+    def encoding(self) -> str:
+        """That of the stream. Beside one of ASCII click would write past this; the stream escapes what it has not."""
+        found = getattr(self.stream, "encoding", None) or "utf-8"
+        return "iso8859-1" if found.lower() in ("ascii", "us-ascii", "ansi_x3.4-1968", "646") else found
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.stream, name)
+
+
+def guard_streams() -> None:
+    """Put the guard before stdout and stderr, once."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None or isinstance(stream, GuardedStream):
+            continue
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # what the terminal cannot show is no reason to fail
+        setattr(sys, name, GuardedStream(stream))
+
+
+def tell(text: str, bold: bool = False) -> None:
+    """A line on stdout, in bold on a terminal if wanted."""
+    stream = _behind(sys.stdout)
+    if stream is None:
+        return
+    shown = visible(text)
+    stream.write(f"{_BOLD}{shown}{_PLAIN}\n" if bold and stream.isatty() else f"{shown}\n")
+
+
+def redraw(text: str) -> None:
+    """Write a text over the line of stderr in which the cursor is."""
+    stream = _behind(sys.stderr)
+    stream.write("\r" + visible(text))
+    stream.flush()
+
+
+def erase(width: int) -> None:
+    """Clear what ``redraw`` has written."""
+    redraw(" " * width)
+    _behind(sys.stderr).write("\r")
+    _behind(sys.stderr).flush()
+
+
+def _behind(stream: Any) -> Any:
+    return stream.stream if isinstance(stream, GuardedStream) else stream

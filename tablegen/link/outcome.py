@@ -1,0 +1,68 @@
+"""What became of an upload: its result, what is known while it runs, and what is said when its time is over."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from tablegen.link.errors import OutOfTime
+from tablegen.link.messages import Upload
+
+_LONG_SILENCE_S = 2.0
+
+ProgressCall = Callable[[int, int], None]  # (bytes that the device has, all bytes)
+
+
+@dataclass(frozen=True, slots=True)
+class UploadResult:
+    """What became of an upload.
+
+    ``line`` is that of the old frame which was the last, None where the answer was lost. ``bytes`` of the
+    image, ``wire_bytes`` that were sent for it, ``resumed`` bytes that the device had before. ``slow_baud`` is about
+    the rate at which answers came, None where it was not far below that of the port.
+    """
+
+    already_running: bool
+    generation: int
+    line: int | None
+    bytes: int
+    wire_bytes: int
+    resumed: int
+    retransmissions: int
+    seconds: float
+    slow_baud: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class UploadState:
+    """What is known of an upload: the bytes that the device confirmed, all bytes, and whether a COMMIT was sent."""
+
+    confirmed: int
+    total: int
+    committed: bool
+
+
+def out_of_time(
+    state: UploadState, upload: Upload | None, busy: bool, silence_s: float, slow_baud: int | None
+) -> OutOfTime:
+    """The error when the time of an upload is over: what the device said last, and what to do.
+
+    ``upload`` is what the last STATUS said of this upload, None if there was none. ``busy``: another upload is in the
+    way. ``silence_s`` is the time since the last answer.
+    """
+    if busy:
+        what = "the device is busy with another upload; try again when that is active"
+    elif upload in (Upload.CHECKING, Upload.WAITING):
+        waits = "not reached the start of a line" if upload == Upload.WAITING else "not ended its checks"
+        what = f"the device has received everything, but has {waits}; see `tablegen status`"
+    else:
+        what = f"by its last answer the device has {state.confirmed} of {state.total} bytes"
+        if not state.committed:
+            what += " and keeps them: repeat the upload to continue"
+        elif state.confirmed < state.total:
+            what += ": repeat the upload to continue (if more has arrived, the scan may become active)"
+        else:
+            what += ", and the scan may become active: see `tablegen status`"
+    if silence_s >= _LONG_SILENCE_S:
+        what = f"no answer for {silence_s:.0f} s; {what}"
+    if slow_baud:
+        what += f"; the line is slow, answers come at about {slow_baud} baud: give --baud {slow_baud}"
+    return OutOfTime(f"timeout: {what}, or increase --timeout")

@@ -1,0 +1,101 @@
+"""What was stored of a session beside what the model has, and where in which program each tick was."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tablegen.device.dual_program import DualProgram
+from tablegen.manifest.read import StoredBuild
+from tablegen.numerics.arrays import Bools, Ints
+from tablegen.verification.stream import FLAGS, Script, Words
+
+UNDEFINED = np.uint64((1 << 64) - 1)  # how a capture is read where the simulator has an unknown bit
+_MASK = {"x": (0, 0xFFFFFF), "y": (24, 0xFFFFFF), "markers": (48, 0xFF), "faults": (56, 0xFF)}
+
+
+@dataclass(frozen=True, eq=False)
+class Capture:
+    """The words that left the device, those of the model, and where in its program the model was.
+
+    ``place`` is the tick of the frame, -1 where nothing plays. ``which`` is the program in the bank, by its number in
+    ``programs``; the first is none. ``steady`` says where the output had caught up with it, ``own`` where it is the
+    program of the build.
+    """
+
+    got: Words
+    wanted: Words
+    place: Ints
+    which: Ints
+    steady: Bools
+    own: Bools
+    programs: tuple[DualProgram | None, ...]
+    lost: int  # ticks that the model has and the capture has not, or the other way round
+
+    @property
+    def known(self) -> Bools:
+        """Ticks of which the simulator knew every bit."""
+        known: Bools = self.got != UNDEFINED
+        return known
+
+    def limits(self, axis: str, name: str) -> Ints:
+        """A figure of the output stage, such as max_step, of the program of each tick; 0 before the first one."""
+        figures = [0 if one is None else int(getattr(getattr(one, axis).output, name)) for one in self.programs]
+        return np.array(figures, dtype=np.int64)[self.which]
+
+
+def part(subject: str, words: Words) -> Ints:
+    """A field of stored words: x, y, markers, or faults."""
+    shift, mask = _MASK[subject]
+    return (words >> np.uint64(shift) & np.uint64(mask)).astype(np.int64)
+
+
+def without_faults(words: Words) -> Words:
+    """Stored words whose faults are none."""
+    kept: Words = words & ~np.uint64(_MASK["faults"][1] << _MASK["faults"][0])
+    return kept
+
+
+def make_capture(stored: StoredBuild, script: Script, got: Words) -> Capture:
+    """Line capture and model up."""
+    wanted = np.array(script.expected, dtype=np.uint64)
+    flags = {name: (wanted >> np.uint64(48 + i) & np.uint64(1)).astype(np.bool_) for i, name in enumerate(FLAGS)}
+    index = np.arange(len(wanted))
+    place = np.where(flags["playing"], index - np.maximum.accumulate(np.where(flags["frame"], index, -1)), -1)
+    firsts = [first for first, _ in script.programs]
+    programs = tuple(program for _, program in script.programs)
+    which = np.searchsorted(firsts, index, side="right") - 1
+    steady = np.zeros(len(wanted), dtype=np.bool_)
+    own = np.zeros(len(wanted), dtype=np.bool_)
+    for number, (first, stop) in enumerate(zip(firsts, [*firsts[1:], len(wanted)], strict=True)):
+        program = programs[number]
+        if program is None:
+            continue
+        own[first:stop] = program is stored.program
+        steady[first:stop] = _caught_up(program, place[first:stop], wanted[first:stop])
+    length = min(len(wanted), len(got))
+    return Capture(
+        got[:length],
+        wanted[:length],
+        place[:length],
+        which[:length],
+        steady[:length],
+        own[:length],
+        programs,
+        abs(len(wanted) - len(got)),
+    )
+
+
+def _caught_up(program: DualProgram, place: Ints, wanted: Words) -> Bools:
+    """Where the codes of the model had caught up with one program, which nothing interrupts but rests and starts."""
+    if not len(place):
+        return np.zeros(0, dtype=np.bool_)
+    frame_ticks = program.schedule.frame_ticks
+    # A scan begins where a frame does and the tick before was not the last of one.
+    begins = (place == 0) & (np.concatenate([[-1], place[:-1]]) != frame_ticks - 1)
+    reached = place >= 0
+    for axis, one in (("x", program.x), ("y", program.y)):
+        reached[reached] = one.codes(place[reached] % one.ticks) == part(axis, wanted)[reached]
+    index = np.arange(len(place))
+    begun = np.maximum.accumulate(np.where(begins, index, 0))
+    # Caught up is for good: one right tick since the program began, this one included, is enough.
+    return (place >= 0) & (np.maximum.accumulate(np.where(reached, index, -1)) >= begun)

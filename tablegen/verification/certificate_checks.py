@@ -1,0 +1,54 @@
+"""The certificates of a build against what its words and its waveform make of them."""
+
+from dataclasses import dataclass
+
+from tablegen.manifest.read import ManifestAxis, StoredBuild
+from tablegen.verification.certified import PlayedPeriod, different_figures
+from tablegen.verification.checks import Check
+from tablegen.verification.directory import some
+from tablegen.verification.scaling import refinement_figures, scaling_figures
+
+
+@dataclass(frozen=True)
+class Certificates:
+    """A check of each axis, and the largest error of its codes in LSB, as it was found here."""
+
+    checks: list[Check]
+    limits: dict[str, float]
+
+
+def check_certificates(stored: StoredBuild, same_version: bool) -> Certificates:
+    """Every figure of both axes; those of scaling errors only where this version of tablegen stated them."""
+    checks: list[Check] = []
+    limits: dict[str, float] = {}
+    for name, axis in stored.axes:
+        check, limits[name] = _check(name, axis, stored, same_version)
+        checks.append(check)
+    return Certificates(checks, limits)
+
+
+def _check(name: str, axis: ManifestAxis, stored: StoredBuild, same_version: bool) -> tuple[Check, float]:
+    period = PlayedPeriod(axis)
+    schedule = stored.program.schedule
+    found = period.figures(float(schedule.line_rate if name == "x" else schedule.frame_rate))
+    told = {key: getattr(axis.certificate, key) for key in found}
+    wrong, count = different_figures(told, found, period.is_whole), len(found)
+    if same_version:
+        for key, sides in (
+            ("scaling_error_percent", scaling_figures(axis, period)),
+            ("refinement_percent", refinement_figures(axis)),
+        ):
+            stated = getattr(axis.certificate, key)
+            if (stated or {}).keys() != (sides or {}).keys():
+                wrong.append(f"certificate.{key} has {', '.join(stated or {}) or 'no direction'}")
+                continue
+            for side, figures in (sides or {}).items():
+                count += len(figures)
+                wrong += different_figures(stated[side], figures, period.is_whole, f"{key}.{side}.")
+    step = found["largest_step"]
+    if isinstance(step, int) and step > axis.output.max_step:
+        wrong.append(f"output.max_step is {axis.output.max_step}, the words step by {step}")
+    worst = found["max_error_lsb"]
+    assert isinstance(worst, float)
+    failure = f"{name}: {some([f'axes.{name}.{one}' for one in wrong])}" if wrong else None
+    return Check(name, "its certificate", f"{count} figures", f"{len(wrong)} differ", "0", failure), worst

@@ -1,0 +1,136 @@
+"""The numbers of a manifest that follow from others of it, worked out again."""
+
+from fractions import Fraction
+from math import ceil, floor, isclose
+
+import numpy as np
+
+from tablegen.fixedpoint.interpolation import guard_bits
+from tablegen.fixedpoint.output import UNIT_GAIN_BITS
+from tablegen.fixedpoint.rounding import round_number
+from tablegen.fixedpoint.synthesis import FourierWords, encode, synthesize
+from tablegen.manifest.read import Manifest, ManifestAxis, StoredBuild
+
+_RELATIVE = 1e-9  # of floats that went through JSON and a handful of operations
+_WINDOW_TICKS = 2  # a window of a line is placed to the tick, and not more than so far from where it was asked for
+_CODINGS, _ALIGNS = ("offset-binary", "twos-complement"), ("right", "left")
+
+
+def wrong_derived(stored: StoredBuild) -> tuple[int, list[str]]:
+    """How many numbers follow from others, and those that do not."""
+    manifest = stored.manifest
+    checks = _sequence(manifest)
+    for name, axis in stored.axes:
+        checks += [(f"axes.{name}.{key}", right, why) for key, right, why in _axis(manifest, name, axis)]
+    x, y = manifest.axes.x, manifest.axes.y
+    ranges = [axis.drive.v_scan / axis.drive.v_scan_normalised for axis in (x, y)]
+    told = y.line.requested_hz
+    right = x.line.requested_hz / manifest.sequence.frame_lines
+    checks += [
+        ("axes.y.drive.v_scan_normalised", _close(*ranges), f"of {ranges[1]:g} V, of x it is of {ranges[0]:g} V"),
+        ("axes.y.line.requested_hz", _close(told, right), f"{told}, that of x makes it {right}"),
+    ]
+    for key in ("v_zero", "v_per_code", "coding", "align", "word_bits"):
+        mine, other = getattr(y.output, key), getattr(x.output, key)
+        checks.append((f"axes.y.output.{key}", mine == other, f"{mine}, of x it is {other}"))
+    return len(checks), [f"{key} is {why}" for key, right, why in checks if not right]
+
+
+Found = list[tuple[str, bool, str]]
+
+
+def _sequence(manifest: Manifest) -> Found:
+    """Turns and windows, from the turn of each axis and its imaging window."""
+    sequence, x, y = manifest.sequence, manifest.axes.x, manifest.axes.y
+    found: Found = []
+    ticks, lines = sequence.line_ticks, sequence.frame_lines
+    for key, axis, period in (("turn_tick", x, ticks), ("turn_line", y, lines)):
+        told, right = getattr(sequence, key), ceil(_exact(axis.drive.turn) * period)
+        found.append((f"sequence.{key}", told == right, f"{told}, the turn makes it {right}"))
+    for key, axis, period, slack in (
+        ("forward_ticks", x, ticks, _WINDOW_TICKS),
+        ("backward_ticks", x, ticks, _WINDOW_TICKS),
+        ("up_lines", y, lines, 1),
+        ("down_lines", y, lines, 1),
+    ):
+        told = getattr(sequence, key)
+        begin, end = _asked_window(axis, backward=key in ("backward_ticks", "down_lines"))
+        if begin == end:
+            found.append((f"sequence.{key}", told[1] == 0, f"{told}, nothing of it is imaged"))
+            continue
+        first, stop = floor(begin * period), ceil(end * period)
+        right = abs(told[0] - first) <= slack and abs(told[0] + told[1] - stop) <= slack
+        found.append((f"sequence.{key}", right, f"{list(told)}, the imaging window is near {[first, stop - first]}"))
+        if key.endswith("ticks"):
+            enough = told[1] >= sequence.pixels
+            found.append(("sequence.pixels", enough, f"{sequence.pixels}, more than the ticks of a window"))
+    return found
+
+
+def _asked_window(axis: ManifestAxis, backward: bool) -> tuple[Fraction, Fraction]:
+    """Where a direction images, in periods; empty where it does not."""
+    turn, (low, high) = _exact(axis.drive.turn), (_exact(edge) for edge in axis.fourier.window)
+    if not backward:
+        return turn * low, turn * high
+    if axis.fourier.directions == "forward":
+        return Fraction(0), Fraction(0)
+    return turn + (1 - turn) * (1 - high), turn + (1 - turn) * (1 - low)
+
+
+def _exact(value: float) -> Fraction:
+    return Fraction(repr(value))
+
+
+def _axis(manifest: Manifest, name: str, axis: ManifestAxis) -> Found:
+    drive, line, fourier, table, output = axis.drive, axis.line, axis.fourier, axis.table, axis.output
+    low, high = fourier.window
+    rate = Fraction(*manifest.sequence.update_rate_hz) / line.ticks
+    amplitude = 0.5 * drive.v_amplitude / output.v_per_code
+    unit = abs(amplitude) * 2.0 ** (UNIT_GAIN_BITS + 1 - output.dac_bits)
+    offset = round_number((drive.v_offset - output.v_zero) / output.v_per_code * float(1 << output.gain_q))
+    middle = axis.program.output.offset_code
+    words = _fourier_words(axis)
+    rendered = words is not None and np.array_equal(
+        synthesize(words, len(table.words), table.bits), np.array(table.words, dtype=np.int64)
+    )
+    found: Found = [
+        ("line.rate_exact", Fraction(*line.rate_exact) == rate, f"{list(line.rate_exact)}, the ticks make it {rate}"),
+        ("line.rate_hz", line.rate_hz == float(rate), f"{line.rate_hz}, the ticks make it {float(rate)}"),
+        ("drive.v_amplitude", _close(drive.v_amplitude, drive.m * drive.g * drive.v_scan), "not m g v_scan"),
+        ("drive.window_nm", _close(drive.window_nm, drive.size_nm * (high - low)), "not size_nm times the window"),
+        ("fourier.window", 0.0 <= low < high <= 1.0, f"{[low, high]}"),
+        ("table.scale", _close(table.scale, abs(output.gain_word) / unit), "not what gain_word makes of the amplitude"),
+        ("output.gain_word", output.gain_word * amplitude > 0.0, f"{output.gain_word}, of the wrong sign"),
+        ("output.offset_word", output.offset_word == offset, f"{output.offset_word}, v_offset makes it {offset}"),
+        ("output.offset_code", output.offset_code == middle, f"{output.offset_code}, the word makes it {middle}"),
+        ("output.coding", output.coding in _CODINGS, f"{output.coding!r}"),
+        ("output.align", output.align in _ALIGNS, f"{output.align!r}"),
+        ("output.word_bits", output.dac_bits <= output.word_bits <= 32, f"{output.word_bits}"),
+        ("fourier.words", words is not None and _same_words(axis, words), "not (2 w - 1) / scale of its coefficients"),
+        ("table.words", rendered, "not what the Fourier words make"),
+        ("table.guard_bits", table.guard_bits == guard_bits(table.bits), f"{table.guard_bits}"),
+    ]
+    held = len(fourier.held_factors) == len(fourier.held_harmonics) and all(
+        0.0 < left < 1.0 + _RELATIVE for left in fourier.held_factors
+    )
+    found.append(("fourier.held_factors", held, "not a share for each of the held harmonics"))
+    if fourier.target is not None:
+        target = len(fourier.target.a) == len(fourier.target.b) == fourier.harmonics
+        found.append(("fourier.target", target, f"not of {fourier.harmonics} harmonics"))
+    return found
+
+
+def _close(a: float, b: float) -> bool:
+    return isclose(a, b, rel_tol=_RELATIVE, abs_tol=_RELATIVE)
+
+
+def _fourier_words(axis: ManifestAxis) -> FourierWords | None:
+    fourier = axis.fourier
+    try:
+        return encode(fourier.a0, np.array(fourier.a), np.array(fourier.b), axis.table.scale)
+    except OverflowError:
+        return None
+
+
+def _same_words(axis: ManifestAxis, words: FourierWords) -> bool:
+    return np.array_equal(words.in_order, axis.fourier_words)

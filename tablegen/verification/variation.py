@@ -1,0 +1,118 @@
+"""Short programs beside that of a build: they differ from it in every register, clamp, are held back, and image.
+
+They are made from integers and a sine alone, near the park codes of the build, so that no ramp from one to the other
+is long.
+"""
+
+from dataclasses import replace
+from fractions import Fraction
+from typing import Literal
+
+import numpy as np
+
+from tablegen.device.dual_program import DualProgram
+from tablegen.device.schedule import Schedule, Window
+from tablegen.fixedpoint.interpolation import index_bits_of
+from tablegen.fixedpoint.output import GAIN_BITS, UNIT_GAIN_BITS, Output
+from tablegen.fixedpoint.phase import RationalPhase
+from tablegen.fixedpoint.program import Program
+from tablegen.numerics.arrays import Ints
+
+Kind = Literal["free", "clamped", "held"]
+_LEAST_TICKS = 8  # of a line
+_RAMP_STEPS = 16  # of the build's own max_step: how far a variation leads at most
+_LEAST_CODES = 12  # of its amplitude, unless the converter has fewer
+_ROOM = 40  # of a guard above the largest step
+_PEAK = 0.9  # of a table's full scale
+
+
+def variation(own: DualProgram, kind: Kind, bank: int, longer: int = 0) -> DualProgram:
+    """A program for the device of ``own`` whose tables are those of a bank, 0 or 1; lines ``longer`` by so many ticks.
+
+    A ``free`` one neither clamps nor is held back, and images both ways. A ``clamped`` one is held at both limits of
+    both axes, a ``held`` one by the slew guard, up and down; it steps y once a line.
+    """
+    x_words = _room(own.x)
+    ticks = min(_LEAST_TICKS + {"free": 24, "clamped": 21, "held": 23}[kind] + longer, x_words)
+    lines = min({"free": 3, "clamped": 2, "held": 4}[kind], _room(own.y))
+    steps = kind == "held" or (kind == "free" and longer > 0) or lines * ticks > _room(own.y)
+    settle_lines = {"free": 1 - bank, "clamped": 0, "held": 2}[kind]
+    schedule = _schedule(ticks, lines, settle_lines, at_once=kind == "free" and bank == 1)
+    return DualProgram(
+        _axis(own.x, RationalPhase(ticks), 1, kind, bank, roomy=longer > 0),
+        _axis(
+            own.y, RationalPhase(lines if steps else lines * ticks), ticks if steps else 1, kind, bank, roomy=longer > 0
+        ),
+        schedule,
+    )
+
+
+def _room(own: Program) -> int:
+    """How many advances a period may have: a word each in a direct table, which is as long as the device's memory."""
+    return 1 << 16 if own.mode == "interpolated" else 1 << max(index_bits_of(len(own.words)), 3)
+
+
+def _schedule(ticks: int, lines: int, settle_lines: int, at_once: bool) -> Schedule:
+    """Both sweeps image, on the last line and the one before it; ``at_once`` on the first, all of it the sweep back."""
+    turn, count = ticks // 2 + 1, ticks * 3 // 8 - 1
+    return Schedule(
+        ticks=ticks,
+        lines=lines,
+        update_rate_hz=Fraction(1),
+        requested_hz=1.0,
+        pixels=max(count * 2 // 3, 1),
+        settle_lines=settle_lines,
+        turn_tick=0 if at_once else turn,
+        forward=Window(1, count),
+        backward=Window(turn + 1, count - 1),
+        turn_line=max(lines - 1, 1),
+        up=Window(0 if at_once else max(lines - 2, 0), 1),
+        down=Window(lines - 1, 1) if lines > 1 else Window(0, 0),
+    )
+
+
+def _axis(own: Program, phase: RationalPhase, hold: int, kind: Kind, bank: int, roomy: bool) -> Program:
+    """One axis; the guard of a ``roomy`` one is far above its steps, as that of a build is."""
+    words = _words(own, phase.ticks, bank)
+    gain, middle = _gain(own.output)
+    gain_q = own.output.gain_q
+    # Nobody's gain or offset: the sign and the bits below a code are others in each bank.
+    offset = (middle << gain_q) + (((2 * bank + 1) << gain_q) // 5)
+    wide = replace(own.output, gain_word=-gain if bank else gain, offset_word=offset)
+    free = Program(phase, hold, own.mode, own.bits, words, _unlimited(wide))
+    codes = free.codes(np.arange(free.ticks, dtype=np.int64))
+    low, high = int(codes.min()), int(codes.max())
+    largest = max(int(np.max(np.abs(codes - np.roll(codes, 1)))), 1)
+    rest = (high - low) // 4 if kind == "clamped" else 0
+    output = replace(
+        wide,
+        code_min=low + rest if rest else max(low - 3 - bank, 0),
+        code_max=high - rest if rest else min(high + 5 + bank, (1 << wide.dac_bits) - 1),
+        max_step=max(largest // 3, 1) if kind == "held" else (_ROOM if roomy else 1) * largest + 3,
+        park_code=low + (high - low) * (2 + bank) // 6,
+    )
+    return replace(free, output=replace(output, park_code=min(max(output.park_code, output.code_min), output.code_max)))
+
+
+def _words(own: Program, advances: int, bank: int) -> Ints:
+    """Two harmonics over most of full scale; a bank each has its own."""
+    length = len(own.words) if own.mode == "interpolated" else advances
+    t = np.arange(length) / length
+    shape = np.sin(2.0 * np.pi * t + 1.0 + bank) + 0.25 * np.sin(6.0 * np.pi * t + 0.3)
+    half = 1 << (own.bits - 1)
+    words: Ints = np.rint(_PEAK * half / 1.25 * shape).astype(np.int64)
+    return words
+
+
+def _gain(output: Output) -> tuple[int, int]:
+    """A gain whose codes are few steps of the build away from its park code, and the code in their middle."""
+    top = (1 << output.dac_bits) - 1
+    amplitude = max(min(top // 5, _RAMP_STEPS * output.max_step), min(_LEAST_CODES, top // 5))
+    gain = -(-(amplitude << (UNIT_GAIN_BITS + 1)) // (1 << output.dac_bits))
+    gain = min(gain, (1 << (GAIN_BITS - 1)) - 1)
+    reach = (gain << output.dac_bits >> (UNIT_GAIN_BITS + 1)) + 1
+    return gain, min(max(output.park_code + amplitude // 3, reach), top - reach)
+
+
+def _unlimited(output: Output) -> Output:
+    return replace(output, code_min=0, code_max=(1 << output.dac_bits) - 1)

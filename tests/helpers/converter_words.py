@@ -1,0 +1,79 @@
+"""The words at two converters against the integer model, where only they tell when a request was heard.
+
+``follow_words`` holds every word. It knows the requests and their order, and tries all ticks on which each of them may
+have been heard; tries that the next word refutes are dropped, and those that come to the same state are one.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from copy import copy
+
+from following import Differs
+
+from tablegen.device.dual_program import DualProgram
+from tablegen.device.sequencer import Sequencer
+
+Request = Callable[[Sequencer], None]
+
+
+def commit(program: DualProgram) -> Request:
+    """A program is committed."""
+    return lambda model: model.commit(program)
+
+
+def start(frames: int = 0) -> Request:
+    """ARM, and a TRIGGER that finds it armed."""
+
+    def request(model: Sequencer) -> None:
+        model.arm(frames)
+        model.trigger()
+
+    return request
+
+
+def park(model: Sequencer) -> None:
+    """PARK."""
+    model.park()
+
+
+def _state(model: Sequencer, heard: int) -> tuple[object, ...]:
+    programs = id(model.playing), id(model.idle)
+    place = model.running, model.tick, model.line, model.frames_left, model.armed
+    return heard, model.codes, *programs, *place
+
+
+def follow_words(words: Iterable[tuple[int, int]], requests: Sequence[Request]) -> list[int]:
+    """Hold words of x and y against a device that powers up at codes 0, and hears the requests in this order.
+
+    Returns the tick on which each was heard, the first one where several fit. Raises ``Differs`` at the first word that
+    the model cannot have, and if not all requests were heard.
+    """
+    tries: list[tuple[Sequencer, list[int]]] = [(Sequencer(None, codes=(0, 0)), [])]
+    at = 0
+    for at, word in enumerate(words):
+        goes_on: dict[tuple[object, ...], tuple[Sequencer, list[int]]] = {}
+        for before, heard in tries:
+            model = before
+            for number in range(len(heard), len(requests) + 1):
+                trial = copy(model)
+                if _word(trial) == word:
+                    ticks = [*heard, *[at] * (number - len(heard))]
+                    goes_on.setdefault(_state(trial, number), (trial, ticks))
+                if number < len(requests):
+                    model = copy(model)
+                    requests[number](model)
+        if not goes_on:
+            number = max(len(heard) for _, heard in tries)
+            raise Differs(f"tick {at}: {word} after {number} of {len(requests)} requests is not the model's")
+        tries = list(goes_on.values())
+    for _, heard in tries:
+        if len(heard) == len(requests):
+            return heard
+    raise Differs(f"not all of {len(requests)} requests were heard in {at + 1} ticks")
+
+
+def _word(model: Sequencer) -> tuple[int, int]:
+    """What its next tick puts out."""
+    tick = model.step()
+    if model.playing is None:
+        return tick.x, tick.y
+    return int(model.playing.x.output.word(tick.x)), int(model.playing.y.output.word(tick.y))

@@ -1,0 +1,318 @@
+"""The firmware of every port, from an upload by the client to the words at its converters, each of them the model's.
+
+RP2040 in rp2040js, STM32F4 under unicorn with a model of the peripherals that it touches, Arduino Mega in simavr. Time
+is virtual, and so is the serial line.
+"""
+
+import os
+import shlex
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from random import Random
+
+import pytest
+from building import EXAMPLE, REMOVED, REPOSITORY, VARIANTS, Variant, run, run_clean, tool, write_variant
+from converter_words import commit, follow_words, park, start
+from following import Differs
+from limits import PATIENCE_S
+from link_line import FarEnd, Line
+from pipe_board import PipeBoard
+from stm32_board import Stm32Board
+
+from tablegen.config.load import load
+from tablegen.link.device import Device
+from tablegen.link.prepare import PreparedScan
+from tablegen.planning.line_plan import make_plan
+from tablegen.verification.elf import read_executable
+
+pytestmark = pytest.mark.rest
+
+DAC_FAULT_UNDERRUN = 8
+AVR_HZ = 16_000_000
+FIRMWARE = REPOSITORY / "examples" / "firmware"
+HELPERS = REPOSITORY / "tests" / "helpers"
+TIMING = {"pixels": 50, "lines": 4, "ticks_per_line": 331}
+SMALL = {
+    **VARIANTS["short_frame"].scan,
+    "limits": REMOVED,
+    "x.table.length": 256,
+    "y.table.length": 128,
+}
+
+
+def _scan(folder: Path, name: str, changes: dict[str, object]) -> tuple[Path, PreparedScan]:
+    file = write_variant(folder / name, Variant(changes))
+    return file, PreparedScan.of_plan(make_plan(load(file)))
+
+
+def _firmware(port: str, folder: Path, scan: Path, *more: str) -> Path:
+    target = folder / port
+    done = run(
+        ["make", "-C", FIRMWARE / port, f"SCAN={scan}", f"BUILD={target}", f"TABLEGEN={sys.executable} -m tablegen",
+         *more]
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr  # a scan that is so small may be warned of
+    return target / "firmware.elf"
+
+
+def _play(board: FarEnd, tick_hz: int, baud: int, scan: PreparedScan, form: str) -> None:
+    """The boot scan plays, another one is uploaded meanwhile, plays for more than a frame, and parks."""
+    line = Line(board, baud=baud, tick_hz=tick_hz)
+    frame = scan.program.schedule.frame_ticks / tick_hz
+    line.sleep(0.02)  # what comes before the UART is on is lost
+    with Device(line.open, random=Random(8), sleep=line.sleep) as client:
+        client.arm()
+        client.trigger()
+        line.sleep(frame / 3)
+        client.upload(scan.image(form), timeout_s=20.0)
+        line.sleep(1.3 * frame)
+        status = client.status()
+        client.park()
+        line.sleep(0.1 * frame)
+    assert status.faults == 0
+    assert status.bad_frames == 0
+
+
+def _follow(words: list[tuple[int, int]], boot: PreparedScan, scan: PreparedScan) -> None:
+    requests = [commit(boot.program), start(), commit(scan.program), park]
+    heard = follow_words(words, requests)
+    assert heard[3] - heard[2] > scan.program.schedule.frame_ticks
+    wrong = heard[2] + scan.program.schedule.ticks * 3
+    x, y = words[wrong]
+    with pytest.raises(Differs, match=f"tick {wrong}"):  # a negative control
+        follow_words([*words[:wrong], (x ^ 1, y), *words[wrong + 1 :]], requests)
+
+
+@pytest.fixture(scope="module")
+def rp2040js(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder in which node finds the emulator."""
+    folder = tmp_path_factory.mktemp("node")
+    (folder / "package.json").write_bytes((HELPERS / "rp2040" / "package.json").read_bytes())
+    subprocess.run(
+        [tool("npm"), "install", "--silent", "--no-audit", "--no-fund", "--no-package-lock", "--ignore-scripts"],
+        cwd=folder, check=True, stdin=subprocess.DEVNULL,
+    )  # fmt: skip
+    return folder
+
+
+def _rp2040(rp2040js: Path, folder: Path, divider: int) -> tuple[PipeBoard, int, PreparedScan, PreparedScan]:
+    """A board at 460800 baud, its update rate, the scan that it has, and another one."""
+    rate = 125_000_000 // 34 // divider
+    changes = {**SMALL, "dac.update_rate_hz": float(rate), "timing": {**TIMING, "line_rate_hz": rate / 331}}
+    file, boot = _scan(folder, "boot", changes)
+    _, scan = _scan(folder, "scan", {**changes, "x.size_nm": 40.0})
+    image = folder / "image.bin"
+    (segment,) = read_executable(_firmware("rp2040", folder, file, "BAUD=460800", f"DIVIDER={divider}")).segments
+    image.write_bytes(segment.data)
+    command = ["node", HELPERS / "rp2040" / "board.mjs", image, "460800"]
+    return PipeBoard(command, 34 * divider, rp2040js), rate, boot, scan
+
+
+def test_rp2040(rp2040js: Path, tmp_path: Path) -> None:
+    """One core plays, the other one serves the link; words are what shifted out of the pins."""
+    board, rate, boot, scan = _rp2040(rp2040js, tmp_path, divider=36)
+    with board:
+        _play(board, rate, 460800, scan, "fourier")
+    lost, apart = board.counts
+    assert (lost, apart) == (0, 0)
+    _follow(board.words, boot, scan)
+
+
+def test_rp2040_tells_underruns(rp2040js: Path, tmp_path: Path) -> None:
+    """A negative control: at five times the rate it holds words, says so, and no word is lost or wrong."""
+    board, rate, boot, _ = _rp2040(rp2040js, tmp_path, divider=7)
+    with board:
+        line = Line(board, baud=460800, tick_hz=rate)
+        line.sleep(0.002)
+        with Device(line.open, random=Random(8), sleep=line.sleep) as client:
+            client.arm()
+            client.trigger()
+            line.sleep(0.02)
+            assert client.status().faults == DAC_FAULT_UNDERRUN
+            client.park()
+            line.sleep(0.002)
+    follow_words(board.words, [commit(boot.program), start(), park])
+
+
+def test_stm32(tmp_path: Path) -> None:
+    """The DAC and the receiver by DMA; words are what DMA gave to the DAC."""
+    rate, baud = 200_000, 460800
+    timing = {**TIMING, "line_rate_hz": rate / 331}
+    changes = {**SMALL, "dac.bits": 12, "dac.update_rate_hz": float(rate), "timing": timing}
+    file, boot = _scan(tmp_path, "boot", changes)
+    _, scan = _scan(tmp_path, "scan", {**changes, "x.size_nm": 40.0})
+    board = Stm32Board(_firmware("stm32", tmp_path, file, f"BAUD={baud}"))
+    board.tick(1)
+    _play(board, rate, baud, scan, "table")
+    _follow(board.words, boot, scan)
+
+
+# Arduino: the recipe of the README, with Arduino's builder, core and libraries.
+
+ARDUINO = FIRMWARE / "arduino"
+_SHARE = Path("/usr/share/arduino")
+_BUILDER = (
+    "arduino-builder", "-compile", "-hardware", "/usr/share/arduino-builder", "-hardware", _SHARE / "hardware",
+    "-tools", _SHARE / "hardware", "-warnings", "all",
+    # Debian's core 1.8.7 takes DECIMAL_DIG from a header in which Debian's avr-gcc 5.4 has it for C alone.
+    "-prefs", "compiler.cpp.extra_flags=-DDECIMAL_DIG=__DECIMAL_DIG__",
+)  # fmt: skip
+
+
+def _recipe() -> list[str]:
+    """The commands that the README gives up to the IDE."""
+    text = (ARDUINO / "README.md").read_text("utf-8").split("Arduino IDE")[0]
+    return [line.strip() for line in text.splitlines() if line.startswith("    ")]
+
+
+@pytest.fixture(scope="module")
+def sketch(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of the sketch after the recipe."""
+    examples = tmp_path_factory.mktemp("recipe") / "examples"
+    shutil.copytree(REPOSITORY / "examples", examples, ignore=shutil.ignore_patterns("build", "__pycache__"))
+    folder = examples / "firmware" / "arduino"
+    for command in _recipe():
+        assert command.startswith(("tablegen ", "cp "))
+        whole = command.replace("tablegen", f"{shlex.quote(sys.executable)} -m tablegen", 1)
+        done = subprocess.run(whole, shell=True, cwd=folder, check=True, capture_output=True)
+        assert done.stderr == b""
+    return folder / "scan_player"
+
+
+def _compiled(sketch: Path, board: str, folder: Path) -> Path:
+    """The sketch as the IDE compiles it; no warning is of ours."""
+    out = folder / board.split(":")[0]
+    out.mkdir()
+    done = run([*_BUILDER, "-fqbn", f"arduino:avr:{board}", "-build-path", out, sketch / "scan_player.ino"])
+    assert done.returncode == 0, done.stderr
+    warnings = [line for line in done.stderr.splitlines() if "warning:" in line]
+    assert [line for line in warnings if not line.startswith(f"{_SHARE}/hardware")] == []
+    return out / "scan_player.ino.elf"
+
+
+def _static_end(executable: Path) -> int:
+    return read_executable(executable).symbols["_end"] & 0xFFFF
+
+
+@pytest.fixture(scope="module")
+def avr_board(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The board's program."""
+    program = tmp_path_factory.mktemp("avr") / "avr_board"
+    run_clean(["gcc", "-std=gnu99", "-O2", HELPERS / "avr_board.c", "-o", program, "-lsimavr", "-lelf", "-lm"])
+    return program
+
+
+def test_arduino_mega(sketch: Path, avr_board: Path, tmp_path: Path) -> None:
+    """The sketch in simavr; words are what the converter puts out when LDAC falls."""
+    rate = 2000
+    text = (
+        (ARDUINO / "scan.toml").read_text("utf-8").replace("../../scanner.toml", str(EXAMPLE.parent / "scanner.toml"))
+    )
+    changes = {
+        "lines = 100 ": "lines = 4 ",
+        "pixels = 100 ": "pixels = 50 ",
+        "line_rate_hz = 2.0": "line_rate_hz = 5.0",
+        "size_nm = 400.0": "size_nm = 300.0",
+        'motion = "step"': "",
+        'mode = "direct"': 'mode = "interpolated"\nlength = 128',
+    }
+    small = text
+    for old, new in changes.items():
+        assert old in small
+        small = small.replace(old, new)
+    scans = []
+    for name, content in (("boot", text), ("scan", small)):
+        (tmp_path / f"{name}.toml").write_text(content, "utf-8")
+        scans.append(PreparedScan.of_plan(make_plan(load(tmp_path / f"{name}.toml"))))
+    executable = _compiled(sketch, "mega:cpu=atmega2560", tmp_path)
+    with PipeBoard([avr_board, "mega", executable, str(_static_end(executable))], AVR_HZ // rate) as board:
+        _play(board, rate, 115200, scans[1], "table")
+    lost, free = board.counts
+    assert lost == 0
+    _follow(board.words, *scans)
+    assert free > 400  # bytes that the stack never reached
+
+
+def test_an_arduino_without_nested_interrupts_loses_bytes(sketch: Path, avr_board: Path, tmp_path: Path) -> None:
+    """A negative control: the tick keeps Serial's interrupt off for longer than a UART of an AVR holds bytes."""
+    wrong = tmp_path / "scan_player"
+    shutil.copytree(sketch, wrong)
+    text = (wrong / "scan_player.ino").read_text("utf-8")
+    before, middle, after = text.partition("    interrupts();  // but Serial's")
+    assert middle
+    (wrong / "scan_player.ino").write_text(f"{before}    // {after}", "utf-8")
+    executable = _compiled(wrong, "mega:cpu=atmega2560", tmp_path)
+    with PipeBoard([avr_board, "mega", executable, str(_static_end(executable))], AVR_HZ // 2000) as board:
+        board.tick(100)
+        board.receive(bytes(range(1, 256)) * 2)
+        board.tick(200)
+        lost, _ = board.counts
+    assert lost > 0
+
+
+def test_arduino_uno(sketch: Path, avr_board: Path, tmp_path: Path) -> None:
+    """Without the link: it plays what was compiled in, and its stack has room beside that."""
+    rate = 2000
+    executable = _compiled(sketch, "uno", tmp_path)
+    scan = PreparedScan.of_plan(make_plan(load(sketch.parent / "scan.toml")))
+    with PipeBoard([avr_board, "uno", executable, str(_static_end(executable))], AVR_HZ // rate) as board:
+        board.tick(200)
+        for letter in (b"t", b"s"):
+            board.receive(letter)
+            board.tick(1500)
+        board.receive(b"p")
+        board.tick(200)
+    _, free = board.counts
+    assert board.transmit() == b"0\r\n"  # no faults
+    heard = follow_words(board.words, [commit(scan.program), start(), park])
+    assert heard[2] - heard[1] > 2 * scan.program.schedule.ticks
+    assert free > 100
+
+
+def test_the_arduino_sketch_compiles_for_a_teensy(sketch: Path, tmp_path: Path) -> None:
+    """With stand-ins for the headers of its core."""
+    run_clean(
+        ["arm-none-eabi-g++", "-std=gnu++17", "-mcpu=cortex-m7", "-mthumb", "-ffreestanding", "-D__IMXRT1062__", "-O2",
+         "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wsign-conversion", "-Werror", f"-I{HELPERS / 'arduino'}",
+         "-x", "c++", "-c", sketch / "scan_player.ino", "-o", tmp_path / "sketch.o"]
+    )  # fmt: skip
+
+
+def test_make_run_is_clean_of_underruns(tmp_path: Path) -> None:
+    """As the README of the reference firmware says, on a machine that is busy with other tests."""
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    process = subprocess.Popen(
+        [tool("make"), "-C", FIRMWARE / "cortex_m", "run", f"BUILD={tmp_path}", f"PORT={port}",
+         f"TABLEGEN={sys.executable} -m tablegen"],
+        start_new_session=True, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+    )  # fmt: skip
+    log, until = tmp_path / "lines.log", time.monotonic() + PATIENCE_S
+
+    def wait(good: Callable[[], bool]) -> None:
+        while not good():
+            assert process.poll() is None, "QEMU has ended"
+            assert time.monotonic() < until, "QEMU does not get there"
+            time.sleep(0.05)
+
+    try:
+        wait(log.exists)
+        scan = PreparedScan.of_plan(make_plan(load(EXAMPLE)))
+        with Device(f"socket://127.0.0.1:{port}", timeout_s=PATIENCE_S) as client:
+            client.arm()
+            client.trigger()
+            for form in ("table", "fourier"):
+                client.upload(scan.image(form), timeout_s=PATIENCE_S, force=True)
+            played = len(log.read_text("ascii").splitlines())
+            wait(lambda: len(log.read_text("ascii").splitlines()) > played + 20)
+            assert client.status().faults == 0
+    finally:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+    assert {line.split()[-1] for line in log.read_text("ascii").splitlines()[:-1]} == {"00"}
