@@ -9,6 +9,7 @@ from tablegen.emit.formats import UnknownFormat, get
 from tablegen.manifest.format import MANIFEST
 from tablegen.manifest.read import StoredBuild
 from tablegen.problems import Unphysical
+from tablegen.reading import BUILD_FILE, read_bytes
 
 _RUNTIME = ("dac_*.v", "dac_*.c", "dac_*.h")  # what a command line with a pattern takes in
 _REWRITTEN = ("c", "verilog")  # formats that are compared constant by constant and word by word, not as they stand
@@ -87,7 +88,7 @@ def unlike_installed(folder: Path, content: Content, formats: list[Format]) -> t
 def _content(path: Path) -> bytes | None:
     """What is in a file; missing ones are told elsewhere."""
     try:
-        return path.read_bytes()
+        return read_bytes(path, BUILD_FILE)
     except OSError:
         return None
 

@@ -30,6 +30,8 @@ ALLOWED = {
     ("verification/simulate.py", "read_text"): "the log of a simulator",
     ("verification/elf.py", "open"): "what it has compiled",
     ("verification/c_target.py", "read_text"): "its own script",
+    ("verification/verilog_bench.py", "read_text"): "its own record",
+    ("verification/listing.py", "read_bytes"): "the runtime, which ships with the package",
     ("verification/directory.py", "shutil.copyfile"): "files of a build, which read_build has found to be files",
     ("verification/verilog_target.py", "shutil.copyfile"): "as in directory.py",
     ("link/transport.py", "open"): "a serial port",
