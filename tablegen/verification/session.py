@@ -15,6 +15,7 @@ from tablegen.verification.requests import Requests
 from tablegen.verification.stream import Script
 
 _CATCH_UP_STRIDE = 64  # ticks after which it is seen whether an output has caught up
+_PARK_TICKS = 500  # in which most programs have parked, whatever the ticks are that were asked for
 _POWER_UP_STEPS = 20  # of max_step, from the codes of power-up to the park codes
 WIRED_TICKS = 24  # ticks so far apart that a serial converter gets each of them
 WIRED_CLOCKS = 240  # clocks between them
@@ -140,8 +141,9 @@ def make_session(
 
     script.request("park")
     script.pace(pace, pace)
-    while not script.model.parked and own.played < own.most:
-        script.wait_ticks(min(_CATCH_UP_STRIDE, own.most - own.played))
+    until = max(own.most, own.played + _PARK_TICKS)
+    while not script.model.parked and own.played < until:
+        script.wait_ticks(min(_CATCH_UP_STRIDE, until - own.played))
     if requests:
         _slowly(own)
     script.state("at the end")
