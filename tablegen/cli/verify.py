@@ -47,9 +47,9 @@ _CLOCKS_A_SECOND = 20_000  # that Icarus simulates, more or less
 )
 @click.option(
     "--ticks",
-    type=click.IntRange(min=7000, max=1 << 28),
+    type=click.IntRange(min=1000, max=1 << 28),
     metavar="N",
-    help="Play at most N ticks, some 6000 of them for requests and faults.  [default: "
+    help="Play at most N ticks of the build's own program, after some 6000 for requests and faults.  [default: "
     "icarus 300000, verilator 3000000, both divided by 41 with --axis serial; c "
     "3000000, cortex-m 1000000]",
 )

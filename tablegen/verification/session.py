@@ -15,11 +15,12 @@ from tablegen.verification.requests import Requests
 from tablegen.verification.stream import Script
 
 _CATCH_UP_STRIDE = 64  # ticks after which it is seen whether an output has caught up
+_PARK_TICKS = 500  # in which most programs have parked, whatever the ticks are that were asked for
 _POWER_UP_STEPS = 20  # of max_step, from the codes of power-up to the park codes
 WIRED_TICKS = 24  # ticks so far apart that a serial converter gets each of them
 WIRED_CLOCKS = 240  # clocks between them
-_LONG_LINES_TICKS = 150_000  # more than the long lines take that are played in C
-REQUEST_TICKS = 6500  # more than the requests take, and the words of the program after them
+_MANY_TICKS = 20_000  # of a session in C that has long lines too
+_TAKING_OVER_TICKS = 1500  # more than pass while its words are written
 
 
 @dataclass(frozen=True)
@@ -33,14 +34,14 @@ class BuildSession:
 
 
 def needed_ticks(program: DualProgram) -> int:
-    """Ticks in which a session plays a whole frame and all the rest."""
+    """Ticks in which a session plays a whole frame of the build's program, and all that follows."""
     schedule = program.schedule
     ramp = max(
         -(-(axis.output.code_max - axis.output.code_min) // axis.output.max_step) for axis in (program.x, program.y)
     )
     lines = 2 * schedule.settle_lines + 8
     return (
-        REQUEST_TICKS
+        _TAKING_OVER_TICKS
         + schedule.frame_ticks
         + lines * schedule.ticks
         + 3 * (min(ramp, schedule.frame_ticks) + _CATCH_UP_STRIDE)
@@ -62,6 +63,7 @@ class _Own:
 
     def __init__(self, script: Script, loader: Loader, most: int, seed: int, pace: int) -> None:
         self.script, self.loader, self.most = script, loader, most
+        self.spare = most // 20  # for the park at the end
         self.random, self.pace = np.random.default_rng(seed), pace
 
     @property
@@ -103,7 +105,7 @@ def make_session(
     placement: Placement,
     requests: bool = True,
 ) -> BuildSession:
-    """At most some ``most`` ticks of a program whose words come from ``memories``; the model plays ``program``.
+    """Requests, and then at most some ``most`` ticks of a program whose words come from ``memories``.
 
     Without memories the device has the program already, as the C of a build does, and a driver reports overruns.
     Without ``requests`` the own program alone is played. A swap in mid-frame comes at a random tick, ticks then come
@@ -117,7 +119,8 @@ def make_session(
 
     if requests:
         in_c = memories is None
-        Requests(script, loader, placement, in_c, in_c and most >= needed_ticks(program) + _LONG_LINES_TICKS).play()
+        Requests(script, loader, placement, in_c, in_c and most >= _MANY_TICKS).play()
+        own.most += own.played
         script.request("arm", "trigger")
         script.wait_ticks(2)
         own.take_over()
@@ -138,8 +141,9 @@ def make_session(
 
     script.request("park")
     script.pace(pace, pace)
-    while not script.model.parked and own.played < own.most:
-        script.wait_ticks(min(_CATCH_UP_STRIDE, own.most - own.played))
+    until = max(own.most, own.played + _PARK_TICKS)
+    while not script.model.parked and own.played < until:
+        script.wait_ticks(min(_CATCH_UP_STRIDE, until - own.played))
     if requests:
         _slowly(own)
     script.state("at the end")
@@ -168,7 +172,7 @@ def _swap_and_back(own: _Own, line: int, settle_lines: int) -> bool:
     script.pace(own.pace, own.pace)
     swaps = script.swaps
     own.loader.commit(variation)
-    budget = own.most - own.most // 20
+    budget = own.most - own.spare
     script.wait_ticks(max(min(line, budget - own.played), 0))  # a line start is among them
     if script.swaps == swaps:
         script.request("withdraw")

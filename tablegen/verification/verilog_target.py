@@ -48,7 +48,7 @@ from tablegen.verification.verilog_bench import (
     wanted_constants,
 )
 
-_SESSION_TICKS = 45_000  # of a session that has its frame apart
+_SESSION_TICKS = 39_000  # of the program of a build, in a session that has its frame apart
 _CAPTURED_TICK_BYTES = 17  # bytes of a captured tick
 _SINE = "sine.mem"
 _MAX_TABLE_WORDS = 1 << 16  # words of a table that the sequencer can address

@@ -99,7 +99,7 @@ def test_a_sequencer_that_is_tampered_with_is_heard(
 ) -> None:
     substitute(folder / f"{file}.v", pattern, new)
     make_right(folder, OTHER)
-    outcome = verify(folder, "--ticks", "9000", "--axis", "blocks")
+    outcome = verify(folder, "--ticks", "2000", "--axis", "blocks")
     assert outcome.status == 5
     assert finds in failed(outcome), outcome.out
     assert ("files", "SHA-256 in the manifest") not in failed(outcome)
@@ -128,7 +128,7 @@ def test_a_serial_output_that_is_tampered_with_is_found(folder: Path) -> None:
     """The words are right, what leaves on the wires is not."""
     substitute(folder / "dac_spi.v", r"(mosi_x *(?:<=|=) *)", r"\1!")
     make_right(folder, OTHER)
-    assert failed(verify(folder, "--ticks", "9000", "--axis", "blocks")) == {("serial", "converter word")}
+    assert failed(verify(folder, "--ticks", "2000", "--axis", "blocks")) == {("serial", "converter word")}
 
 
 # What the C does
@@ -153,7 +153,7 @@ C = [
 def test_c_that_is_tampered_with_is_heard(folder: Path, file: str, pattern: str, new: str) -> None:
     substitute(folder / f"dac_{file}", pattern, new)
     make_right(folder, OTHER)
-    outcome = verify(folder, "--target", "c", "--ticks", "9000")
+    outcome = verify(folder, "--target", "c", "--ticks", "2000")
     assert outcome.status == 5
     assert {against for _, against in failed(outcome)} & {"integer model", "slew guard", "clamp"}
 

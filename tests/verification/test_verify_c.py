@@ -172,7 +172,7 @@ def benches(short: Build, tmp_path_factory: pytest.TempPathFactory) -> Benches:
 
 @pytest.mark.common
 @settings(deadline=None, max_examples=40)
-@given(st.integers(0, 1 << 32), st.integers(7000, 40_000))
+@given(st.integers(0, 1 << 32), st.integers(1000, 6000))
 def test_sessions_of_any_seed_and_length_equal_the_model(benches: Benches, seed: int, ticks: int) -> None:
     """By steps and by fills; the ticks suffice for a whole session or end anywhere in it."""
     stored = benches.stored
