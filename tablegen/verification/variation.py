@@ -22,6 +22,7 @@ Kind = Literal["free", "clamped", "held"]
 _LEAST_TICKS = 8  # of a line
 _RAMP_STEPS = 16  # of the build's own max_step: how far a variation leads at most
 _LEAST_CODES = 12  # of its amplitude, unless the converter has fewer
+_MAX_STEP = (1 << 24) - 1  # that a sequencer takes
 _ROOM = 40  # of a guard above the largest step
 _PEAK = 0.9  # of a table's full scale
 
@@ -88,7 +89,7 @@ def _axis(own: Program, phase: RationalPhase, hold: int, kind: Kind, bank: int, 
         wide,
         code_min=low + rest if rest else max(low - 3 - bank, 0),
         code_max=high - rest if rest else min(high + 5 + bank, (1 << wide.dac_bits) - 1),
-        max_step=max(largest // 3, 1) if kind == "held" else (_ROOM if roomy else 1) * largest + 3,
+        max_step=max(largest // 3, 1) if kind == "held" else min((_ROOM if roomy else 1) * largest + 3, _MAX_STEP),
         park_code=low + (high - low) * (2 + bank) // 6,
     )
     return replace(free, output=replace(output, park_code=min(max(output.park_code, output.code_min), output.code_max)))
