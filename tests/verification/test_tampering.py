@@ -139,7 +139,7 @@ C = [
     ("withdraw ignored", "sequencer.c", r"(case WITHDRAW:\n *)s->waiting = 0;", r"\1;"),
     ("swap in mid-line", "sequencer.c", r"\(s->running && s->tick != 0\)", "false"),
     ("begins settled", "sequencer.c", r"settle_left = [^;]*settle_lines;", "settle_left = 0;"),
-    ("faults not sticky", "sequencer.c", r"s->faults = [^;]*\| fault\b[^;]*;", ";"),
+    ("faults not sticky", "sequencer.c", r"s->faults = [^;]*\| \(?fault\b[^;]*;", ";"),
     ("busy is no reason", "program.c", r"if \(!dac_sequencer_writable\(s\)\)", "if (0)"),
     ("no lower limit", "program.c", r"b->code_min = p->code_min;", "b->code_min = 0;"),
     ("no upper limit", "program.c", r"b->code_max = p->code_max;", "b->code_max = (1 << p->dac_bits) - 1;"),

@@ -314,9 +314,9 @@ PLAYED = [
     ("UP_LINES", lambda value: value - 1, ("markers", "integer model")),
     ("X_GAIN_WORD", lambda value: value + 40, ("x", "integer model")),
     ("Y_OFFSET_WORD", lambda value: value + (1 << 21), ("y", "integer model")),
-    ("X_OFFSET_CODE", lambda value: value + 1, ("x", "integer model")),
+    ("X_OFFSET_CODE", lambda value: value + 1, None),  # for people: no device needs it
     ("Y_MAX_STEP", lambda value: value - 1000, ("y", "integer model")),
-    ("X_MAX_STEP", lambda value: value + 1000, None),  # x never steps so far here
+    ("X_MAX_STEP", lambda value: value + 1000, ("x", "integer model")),
     ("X_PARK_CODE", lambda value: value + 1, ("x", "integer model")),
     ("Y_CODE_MAX", lambda value: value // 2 + 1000, ("y", "integer model")),
     ("X_DAC_TWOS_COMPLEMENT", lambda value: 1 - value, ("x", "converter word")),
@@ -425,7 +425,7 @@ MUTANTS = [
         "settle_left = 1;",
         ("markers", "integer model"),
     ),
-    ("unsticky faults", "sequencer.c", r"s->faults = [^;]*\| fault\b[^;]*;", ";", ("faults", "integer model")),
+    ("unsticky faults", "sequencer.c", r"s->faults = [^;]*\| \(?fault\b[^;]*;", ";", ("faults", "integer model")),
     ("no coding", "axis.h", r"\(uint32_t\)code \^ axis->flip", "(uint32_t)code", ("x", "converter word")),
     ("other alignment", "axis.h", r"<< axis->shift\)", "<< axis->shift | 1u)", ("y", "converter word")),
     ("fills", "sequencer.c", r"(void dac_sequencer_fill\([^)]*\)\n{\n)", r"\1    dac_sequencer_report(s, 2);\n", FILL),
