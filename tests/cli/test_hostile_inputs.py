@@ -8,13 +8,12 @@ import os
 import re
 import struct
 import subprocess
-import sys
-import threading
 import zlib
 from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
 
+import measured
 import numpy as np
 import pytest
 import tifffile
@@ -36,22 +35,20 @@ def build(tmp_path: Path) -> Path:
 
 def refused(*arguments: str | Path, folder: Path) -> str:
     """The message of a command that ends with status 2, having taken little."""
-    command = within(CPU_S, [sys.executable, "-m", "tablegen", *map(str, arguments)])
-    log = folder / "stderr"
-    with (
-        log.open("wb") as err,
-        subprocess.Popen(
-            command, cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=err
-        ) as process,
-    ):
-        patience = threading.Timer(PATIENCE_S, process.kill)
-        patience.start()
-        _, status, used = os.wait4(process.pid, 0)
-        patience.cancel()
-        process.returncode = os.waitstatus_to_exitcode(status)
+    log, memory = folder / "stderr", folder / "memory"
+    with log.open("wb") as err:
+        done = subprocess.run(
+            within(CPU_S, [*measured.command(memory), *map(str, arguments)]),
+            cwd=folder,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=err,
+            timeout=PATIENCE_S,
+            check=False,
+        )
     said = log.read_text("utf-8")
-    assert process.returncode == 2, said[:2000]
-    assert used.ru_maxrss << 10 < MOST_MEMORY_BYTES
+    assert done.returncode == 2, said[:2000]
+    assert int(memory.read_text()) < MOST_MEMORY_BYTES
     assert len(said) < 20_000
     return said
 

@@ -1221,7 +1221,7 @@ TIMING = [
         says=(
             "scan.toml:56: limits.max_scaling_error_percent: the x axis has a scaling error of 132.5 %, above "
             "0.5 %; most of it is the band limit: more x.band_limit.harmonics, a narrower window or method = "
-            "'window'"
+            "'window'; no remedy that was tried is enough; the best: x.band_limit.window = [0.2, 0.8] leaves 12.3 %"
         ),
         status=3,
     ),
@@ -1241,11 +1241,15 @@ LIMITS = [
         says=[
             (
                 "scan.toml:56: limits.max_scaling_error_percent: the x axis has a scaling error of 0.3104 %, above "
-                "0.3 %; most of it is quantisation: more dac.bits, or an amplifier whose range fits the x scan"
+                "0.3 %; most of it is quantisation: more dac.bits, or an amplifier whose range fits the x scan; "
+                "tried: amplifier.gain = 8.7 with amplifier.bias_v = 49.99 leaves 0.282 %; or dac.bits = 17 leaves "
+                "0.18 %"
             ),
             (
                 "scan.toml:56: limits.max_scaling_error_percent: the y axis has a scaling error of 0.3498 %, above "
-                "0.3 %; most of it is quantisation: more dac.bits, or an amplifier whose range fits the y scan"
+                "0.3 %; most of it is quantisation: more dac.bits, or an amplifier whose range fits the y scan; "
+                "tried: amplifier.gain = 7.7 with amplifier.bias_v = 49.99 leaves 0.283 %; or dac.bits = 17 leaves "
+                "0.2 %"
             ),
         ],
         status=3,
@@ -1255,7 +1259,7 @@ LIMITS = [
         says=(
             "scan.toml:56: limits.max_scaling_error_percent: the x axis has a scaling error of 11.74 %, above "
             "0.5 %; most of it is the band limit: more x.band_limit.harmonics, a narrower window or method = "
-            "'window'"
+            "'window'; tried: x.band_limit.method = \"window\" leaves 0.31 %"
         ),
         status=3,
     ),
@@ -1265,7 +1269,8 @@ LIMITS = [
         "limits.max_scaling_error_percent = 0.34",
         says=(
             "scan.toml:56: limits.max_scaling_error_percent: the y axis has a scaling error of 0.3436 %, above "
-            "0.34 %; most of it is quantisation: more dac.bits, or an amplifier whose range fits the y scan"
+            "0.34 %; most of it is quantisation: more dac.bits, or an amplifier whose range fits the y scan; tried: "
+            "amplifier.gain = 8.9 with amplifier.bias_v = 49.99 leaves 0.315 %; or dac.bits = 17 leaves 0.204 %"
         ),
         status=3,
     ),
@@ -1496,7 +1501,9 @@ def test_what_a_message_advises_helps(here: Path, wrong: tuple[str, ...], advice
     assert found, before.err
     write_pair(here, edited(scan, *(edit.format(figure) for edit, figure in zip(remedy, found.groups(), strict=True))))
     after = run("check", "scan.toml")
-    assert (after.messages, after.status) == ([], 0)
+    # Such a scan may be a poor one, of which a warning tells; it is accepted.
+    assert [said for said in after.messages if not said.startswith("warning: ")] == []
+    assert after.status == 0
 
 
 SCANNER_REMEDIES = [
