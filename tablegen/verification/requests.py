@@ -166,7 +166,7 @@ class Requests:
         program = self.loader.load("clamped")
         self._mid_line(line)
         self.loader.commit(program)
-        self._ticks(line + 2 * program.schedule.frame_ticks + 5)
+        self._ticks(line + 12 * program.schedule.frame_ticks + 5)  # more faults than a counter of the bench holds
         self._rest("with codes that clamp")
         for _ in range(program.schedule.ticks):  # the first tick that clamps after it is every one in turn
             script.request("clear_faults")

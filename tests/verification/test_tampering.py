@@ -107,20 +107,13 @@ def test_a_sequencer_that_is_tampered_with_is_heard(
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize(
-    ("pattern", "new"),
-    [
-        (r"\{underrun, overrun, clamp_fault, slew_fault\}", "{underrun, 1'b0, clamp_fault, slew_fault}"),
-        (r"underrun \|\| overrun \|\|", "underrun ||"),
-    ],
-    ids=["never flagged", "valid all the same"],
-)
-def test_an_overrun_that_is_not_told_is_found(folder: Path, pattern: str, new: str) -> None:
+def test_an_overrun_that_is_not_told_is_found(folder: Path) -> None:
     """A tick that comes while the low-area axis is busy is lost."""
-    substitute(folder / "dac_verdict.v", pattern, new)
+    faults = r"\{underrun, overrun, clamp_fault, slew_fault\}"
+    substitute(folder / "dac_verdict.v", faults, "{underrun, 1'b0, clamp_fault, slew_fault}")
     make_right(folder, OTHER)
-    outcome = verify(folder, "--axis", "serial")
-    assert {FAULTS, MARKERS} & failed(outcome), outcome.out
+    outcome = verify(folder, "--axis", "serial", "--ticks", "1000")
+    assert FAULTS in failed(outcome), outcome.out
 
 
 @pytest.mark.rest
