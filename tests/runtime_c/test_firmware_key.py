@@ -105,9 +105,10 @@ class Wire:
         return answer
 
     def _answer(self) -> Frame:
-        while True:
-            for frame in self.talk.answers(self.line.recv(4096)):
+        while received := self.line.recv(4096):
+            for frame in self.talk.answers(received):
                 return frame
+        raise AssertionError("QEMU has ended")
 
 
 def test_a_recorded_trigger_is_worth_nothing_after_a_power_cycle(folder: Path) -> None:
