@@ -455,8 +455,8 @@ def test_words_can_be_written_in_any_order(tmp_path: Path) -> None:
     script = Script()
     script.tick_every(1)
     for _ in range(8):
-        program = random_dual(rng, shape, kind="tame")
-        in_any_order(rng, script, program)
+        program, other = (random_dual(rng, shape, kind="tame") for _ in range(2))
+        in_any_order(rng, script, program, other)
         script.request("commit", "arm", program=program)
         script.wait_ticks(3)
         script.request("trigger")

@@ -236,8 +236,11 @@ def refusals(script: Script, playing: DualProgram, other: DualProgram) -> None:
     script.wait_ticks(other.schedule.ticks + 4 * ticks)
 
 
-def in_any_order(rng: Generator, script: Script, program: DualProgram) -> None:
-    """Every word of a program by itself, in a random order, each of them written twice."""
+def in_any_order(rng: Generator, script: Script, program: DualProgram, other: DualProgram) -> None:
+    """Every word of a program by itself, in a random order, each of them written twice: first another one.
+
+    The registers get those of ``other`` first, since a word that does not fit would spoil the program.
+    """
     script.wait_writable()
     assert script.writable
     regions = {
@@ -245,12 +248,13 @@ def in_any_order(rng: Generator, script: Script, program: DualProgram) -> None:
         X_TABLE: [int(word) for word in program.x.words],
         Y_TABLE: [int(word) for word in program.y.words],
     }
+    before = {region: [~word for word in words] for region, words in regions.items()}
+    before[PROGRAM] = program_words(other.schedule, other.x, other.y)
     places = [(region, address) for region, words in regions.items() for address in range(len(words))]
-    for times in range(2):
+    for written in (before, regions):
         for place in rng.permutation(len(places)):
             region, address = places[place]
-            word = regions[region][address]
-            script.write(region, [word if times else ~word], address)
+            script.write(region, [written[region][address]], address)
 
 
 def clears_at_every_tick(script: Script, program: DualProgram) -> None:

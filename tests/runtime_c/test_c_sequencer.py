@@ -112,8 +112,8 @@ def test_words_can_be_written_in_any_order(benches: Benches) -> None:
     shape, rng, script = SequencerShape(16, 1, 3, 16, 0, 3, 16), np.random.default_rng(3), Script()
     script.tick_every(1)
     for _ in range(4):
-        program = long_dual(rng, shape, (8, 8), lines=(1, 2))
-        in_any_order(rng, script, program)
+        program, other = (long_dual(rng, shape, (8, 8), lines=(1, 2)) for _ in range(2))
+        in_any_order(rng, script, program, other)
         script.request("commit", "arm", program=program)
         script.wait_ticks(3)
         script.request("trigger")

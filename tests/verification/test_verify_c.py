@@ -401,7 +401,7 @@ def test_an_array_of_another_length_or_name_or_content_is_found(folder: Path) ->
     outcome = verify(folder)
     assert outcome.status == 5
     for text in (
-        f"{NAME}_x_table has 2047 words, the manifest 2048",
+        f"{NAME}_x_table has 2048 words, it takes 2049",
         f"{NAME}_y_fourier[0] is one, it is ",
         f"{NAME}_x_fourier is missing",
         "program: cc ",

@@ -98,7 +98,7 @@ def wrong_arrays(folder: Path, content: Content) -> tuple[int, list[str]]:
         if array not in found:
             wrong.append(f"{name}: {array} is missing")
         elif len(found[array]) != len(words):
-            wrong.append(f"{name}: {array} has {len(found[array])} words, the manifest {len(words)}")
+            wrong.append(f"{name}: {array} has {len(found[array])} words, it takes {len(words)}")
         else:
             pairs = zip(map(str.strip, found[array]), map(str, words.tolist()), strict=True)
             differs = [(at, word, right) for at, (word, right) in enumerate(pairs) if word != right]
