@@ -28,7 +28,7 @@ def c_axis(program: Program, table: str) -> str:
     """A program of an axis as C initialises it."""
     output = program.output
     values = [
-        table, len(program.words), program.bits,
+        table, len(program.words), 16, program.bits,
         (len(program.words) - 1).bit_length() if program.mode == "interpolated" else 0,
         program.phase.ticks, program.hold, output.gain_word, f"INT64_C({output.offset_word})", output.gain_q,
         output.code_min, output.code_max, output.park_code, output.max_step, output.dac_bits, output.word_bits, 0, 0,
@@ -42,7 +42,8 @@ def c_programs(programs: Sequence[DualProgram], rounds: int) -> str:
     rows = []
     for number, program in enumerate(programs):
         for axis in ("x", "y"):
-            words = ", ".join(map(str, getattr(program, axis).words.tolist()))
+            table = getattr(program, axis).words.tolist()
+            words = ", ".join(map(str, [*table, table[0]]))
             lines.append(f"static const dac_word {axis}_{number}[] = {{{words}}};")
         s = program.schedule
         windows = [f"{{{w.first}, {w.count}}}" for w in (s.forward, s.backward, s.up, s.down)]
