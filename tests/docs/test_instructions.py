@@ -36,10 +36,10 @@ def test_what_a_sample_takes_on_a_cortex_m4(firmware: ModuleType, tmp_path: Path
 
 
 def test_what_it_takes_on_a_cortex_m0(firmware: ModuleType, tmp_path: Path) -> None:
-    """The aims of 26 instructions and 3 kB are missed; what was reached is kept: 4.4 kB with sums of 32 bits."""
+    """The aims of 26 instructions and 3 kB are missed; what was reached is kept."""
     fast, small = (firmware.measure("cortex-m0plus", option, tmp_path) for option in ("-O2", "-Os"))
     assert fast.fill <= 45.0
-    assert sum(small.code.values()) <= 4608
+    assert sum(small.code.values()) <= 4096
     assert small.state <= 2 * 256
 
 
