@@ -1,4 +1,4 @@
-"""Settled lines -> the operator: family, creep, residual and size, each chosen by what it predicts of a line left out."""
+"""Settled lines -> the operator: family, creep, residual and size, by what each predicts of a line left out."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -34,8 +34,8 @@ Factor = Callable[[float], float]
 class OperatorFit:
     """The operator, and what it leaves of each line: in the fit, and when the line is left out; in percent.
 
-    ``rows`` and ``sizes`` are what its fields go through, a row a line; ``candidates`` has the families that were tried,
-    and the median rms of a line left out, in percent.
+    ``rows`` and ``sizes`` are what its fields go through, a row a line; ``candidates`` has the families that were
+    tried, and the median rms of a line left out, in percent.
     """
 
     operator: Operator
@@ -82,8 +82,8 @@ def _check(lines: Sequence[PeriodicLine]) -> None:
         noise = 100.0 * line.noise_nm / float(np.ptp(line.displacement_nm))
         if noise > _MAX_NOISE_PERCENT:
             raise Unphysical(
-                f"{line.name}: {noise:.2g} % of the line differ from period to period; at most {_MAX_NOISE_PERCENT:g} % "
-                "serve; record more periods, or a settled scan"
+                f"{line.name}: {noise:.2g} % of the line differ from period to period; at most "
+                f"{_MAX_NOISE_PERCENT:g} % serve; record more periods, or a settled scan"
             )
 
 

@@ -22,8 +22,8 @@ _BACKWARDS = 0.02  # of the span: how far a sweep may go back, as noise of the r
 class PeriodicLine:
     """One period of a settled line, from the minimum of the drive on; arrays have ``PHASES`` values.
 
-    ``drive`` is normalised to v_max, ``displacement_nm`` a mean over ``periods``; ``noise_nm`` is the standard deviation
-    of that mean, and ``drift_nm`` what was taken out over the record.
+    ``drive`` is normalised to v_max, ``displacement_nm`` a mean over ``periods``; ``noise_nm`` is the standard
+    deviation of that mean, and ``drift_nm`` what was taken out over the record.
     """
 
     name: str
@@ -88,7 +88,7 @@ def periodic_line(trace: Trace, v_max: float) -> PeriodicLine:
     if np.min(drive) < -0.02 or np.max(drive) > 1.02:
         low, high = float(np.min(trace.drive_v)), float(np.max(trace.drive_v))
         raise Unphysical(f"a drive of {low:.4g}..{high:.4g} V is outside the driver's 0..{v_max:g} V")
-    period, first = _period(time, drive)
+    period = _period(time, drive)
     # Whole periods from the first sample on; the grid then begins at a minimum.
     periods = int((time[-1] - time[0]) / period + 1e-3)
     if periods < 1:
@@ -118,8 +118,8 @@ def periodic_line(trace: Trace, v_max: float) -> PeriodicLine:
     )
 
 
-def _period(time: Floats, drive: Floats) -> tuple[float, float]:
-    """The period in s and the first rise through the middle, from all rises of the record."""
+def _period(time: Floats, drive: Floats) -> float:
+    """The period in s, from all rises and falls of the record through the middle."""
     middle = 0.5 * (float(np.max(drive)) + float(np.min(drive)))
     level = (drive - middle) / float(np.ptp(drive))
     side = np.where(level > _LEVEL, 1, np.where(level < -_LEVEL, -1, 0))
@@ -138,7 +138,7 @@ def _period(time: Floats, drive: Floats) -> tuple[float, float]:
     several = [at for at in crossings if len(at) >= 2]
     if several:
         slopes = [float(np.polyfit(np.arange(len(at)), at, 1)[0]) for at in several]
-        return float(np.mean(slopes)), float(several[0][0])
+        return float(np.mean(slopes))
     raise Unphysical("no whole period: the drive has to rise and to fall, at least one and a half times")
 
 
