@@ -14,8 +14,8 @@ from tablegen.calibration.hysteresis import TURN_TOLERANCE
 from tablegen.compensation.branch import LAW, MEASURED
 from tablegen.config.decode import decode
 from tablegen.config.scanner import Scanner
-from tablegen.config.toml import parse_toml
 from tablegen.problems import Problem, Problems, Rejected
+from tablegen.toml import parse_toml
 
 _PROVENANCE_MARK = "# calibrate "
 _FIRST_MARK = re.compile(r"# calibrate (\w+)(?:, turn ([\d.]+))?: ")

@@ -1,4 +1,4 @@
-"""``tablegen calibrate operator``: traces of a sensor to an operator of the piezo, in a file beside the scanner file."""
+"""``tablegen calibrate operator``: traces of a sensor to an operator of the piezo, in a file of its own."""
 
 import json
 from collections.abc import Sequence
@@ -43,7 +43,7 @@ def operator(common: Common, data: tuple[Path, ...]) -> int:
 
     \b
     Example:
-      tablegen calibrate operator --axis x 10v.csv 25v.csv 45v.csv 65v.csv 80v.csv 97v.csv --scanner scanner.toml --write
+      tablegen calibrate operator --axis x 10v.csv 25v.csv 50v.csv 75v.csv 97v.csv --scanner scanner.toml --write
     """
     from tablegen.calibration.columns import DISPLACEMENT, DRIVE, TIME, TRACE
     from tablegen.calibration.operator.advice import next_trace

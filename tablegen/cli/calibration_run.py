@@ -140,8 +140,8 @@ def within(table: "MeasuredTable", from_hz: float, to_hz: float) -> "MeasuredTab
 
 def _scanner_values(common: Common) -> dict[str, Any]:
     """What the scanner file says now; nothing where it is to be made."""
-    from tablegen.config.toml import read_toml
     from tablegen.problems import Rejected
+    from tablegen.toml import read_toml
 
     if common.scanner is None or (common.write and not common.scanner.exists()):
         return {}
@@ -179,8 +179,8 @@ def size_law(common: Common, v_max: float, size_v: float) -> "SizeLaw":
     from tablegen.compensation.size import SizeLaw
     from tablegen.config.decode import decode
     from tablegen.config.scanner import Scanner
-    from tablegen.config.toml import read_toml
     from tablegen.problems import Problems, Unphysical
+    from tablegen.toml import read_toml
 
     path = f"{common.axis}.size"
     if in_file(common, "size", "k_nm_per_v") is None:
@@ -204,10 +204,10 @@ def scanner_axis(common: Common, v_max: float) -> "tuple[Response | None, Offset
     """The dynamics and the offset law of the scanner file; without them, none and a constant."""
     from tablegen.compensation.offset import OffsetLaw
     from tablegen.config.decode import decode
-    from tablegen.config.schema import Scanner
-    from tablegen.config.toml import read_toml
+    from tablegen.config.scanner import Scanner
     from tablegen.planning.drive import dynamics_of, offset_law_of
     from tablegen.problems import Problems, Unphysical
+    from tablegen.toml import read_toml
 
     if common.scanner is None or not common.scanner.exists():
         return None, OffsetLaw()

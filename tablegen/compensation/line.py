@@ -5,7 +5,7 @@ whole periodic waveform itself gives a ``WholeLine``.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,6 +13,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from tablegen.compensation.dynamics import Response
 from tablegen.numerics.arrays import Bools, Floats, FloatsLike
 from tablegen.problems import Document, Problems, Unphysical
 from tablegen.waveform.series import FourierSeries
@@ -181,6 +182,8 @@ class WantedLine:
 
     ``v`` is the normalised scan voltage V_scan / V_max, in [0, 1]; ``v_amplitude`` = m g V_scan, volts peak to peak at
     the piezo for w from 0 to 1; ``harmonics`` the highest that is played; ``both`` whether both directions image.
+    ``response`` are the dynamics, whose inverse gives no harmonic more than ``max_boost_db``; ``factor_at`` is m of (1)
+    at an offset as a share of v_max, ``rate_gain`` g of (23) at a rate in Hz, None where it is not calibrated.
     """
 
     axis: str
@@ -194,6 +197,10 @@ class WantedLine:
     harmonics: int
     window: tuple[float, float]
     both: bool
+    response: Response | None
+    max_boost_db: float
+    factor_at: Callable[[float], float]
+    rate_gain: Callable[[float], float] | None
     folder: Path
     scan_file: Document
     scanner_file: Document

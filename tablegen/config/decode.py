@@ -10,8 +10,8 @@ from msgspec import Struct
 
 from tablegen.compensation import models
 from tablegen.compensation.model import Hysteresis
-from tablegen.config.toml import join_key
 from tablegen.problems import Document, Problems
+from tablegen.toml import join_key
 
 T = TypeVar("T", bound=Struct)
 

@@ -14,10 +14,10 @@ from tablegen.config.decode import decode, meant
 from tablegen.config.names import why_not_a_name
 from tablegen.config.scanner import Offset, Resonance, Scanner
 from tablegen.config.schema import MAXIMUM_NAME, Amplifier, BandLimit, Dac, FastAxis, Refinement, Scan, Table, Timing
-from tablegen.config.toml import read_toml
 from tablegen.figures import shown_path
 from tablegen.problems import Document, Problems, Rejected
 from tablegen.quantities import MAXIMUM_FILE_NAME
+from tablegen.toml import read_toml
 
 
 @dataclass(frozen=True, repr=False)

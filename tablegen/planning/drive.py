@@ -84,7 +84,7 @@ def compensate(setup: Setup, axis: str, rate_hz: float, harmonics: int, problems
     if scanner.offset is not None:
         _check_points(setup, axis, problems)
         with problems.at(scanner_file, f"{axis}.offset{'.points' if scanner.offset.points is not None else ''}"):
-            offset_law = _offset_law(scanner.offset, v_max)
+            offset_law = offset_law_of(scanner.offset, v_max)
     size_law = None
     with problems.at(scanner_file, f"{axis}.size.base_nm"):
         s = scanner.size
@@ -126,6 +126,12 @@ def compensate(setup: Setup, axis: str, rate_hz: float, harmonics: int, problems
 
     p = normalised_offset(v_offset, v_max)
     m = offset_law.factor(p)
+    response, max_boost_db, law = None, 0.0, scanner.frequency
+    if scanner.resonance is not None:
+        max_boost_db = scanner.resonance.max_boost_db
+        key = f"{axis}.resonance.response" if scanner.resonance.response is not None else f"{axis}.resonance"
+        with problems.at(scanner_file, key):
+            response = dynamics_of(scanner.resonance, setup.scanner_folder)
     hysteresis = models.get(models.UNCOMPENSATED)() if scanner.hysteresis is None else scanner.hysteresis
     shape = hysteresis.line(
         WantedLine(
@@ -140,17 +146,16 @@ def compensate(setup: Setup, axis: str, rate_hz: float, harmonics: int, problems
             harmonics=harmonics,
             window=(low, high),
             both=scan.band_limit.directions == "both",
+            response=response,
+            max_boost_db=max_boost_db,
+            factor_at=lambda share: offset_law.factor(normalised_offset(share * v_max, v_max)),
+            rate_gain=None if law is None else lambda hz: frequency_gain(hz, law.alpha, law.reference_hz),
             folder=setup.scanner_folder,
             scan_file=scan_file,
             scanner_file=scanner_file,
             problems=problems,
         )
     )
-    response = None
-    if scanner.resonance is not None:
-        key = f"{axis}.resonance.response" if scanner.resonance.response is not None else f"{axis}.resonance"
-        with problems.at(scanner_file, key):
-            response = _response(scanner.resonance, setup.scanner_folder)
     if len(problems.found) > before or shape is None or size_law is None:
         return None
     return Drive(
@@ -170,7 +175,7 @@ def compensate(setup: Setup, axis: str, rate_hz: float, harmonics: int, problems
         size_law=size_law,
         shape=shape,
         response=response,
-        max_boost_db=scanner.resonance.max_boost_db if scanner.resonance is not None else 0.0,
+        max_boost_db=max_boost_db,
     )
 
 
@@ -190,7 +195,8 @@ def _check_points(setup: Setup, axis: str, problems: Problems) -> None:
             problems.add(setup.scanner_file, key, outside_driver(point.offset_v, v_max))
 
 
-def _offset_law(offset: Offset, v_max: float) -> OffsetLaw:
+def offset_law_of(offset: Offset, v_max: float) -> OffsetLaw:
+    """The law of a scanner file. Raises ``Unphysical``."""
     if offset.points is not None:
         p = [normalised_offset(point.offset_v, v_max) for point in offset.points]
         return OffsetLaw.fit(p, [point.apparent_nm for point in offset.points])
@@ -199,7 +205,8 @@ def _offset_law(offset: Offset, v_max: float) -> OffsetLaw:
     return OffsetLaw(offset.alpha or 0.0, offset.beta or 0.0)
 
 
-def _response(resonance: Resonance, folder: Path) -> Response:
+def dynamics_of(resonance: Resonance, folder: Path) -> Response:
+    """The dynamics of a scanner file in ``folder``. Raises ``Unphysical``."""
     if resonance.response is None:
         assert resonance.frequency_hz is not None
         assert resonance.quality is not None

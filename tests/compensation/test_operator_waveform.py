@@ -5,7 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tablegen.compensation.hysteresis import BranchShape, LineShape
+from tablegen.compensation.dynamics import SecondOrder
+from tablegen.compensation.hysteresis import BranchShape
+from tablegen.compensation.line import LineShape
 from tablegen.compensation.operator.creep import NO_CREEP, Creep
 from tablegen.compensation.operator.field import Field, Lengths
 from tablegen.compensation.operator.operator import Operator
@@ -74,11 +76,17 @@ def test_plays_that_are_stepped_follow_it_straight(turn: float, size_nm: float) 
 
 def test_creep_and_dynamics_are_undone() -> None:
     late = Creep(0.05, 1e-5, 10.0, 500.0)
+    response = SecondOrder(40e3, 12.0, 4e-6)
+    real, imaginary = response.inverse(np.arange(1.0, HARMONICS + 1.0) * 500.0)
 
     def dynamics(f_hz: Floats) -> tuple[Floats, Floats]:
-        return np.cos(1e-4 * f_hz) / (1.0 + (f_hz / 5e4) ** 2), -np.sin(1e-4 * f_hz)
+        real, imaginary = response.inverse(f_hz)
+        return real / (real**2 + imaginary**2), -imaginary / (real**2 + imaginary**2)
 
-    found = find_waveform(operator(late), wanted(), straight(0.5), same, dynamics)
+    def inverse(series: FourierSeries) -> FourierSeries:
+        return series.times(real, imaginary)
+
+    found = find_waveform(operator(late), wanted(), straight(0.5), inverse, dynamics)
     without = find_waveform(operator(), wanted(), straight(0.5), same, None)
     assert max(found.expected.rms) < 0.03
     assert found.expected.mismatch < 0.1

@@ -11,7 +11,7 @@ from tablegen.numerics.arrays import Floats
 WINDOW = (0.1, 0.9)
 _CHORD = 0.05  # of the line
 _POINTS = 321  # over the window
-_SMOOTHING = 24  # Chebyshev series over the window, which noise of single samples does not pass
+_SMOOTHING = 12  # Chebyshev series over the window, which noise of single samples does not pass
 
 
 @dataclass(frozen=True, slots=True)

@@ -50,12 +50,9 @@ class OperatorFit:
 def fit_operator(lines: Sequence[PeriodicLine], response: Response | None, factor: Factor) -> OperatorFit:
     """The operator of some lines; ``factor`` is m of (1) at a centre, in shares of v_max.
 
-    Raises ``Unphysical`` for too few lines.
+    Raises ``Unphysical`` for too few lines, for such as are alike, and for noisy ones.
     """
-    if len(lines) < _MIN_LINES:
-        raise Unphysical(
-            f"{len(lines)} traces are not enough for an operator; at least {_MIN_LINES} strokes are needed"
-        )
+    _check(lines)
     still = [line.without(response, None) for line in lines]
     main = _main_centre(still)
     creep = _fit_creep(still, main)

@@ -1,21 +1,20 @@
 """The operator's file: TOML that `tablegen calibrate operator` writes beside the scanner file, which names it."""
 
 import os
-from collections.abc import Mapping, Sequence
-from functools import partial
+import re
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
-from msgspec import Meta, Struct
+from msgspec import Meta, Struct, ValidationError, convert
 
 from tablegen.compensation.operator.creep import Creep
 from tablegen.compensation.operator.field import Lengths, shape_field, through
 from tablegen.compensation.operator.operator import MeasuredLine, Operator
 from tablegen.compensation.operator.plays import TRANSFORMS, Plays
-from tablegen.config.decode import decode
-from tablegen.config.toml import read_toml
-from tablegen.problems import Document, Problem, Problems, Rejected
+from tablegen.problems import Problem, Problems, Rejected
+from tablegen.toml import read_toml
 
 VERSION = 1
 _Number = Annotated[float, Meta(ge=-1e9, le=1e9)]
@@ -84,40 +83,41 @@ class OperatorFile(_Table, frozen=True, kw_only=True):
 
 
 def read_operator(path: Path, name: str) -> tuple[Operator, OperatorFile]:
-    """The operator of a file, and the file. Raises ``Rejected`` with every fault, at its line."""
+    """The operator of a file, and the file. Raises ``Rejected``, at the line of the first fault."""
     if not os.path.isfile(path):  # a pipe would be waited for
         raise Rejected([Problem(name, 0, "", "is not a file; the path is relative to the scanner file")])
     values, document = read_toml(path, name)
     problems = Problems()
-    if values.get("version") not in (None, VERSION):
-        problems.add(document, "version", f"{values['version']!r} is not {VERSION}, the only one that is known")
+    version = values.get("version")
+    if version != VERSION:
+        problems.add(document, "version", f"{version!r} is not {VERSION}, the only one that this tablegen knows")
         problems.stop_if_any()
-    found = decode(OperatorFile, values, document, problems, partial(_check, document, problems))
+    try:
+        found = convert(values, OperatorFile)
+    except ValidationError as error:
+        why, _, place = str(error).partition(" - at ")
+        problems.add(document, re.sub(r"^\$\.?", "", place.strip("`")), f"{why[:1].lower()}{why[1:]}")
+        raise Rejected(problems.found) from None
+    for key, why in _contradictions(found):
+        problems.add(document, key, why)
     problems.stop_if_any()
-    assert found is not None
     return _operator(found), found
 
 
-def _check(
-    document: Document, problems: Problems, kind: type, key: str, written: Mapping[str, Any], built: Any
-) -> None:
+def _contradictions(file: OperatorFile) -> list[tuple[str, str]]:
     """What the types cannot say."""
-    at = f"{key}." if key else ""
-    if isinstance(built, PlaysTable):
-        if any(b <= a for a, b in zip(built.thresholds, built.thresholds[1:], strict=False)):
-            problems.add(document, f"{at}thresholds", "do not ascend")
-        if any(len(row) != len(built.thresholds) for row in built.weights):
-            problems.add(
-                document, f"{at}weights", f"need {len(built.thresholds)} numbers a row, one for each threshold"
-            )
-        if any(weight < 0.0 for row in built.weights for weight in row):
-            problems.add(document, f"{at}weights", "a weight below 0 would let a branch run backwards")
-    elif isinstance(built, CreepTable) and built.slowest_s < built.fastest_s:
-        problems.add(document, f"{at}slowest_s", "is below fastest_s")
-    elif isinstance(built, OperatorFile):
-        lengths = {len(row) for line in built.lines for row in (line.rising, line.falling)}
-        if len(lengths) > 1:
-            problems.add(document, f"{at}lines", "have rows of different lengths")
+    plays, found = file.plays, []
+    if any(b <= a for a, b in zip(plays.thresholds, plays.thresholds[1:], strict=False)):
+        found.append(("plays.thresholds", "do not ascend"))
+    if any(len(row) != len(plays.thresholds) for row in plays.weights):
+        found.append(("plays.weights", f"need {len(plays.thresholds)} numbers a row, one for each threshold"))
+    if any(weight < 0.0 for row in plays.weights for weight in row):
+        found.append(("plays.weights", "a weight below 0 would let a branch run backwards"))
+    if file.creep.slowest_s < file.creep.fastest_s:
+        found.append(("creep.slowest_s", "is below fastest_s"))
+    if len({len(row) for line in file.lines for row in (line.rising, line.falling)}) > 1:
+        found.append(("lines", "have rows of different lengths"))
+    return found
 
 
 def _operator(file: OperatorFile) -> Operator:
