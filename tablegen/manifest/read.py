@@ -264,8 +264,8 @@ class ManifestSequence(Struct):
         )
 
 
-class ManifestAxes(Struct):
-    """Both axes."""
+class ManifestAxes(Struct, forbid_unknown_fields=True):
+    """Both axes; a third one has nothing to play it."""
 
     x: ManifestAxis
     y: ManifestAxis

@@ -55,7 +55,8 @@ def test_what_is_visible() -> None:
 
 
 def test_every_control_of_unicode_is_seen() -> None:
-    controls = [*range(0x20), *range(0x7F, 0xA0), *range(0x202A, 0x202F), *range(0x2066, 0x206A), 0x2028, 0x2029]
+    controls = [*range(0x20), *range(0x7F, 0xA0), *range(0x200B, 0x2010), *range(0x2028, 0x202F)]
+    controls += [*range(0x2060, 0x206A), 0x061C, 0xFEFF]
     assert [c for c in controls if visible(chr(c)) == chr(c)] == [ord("\t"), ord("\n")]
 
 
