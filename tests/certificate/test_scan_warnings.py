@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from variants import setup_of
 
@@ -106,6 +106,9 @@ def test_a_warning_has_its_place_its_cause_and_a_remedy_that_holds(tmp_path: Pat
     assert "above 1 %" in text
     advice = text.split("; tried: ")[1].split("; or ")
     assert advice[0].startswith(f"{remedy} = ")
+    assert len(advice) == (
+        2 if remedy == "amplifier.gain" else 1
+    )  # where the scan itself can help, nothing else is named
     for one in advice:  # as a user would: each is written into the file, built, and measured
         edits, _, left = one.rpartition(" leaves ")
         change = tomllib.loads(edits.replace(" with ", "\n"))
@@ -183,6 +186,11 @@ def test_without_hysteresis_there_is_no_line_to_be_worse_than(tmp_path: Path, mo
 PERCENT = st.floats(0.0, 50.0)
 
 
+@example(total=0.0, band=0.0, rest=0.0, size=-1.1, before=2.0)
+@example(total=0.0, band=0.0, rest=0.0, size=1.1, before=2.0)
+@example(total=0.0, band=1.1, rest=0.0, size=0.0, before=2.0)
+@example(total=1.1, band=0.0, rest=0.0, size=0.0, before=2.0)
+@example(total=0.6, band=0.0, rest=0.0, size=0.0, before=0.5)
 @given(total=PERCENT, band=PERCENT, rest=PERCENT, size=st.floats(-5.0, 5.0), before=st.floats(0.01, 50.0))
 def test_when_a_scan_is_warned_of(total: float, band: float, rest: float, size: float, before: float) -> None:
     parts = ScalingError(total, band, rest, 0.0, size, before)
@@ -195,6 +203,27 @@ def test_when_a_scan_is_warned_of(total: float, band: float, rest: float, size: 
         assert found.cause == ("band limit" if band > rest else "quantisation")
         text = found.text("x")
         assert ("of the uncompensated line" in text) == (found.what == "scaling error" and max(total, band) > before)
+
+
+def test_the_worst_of_all_errors_is_told() -> None:
+    """Of both directions, and of scaling and size, by how far each is above what it may be."""
+    parts = {
+        "forward": ScalingError(2.0, 0.0, 2.0, 0.0, -1.5, 5.0),
+        "backward": ScalingError(3.0, 0.0, 3.0, 0.0, 2.5, 5.0),
+    }
+    found = excess(parts)
+    assert found is not None
+    assert (found.side, found.what, found.times) == ("backward", "scaling error", 3.0)
+    parts["forward"] = replace(parts["forward"], size=-3.5)
+    found = excess(parts)
+    assert found is not None
+    assert (found.side, found.what, found.percent) == ("forward", "size error", -3.5)
+    found = excess(parts, most=4.0)
+    assert found is None
+    parts["backward"] = replace(parts["backward"], uncompensated=0.1)
+    found = excess(parts)
+    assert found is not None
+    assert (found.side, found.times) == ("backward", 30.0)
 
 
 def test_brief_warnings_are_the_same_without_remedies(tmp_path: Path) -> None:
