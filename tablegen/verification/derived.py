@@ -9,7 +9,8 @@ from tablegen.fixedpoint.interpolation import guard_bits
 from tablegen.fixedpoint.output import UNIT_GAIN_BITS
 from tablegen.fixedpoint.rounding import round_number
 from tablegen.fixedpoint.synthesis import FourierWords, encode, synthesize
-from tablegen.manifest.read import Manifest, ManifestAxis, StoredBuild
+from tablegen.manifest.fields import Manifest, ManifestAxis
+from tablegen.manifest.read import StoredBuild
 
 _RELATIVE = 1e-9  # of floats that went through JSON and a handful of operations
 _WINDOW_TICKS = 2  # a window of a line is placed to the tick, and not more than so far from where it was asked for

@@ -34,6 +34,7 @@ CASES: dict[str, tuple[dict[str, str], dict[str, str], str, str, str, str]] = {
         "quantisation",
         "amplifier.gain",
     ),
+    "small, inverted": ({**SMALL, "amplifier.gain": "-10.0"}, {}, "x", "x.size_nm", "quantisation", "amplifier.gain"),
     "coarse words": ({"x.table.bits": "8"}, {}, "x", "x.size_nm", "quantisation", "x.table.bits"),
     "few words": (
         {"x.table.length": "32", "x.band_limit.harmonics": "15"},
@@ -109,6 +110,7 @@ def test_a_warning_has_its_place_its_cause_and_a_remedy_that_holds(tmp_path: Pat
     assert len(advice) == (
         2 if remedy == "amplifier.gain" else 1
     )  # where the scan itself can help, nothing else is named
+    assert ("amplifier.gain = -" in text) == ("inverted" in case)
     for one in advice:  # as a user would: each is written into the file, built, and measured
         edits, _, left = one.rpartition(" leaves ")
         change = tomllib.loads(edits.replace(" with ", "\n"))
