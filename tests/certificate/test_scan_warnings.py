@@ -157,6 +157,21 @@ def test_what_nothing_helps_ends_after_few_trials(tmp_path: Path, monkeypatch: p
     assert len(trials) <= 40
 
 
+@pytest.mark.parametrize(
+    ("left", "said"),
+    [
+        (2.6, "no remedy that was tried helps"),
+        (1.5, "no remedy that was tried is enough; the best: a = 1 leaves 1.5 %"),
+    ],
+)
+def test_a_remedy_that_changes_little_is_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, left: float, said: str
+) -> None:
+    one = remedies.Remedy("a = 1", left, low=False, within_limits=True)
+    monkeypatch.setattr(remedies, "tried", lambda *_: [one])
+    assert all(text.endswith(said) for text in warned(setup_of(tmp_path, {**FREE, **SMALL})))
+
+
 def test_a_trial_that_cannot_be_planned_is_no_remedy(tmp_path: Path) -> None:
     """The converter's word has 16 bits: no more can be advised."""
     text = warned(setup_of(tmp_path, {**FREE, **SMALL, "dac.word_bits": "16"}))[0]

@@ -296,6 +296,17 @@ def test_a_request_that_was_sent_twice_teaches_nothing() -> None:
     assert pace.late_s == 0.0
 
 
+def test_small_frames_tell_no_rate() -> None:
+    """Latency drowns them: sixteen answers to short requests, 10 ms apart, are no slow line."""
+    for size, slow in ((20, None), (200, 20_000)):
+        pace = Pace(0.016)
+        for seq in range(16):
+            pace.sent((Request.STATUS, seq), 0.0, 115200, (size, 8), learn=True)
+        for seq in range(16):
+            pace.answered((Request.STATUS, seq), 0.1 + 0.005 * seq * (size / 10), 8)
+        assert pace.slow_baud(115200) == slow
+
+
 def test_a_delay_that_was_once_fades() -> None:
     pace = Pace(0.016)
     _answered(pace, 0.0, 0, 2.0)
