@@ -335,6 +335,35 @@ def test_requests_on_their_way_have_a_bound_of_their_own() -> None:
     assert flight.take((Request.DATA, 1), 6.0) is None
 
 
+def test_the_window_grows_back_to_that_of_the_device_and_no_further() -> None:
+    flight = Flight(3, 0.0)
+    flight.lost()
+
+    def room() -> int:
+        flight.clear(0.0)
+        count = 0
+        while flight.has_room() and count < 10:
+            flight.add(Sent(Request.DATA, count, 0.0, 1.0))
+            count += 1
+        return count
+
+    assert room() == 2
+    for _ in range(4):  # two windows of two
+        flight.got_through()
+    assert room() == 3
+    for _ in range(100):
+        flight.got_through()
+    assert room() == 3
+
+
+def test_one_wait_in_vain_is_no_silence() -> None:
+    flight = Flight(8, 0.0)
+    for count in range(2):
+        flight.add(Sent(Request.STATUS, count, 10.0 * count, 10.0 * count + 0.1))
+        assert len(flight.overdue(10.0 * count + 9.0)) == 1
+        assert flight.is_silent(10.0 * count + 9.0) == (count == 1)
+
+
 @pytest.mark.parametrize(("tries_in_vain", "left"), [(0, 2), (2, 1)])
 def test_two_requests_stay_on_their_way_while_answers_come(tries_in_vain: int, left: int) -> None:
     flight = Flight(8, 0.0)
