@@ -210,7 +210,7 @@ MUTANTS = {
     # f. refusals are said, a commit is kept
     "refusal_not_said": ("sequencer", "dac_sequencer", "(write && !writable) ||", "(write && committed) ||"),
     "commit_of_what_does_not_fit": ("sequencer", "dac_sequencer", "rendered = sound_commit", "rendered = host_commit"),
-    "refused_commit_not_said": ("sequencer", "dac_sequencer", " || (host_commit && !fits))", ")"),
+    "refused_commit_not_said": ("sequencer", "dac_sequencer", " || (host_commit && !fits)", ""),
     "commit_lost": ("scan", "dac_bank", "withdraw || take", "withdraw || take || (committed && !bank)"),
     "commit_not_withdrawn": ("scan", "dac_bank", "reset || withdraw || take", "reset || take"),
     # g. what stops a scan

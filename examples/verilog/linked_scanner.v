@@ -73,8 +73,8 @@ module linked_scanner #(
         .booting(booting), .write(host_write), .write_region(host_region), .write_address(host_address),
         .write_data(host_data), .writable(writable), .refused(refused), .commit(host_commit), .withdraw(withdraw),
         .arm(arm), .arm_frames(arm_frames), .trigger(trigger), .park(park), .clear_faults(clear_faults),
-        .strobe(strobe), .line_marker(line), .frame_marker(frame), .swapped_marker(swapped), .playing(playing), .parked(parked),
-        .faults(faults), .fault_counts(fault_counts)
+        .strobe(strobe), .line_marker(line), .frame_marker(frame), .swapped_marker(swapped), .playing(playing),
+        .parked(parked), .faults(faults), .fault_counts(fault_counts)
     );
 
     dac_boot #(
@@ -122,7 +122,7 @@ module linked_scanner #(
         .cs_y_n(), .mosi_x(x_data), .mosi_y(y_data), .ldac_n(load_n), .busy(), .missed(missed)
     );
 
-    assign fault = faults != 4'd0 || missing;
+    assign fault = faults != 4'd0 || missing || refused;
 endmodule
 
 `default_nettype wire

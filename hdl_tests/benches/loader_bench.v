@@ -177,8 +177,8 @@ module loader_bench #(
         .booting(booting), .write(host_write), .write_region(host_region), .write_address(host_address),
         .write_data(host_word), .writable(writable), .refused(refused), .commit(host_commit), .withdraw(withdraw),
         .arm(arm), .arm_frames(arm_frames), .trigger(trigger), .park(park), .clear_faults(clear_faults),
-        .strobe(strobe), .line_marker(line_marker), .frame_marker(frame_marker), .swapped_marker(swapped_marker), .playing(playing),
-        .parked(parked), .faults(faults), .fault_counts(fault_counts)
+        .strobe(strobe), .line_marker(line_marker), .frame_marker(frame_marker), .swapped_marker(swapped_marker),
+        .playing(playing), .parked(parked), .faults(faults), .fault_counts(fault_counts)
     );
 
     generate
