@@ -202,6 +202,13 @@ class ManifestAxis(Struct):
         n = np.arange(1, self.fourier.harmonics + 1, dtype=np.int64)
         a, b = np.array(self.fourier.a), np.array(self.fourier.b)
         w = np.full(len(advances), self.fourier.a0)
+        if period <= 4 * len(advances):  # a cosine of every phase costs less than one of every product
+            angle = 2.0 * np.pi / period * np.arange(period)
+            cosines, sines = np.cos(angle), np.sin(angle)
+            for harmonic in range(len(n)):
+                phase = advances * n[harmonic] % period
+                w += a[harmonic] * cosines[phase] + b[harmonic] * sines[phase]
+            advances = advances[:0]
         rows = max(_CHUNK_PRODUCTS // len(n), 1)
         for first in range(0, len(advances), rows):
             angle = 2.0 * np.pi / period * (np.outer(advances[first : first + rows], n) % period)
