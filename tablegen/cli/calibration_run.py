@@ -176,7 +176,7 @@ def size_law(common: Common, v_max: float, size_v: float) -> "SizeLaw":
     """The size law of the scanner file, for images of ``size_v`` volts; the rest of the file may be incomplete."""
     from tablegen.compensation.size import SizeLaw
     from tablegen.config.decode import decode
-    from tablegen.config.schema import Scanner
+    from tablegen.config.scanner import Scanner
     from tablegen.config.toml import read_toml
     from tablegen.problems import Problems, Unphysical
 
