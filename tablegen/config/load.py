@@ -53,13 +53,13 @@ def load(path: str | Path) -> Setup:
     path = Path(path)
     values, scan_file = read_toml(path, str(path))
     if "v_max" in values and "dac" not in values:  # else every key of it is a fault, and none says this
-        why = f"this is a scanner file; give the scan file that names it, scanner = '{shown_path(path.name)}'"
+        why = f"this is a scanner file; give the scan file that names it, scanner = '{shown_path(Path(path.name))}'"
         raise Rejected([scan_file.problem("", why)])
     problems = Problems()
     scan = decode(Scan, values, scan_file, problems, partial(_check, scan_file, problems))
     name = values.get("name")
-    if isinstance(name, str) and 0 < len(name) <= MAXIMUM_NAME and (why := why_not_a_name(name)):
-        problems.add(scan_file, "name", why)
+    if isinstance(name, str) and 0 < len(name) <= MAXIMUM_NAME and (fault := why_not_a_name(name)):
+        problems.add(scan_file, "name", fault)
 
     named = values.get("scanner")
     if not isinstance(named, str) or not 0 < len(named) <= MAXIMUM_FILE_NAME:
