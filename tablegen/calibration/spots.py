@@ -50,17 +50,17 @@ def strongest(geometry: Geometry, heights: Floats) -> Spot:
     weight = np.hanning(geometry.rows + 2)[1:-1, None] * np.hanning(geometry.columns + 2)[1:-1]
     best = (0.0, 0, 0, 0.0, 1.0)
     kept = np.zeros((1, 1))
-    for bend in np.arange(-6, 7) * _COARSE_STEP:
-        straight, span = _straightened(geometry, heights, BranchShape.at(np.array([bend, 0.0])))
+    for shape in np.arange(-6, 7) * _COARSE_STEP:
+        straight, span = _straightened(geometry, heights, BranchShape.at(np.array([shape, 0.0])))
         power = np.abs(np.fft.rfft2(weight * straight)) ** 2
         first = int(np.ceil(_MIN_SEARCHED_PERIODS * span))
         power[:, :first] = 0.0
         # The wave of a lattice along x is the most significant; the harmonics of a grating fall faster than 1 / q.
         row, column = divmod(int(np.argmax(power * np.arange(power.shape[1]))), power.shape[1])
         if power[row, column] * column > best[0]:
-            best = (float(power[row, column]) * column, row, column, float(bend), span)
+            best = (float(power[row, column]) * column, row, column, float(shape), span)
             kept = power
-    _, row, column, bend, span = best
+    _, row, column, sharpest, span = best
     # A rough surface has spectrum all around; held against what lies beside it, none of that stands out. The median,
     # as the mean of what is random, does not see another spot of a lattice.
     beside = np.concatenate([np.arange(3, 13), -np.arange(3, 13)])
@@ -76,7 +76,7 @@ def strongest(geometry: Geometry, heights: Floats) -> Spot:
         raise Unphysical(f"{q:.3g} periods in {geometry.columns} columns are too fine; scan less, or take more pixels")
     if q < MIN_PERIODS - 0.5:
         raise Unphysical(f"the line has about {q:.2g} periods; at least {MIN_PERIODS:g} are needed: scan more of them")
-    return Spot(q, s - count if s > count / 2 else s, bend)
+    return Spot(q, s - count if s > count / 2 else s, sharpest)
 
 
 def bend_of(geometry: Geometry, heights: Floats, forward: bool, spot: Spot, around: float | None = None) -> Bend:

@@ -52,11 +52,14 @@ def load(path: str | Path) -> Setup:
     """
     path = Path(path)
     values, scan_file = read_toml(path, str(path))
+    if "v_max" in values and "dac" not in values:  # else every key of it is a fault, and none says this
+        why = f"this is a scanner file; give the scan file that names it, scanner = '{shown_path(Path(path.name))}'"
+        raise Rejected([scan_file.problem("", why)])
     problems = Problems()
     scan = decode(Scan, values, scan_file, problems, partial(_check, scan_file, problems))
     name = values.get("name")
-    if isinstance(name, str) and 0 < len(name) <= MAXIMUM_NAME and (why := why_not_a_name(name)):
-        problems.add(scan_file, "name", why)
+    if isinstance(name, str) and 0 < len(name) <= MAXIMUM_NAME and (fault := why_not_a_name(name)):
+        problems.add(scan_file, "name", fault)
 
     named = values.get("scanner")
     if not isinstance(named, str) or not 0 < len(named) <= MAXIMUM_FILE_NAME:
@@ -71,6 +74,9 @@ def load(path: str | Path) -> Setup:
         scanner_values, scanner_file = read_toml(scanner_path, str(scanner_path))
     except Rejected as rejected:
         raise Rejected(problems.found + rejected.problems) from None
+    if "dac" in scanner_values and "v_max" not in scanner_values:
+        problems.add(scan_file, "scanner", f"{shown_path(scanner_path)} is a scan file, not a scanner file")
+        raise Rejected(problems.found)
     scanner = decode(Scanner, scanner_values, scanner_file, problems, partial(_check, scanner_file, problems))
     problems.stop_if_any()
     assert scan is not None
