@@ -118,6 +118,8 @@ def _record(
     tables: "Sequence[MeasuredTable]",
 ) -> dict[str, Any]:
     """The same for programs."""
+    from tablegen.compensation.models.operator import OperatorModel
+
     traces = [
         {
             "name": line.name,
@@ -135,7 +137,7 @@ def _record(
         for line, left, out in zip(lines, fit.left, fit.left_out, strict=True)
     ]
     return {
-        "kind": "operator",
+        "kind": OperatorModel.model(),
         "axis": axis,
         "family": fit.family,
         "candidates_percent": dict(fit.candidates),
@@ -150,6 +152,7 @@ def _write(common: Common, fit: "OperatorFit", tables: "Sequence[MeasuredTable]"
     """The operator's file, then the scanner file that names it."""
     from tablegen.calibration.operator.record import operator_file
     from tablegen.calibration.scanner_file import Change, new_file, updated
+    from tablegen.compensation.models.operator import OperatorModel
     from tablegen.problems import Rejected
 
     assert common.scanner is not None
@@ -161,7 +164,9 @@ def _write(common: Common, fit: "OperatorFit", tables: "Sequence[MeasuredTable]"
         path = common.scanner.resolve()
         text = read_text(path, CONFIGURATION) if path.exists() else new_file(path.stem, v_max)
         summary = f"operator of {len(fit.operator.lines)} traces, family {fit.family}"
-        change = Change("hysteresis", {"model": "operator", "file": beside.name}, provenance=[[summary, *sources]])
+        change = Change(
+            "hysteresis", {"model": OperatorModel.model(), "file": beside.name}, provenance=[[summary, *sources]]
+        )
         scanner = updated(text, name, common.axis, change).encode("utf-8")
     except Rejected as rejected:
         fail(rejected.problems, ExitStatus.WRONG_INPUT)

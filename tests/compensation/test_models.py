@@ -16,6 +16,7 @@ import tablegen
 from tablegen.compensation import models
 from tablegen.compensation.line import AppliedBranch, LineShape, Sweep, WholeLine
 from tablegen.compensation.models.harmonic import HarmonicModel
+from tablegen.compensation.models.operator import OperatorModel
 from tablegen.compensation.models.sinusoidal import SinusoidalModel
 from tablegen.compensation.models.triangle import TriangleModel
 from tablegen.config.load import load
@@ -63,11 +64,11 @@ def displaced(w: np.ndarray, play: float) -> np.ndarray:
 
 
 def test_names_stand_with_the_models() -> None:
-    assert models.names() == ["harmonic", "sinusoidal", "triangle"]
-    assert models.own() == [HarmonicModel, SinusoidalModel, TriangleModel]
+    assert models.names() == ["harmonic", "operator", "sinusoidal", "triangle"]
+    assert models.own() == [HarmonicModel, OperatorModel, SinusoidalModel, TriangleModel]
     assert {models.DEFAULT, models.UNCOMPENSATED} < set(models.names())
     assert all(kind.purpose for kind in models.own())
-    assert sorted(kind.order for kind in models.own()) == [0, 1, 2]
+    assert sorted(kind.order for kind in models.own()) == [0, 1, 2, 3]
 
 
 # What says the equations once more does so on purpose; the page for notebooks draws a triangle, and no model.
@@ -150,7 +151,10 @@ def test_a_refinement_belongs_to_the_content_of_the_file(pair: Path) -> None:
 @pytest.mark.parametrize(
     ("table", "message"),
     [
-        (TABLE.replace('"play"', '"prey"'), "model: 'prey' is not one of 'harmonic', 'sinusoidal', 'triangle'"),
+        (
+            TABLE.replace('"play"', '"prey"'),
+            "model: 'prey' is not one of 'harmonic', 'operator', 'sinusoidal', 'triangle'",
+        ),
         (TABLE.replace("operator =", "operater ="), "operater: unknown key; did you mean operator?"),
         (TABLE.replace('= "x.operator.json"', "= 3"), "operator: 3 is not a text in quotes"),
         (TABLE.replace("x.operator", "z"), "operator: z.json cannot be read"),

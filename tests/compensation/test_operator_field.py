@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tablegen.compensation.operator.creep import NO_CREEP, Creep
+from tablegen.compensation.operator.creep import NO_CREEP, LogarithmicCreep
 from tablegen.compensation.operator.field import Lengths, covariance, distinct, shape_field, through
 
 POINTS = np.array([(0.1, 0.5), (0.4, 0.5), (0.9, 0.5), (0.3, 0.7)])
@@ -41,7 +41,7 @@ def test_centres_that_are_the_same() -> None:
 
 
 def test_creep_loses_its_share_a_decade() -> None:
-    creep = Creep(0.03, 1e-5, 1e3, 1.0)
+    creep = LogarithmicCreep(0.03, 1e-5, 1e3, 1.0)
     f = np.array([0.1, 1.0, 10.0])
     real, imaginary = creep.response(f)
     size = np.hypot(real, imaginary)

@@ -8,7 +8,7 @@ import pytest
 from tablegen.compensation.dynamics import SecondOrder
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.compensation.line import LineShape
-from tablegen.compensation.operator.creep import NO_CREEP, Creep
+from tablegen.compensation.operator.creep import NO_CREEP, LogarithmicCreep
 from tablegen.compensation.operator.field import Field, Lengths
 from tablegen.compensation.operator.operator import Operator
 from tablegen.compensation.operator.plays import Plays, transformed
@@ -26,7 +26,7 @@ THRESHOLDS = np.geomspace(0.01, 0.4, 30)
 WEIGHTS = np.stack([np.full(30, 12.0), np.full(30, 3.0), np.full(30, 5.0)])
 
 
-def operator(creep: Creep = NO_CREEP) -> Operator:
+def operator(creep: LogarithmicCreep = NO_CREEP) -> Operator:
     return Operator(Plays(THRESHOLDS, WEIGHTS, np.array([700.0, 60.0])), _NOTHING, _NO_SIZES, creep, 0.5, ())
 
 
@@ -75,7 +75,7 @@ def test_plays_that_are_stepped_follow_it_straight(turn: float, size_nm: float) 
 
 
 def test_creep_and_dynamics_are_undone() -> None:
-    late = Creep(0.05, 1e-5, 10.0, 500.0)
+    late = LogarithmicCreep(0.05, 1e-5, 10.0, 500.0)
     response = SecondOrder(40e3, 12.0, 4e-6)
     real, imaginary = response.inverse(np.arange(1.0, HARMONICS + 1.0) * 500.0)
 

@@ -11,7 +11,7 @@ from tablegen.calibration.operator.errors import WORST, LineErrors, compare
 from tablegen.calibration.operator.family import fit_plays, groups_of
 from tablegen.calibration.operator.periodic_line import PeriodicLine
 from tablegen.compensation.dynamics import Response
-from tablegen.compensation.operator.creep import NO_CREEP, Creep
+from tablegen.compensation.operator.creep import NO_CREEP, LogarithmicCreep
 from tablegen.compensation.operator.field import Field, Lengths, shape_field, through
 from tablegen.compensation.operator.operator import MeasuredLine, Operator
 from tablegen.compensation.operator.plays import NO_PLAYS, Plays
@@ -91,15 +91,15 @@ def _main_centre(lines: Sequence[PeriodicLine]) -> float:
     return float(np.mean([line.centre for line, group in zip(lines, groups, strict=True) if group == most]))
 
 
-def _fit_creep(lines: Sequence[PeriodicLine], main: float) -> Creep:
+def _fit_creep(lines: Sequence[PeriodicLine], main: float) -> LogarithmicCreep:
     """The loss per decade with which plays describe the lines best: a parabola through the best of some."""
     low = min(line.rate_hz for line in lines)
     high = max(line.rate_hz for line in lines)
     reference = float(np.exp(np.mean([np.log(line.rate_hz) for line in lines])))
     fastest, slowest = 10.0 ** (-2.0 - _DECADES) / high, 10.0**_DECADES / low
 
-    def creep(loss: float) -> Creep:
-        return Creep(loss, fastest, slowest, reference)
+    def creep(loss: float) -> LogarithmicCreep:
+        return LogarithmicCreep(loss, fastest, slowest, reference)
 
     def misfit(loss: float) -> float:
         settled = [line.without(None, creep(loss)) for line in lines]
@@ -129,7 +129,9 @@ def _misfit(line: PeriodicLine, family: Plays) -> float:
     return float(np.std(line.displacement_nm - gain * modelled - offset)) / float(np.ptp(line.displacement_nm))
 
 
-def _fit_family(name: str, lines: Sequence[PeriodicLine], creep: Creep, main: float, factor: Factor) -> OperatorFit:
+def _fit_family(
+    name: str, lines: Sequence[PeriodicLine], creep: LogarithmicCreep, main: float, factor: Factor
+) -> OperatorFit:
     """The best lengths for one family, and the operator with them."""
 
     def family_of(some: Sequence[PeriodicLine]) -> Plays:
@@ -185,7 +187,7 @@ def _operator(
     lines: Sequence[PeriodicLine],
     left: Sequence[Left],
     lengths: Lengths,
-    creep: Creep,
+    creep: LogarithmicCreep,
     main: float,
     factor: Factor,
 ) -> Operator:

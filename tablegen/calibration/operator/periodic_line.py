@@ -6,7 +6,7 @@ import numpy as np
 
 from tablegen.calibration.hysteresis import Trace
 from tablegen.compensation.dynamics import Response
-from tablegen.compensation.operator.creep import Creep
+from tablegen.compensation.operator.creep import LogarithmicCreep
 from tablegen.numerics.arrays import Bools, Floats
 from tablegen.problems import Unphysical
 
@@ -59,7 +59,7 @@ class PeriodicLine:
         """Where the drive is on its way from its minimum to its maximum."""
         return np.arange(PHASES) < int(np.argmax(self.drive))
 
-    def without(self, response: Response | None, creep: Creep | None) -> "PeriodicLine":
+    def without(self, response: Response | None, creep: LogarithmicCreep | None) -> "PeriodicLine":
         """The same with the displacement before the dynamics, which come behind the hysteresis."""
         n = np.arange(PHASES // 2 + 1, dtype=np.float64)
         spectrum = np.fft.rfft(self.displacement_nm)

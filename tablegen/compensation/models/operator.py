@@ -43,6 +43,7 @@ class OperatorModel(WithBranches, frozen=True, kw_only=True, tag="operator"):
     """What `tablegen calibrate operator` identified: in a file, for every size, offset and rate. Branches may stay."""
 
     purpose: ClassVar[str] = "identified from traces"
+    calibration: ClassVar[str] = "`calibrate operator`"
     order: ClassVar[int] = 3
 
     file: Annotated[FileName, Meta(description="the operator's file, relative to the scanner file")]

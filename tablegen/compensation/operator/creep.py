@@ -17,7 +17,7 @@ _LN10 = 2.302585092994046
 
 
 @dataclass(frozen=True, slots=True)
-class Creep:
+class LogarithmicCreep:
     """Time constants from ``fastest_s`` to ``slowest_s``; at ``reference_hz`` |C| is taken as 1."""
 
     loss_per_decade: float
@@ -47,4 +47,4 @@ class Creep:
         return real, imaginary
 
 
-NO_CREEP = Creep(0.0, 1.0, 1.0, 1.0)
+NO_CREEP = LogarithmicCreep(0.0, 1.0, 1.0, 1.0)

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import numpy as np
 from msgspec import Meta, Struct, ValidationError, convert
 
-from tablegen.compensation.operator.creep import Creep
+from tablegen.compensation.operator.creep import LogarithmicCreep
 from tablegen.compensation.operator.field import Lengths, shape_field, through
 from tablegen.compensation.operator.operator import MeasuredLine, Operator
 from tablegen.compensation.operator.plays import TRANSFORMS, Plays
@@ -29,7 +29,7 @@ class _Table(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class CreepTable(_Table, frozen=True, kw_only=True):
-    """Logarithmic creep; see ``Creep``."""
+    """Logarithmic creep; see ``LogarithmicCreep``."""
 
     loss_per_decade: Annotated[float, Meta(ge=0.0, le=0.5)]
     fastest_s: _Time
@@ -123,7 +123,9 @@ def _contradictions(file: OperatorFile) -> list[tuple[str, str]]:
 def _operator(file: OperatorFile) -> Operator:
     lengths = Lengths(file.lengths.stroke, file.lengths.centre, file.lengths.noise)
     family = Plays(np.array(file.plays.thresholds), np.array(file.plays.weights), np.array(file.plays.reversible))
-    creep = Creep(file.creep.loss_per_decade, file.creep.fastest_s, file.creep.slowest_s, file.creep.reference_hz)
+    creep = LogarithmicCreep(
+        file.creep.loss_per_decade, file.creep.fastest_s, file.creep.slowest_s, file.creep.reference_hz
+    )
     points = np.array([(line.stroke, line.centre) for line in file.lines])
     rows = np.array([[*line.rising, *line.falling] for line in file.lines])
     residual = shape_field(points, rows, lengths)

@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from tablegen.compensation.operator.creep import Creep
+from tablegen.compensation.operator.creep import LogarithmicCreep
 from tablegen.compensation.operator.field import Field
 from tablegen.compensation.operator.loop import POINTS, Loop
 from tablegen.compensation.operator.plays import Plays
@@ -44,7 +44,7 @@ class Operator:
     family: Plays
     residual: Field
     size: Field
-    creep: Creep
+    creep: LogarithmicCreep
     centre: float
     lines: tuple[MeasuredLine, ...]
 
