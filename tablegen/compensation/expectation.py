@@ -19,12 +19,12 @@ class Expectation:
 
     ``rms`` is the residual about the best straight line, ``scaling`` the scaling error, peak to peak, each by
     direction; ``mismatch`` the largest distance of trace and retrace; ``size`` the error of the size, with its sign.
-    ``basis`` says where they are from: an identified "operator", or the "laws" of the scanner file, by which the
+    ``basis`` says where they are from: "traces" of the piezo, or the "laws" of the scanner file, by which the
     mismatch alone is known. ``distance`` is how far stroke or centre are from the nearest measured line, in percent of
     v_max.
     """
 
-    basis: Literal["operator", "laws"]
+    basis: Literal["traces", "laws"]
     rms: Mapping[str, Figure] = field(default_factory=dict)
     scaling: Mapping[str, Figure] = field(default_factory=dict)
     mismatch: Figure | None = None

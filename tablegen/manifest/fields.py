@@ -141,7 +141,7 @@ class ManifestFigure(Struct):
 class ManifestExpected(Struct):
     """What the scanner should do with the line, by an operator or by the laws of the scanner file."""
 
-    basis: Literal["operator", "laws"]
+    basis: Literal["traces", "laws"]
     rms_percent: dict[str, ManifestFigure] = {}
     scaling_percent: dict[str, ManifestFigure] = {}
     mismatch_percent: ManifestFigure | None = None

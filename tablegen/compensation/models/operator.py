@@ -45,7 +45,7 @@ class OperatorLine(WholeLine):
         """All of it, in percent."""
         found, by = self.expected, self.uncertainty
         return Expectation(
-            "operator",
+            "traces",
             {side: Figure(found.rms[i], by.rms[i]) for i, side in enumerate(SIDES)},
             {side: Figure(found.scaling[i], by.scaling[i]) for i, side in enumerate(SIDES)},
             Figure(found.mismatch, by.mismatch),
