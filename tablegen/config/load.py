@@ -63,8 +63,8 @@ def load(path: str | Path) -> Setup:
     path = Path(path)
     values, scan_file = read_toml(path, str(path))
     if "v_max" in values and "dac" not in values:  # else every key of it is a fault, and none says this
-        why = f"this is a scanner file; give the scan file that names it, scanner = '{shown_path(path.name)}'"
-        raise Rejected([scan_file.problem("", why)])
+        wanted = f"the scan file that names it, scanner = '{shown_path(Path(path.name))}'"
+        raise Rejected([scan_file.problem("", f"this is a scanner file; give {wanted}")])
     problems = Problems()
     scan = decode(Scan, values, scan_file, problems, partial(_check, scan_file, problems))
     name = values.get("name")
