@@ -12,6 +12,7 @@ import mutants
 import numpy as np
 from mutants import Verdict
 from programs import random_dual
+from stream_benches import with_sine
 from stream_scripts import (
     counted_frames,
     counts_after_a_clear,
@@ -23,8 +24,6 @@ from stream_scripts import (
     sweep,
 )
 
-from tablegen.emit.memory import memory_file
-from tablegen.fixedpoint.synthesis import sine_quarter
 from tablegen.resources import verilog_runtime
 from tablegen.verification.bench import SequencerBench, SequencerShape
 from tablegen.verification.placement import Placement
@@ -103,9 +102,7 @@ def bench_of(bench: str, folder: Path, mutant: Mutant | None = None) -> Sequence
     parameters: dict[str, int | str] = {"PLAIN_MULTIPLIER": int(bench in ("plain", "fourier", "long table"))}
     parameters["LOW_AREA"] = int(bench == "low area")
     if bench == "fourier":
-        sine = folder / "sine.mem"
-        sine.write_bytes(memory_file(sine_quarter(SHAPES[bench].x_index_bits), 32))
-        parameters |= {"FOURIER": 1, "HARMONICS": HARMONICS, "SINE_FILE": str(sine)}
+        parameters |= with_sine(folder, SHAPES[bench], HARMONICS)
     return SequencerBench("icarus", SHAPES[bench], folder / "bench", parameters, sources)
 
 

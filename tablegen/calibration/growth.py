@@ -53,7 +53,7 @@ def fit_growth(v: Floats, branches: Sequence[MeasuredBranch], rho: float) -> Gro
     found = None
     if float(np.max(v)) - float(np.min(v)) > 0.05:
         found = _both(v, beta, error, rho, remarks)
-    found_rho = found
+    freedom = max(len(v) - (1 if found is None else 2), 1)
     if found is None:
         steep = _steepest(v, beta, error, rho)
         found = _height(v, beta, error, steep or rho, remarks)
@@ -75,7 +75,6 @@ def fit_growth(v: Floats, branches: Sequence[MeasuredBranch], rho: float) -> Gro
     if top < 0.6:
         remarks.append(f"beta_max is extrapolated from {top:.2g} of v_max; it holds up to about there")
     missed = beta_max.value * _share(v, estimate.value) - beta
-    freedom = max(len(v) - (1 if found_rho is None else 2), 1)
     off_errors = sqrt(float(np.sum((missed / error) ** 2)) / freedom)
     off_share = sqrt(float(np.sum(missed**2)) / freedom) / float(np.max(np.abs(beta)))
     return Growth(beta_max, estimate, _peak(branches, beta, error, remarks), tuple(remarks), off_errors, off_share)

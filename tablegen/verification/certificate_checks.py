@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tablegen.manifest.read import ManifestAxis, StoredBuild
+from tablegen.manifest.fields import ManifestAxis
+from tablegen.manifest.read import StoredBuild
 from tablegen.verification.certified import PlayedPeriod, different_figures
 from tablegen.verification.checks import Check
 from tablegen.verification.directory import some

@@ -9,7 +9,7 @@ from math import ceil, cos, floor, pi, sin
 
 import numpy as np
 
-from tablegen.manifest.read import ManifestAxis, ManifestBranch, ManifestSeries
+from tablegen.manifest.fields import ManifestAxis, ManifestBranch, ManifestSeries
 from tablegen.numerics.arrays import Floats
 from tablegen.verification.certified import PlayedPeriod, at, played_series
 
