@@ -10,6 +10,7 @@ from scipy.special import chdtrc
 from tablegen.calibration.branch import MeasuredBranch
 from tablegen.calibration.estimate import Estimate
 from tablegen.calibration.least_squares import few_points, solve
+from tablegen.compensation.models import UNCOMPENSATED
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 
@@ -18,7 +19,9 @@ _STRAIGHT_RHO = 1e-9  # below it (22) is a straight line to the last place
 _LARGEST_RHO, _OPEN_RHO = 60.0, 5.0  # beyond the first (22) is a step; a larger error than the second tells nothing
 _NOISE_LIMIT_ERRORS = 3.0  # standard errors of a residual that may be noise
 _CHI2_LIMIT = 4.0  # in chi squared, two standard errors
-_NO_HYSTERESIS = 'no hysteresis can be told from noise, and hence no u_peak; model = "triangle" does, or average more'
+_NO_HYSTERESIS = (
+    f'no hysteresis can be told from noise, and hence no u_peak; model = "{UNCOMPENSATED}" does, or average more'
+)
 _LEAST_BETA_ERROR = 1e-9  # least error of a measured beta: that of the fit's own arithmetic
 
 

@@ -20,9 +20,10 @@ from tablegen.calibration.offset import fit_offset
 from tablegen.calibration.resonance import ResonanceFit, fit_resonance
 from tablegen.calibration.size import SizeFit, fit_size
 from tablegen.calibration.summary import change
+from tablegen.compensation import models
 from tablegen.compensation.size import SizeLaw
 from tablegen.config.load import Setup
-from tablegen.config.schema import Frequency, Hysteresis, Offset, Resonance, ScannerAxis, Size
+from tablegen.config.scanner import Frequency, Offset, Resonance, ScannerAxis, Size
 from tablegen.virtual.experiments import actual_sizes, apparent_sizes, frequency_response, sensor_trace
 from tablegen.virtual.imaging import grating, hexagonal, image_pair
 from tablegen.virtual.scanner import VirtualAxis, VirtualScanner
@@ -121,7 +122,7 @@ class _Day:
         return ScannerAxis(
             size=_as(Size, changes["size"].values),
             offset=_as(Offset, changes["offset"].values),
-            hysteresis=_as(Hysteresis, {"model": "harmonic", "branches": branches}),
+            hysteresis=_as(models.get(changes["hysteresis"].values["model"]), {"branches": branches}),
             frequency=_as(Frequency, changes["frequency"].values),
             resonance=resonance,
         )

@@ -9,9 +9,9 @@ from typing import Annotated, Any
 from msgspec import Meta, Struct
 
 from tablegen.config.decode import decode
-from tablegen.config.schema import Hertz, Name, PositiveVolts
-from tablegen.config.toml import read_toml
 from tablegen.problems import Document, Problems
+from tablegen.quantities import Hertz, Name, PositiveVolts
+from tablegen.toml import read_toml
 
 Coefficient = Annotated[float, Meta(ge=0.0, le=1e9)]
 
