@@ -118,8 +118,9 @@ def test_plays_that_are_stepped_do_with_the_codes_what_is_expected(tmp_path: Pat
     assert expected.basis == "traces"
     ticks = line.program.ticks
     volts = line.converter.v_zero + line.converter.v_per_code * line.codes(0, ticks)
-    position = stepped(volts / 100.0)
-    t = (np.arange(ticks) + 0.5) / ticks  # a code stands for the middle of its tick
+    middles = (np.arange(ticks) + 0.5) / ticks  # a code stands for the middle of its tick
+    t = np.arange(1024) / 1024
+    position = np.interp(t, middles, stepped(volts / 100.0), period=1.0)
     x = np.where(t <= 0.5, 2.0 * t, 2.0 - 2.0 * t)
     inside = (x >= 0.1) & (x <= 0.9)
     edge = (x[inside] - 0.1) / 0.8  # the line is that of points which are denser towards the edges, as Chebyshev's
