@@ -119,6 +119,11 @@ class Duhem:
             falling = falling - lag.fall * (polyval(POINTS, powers_of(lag.above)) - low)
         return float(min(np.min(rising), np.min(falling)))
 
+    def middle(self, drive: FloatsLike) -> Floats:
+        """In balance at a drive, in nm: between the branches of every small loop there."""
+        lags = sum(lag.balance(drive) for lag in self.lags) - sum(self.rest.nm)
+        return np.asarray(np.polynomial.polynomial.polyval(drive, self._integral) + lags, dtype=np.float64)
+
     def play(self, drive: Floats, memory: Lags | None = None) -> tuple[Floats, Lags]:
         """Displacement in nm at each drive of a sequence, and what is remembered after it."""
         drive = normalised(drive)

@@ -62,6 +62,11 @@ class Preisach:
         """E(high, low): nm between the drives ``low`` and ``high`` along the branch that turned at one of them."""
         return np.asarray(np.polynomial.polynomial.polyval2d(high, low, self.everett), dtype=np.float64)
 
+    def middle(self, drive: FloatsLike) -> Floats:
+        """Between the branches of the largest loop, in nm."""
+        full, none = np.ones_like(drive, dtype=np.float64), np.zeros_like(drive, dtype=np.float64)
+        return 0.5 * (self.branch(drive, none) + self.branch(full, none) - self.branch(full, drive))
+
     def play(self, drive: Floats, memory: TurningPoints | None = None) -> tuple[Floats, TurningPoints]:
         """Displacement in nm at each drive of a sequence, and what is remembered after it."""
         drive = normalised(drive)

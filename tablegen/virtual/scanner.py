@@ -30,6 +30,9 @@ class Operator(Protocol):
     def settled(self, drive: Floats) -> Floats:
         """Displacement over one period of a drive that has been repeated for ever."""
 
+    def middle(self, drive: FloatsLike) -> Floats:
+        """Displacement between the branches, at drives of 0..1."""
+
 
 @dataclass(frozen=True)
 class VirtualAxis:
@@ -71,7 +74,7 @@ class VirtualAxis:
         late = delayed(volts, self.dead_time_s / tick_s)
         drive = self._normalised(self.amplifier.settled(late, tick_s))
         mean_v: FloatsLike = float(np.mean(volts)) if self.memory is None else self.memory.settled(late, tick_s)
-        moved = self._sensitivity(mean_v) * self.hysteresis.settled(drive)
+        moved = self._moved(self.hysteresis.settled(drive), mean_v)
         return self.resonance.settled(self.creep.settled(moved, tick_s), tick_s)
 
     def follow(self, volts: Floats, tick_s: float, mean_v: float | None = None) -> Floats:
@@ -90,8 +93,8 @@ class VirtualAxis:
         else:
             start = first if mean_v is None else mean_v
             bias = self.memory.follow(late, tick_s, start)
-        moved = self._sensitivity(bias) * self.hysteresis.play(drive, memory)[0]
-        at_rest = float(self._sensitivity(start)) * float(rest[0])
+        moved = self._moved(self.hysteresis.play(drive, memory)[0], bias)
+        at_rest = float(self._moved(rest, start)[0])
         crept = self.creep.follow(moved, tick_s, at_rest)
         return self.resonance.follow(crept, tick_s, at_rest * float(self.creep.response(0.0).real))
 
@@ -100,6 +103,14 @@ class VirtualAxis:
         late = np.exp(-2j * pi * self.dead_time_s * np.asarray(f_hz, dtype=np.float64))
         linear = self.amplifier.response(f_hz) * self.creep.response(f_hz) * self.resonance.response(f_hz)
         return np.asarray(late * linear, dtype=np.complex128)
+
+    def _moved(self, displacement: Floats, mean_v: FloatsLike) -> Floats:
+        """With the sensitivity; one that changes with a memory scales about where the remembered drive would be."""
+        factor = self._sensitivity(mean_v)
+        if self.memory is None:
+            return np.asarray(factor * displacement, dtype=np.float64)
+        about = self.hysteresis.middle(np.clip(np.asarray(mean_v, dtype=np.float64) / self.v_max, 0.0, 1.0))
+        return np.asarray(about + factor * (displacement - about), dtype=np.float64)
 
     def _sensitivity(self, mean_v: FloatsLike) -> Floats:
         return sensitivity(self.sensitivity, 2.0 * np.asarray(mean_v, dtype=np.float64) / self.v_max - 1.0)

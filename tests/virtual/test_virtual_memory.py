@@ -61,13 +61,16 @@ def test_the_size_drifts_after_a_step_of_the_offset() -> None:
     line = size_v * (ideal_triangle(ticks, 0.5) - 0.5)
     before, after = np.tile(30.0 + line, 5), np.tile(70.0 + line, 60)
     moved = axis.follow(np.concatenate((before, after)), 1.0 / ticks, mean_v=30.0)[len(before) :]
-    # A line a second; the drift within a line is that of its middle, and goes with the whole displacement.
+    # A line a second. What departs from the remembered drive is scaled, so that its place does not move.
+    seconds = np.arange(60.0) + np.array([[0.0], [0.5]])
+    p = 0.4 - 0.8 * np.exp(-seconds / TAU_S)
+    ends = np.array([[650.0], [750.0]])
+    about = 500.0 * (1.0 + p)
+    expected = about + (1.0 + 0.5 * p) * (ends - about)
     turned = moved.reshape(60, ticks)
-    rise = turned[:, ticks // 2] - turned[:, 0]
-    seconds = np.arange(60.0)
-    p = 0.4 - 0.8 * np.exp(-(seconds + np.array([[0.0], [0.5]])) / TAU_S)
-    low, high = 10.0 * 65.0, 10.0 * 75.0
-    assert rise == pytest.approx((1.0 + 0.5 * p[1]) * high - (1.0 + 0.5 * p[0]) * low, abs=0.35)
+    assert turned[:, 0] == pytest.approx(expected[0], abs=0.7)
+    assert turned[:, ticks // 2] == pytest.approx(expected[1], abs=0.7)
+    assert turned[-1, ticks // 2] - turned[-1, 0] == pytest.approx(100.0 * (1.0 + 0.5 * p[0, -1]), abs=1.0)
     # Negative control: without a memory the sensitivity is that of the whole drive's mean, at once.
     plain = VirtualAxis(100.0, STRAIGHT, axis.hysteresis, axis.sensitivity, STRAIGHT, STRAIGHT)
     still = plain.follow(after, 1.0 / ticks).reshape(60, ticks)
@@ -76,6 +79,7 @@ def test_the_size_drifts_after_a_step_of_the_offset() -> None:
 
 def test_settled_is_what_the_memory_ends_at() -> None:
     axis = with_memory()
+    assert axis.hysteresis.middle(0.3) == pytest.approx(300.0)
     period = 60.0 + 20.0 * (ideal_triangle(50, 0.5) - 0.5)
     followed = axis.follow(np.tile(period, 400), 0.02, mean_v=10.0)[-50:]
     assert followed == pytest.approx(axis.settled(period, 0.02), abs=1e-5)
