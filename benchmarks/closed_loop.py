@@ -146,11 +146,11 @@ def main() -> None:
     parser.add_argument("--write", action="store_true", help=f"put the tables into {PAGE.name}")
     given = parser.parse_args()
     example = load(ROOT / "examples" / "annexin_200nm.toml")
-    page = PAGE.read_text("utf-8")
     plants = {name: played_lines(example, scanner) for name, scanner in SCANNERS.items()}
     tables = [("summary", summary_table(plants)), ("plants", plants_table(example))]
     for name, scanner in SCANNERS.items():
         tables += [(f"measured {name}", loop_table(plants[name])), (f"map {name}", map_table(example, scanner))]
+    page = PAGE.read_text("utf-8")
     for mark, table in tables:
         text = "\n".join(table) + "\n"
         print(text)
