@@ -8,7 +8,11 @@ from textwrap import fill
 
 import msgspec.inspect as types
 
-from tablegen.config.schema import Scan, Scanner
+from tablegen.compensation import models
+from tablegen.compensation.model import Hysteresis
+from tablegen.config.describe import model_fields, purposes
+from tablegen.config.scanner import Scanner
+from tablegen.config.schema import Scan
 
 PAGE = Path(__file__).with_name("configuration.md")
 INTRODUCTION = """\
@@ -17,7 +21,7 @@ INTRODUCTION = """\
 This page lists all keys of the scan file and the scanner file. It is for everybody who writes these files. Start with
 the commented pair that `tablegen init` writes; [calibration](calibration.md) explains how to measure the values of the
 scanner file. `tablegen schema scan` and `tablegen schema scanner` print JSON Schema for editors.
-`python docs/make_configuration.py` writes this page from `tablegen/config/schema.py`.
+`python docs/make_configuration.py` writes this page from the types of both files.
 
 Voltages are at the piezo unless a key says otherwise. Units are part of every key. A key without a default may be left
 out if its meaning names an alternative ("or give"). Unknown keys are errors. In addition to the ranges below, a build
@@ -44,8 +48,14 @@ def _tables(kind: types.Type, path: str, written: dict[type, str]) -> list[str]:
     heading = fill(f"{name}{_summary(kind)}", 120, break_long_words=False, break_on_hyphens=False)
     rows = [f"{heading}\n", "| key | accepts | default | meaning |", "|---|---|---|---|"]
     inner_tables = []
-    for field in kind.fields:
+    fields = [(field, "") for field in kind.fields]
+    if kind.cls is Hysteresis:
+        names = ", ".join(f'`"{name}"`' for name in models.names())
+        rows.append(f'| `model` | {names} | `"{models.DEFAULT}"` | {purposes()} |')
+        fields = model_fields()
+    for field, takers in fields:
         inner, description = _plain(field.type)
+        description = takers + description
         child = f"{path}.{field.encode_name}" if path else field.encode_name
         accepts = None
         if isinstance(inner, types.ListType):

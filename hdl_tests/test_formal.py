@@ -6,6 +6,7 @@ the harnesses can fail, and by what: a counterexample from power-up, not a lost 
 """
 
 import re
+import shutil
 import subprocess
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -40,10 +41,10 @@ ALL_STUBS = ("dac_axis", "dac_axis_serial", "dac_fourier", "dac_fit")
 PROOFS = {
     "slew": Proof("slew_properties", 1, 12, {"BITS": 4}),
     # These look back for as long as a sample is under way.
-    "writes_pipelined": Proof("writes_properties", 26, 34, {"LOW_AREA": 0}, ALL_STUBS, 40),
-    "writes_low_area": Proof("writes_properties", 10, 20, {"LOW_AREA": 1}, ALL_STUBS, 30),
+    "writes_pipelined": Proof("writes_properties", 26, 34, {"FOURIER": 1}, ALL_STUBS, 40),
+    "writes_low_area": Proof("writes_properties", 10, 20, {"FOURIER": 1, "LOW_AREA": 1}, ALL_STUBS, 30),
     "scan": Proof("scan_properties", 2, 20, covers=20),
-    "play_pipelined": Proof("play_properties", 26, 34, {"LOW_AREA": 0}, ALL_STUBS, 40, asserts_in_stubs=False),
+    "play_pipelined": Proof("play_properties", 26, 34, {}, ALL_STUBS, 40, asserts_in_stubs=False),
     "play_low_area": Proof("play_properties", 18, 26, {"LOW_AREA": 1}, ALL_STUBS, 30),
     "valid": Proof("valid_properties", 4, 20, covers=12),
     "sequencer": Proof("sequencer_properties", 26, 34, stubs=("dac_axis", "dac_fit"), covers=40),
@@ -58,6 +59,8 @@ def _read(proof: Proof, modules: Mapping[str, str], folder: Path, alone: bool = 
 
     ``alone`` leaves out what makes a harness inductive, where it marks that: a mutant has to break a property.
     """
+    for path in FORMAL.glob("*.vh"):  # harnesses of the same modules share their ports
+        shutil.copy(path, folder)
     texts = {path.stem: path.read_text("utf-8") for path in MODULES.glob("dac_*.v")} | dict(modules)
     for name, text in texts.items():
         if name not in proof.stubs:
@@ -210,7 +213,7 @@ MUTANTS = {
     # f. refusals are said, a commit is kept
     "refusal_not_said": ("sequencer", "dac_sequencer", "(write && !writable) ||", "(write && committed) ||"),
     "commit_of_what_does_not_fit": ("sequencer", "dac_sequencer", "rendered = sound_commit", "rendered = host_commit"),
-    "refused_commit_not_said": ("sequencer", "dac_sequencer", " || (host_commit && !fits))", ")"),
+    "refused_commit_not_said": ("sequencer", "dac_sequencer", " || (host_commit && !fits)", ""),
     "commit_lost": ("scan", "dac_bank", "withdraw || take", "withdraw || take || (committed && !bank)"),
     "commit_not_withdrawn": ("scan", "dac_bank", "reset || withdraw || take", "reset || take"),
     # g. what stops a scan

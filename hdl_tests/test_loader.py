@@ -11,15 +11,18 @@ import numpy as np
 import pytest
 from building import HELPERS
 from dialogues import GOLDEN, boot_program, dialogues, hold
+from link_images import resealed
 from link_talk import Talk
 from loader_bridge import BREAK, NO_STOP_BIT, PULSE, Simulation, assembler
 from loader_device import Loader, LoaderDevice, limited, told_to_be
-from loader_dialogues import Dialogue, Differs
+from loader_dialogues import Dialogue, Differs, objection
 from loader_mutants import MUTANTS, Mutant
 
+from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS, SCAN_WORDS
+from tablegen.device.widths import AxisWidths, Widths, misfits
 from tablegen.link.frames import FrameReader
 from tablegen.link.image import ProgramImage, take_apart
-from tablegen.link.messages import AxisLimits, DeviceInfo, DeviceStatus, ImageInfo, Reason, Refusal, Request
+from tablegen.link.messages import AxisLimits, DeviceInfo, DeviceStatus, ImageInfo, Reason, Refusal, Request, Upload
 from tablegen.verification.bench import SequencerShape
 
 MADE = GOLDEN["devices"]["open"]
@@ -28,9 +31,16 @@ FRAMES = json.loads((HELPERS / "golden_frames.json").read_text("utf-8"))
 SHAPE = SequencerShape(16, 1, 4, 16, 1, 4, 12)
 TOP = (1 << 16) - 1
 CLOCKS_PER_BIT = 8
+_BYTES = bytes.fromhex(MADE["boot_image"])
+BOOT_IMAGE = ProgramImage(ImageInfo(bytes(32), len(_BYTES), crc32(_BYTES), TOLD.x, TOLD.y), _BYTES)
 SHORTER = "Shorter tables: BEGIN"  # from there on the dialogue is for devices that take them
 # Not for this device: it has no key and no limits to narrow, keeps images, checks less, and waits for no tick to act.
 LACKS = ("key", "narrows", "keeps tables", "checks", "plays", "queue of 8")
+
+
+def other_word(at: int, word: int) -> ProgramImage:
+    """The boot program with another program word."""
+    return resealed(BOOT_IMAGE, _BYTES[: 4 * at] + word.to_bytes(4, "little") + _BYTES[4 * at + 4 :])
 
 
 @pytest.fixture(scope="module")
@@ -95,6 +105,24 @@ def test_every_check_is_that_of_the_model(seed: int, loader: Loader) -> None:
     assert len(reasons) >= 4
 
 
+def test_what_passes_the_checks_fits_the_sequencer() -> None:
+    """Or the sequencer would refuse it, and no check of the model would say why: words at the ends of their range."""
+    info, image = TOLD, take_apart(bytes.fromhex(MADE["boot_image"]), TOLD.x, TOLD.y)
+    x, y = (AxisWidths(True, shape.index_bits, shape.word_bits, 31) for shape in (info.x, info.y))
+    widths = Widths(info.x.dac_bits, 24, 16, replace(x, period_bits=25), y, info.harmonics)
+    wide = AxisLimits(0, TOP, TOP, TOP)
+    passed, fit = 0, 0
+    for at in range(len(image.words)):
+        for word in sorted({(1 << bit) + d & 0xFFFFFFFF for bit in range(33) for d in (-2, -1, 0, 1)}):
+            changed = replace(image, words=(*image.words[:at], word, *image.words[at + 1 :]))
+            fits = not misfits(changed.words, widths)
+            if at % PAGE_WORDS != AXIS_WORDS.index("harmonics") and objection(changed, wide, wide, None) is None:
+                passed += 1
+                assert fits, (at, word)
+            fit += fits
+    assert fit > passed > 1000
+
+
 def exact_limits(loader: Loader, words: list[int]) -> None:
     """Programs at the limits are taken, and one beyond them refused."""
     image = take_apart(bytes.fromhex(MADE["boot_image"]), TOLD.x, TOLD.y)
@@ -123,6 +151,55 @@ def exact_limits(loader: Loader, words: list[int]) -> None:
 @pytest.mark.rest
 def test_limits_are_exact(loader: Loader) -> None:
     exact_limits(loader, [])
+
+
+def settle_lines(loader: Loader, words: list[int]) -> None:
+    """As many as the sequencer counts, and not one more."""
+    with Simulation(loader.compiled, words) as simulation:
+        talk = Talk()
+        LoaderDevice(simulation, loader.info, 1).tick(50)
+        simulation.talk(talk.hello())
+        for lines, expected in ((256, (Reason.SCHEDULE, 0)), (255, None), (0xFFFFFFFF, (Reason.SCHEDULE, 0))):
+            wire = upload(simulation, talk, other_word(SCAN_WORDS.index("settle_lines"), lines))
+            simulation.ticks(20)
+            answer = talk.answers(wire + simulation.talk())[-1]
+            refusal = Refusal.unpack(answer.payload)
+            assert (answer.type == 0xFF and (refusal.reason, refusal.detail)) == (expected or False), lines
+
+
+def refused_by_the_sequencer(loader: Loader, words: list[int]) -> None:
+    """What passes the checks of a loader that is wrong about its sequencer: the host is told, and the next is taken."""
+    too_far = AxisLimits(0, TOP, 1 << 20, TOP)
+    _, memory = limited(loader.info, too_far, too_far)
+    wide = other_word(2 * PAGE_WORDS + AXIS_WORDS.index("max_step"), 1 << 16)  # in 16 bits it would be 0
+    with Simulation(loader.compiled, words, memory) as simulation:
+        talk = Talk()
+        LoaderDevice(simulation, loader.info, 1).tick(50)
+        simulation.talk(talk.hello())
+
+        def commit(image: ProgramImage, *then: int) -> list[tuple[int, int]]:
+            """The refusals of a COMMIT, and of requests while its program waits."""
+            wire = upload(simulation, talk, image)
+            for kind in then:
+                wire += simulation.talk(talk.acting(kind))
+            simulation.ticks(20)
+            return talk.refusals(wire + simulation.talk())
+
+        assert commit(wide) == [(Reason.REFUSED, 0)]
+        assert commit(wide) == [(Reason.REFUSED, 0)]
+        (answer,) = talk.answers(simulation.talk(talk.request(Request.STATUS)))
+        status = DeviceStatus.unpack(answer.payload)
+        assert (status.upload, status.generation, status.received) == (Upload.NONE, 1, 0)
+        assert commit(BOOT_IMAGE, Request.ABORT) == [(Reason.WITHDRAWN, 0)]
+        assert commit(BOOT_IMAGE) == []
+        (answer,) = talk.answers(simulation.talk(talk.request(Request.STATUS)))
+        assert DeviceStatus.unpack(answer.payload).generation == 2
+
+
+@pytest.mark.rest
+@pytest.mark.parametrize("what", [settle_lines, refused_by_the_sequencer])
+def test_what_does_not_fit_is_refused_with_a_reason(what: Callable[[Loader, list[int]], None], loader: Loader) -> None:
+    what(loader, [])
 
 
 # Frames
@@ -161,14 +238,17 @@ def golden_frames(loader: Loader, words: list[int]) -> None:
         assert bad_frames(simulation) == len(FRAMES["bad"]) + 1
 
 
-def upload(simulation: Simulation, talk: Talk, before_commit: Callable[[], None] = lambda: None) -> bytes:
-    """The boot program once more; the answer to COMMIT."""
-    image = bytes.fromhex(MADE["boot_image"])
-    info = ImageInfo(bytes(32), len(image), crc32(image), TOLD.x, TOLD.y)
-    for wire in talk.upload(ProgramImage(info, image)):
+def upload(
+    simulation: Simulation,
+    talk: Talk,
+    image: ProgramImage = BOOT_IMAGE,
+    before_commit: Callable[[], None] = lambda: None,
+) -> bytes:
+    """The answer to COMMIT."""
+    for wire in talk.upload(image):
         simulation.talk(wire)
     before_commit()
-    return simulation.talk(talk.commit(ProgramImage(info, image)))
+    return simulation.talk(talk.commit(image))
 
 
 # The line
@@ -233,7 +313,9 @@ def test_a_reset_forgets_session_and_upload_but_not_what_plays(loader: Loader) -
 FINDERS: dict[str, Callable[[Loader, list[int]], object]] = {
     "random": lambda loader, words: [random_dialogue(loader, seed, 120, words) for seed in range(5)],
     "frames": golden_frames,
-    "limits": lambda loader, words: exact_limits(loader, words),
+    "limits": exact_limits,
+    "settle lines": settle_lines,
+    "refused": refused_by_the_sequencer,
     "uploads": lambda loader, words: [checked_uploads(loader, seed, 40, words) for seed in range(8)],
     **{
         dialogue["name"]: lambda loader, words, dialogue=dialogue: golden(dialogue, loader, words)  # type: ignore[misc]
@@ -262,7 +344,7 @@ def test_no_processor_commits_against_the_interlock(loader: Loader) -> None:
         device = LoaderDevice(simulation, loader.info, 1)
         device.tick(50)
         (hello,) = talk.answers(simulation.talk(talk.hello()))
-        upload(simulation, talk, lambda: setattr(device, "permits", False))
+        upload(simulation, talk, before_commit=lambda: setattr(device, "permits", False))
         device.tick(200)
         (status,) = talk.answers(simulation.talk(talk.request(Request.STATUS)))
         assert DeviceStatus.unpack(status.payload).generation == DeviceStatus.unpack(hello.payload[56:]).generation == 1

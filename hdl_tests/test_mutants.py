@@ -2,9 +2,13 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from building import REPOSITORY
-from stream_mutants import BENCHES, MUTANTS, Mutant, bench_of, judge, script_of
+from programs import random_dual
+from stream_mutants import BENCHES, MUTANTS, SHAPES, Mutant, bench_of, judge, script_of
+
+from tablegen.verification.stream import Script
 
 
 @pytest.mark.rest
@@ -28,3 +32,25 @@ def test_no_mutant_is_listed_twice() -> None:
 @pytest.mark.parametrize("mutant", MUTANTS, ids=lambda mutant: f"{mutant.file}: {mutant.breaks}")
 def test_every_mutant_is_found(mutant: Mutant, tmp_path: Path) -> None:
     assert judge(mutant, tmp_path).killed
+
+
+@pytest.mark.rest
+def test_a_strobe_that_is_late_at_times_is_found_by_its_time(tmp_path: Path) -> None:
+    """Ticks are so far apart that its codes and markers are right all the same."""
+    late = "reg late = 0;\n    always @(posedge clock) begin\n        late <= tick && line;"
+    old, new = (
+        "    always @(posedge clock) begin\n        strobe <= tick;",
+        "        strobe <= (tick && !line) || late;",
+    )
+    mutant = Mutant("a line's first strobe is a clock late", "dac_verdict", old, f"    {late}\n{new}", "plain")
+    bench, script = bench_of("plain", tmp_path, mutant), Script()
+    program = random_dual(np.random.default_rng(1), SHAPES["plain"], kind="tame")
+    script.load(program)
+    script.request("commit", program=program)
+    script.tick_every(5)
+    script.wait_ticks(2)
+    script.request("arm", "trigger")
+    script.wait_ticks(200)
+    played = bench.play(script)
+    assert played.mismatch is None
+    assert played.jitter > 0

@@ -6,10 +6,11 @@ import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
 
-from tablegen.compensation.hysteresis import BranchShape, LineShape
+from tablegen.compensation.hysteresis import BranchShape
+from tablegen.compensation.line import LineShape
 from tablegen.config.schema import BandLimit
 from tablegen.numerics.arrays import Floats
-from tablegen.waveform.band_limit import band_limited
+from tablegen.planning.band_limit import band_limited
 
 FOLDER = Path(__file__).parent
 HARMONICS = 32

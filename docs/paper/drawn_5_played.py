@@ -6,7 +6,6 @@ from matplotlib.figure import Figure
 from paper.drawing import BLUE, GREY, RED, SHADE, key, printed, sheet, span
 from paper.measured import full_scale
 from tablegen.virtual.line_error import BranchError, ideal_triangle
-from tablegen.virtual.simulation import Model
 
 COLOURS = {"forward": RED, "backward": BLUE}
 WINDOW = (0.1, 0.9)
@@ -35,7 +34,7 @@ def figure_5a() -> Figure:
 def figure_5cdi() -> Figure:
     """Lines in time, and their residuals from the triangle."""
     figure, axes = sheet(2, 3, 12.0, 6.0, sharex=True, sharey="row")
-    panels: tuple[tuple[Model, str, float, float], ...] = (
+    panels: tuple[tuple[str, str, float, float], ...] = (
         ("triangle", "5c: triangle", -3.5, 8.5),
         ("sinusoidal", "5d: sinusoidal model", 1.5, 1.5),
         ("harmonic", "5i: harmonic model", 0.5, 1.0),
@@ -68,7 +67,7 @@ def figure_5cdi() -> Figure:
 def figure_5efj() -> Figure:
     """Scaling errors over the line."""
     figure, axes = sheet(1, 3, 12.0, 4.2, sharey=True)
-    panels: tuple[tuple[Model, str, float, float], ...] = (
+    panels: tuple[tuple[str, str, float, float], ...] = (
         ("triangle", "5e: triangle", 30.0, 60.0),
         ("sinusoidal", "5f: sinusoidal model", 15.0, 15.0),
         ("harmonic", "5j: harmonic model", 5.0, 11.0),

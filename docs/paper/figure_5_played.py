@@ -7,7 +7,8 @@ import numpy as np
 
 from paper.measured import V_MAX, axis, calibrated, full_scale, modelled, optimised
 from paper.rows import Row, Source, about, exact, limits
-from tablegen.compensation.hysteresis import BranchShape, LineShape
+from tablegen.compensation.hysteresis import BranchShape
+from tablegen.compensation.line import LineShape
 from tablegen.virtual.line_error import BranchError, LineError
 from tablegen.virtual.paper import triangle_line
 

@@ -8,9 +8,12 @@ import msgspec
 import numpy as np
 
 from tablegen.calibration.hysteresis import HysteresisFit, Trace, fit_hysteresis
-from tablegen.compensation.hysteresis import BranchShape, LineShape
+from tablegen.compensation.branch import Branch
+from tablegen.compensation.branches import Branches
+from tablegen.compensation.hysteresis import BranchShape
+from tablegen.compensation.line import LineShape
+from tablegen.compensation.models.sinusoidal import SinusoidalModel
 from tablegen.config.load import load
-from tablegen.config.schema import Branch, Branches, Hysteresis
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import make_plan
 from tablegen.virtual.experiments import triangle_size
@@ -18,7 +21,7 @@ from tablegen.virtual.line_error import LineError, ideal_triangle, line_error
 from tablegen.virtual.paper import SECTION_8, default_x, played_line
 from tablegen.virtual.played import PlayedDrive, played
 from tablegen.virtual.scanner import VirtualAxis
-from tablegen.virtual.simulation import Model, with_model
+from tablegen.virtual.simulation import with_model
 
 SCAN = Path(__file__).parent / "full_scale.toml"
 V_MAX, MIDDLE_V = 100.0, 50.0
@@ -44,13 +47,13 @@ def axis() -> VirtualAxis:
 
 
 @cache
-def full_scale(model: Model) -> Played:
+def full_scale(model: str) -> Played:
     """Figures 5a to 5j: 100 V, every tick an emitted 16-bit integer."""
     setup = load(SCAN)
-    if model == "sinusoidal":
+    if model == SinusoidalModel.model():
         forward, backward = (Branch(beta_max=beta, rho=1.0) for beta in optimised())
         branches = [Branches(turn=0.5, forward=forward, backward=backward)]
-        x = msgspec.structs.replace(setup.scanner.x, hysteresis=Hysteresis(model=model, branches=branches))
+        x = msgspec.structs.replace(setup.scanner.x, hysteresis=SinusoidalModel(branches=branches))
         setup = replace(setup, scanner=msgspec.structs.replace(setup.scanner, x=x))
     drive = played(make_plan(with_model(setup, model)).x)
     moved = axis().settled(drive.volts, drive.tick_s)

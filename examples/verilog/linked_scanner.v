@@ -52,7 +52,7 @@ module linked_scanner #(
     wire [2:0] host_region, region;
     wire [15:0] host_address, address, arm_frames;
     wire [31:0] host_data, data;
-    wire strobe, swapped, playing, parked, missed, missing;
+    wire strobe, swapped, playing, parked, missed, missing, refused;
     wire [15:0] x_code, y_code, x_word, y_word;
     wire [3:0] faults;
     wire [63:0] fault_counts;
@@ -71,10 +71,10 @@ module linked_scanner #(
     ) loader (
         .clock(clock), .reset(1'b0), .line_in(line_in), .line_out(line_out), .permit(permit), .boot(32'd0),
         .booting(booting), .write(host_write), .write_region(host_region), .write_address(host_address),
-        .write_data(host_data), .writable(writable), .commit(host_commit), .withdraw(withdraw), .arm(arm),
-        .arm_frames(arm_frames), .trigger(trigger), .park(park), .clear_faults(clear_faults), .strobe(strobe),
-        .line_marker(line), .frame_marker(frame), .swapped_marker(swapped), .playing(playing), .parked(parked),
-        .faults(faults), .fault_counts(fault_counts)
+        .write_data(host_data), .writable(writable), .refused(refused), .commit(host_commit), .withdraw(withdraw),
+        .arm(arm), .arm_frames(arm_frames), .trigger(trigger), .park(park), .clear_faults(clear_faults),
+        .strobe(strobe), .line_marker(line), .frame_marker(frame), .swapped_marker(swapped), .playing(playing),
+        .parked(parked), .faults(faults), .fault_counts(fault_counts)
     );
 
     dac_boot #(
@@ -99,7 +99,7 @@ module linked_scanner #(
         .LOW_AREA(1), .FOURIER(1), .HARMONICS(HARMONICS), .SINE_FILE(ANNEXIN_200NM_SINE_FILE)
     ) sequencer (
         .clock(clock), .reset(1'b0), .write(write), .write_region(region), .write_address(address), .write_data(data),
-        .writable(writable), .refused(), .commit(commit), .withdraw(withdraw || (booting && missing)),
+        .writable(writable), .refused(refused), .commit(commit), .withdraw(withdraw || (booting && missing)),
         .committed(), .arm(arm),
         .arm_frames(arm_frames), .trigger(trigger), .park(park), .clear_faults(clear_faults), .armed(), .running(),
         .tick(tick && !booting), .underrun(missed), .busy(), .strobe(strobe), .x_code(x_code), .y_code(y_code),
@@ -122,7 +122,7 @@ module linked_scanner #(
         .cs_y_n(), .mosi_x(x_data), .mosi_y(y_data), .ldac_n(load_n), .busy(), .missed(missed)
     );
 
-    assign fault = faults != 4'd0 || missing;
+    assign fault = faults != 4'd0 || missing || refused;
 endmodule
 
 `default_nettype wire

@@ -40,7 +40,7 @@ module scanner #(
         {run_1, run_2, started, start} = 4'd0;
     end
 
-    wire writable, write, commit, missed, missing, strobe, swapped;
+    wire writable, write, commit, missed, missing, refused, strobe, swapped;
     wire [2:0] region;
     wire [15:0] address;
     wire [31:0] data;
@@ -81,7 +81,7 @@ module scanner #(
         .LOW_AREA(1), .FOURIER(1), .HARMONICS(127), .SINE_FILE(ANNEXIN_200NM_SINE_FILE)
     ) sequencer (
         .clock(clock), .reset(1'b0), .write(write), .write_region(region), .write_address(address), .write_data(data),
-        .writable(writable), .refused(), .commit(commit), .withdraw(1'b0), .committed(), .arm(start),
+        .writable(writable), .refused(refused), .commit(commit), .withdraw(1'b0), .committed(), .arm(start),
         .arm_frames(16'd0),
         .trigger(start), .park(!run_2), .clear_faults(1'b0), .armed(), .running(), .tick(tick), .underrun(missed),
         .busy(),
@@ -106,7 +106,7 @@ module scanner #(
         .cs_y_n(), .mosi_x(x_data), .mosi_y(y_data), .ldac_n(load_n), .busy(), .missed(missed)
     );
 
-    assign fault = faults != 4'd0 || missing;
+    assign fault = faults != 4'd0 || missing || refused;
 endmodule
 
 `default_nettype wire

@@ -14,13 +14,22 @@ bool dac_axis_approach(dac_axis *axis, const dac_bank_axis *bank, int32_t target
     return axis->code == target;
 }
 
+/* The sample at a position, of which it takes the upper word. */
+static inline int32_t sample_at(const dac_bank_axis *bank, uint32_t high)
+{
+    const uint32_t index = high >> 15; /* the fraction behind it is 0 in a direct table */
+    const unsigned guard = DAC_GUARD(bank);
+    return dac_between(bank->table[index], bank->table[index + 1], high & 0x7fffu, guard, DAC_HALF(guard));
+}
+
+static inline int32_t code_of(const dac_bank_axis *bank, int32_t sample)
+{
+    return (int32_t)(((int64_t)bank->gain * sample + bank->offset) >> bank->gain_q); /* 28 bits or fewer */
+}
+
 bool dac_axis_step(dac_axis *axis, const dac_bank_axis *bank, bool *outside)
 {
-    const uint32_t index = axis->at.high >> 15, fraction = axis->at.high & 0x7fffu; /* 0 in a direct table */
-    const unsigned guard = DAC_GUARD(bank);
-    const int32_t here = bank->table[index], there = bank->table[index + 1];
-    const int32_t sample = dac_between(here, there, fraction, guard, DAC_HALF(guard));
-    const int32_t code = (int32_t)(((int64_t)bank->gain * sample + bank->offset) >> bank->gain_q); /* 28 bits or fewer */
+    const int32_t code = code_of(bank, sample_at(bank, axis->at.high));
     const int32_t clamped = code < bank->code_min ? bank->code_min : code > bank->code_max ? bank->code_max : code;
 
     if (clamped != code)
@@ -155,18 +164,11 @@ static uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uin
     const READ_AGAIN uint64_t advance = step;
     const uint32_t gain = (uint32_t)bank->gain, spread = UINT32_C(1) << bank->run_spread;
     const unsigned gain_q = bank->gain_q;
-    const uint32_t first = (uint32_t)(at >> 32);
-    const uint64_t block = (DAC_RUN - 1) * step;
-    uint32_t done = 0, sample, last;
+    const int32_t begin = sample_at(bank, (uint32_t)(at >> 32));
+    uint32_t done = 0, sample = (uint32_t)begin, last;
 
-    {
-        NEIGHBOURS(table, first >> 15, here, there);
-        const int32_t begin = dac_between(here, there, first & 0x7fffu, 4, DAC_HALF(4));
-        const int64_t code = ((int64_t)bank->gain * begin + bank->offset) >> gain_q;
-        if ((uint32_t)((int32_t)code - axis->code + bank->run_half) >> bank->run_bits != 0)
-            return 0;
-        sample = (uint32_t)begin;
-    }
+    if ((uint32_t)(code_of(bank, begin) - axis->code + bank->run_half) >> bank->run_bits != 0)
+        return 0;
     while (done < ticks) {
         const uint32_t length = block_of(ticks - done);
         int32_t base = axis->code - bank->run_half;
@@ -178,7 +180,8 @@ static uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uin
 
         if (!has_room(bank, base))
             break;
-        if ((at + block) >> 47 == at >> 47) { /* all between the same two words */
+#if !defined(__OPTIMIZE_SIZE__) /* what is small has the second loop only */
+        if ((at + (DAC_RUN - 1) * step) >> 47 == at >> 47) { /* all between the same two words */
             NEIGHBOURS(table, (uint32_t)(at >> 47), here, there);
             const uint32_t slope = (uint32_t)(there - here);
             low += (uint32_t)here << 15;
@@ -187,7 +190,9 @@ static uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uin
                 rise = (slope * ((uint32_t)(at >> 32) & 0x7fffu) + low) >> ABOVE;
                 PUT_CODE;
             } while (out != stop);
-        } else {
+        } else
+#endif
+        {
             do {
                 PUT_ASIDE(low, base, stop);
                 const uint32_t high = (uint32_t)(at >> 32);

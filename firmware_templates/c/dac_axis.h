@@ -24,13 +24,13 @@
 #endif
 
 /* 1: runs add products of 64 bits; 0: they do with 32 bits, for processors that need a call or several instructions for one. Words of
- * more than 16 bits need 64 bits everywhere. A Cortex-M0 calls where size counts, since 32 bits take more code. */
+ * more than 16 bits need 64 bits everywhere. */
 #if DAC_TABLE_STORAGE_BITS != 16
 #undef DAC_LONG_MULTIPLY
 #define DAC_LONG_MULTIPLY 1
 #elif !defined(DAC_LONG_MULTIPLY)
-#if defined(__AVR__) || (defined(__riscv) && __riscv_xlen == 32) \
-    || ((defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__)) && !defined(__OPTIMIZE_SIZE__))
+#if defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__) || defined(__AVR__) \
+    || (defined(__riscv) && __riscv_xlen == 32)
 #define DAC_LONG_MULTIPLY 0
 #else
 #define DAC_LONG_MULTIPLY 1

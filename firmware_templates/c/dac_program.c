@@ -58,30 +58,39 @@ static bool good_output(const dac_axis_program *p)
         && p->code_max < INT32_C(1) << p->dac_bits && p->max_step >= 1 && p->max_step < INT32_C(1) << 24;
 }
 
+/* Whether a program is for the converter, which dac_sequencer_init() has found good, or has left at 0 bits. */
 static bool same_converter(const dac_axis_program *p, const dac_axis *axis)
 {
     const bool shifted = p->left_aligned && p->word_bits != p->dac_bits;
-    return p->dac_bits >= 8 && p->dac_bits <= 24 && p->dac_bits <= p->word_bits
-        && p->word_bits <= DAC_OUTPUT_STORAGE_BITS && p->dac_bits == axis->bits && p->word_bits == axis->word_bits
+    return axis->bits != 0 && p->dac_bits == axis->bits && p->word_bits == axis->word_bits
         && p->twos_complement == (axis->flip != 0) && shifted == (axis->shift != 0);
+}
+
+/* The first reason not to play an axis. */
+static dac_loaded judge_axis(const dac_axis_program *p, const dac_axis *axis)
+{
+    return !same_converter(p, axis) ? DAC_OTHER_CONVERTER
+         : !good_storage(p) ? DAC_OTHER_STORAGE
+         : !good_table(p) ? DAC_BAD_TABLE
+         : !good_output(p) ? DAC_BAD_OUTPUT : DAC_LOADED;
 }
 
 /* numerator 2^`zeros` by divisor < 2^31, rounded up, by long division: 95 bits or fewer, some 12 instructions a bit. */
 static dac_position power_divided(unsigned zeros, uint32_t divisor)
 {
     dac_position quotient = {0, 0};
-    uint32_t rest = 1 % divisor;
+    uint32_t rest = 1;
     const dac_position one = {0, 1};
 
-    quotient.low = divisor == 1;
-    while (zeros-- != 0) {
-        rest <<= 1;
-        quotient.high = quotient.high << 1 | (uint32_t)(quotient.low >> 63);
-        quotient.low <<= 1;
+    for (;; rest <<= 1) {
         if (rest >= divisor) {
             rest -= divisor;
             quotient.low |= 1;
         }
+        if (zeros-- == 0)
+            break;
+        quotient.high = quotient.high << 1 | (uint32_t)(quotient.low >> 63);
+        quotient.low <<= 1;
     }
     if (rest != 0)
         dac_advance(&quotient, &one);
@@ -93,8 +102,8 @@ static void allow_runs(dac_bank_axis *b, const dac_axis_program *p)
 {
     int32_t widest = (p->code_max - p->code_min) / 32; /* keeps most of the range far enough from the limits */
     const uint32_t most = UINT32_MAX / p->phase_period;
+    uint8_t bits = 0;
 
-    b->run_bits = 0;
     b->run_most = 0;
 #if !DAC_LONG_MULTIPLY
     uint32_t gain = (uint32_t)(p->gain_word < 0 ? -p->gain_word : p->gain_word);
@@ -114,10 +123,11 @@ static void allow_runs(dac_bank_axis *b, const dac_axis_program *p)
     b->run_most = most > 258 ? 256 : most > 2 ? most - 2 : 0;
     if (widest > p->max_step)
         widest = p->max_step;
-    while ((widest + 1) >> (b->run_bits + 1) != 0) /* gain_q + run_bits <= 31, with words of 16 bits */
-        b->run_bits++;
-    b->run_half = INT32_C(1) << b->run_bits >> 1;
-    b->run_room = p->code_max - p->code_min + 1 - (INT32_C(1) << b->run_bits);
+    while ((widest + 1) >> (bits + 1) != 0) /* gain_q + bits <= 31, with words of 16 bits */
+        bits++;
+    b->run_bits = bits;
+    b->run_half = INT32_C(1) << bits >> 1;
+    b->run_room = p->code_max - p->code_min + 1 - (INT32_C(1) << bits);
 }
 
 static void derive(dac_bank_axis *b, const dac_axis_program *p)
@@ -143,18 +153,13 @@ dac_loaded dac_sequencer_load(dac_sequencer *s, const dac_program *p)
 {
     if (!dac_sequencer_writable(s))
         return DAC_BUSY;
-    if (!same_converter(&p->x, &s->x) || !same_converter(&p->y, &s->y))
-        return DAC_OTHER_CONVERTER;
     if (!good_schedule(&p->schedule))
         return DAC_BAD_SCHEDULE;
-    if (!good_storage(&p->x) || !good_storage(&p->y))
-        return DAC_OTHER_STORAGE;
-    if (!good_table(&p->x) || !good_table(&p->y))
-        return DAC_BAD_TABLE;
+    const dac_loaded x = judge_axis(&p->x, &s->x), y = judge_axis(&p->y, &s->y);
+    if (x != DAC_LOADED || y != DAC_LOADED)
+        return x != DAC_LOADED ? x : y;
     if (!good_periods(p))
         return DAC_BAD_PERIOD;
-    if (!good_output(&p->x) || !good_output(&p->y))
-        return DAC_BAD_OUTPUT;
 
     dac_bank *const bank = &s->bank[dac_sequencer_idle(s)];
     bank->schedule = p->schedule;

@@ -14,29 +14,29 @@ static void clear_faults(dac_sequencer *s)
 
 /* Functions of the producer. */
 
-static void power_up(dac_axis *axis, const dac_converter *converter)
+/* With 0 bits, as they are before, every program is for another converter. */
+static bool power_up(dac_axis *axis, const dac_converter *converter)
 {
+    if (!dac_axis_serves(converter))
+        return false;
     axis->code = converter->power_up_code;
     axis->bits = converter->bits;
     axis->word_bits = converter->word_bits;
     axis->flip = converter->twos_complement ? UINT32_C(1) << (converter->bits - 1) : 0;
     axis->shift = (uint8_t)(converter->left_aligned ? converter->word_bits - converter->bits : 0);
+    return true;
 }
 
 bool dac_sequencer_init(dac_sequencer *s, const dac_converter *x, const dac_converter *y)
 {
-    const bool good = dac_axis_serves(x) && dac_axis_serves(y);
     unsigned char *const bytes = (unsigned char *)s;
 
     for (size_t i = 0; i < sizeof *s; i++)
         bytes[i] = 0;
     s->pixel_rest = UNKNOWN;
     s->playing = NOTHING;
-    if (good) { /* otherwise every program is for another converter */
-        power_up(&s->x, x);
-        power_up(&s->y, y);
-    }
-    return good;
+    const bool x_good = power_up(&s->x, x);
+    return power_up(&s->y, y) && x_good;
 }
 
 bool dac_sequencer_writable(const dac_sequencer *s)

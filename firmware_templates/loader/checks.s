@@ -25,7 +25,9 @@ schedule:
         jnz no_schedule
         ld4 answer
         st4 answer+4
-        ld4 [p]
+        ld #255
+        cmp4 [p]                ; settle_lines, which the sequencer counts in 8 bits
+        jnc no_schedule
         ld4 t2
         cmp4 [p]                ; turn_tick
         jnc no_schedule
@@ -401,6 +403,8 @@ wide_word:
 load_axis:
         ld1 detail
         jnz tables
+        ld #WITHDRAW            ; the sequencer commits nothing after a program that did not fit, until it is discarded
+        request
         ld #0
         setregion
         setp

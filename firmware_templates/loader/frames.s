@@ -1,11 +1,10 @@
 ; Frames: read from the ring, and sent on the line.
 
 start:
-        ld #0
+        call forget             ; a = 0
         st1 has_session
         st1 last_type
         st1 aborting
-        call forget
         ld #WITHDRAW
         request
         ld #2
@@ -35,7 +34,7 @@ nothing_taken:
         ld1 IN_WRITABLE
         jz receive
         ld1 IN_SWAPPED          ; looked at again: it comes some clocks later
-        jz withdrawn
+        jz gone
 receive:
         ld1 ring
         cmp1 IN_RING
@@ -114,7 +113,8 @@ counted:
         st2 count
         ret
 
-; Copies words from p to q, less a of them.
+; Copies words from p to q, less a of them; `copy_8` eight.
+copy_8: ld #0xf8
 copy:   st1 count
 copy_word:
         ld4 [p]

@@ -33,6 +33,7 @@
 .equ IN_SWAPPED, 0xf4     ; a program was taken, and the processor has not seen it
 .equ IN_WRITABLE, 0xf5
 .equ IN_STATE, 0xf6       ; state as in STATUS, except 0
+.equ IN_GONE, 0xf7        ; the reason why a program that waited is gone: withdrawn or refused
 
 ; Requests
 .equ COMMIT, 1

@@ -73,8 +73,7 @@ as_asked:
         ldp PAYLOAD             ; LIMITS
         saveq
         ldp LIMITS_X
-        ld #0xf8
-        call copy
+        call copy_8
         ld #32
         jmp long_answer
 
@@ -95,10 +94,9 @@ hello:  ld1 length
         jz no_payload
         ldp PAYLOAD
         ld1 [p]
-        cmp #1
+        sub #1
         jz version_1
-        ld #1
-        st1 detail
+        inc1 detail             ; 1, the version of this device
         jmp no_version
 version_1:
         ld1 length
@@ -163,8 +161,7 @@ state:  st1 [p]
         st4 [p]
         saveq
         ldp HASH
-        ld #0xf8
-        call copy
+        call copy_8
         ld1 answer_length
         jmp long_answer
 

@@ -58,7 +58,7 @@ another:
         ld #1
         st1 upload
 begun:  ld4 received
-        st4 answer
+number: st4 answer
         ld #4
         jmp answered
 
@@ -163,8 +163,7 @@ accepted:
 taken:  ldp HASH
         saveq
         ldp INFO
-        ld #0xf8
-        call copy
+        call copy_8
         ld4 info_crc
         st4 done_crc
         ld4 info_bytes
@@ -188,10 +187,16 @@ ended:  call reply
         ld4 session
         st4 asker
         jmp aborted
-withdrawn:
-        call commit_ended
+
+; The sequencer has neither taken it, nor does it wait: it was withdrawn, or the sequencer has refused it.
+gone:   call commit_ended
         ld #25
         st1 reason
+        ld1 aborting
+        jnz by_abort
+        ld1 IN_GONE
+        st1 reason
+by_abort:
         call refusal
         jmp ended
 
@@ -234,6 +239,4 @@ withdrawing:
 aborted:
         call forget
         ld4 generation
-        st4 answer
-        ld #4
-        jmp answered
+        jmp number

@@ -21,15 +21,18 @@ module dac_fit #(
     parameter HARMONICS = 0     // 0: there is no renderer, and the number of harmonics is not used
 ) (
     input  wire        clock,
-    input  wire [31:0] data,        // the word of the write on the next clock
+    input  wire [31:0] data,        // of the write on the next clock
+    input  wire [3:0]  address,
     input  wire        scan_write,  // a write of this clock, to one of the three pages
     input  wire        x_write,
     input  wire        y_write,
-    input  wire [3:0]  address,
     input  wire        discard,
     output wire        fits         // with the write of this clock
 );
-    localparam [3:0] LINE_TICKS = 4'd0;
+    localparam [3:0] LINE_TICKS = 4'd0, FRAME_LINES = 4'd1, SETTLE_LINES = 4'd2, TURN_TICK = 4'd3, TICKS_END = 4'd8;
+    localparam [3:0] LINES_END = 4'd12, PIXELS = 4'd12, Y_STEPS = 4'd13;
+    localparam [3:0] REMAINDER = 4'd1, PERIOD = 4'd2, GAIN = 4'd3, OFFSET_LOW = 4'd4, OFFSET_HIGH = 4'd5;
+    localparam [3:0] CODES = 4'd6, CODES_END = 4'd10, AXIS_HARMONICS = 4'd10;
     localparam [31:0] MOST_HARMONICS = HARMONICS;
     localparam X_HIGH_BITS = X_WORD_BITS > 21 ? 25 : X_WORD_BITS + 4;  // of the offset above its low word, signed
     localparam Y_HIGH_BITS = Y_WORD_BITS > 21 ? 25 : Y_WORD_BITS + 4;
@@ -43,7 +46,7 @@ module dac_fit #(
     wire within_tick = data >> (TICK_BITS + 1) == 0;
     wire within_line = data >> (LINE_BITS + 1) == 0;
     reg is_tick, is_line, is_line_ticks, is_frame_lines, is_flag, is_short, is_code, is_gain, is_low;
-    reg is_x_high, is_y_high, is_x_phase, is_y_phase, is_x_period, is_y_period, is_harmonics;
+    reg is_x_high, is_y_high, is_x_period, is_y_period, is_harmonics;
     always @(posedge clock) begin
         is_tick <= within_tick;
         is_line <= within_line;
@@ -56,25 +59,40 @@ module dac_fit #(
         is_low <= data[31:18] == 14'd0;
         is_x_high <= data[31:X_HIGH_BITS-1] == 0 || &data[31:X_HIGH_BITS-1];
         is_y_high <= data[31:Y_HIGH_BITS-1] == 0 || &data[31:Y_HIGH_BITS-1];
-        is_x_phase <= X_INTERPOLATED == 0 || within_x_period;
-        is_y_phase <= Y_INTERPOLATED == 0 || within_y_period;
         is_x_period <= X_INTERPOLATED != 0 ? within_x_period : within_x_table;
         is_y_period <= Y_INTERPOLATED != 0 ? within_y_period : within_y_table;
         is_harmonics <= HARMONICS == 0 || data <= MOST_HARMONICS;
     end
 
-    // By address; what is not named takes any word.
-    wire [15:0] scan = {
-        2'b11, is_flag, is_tick, {4{is_line}}, {4{is_tick}}, is_tick, is_short, is_frame_lines, is_line_ticks
-    };
-    wire [15:0] x = {
-        5'b11111, is_harmonics, {4{is_code}}, is_x_high, is_low, is_gain, is_x_period, is_x_phase, 1'b1
-    };
-    wire [15:0] y = {
-        5'b11111, is_harmonics, {4{is_code}}, is_y_high, is_low, is_gain, is_y_period, is_y_phase, 1'b1
-    };
-    wire spoils = (scan_write && !scan[address]) || (x_write && !x[address]) || (y_write && !y[address]);
-    wire begins = scan_write && address == LINE_TICKS;
+    // What it has to fit, by its address; what is not named takes any word. All of this is known on the clock of the
+    // write, so that little is left to do on that of a commit.
+    reg of_tick, of_line, of_line_ticks, of_frame_lines, of_flag, of_short, of_code, of_gain, of_low, of_high;
+    reg of_x_period, of_y_period, of_harmonics;
+    always @(posedge clock) begin
+        of_line_ticks <= address == LINE_TICKS;
+        of_frame_lines <= address == FRAME_LINES;
+        of_short <= address == SETTLE_LINES;
+        of_tick <= (address >= TURN_TICK && address < TICKS_END) || address == PIXELS;
+        of_line <= address >= TICKS_END && address < LINES_END;
+        of_flag <= address == Y_STEPS;
+        of_x_period <= address == PERIOD || (X_INTERPOLATED != 0 && address == REMAINDER);
+        of_y_period <= address == PERIOD || (Y_INTERPOLATED != 0 && address == REMAINDER);
+        of_gain <= address == GAIN;
+        of_low <= address == OFFSET_LOW;
+        of_high <= address == OFFSET_HIGH;
+        of_code <= address >= CODES && address < CODES_END;
+        of_harmonics <= address == AXIS_HARMONICS;
+    end
+
+    wire scan_spoils = (of_line_ticks && !is_line_ticks) || (of_frame_lines && !is_frame_lines) ||
+                       (of_short && !is_short) || (of_tick && !is_tick) || (of_line && !is_line) ||
+                       (of_flag && !is_flag);
+    wire axis_spoils = (of_gain && !is_gain) || (of_low && !is_low) || (of_code && !is_code) ||
+                       (of_harmonics && !is_harmonics);
+    wire x_spoils = axis_spoils || (of_x_period && !is_x_period) || (of_high && !is_x_high);
+    wire y_spoils = axis_spoils || (of_y_period && !is_y_period) || (of_high && !is_y_high);
+    wire spoils = (scan_write && scan_spoils) || (x_write && x_spoils) || (y_write && y_spoils);
+    wire begins = scan_write && of_line_ticks;
 
     reg spoilt, empty;
     initial begin

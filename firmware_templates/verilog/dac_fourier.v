@@ -33,7 +33,7 @@
 // again, and its word is bit 30 above the 0 that is found there: so no block RAM is lost to a single word. The other
 // quadrants are mirror images word for word, the cosine is the sine a quarter further on, and the sine table of a
 // shorter length is word for word every 2^n-th word of a longer one: the index counts in steps of the longer table for
-// both axes.
+// both axes. A word that the file does not have is `missing` when it is used.
 //
 // A sweep is 2 H + 3 slots of one clock: SHIFT to the next digit, the 2 H + 1 TERMS in the order of the words (a0 is a
 // cosine with n = 0), a GAP that lets the last one arrive. After the last digit come two slots of OUT. Slots march
@@ -63,7 +63,8 @@ module dac_fourier #(
     output reg         table_write,
     output wire        table_axis,
     output reg  [15:0] table_address,
-    output reg  [23:0] table_data      // sign-extended
+    output reg  [23:0] table_data,     // sign-extended
+    output wire        missing         // SINE_FILE does not have a word of this rendering: the table is wrong
 );
     localparam INDEX_BITS = X_INDEX_BITS > Y_INDEX_BITS ? X_INDEX_BITS : Y_INDEX_BITS;
     localparam QUARTER_BITS = INDEX_BITS - 2;
@@ -110,9 +111,15 @@ module dac_fourier #(
     // Coefficients and the quarter of the sine: block RAMs, one clocked read port each. One is written while not busy
     // and read while busy, and a synthesiser sees that: what a read of the word being written gives is of no account.
     reg [31:0] coefficients [0:(2 << ADDRESS_BITS)-1];
-    reg [29:0] quarter_sine [0:(1 << QUARTER_BITS)-1];
+    // The bit above a word of the sine is 1 where no file has filled it. Where one has, it is 0 throughout, and a
+    // synthesiser takes it away.
+    reg [30:0] quarter_sine [0:(1 << QUARTER_BITS)-1];
+    integer i;
 
-    initial if (SINE_FILE != "") $readmemh(SINE_FILE, quarter_sine);
+    initial begin
+        for (i = 0; i < 1 << QUARTER_BITS; i = i + 1) quarter_sine[i] = {1'b1, 30'd0};
+        if (SINE_FILE != "") $readmemh(SINE_FILE, quarter_sine);
+    end
 
     always @(posedge clock)
         if (write && !busy && write_address >> ADDRESS_BITS == 11'd0)
@@ -208,7 +215,7 @@ module dac_fourier #(
     // Stage 1: the sine word; stage 2: the coefficient, and the digit in the product.
     wire backwards = index[INDEX_BITS-2];
     wire [QUARTER_BITS-1:0] along = index[QUARTER_BITS-1:0];
-    reg [29:0] sine_low;     // what block RAMs put out has no value at power-up: it would be built around them
+    reg [30:0] sine_word;    // what block RAMs put out has no value at power-up: it would be built around them
     reg [31:0] coefficient;
     reg sine_top;
     reg [ADDRESS_BITS-1:0] address_1;
@@ -219,7 +226,7 @@ module dac_fourier #(
     end
 
     always @(posedge clock) begin
-        sine_low <= quarter_sine[backwards ? -along : along];
+        sine_word <= quarter_sine[backwards ? -along : along];
         sine_top <= backwards && along == 0;
         address_1 <= address[ADDRESS_BITS-1:0];
         if (busy) coefficient <= coefficients[{axis_now, address_1}];
@@ -229,7 +236,7 @@ module dac_fourier #(
     wire digit_negative;
 
     dac_fourier_product #(.DIGIT_BITS(DIGIT_BITS)) multiplier (
-        .clock(clock), .sine({sine_top, sine_low}), .digit_number(digit), .coefficient(coefficient),
+        .clock(clock), .sine({sine_top, sine_word[29:0]}), .digit_number(digit), .coefficient(coefficient),
         .product(product), .negative(digit_negative)
     );
 
@@ -237,6 +244,8 @@ module dac_fourier #(
     wire [4:0] leaving = {slot == SHIFT, slot == TERMS, slot == OUT, is_sine, index[INDEX_BITS-1]};
     reg [5*STAGES-1:0] passing;
     wire shift_s, term_s, out_s, sine_s, second_half_s;
+
+    assign missing = passing[3] && sine_word[30];  // of a term, the clock after it was read
 
     initial passing = 0;
 

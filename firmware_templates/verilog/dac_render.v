@@ -2,7 +2,7 @@
 //
 // The program word `harmonics` is 0 if the table was uploaded, or H if 2 H + 1 Fourier words were uploaded. The commit
 // goes on when the last table word is in its bank, so that a bank that waits to be taken is always complete. A reset
-// or a withdrawal ends a rendering; its commit never comes.
+// or a withdrawal ends a rendering; its commit never comes. Nor does it where a word of the sine is missing.
 
 `default_nettype none
 
@@ -25,6 +25,7 @@ module dac_render #(
     input  wire [31:0] write_data,
     input  wire        commit,       // from the host
     output reg         rendered,     // the commit to the banks
+    output reg         failed,       // in the place of `rendered`: SINE_FILE has not all of its words
     output wire        rendering,
     output wire        x_write,      // a table word
     output wire        y_write,
@@ -35,8 +36,8 @@ module dac_render #(
 
     reg [9:0] x_harmonics, y_harmonics;
     reg [1:0] state;
-    reg start;
-    wire busy, write, axis;
+    reg start, incomplete;
+    wire busy, write, axis, missing;
 
     initial begin
         x_harmonics = 10'd0;
@@ -44,6 +45,8 @@ module dac_render #(
         state = IDLE;
         start = 1'b0;
         rendered = 1'b0;
+        failed = 1'b0;
+        incomplete = 1'b0;
     end
 
     assign rendering = state != IDLE || rendered;
@@ -55,6 +58,8 @@ module dac_render #(
         if (write_y_harmonics) y_harmonics <= write_data[9:0];
         start <= 1'b0;
         rendered <= 1'b0;
+        failed <= 1'b0;
+        incomplete <= state != IDLE && (incomplete || missing);
         if (cancel)
             state <= IDLE;
         else
@@ -69,7 +74,8 @@ module dac_render #(
                 end
                 default: if (!start && !busy) begin
                     state <= IDLE;
-                    rendered <= 1'b1;
+                    rendered <= !incomplete;
+                    failed <= incomplete;
                 end
             endcase
     end
@@ -81,7 +87,7 @@ module dac_render #(
         .clock(clock), .reset(cancel), .write(write_x_word || write_y_word), .write_axis(write_y_word),
         .write_address(write_address), .write_data(write_data), .start(start), .axis(state == Y),
         .harmonics(state == Y ? y_harmonics : x_harmonics), .busy(busy), .table_write(write), .table_axis(axis),
-        .table_address(address), .table_data(data)
+        .table_address(address), .table_data(data), .missing(missing)
     );
 endmodule
 

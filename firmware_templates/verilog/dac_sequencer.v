@@ -134,7 +134,7 @@ module dac_sequencer #(
     endgenerate
 
     // Writes go to the idle bank, one clock late. A commit is as late, so that it never overtakes a write.
-    wire idle_writable, rendered, rendering;
+    wire idle_writable, rendered, rendering, unrendered;
     reg host_write, host_commit;
     initial begin
         host_write = 0;
@@ -164,7 +164,7 @@ module dac_sequencer #(
         region <= write_region;
         address <= write_address;
         data <= write_data;
-        if ((write && !writable) || (host_commit && !fits))
+        if ((write && !writable) || (host_commit && !fits) || unrendered)
             refused <= 1'b1;
         else if (clear_faults || reset)
             refused <= 1'b0;
@@ -183,8 +183,8 @@ module dac_sequencer #(
         .LINE_BITS(LINE_BITS), .X_PERIOD_BITS(X_PERIOD_BITS), .Y_PERIOD_BITS(PERIOD_BITS),
         .HARMONICS(FOURIER ? HARMONICS : 0)
     ) fit (
-        .clock(clock), .data(write_data), .scan_write(scan_write), .x_write(x_write), .y_write(y_write),
-        .address(address[3:0]), .discard(reset || withdraw), .fits(fits)
+        .clock(clock), .data(write_data), .address(write_address[3:0]), .scan_write(scan_write), .x_write(x_write),
+        .y_write(y_write), .discard(reset || withdraw), .fits(fits)
     );
 
     wire bank, loaded, take, drained;
@@ -359,8 +359,8 @@ module dac_sequencer #(
                 .write_y_harmonics(y_write && address[3:0] == AXIS_HARMONICS),
                 .write_x_word(host_write && region == X_FOURIER), .write_y_word(host_write && region == Y_FOURIER),
                 .write_address(address[10:0]), .write_data(data), .commit(sound_commit), .rendered(rendered),
-                .rendering(rendering), .x_write(x_rendered), .y_write(y_rendered), .address(rendered_address),
-                .data(rendered_data)
+                .failed(unrendered), .rendering(rendering), .x_write(x_rendered), .y_write(y_rendered),
+                .address(rendered_address), .data(rendered_data)
             );
             assign x_table_write = x_rendered || (host_write && region == X_TABLE);
             assign y_table_write = y_rendered || (host_write && region == Y_TABLE);
@@ -369,6 +369,7 @@ module dac_sequencer #(
         end else begin : uploaded
             assign rendered = sound_commit;
             assign rendering = 1'b0;
+            assign unrendered = 1'b0;
             assign x_table_write = host_write && region == X_TABLE;
             assign y_table_write = host_write && region == Y_TABLE;
             assign table_address = address;

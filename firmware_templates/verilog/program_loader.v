@@ -51,6 +51,7 @@ module program_loader #(
     output wire [15:0] write_address,
     output wire [31:0] write_data,
     input  wire        writable,
+    input  wire        refused,
     output wire        commit,
     output wire        withdraw,
     output wire        arm,
@@ -69,6 +70,7 @@ module program_loader #(
     input  wire [63:0] fault_counts      // COUNT_BITS = 16
 );
     localparam ADDRESS_BITS = $clog2(MEMORY_BYTES);
+    localparam [7:0] WITHDRAWN = 8'd25, REFUSED = 8'd28;
     localparam [31:0] IMAGE_AT = 32'h300;
     localparam [31:0] IMAGE_BYTES = (1 << ADDRESS_BITS) - IMAGE_AT;
     localparam [31:0] RING_AT = 32'h180;  // 128 bytes
@@ -262,7 +264,8 @@ module program_loader #(
             5'd19: in <= {7'd0, ready};
             5'd20: in <= {7'd0, swapped};
             5'd21: in <= {7'd0, may_write};
-            default: in <= {6'd0, playing ? 2'd3 : parked ? 2'd1 : 2'd2};
+            5'd22: in <= {6'd0, playing ? 2'd3 : parked ? 2'd1 : 2'd2};
+            default: in <= refused ? REFUSED : WITHDRAWN;
         endcase
     end
 

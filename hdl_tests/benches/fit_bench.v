@@ -27,8 +27,8 @@ module fit_bench;
         .Y_INTERPOLATED(Y_INTERPOLATED), .Y_INDEX_BITS(Y_INDEX_BITS), .Y_WORD_BITS(Y_WORD_BITS), .TICK_BITS(TICK_BITS),
         .LINE_BITS(LINE_BITS), .X_PERIOD_BITS(X_PERIOD_BITS), .Y_PERIOD_BITS(Y_PERIOD_BITS), .HARMONICS(HARMONICS)
     ) fit (
-        .clock(clock), .data(next[31:0]), .scan_write(now[38] && now[37:36] == 0),
-        .x_write(now[38] && now[37:36] == 1), .y_write(now[38] && now[37:36] == 2), .address(now[35:32]),
+        .clock(clock), .data(next[31:0]), .address(next[35:32]), .scan_write(now[38] && now[37:36] == 0),
+        .x_write(now[38] && now[37:36] == 1), .y_write(now[38] && now[37:36] == 2),
         .discard(now[39]), .fits(fits)
     );
     initial begin

@@ -37,7 +37,8 @@ module fourier_bench;
     ) renderer (
         .clock(clock), .reset(reset), .write(write), .write_axis(write_axis), .write_address(write_address),
         .write_data(write_data), .start(start), .axis(axis), .harmonics(harmonics), .busy(busy),
-        .table_write(table_write), .table_axis(table_axis), .table_address(table_address), .table_data(table_data)
+        .table_write(table_write), .table_axis(table_axis), .table_address(table_address), .table_data(table_data),
+        .missing()
     );
 
     localparam [2:0] WAIT = 3'd0, HEADER = 3'd1, WRITE = 3'd2, START = 3'd3, RENDER = 3'd4, REST = 3'd5, DONE = 3'd6;

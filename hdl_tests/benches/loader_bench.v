@@ -62,7 +62,7 @@ module loader_bench #(
     end
 
     integer receiving = 0;
-    wire booting, committed, writable;
+    wire booting, committed, writable, refused;
 
     // The host's transmitter. The line is what it is until `edge_in` more sixteenths have gone.
     reg host_line = 1;
@@ -175,10 +175,10 @@ module loader_bench #(
     ) loader (
         .clock(clock), .reset(reset), .line_in(host_line), .line_out(device_line), .permit(permit), .boot(boot_count),
         .booting(booting), .write(host_write), .write_region(host_region), .write_address(host_address),
-        .write_data(host_word), .writable(writable), .commit(host_commit), .withdraw(withdraw), .arm(arm),
-        .arm_frames(arm_frames), .trigger(trigger), .park(park), .clear_faults(clear_faults), .strobe(strobe),
-        .line_marker(line_marker), .frame_marker(frame_marker), .swapped_marker(swapped_marker), .playing(playing),
-        .parked(parked), .faults(faults), .fault_counts(fault_counts)
+        .write_data(host_word), .writable(writable), .refused(refused), .commit(host_commit), .withdraw(withdraw),
+        .arm(arm), .arm_frames(arm_frames), .trigger(trigger), .park(park), .clear_faults(clear_faults),
+        .strobe(strobe), .line_marker(line_marker), .frame_marker(frame_marker), .swapped_marker(swapped_marker),
+        .playing(playing), .parked(parked), .faults(faults), .fault_counts(fault_counts)
     );
 
     generate
@@ -205,7 +205,7 @@ module loader_bench #(
         .PLAIN_MULTIPLIER(PLAIN_MULTIPLIER), .FOURIER(FOURIER), .HARMONICS(HARMONICS), .SINE_FILE(SINE_FILE)
     ) sequencer (
         .clock(clock), .reset(1'b0), .write(write), .write_region(region), .write_address(address), .write_data(word),
-        .writable(writable), .refused(), .commit(commit), .withdraw(withdraw), .committed(committed), .arm(arm),
+        .writable(writable), .refused(refused), .commit(commit), .withdraw(withdraw), .committed(committed), .arm(arm),
         .arm_frames(arm_frames), .trigger(trigger), .park(park), .clear_faults(clear_faults), .armed(), .running(),
         .tick(tick), .underrun(underrun), .busy(busy), .strobe(strobe), .x_code(x_code), .y_code(y_code),
         .line_marker(line_marker), .frame_marker(frame_marker), .pixel_marker(pixel_marker),

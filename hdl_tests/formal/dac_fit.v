@@ -19,10 +19,10 @@ module dac_fit #(
 ) (
     input  wire        clock,
     input  wire [31:0] data,
+    input  wire [3:0]  address,
     input  wire        scan_write,
     input  wire        x_write,
     input  wire        y_write,
-    input  wire [3:0]  address,
     input  wire        discard,
     output wire        fits
 );

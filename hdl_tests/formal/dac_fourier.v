@@ -25,9 +25,11 @@ module dac_fourier #(
     output reg         table_write,
     output wire        table_axis,
     output reg  [15:0] table_address,
-    output reg  [23:0] table_data
+    output reg  [23:0] table_data,
+    output wire        missing
 );
-    (* anyseq *) reg ends, writes;
+    (* anyseq *) reg ends, writes, misses;
+    assign missing = misses;
     reg of_axis;
     initial begin
         busy = 1'b0;

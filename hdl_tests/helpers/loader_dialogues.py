@@ -29,6 +29,7 @@ MOST_FRAMES = (1 << 16) - 1
 _NOT_CHECKED = {Reason.RANGE, Reason.SLEW, Reason.JUMP}  # docs/verilog.md says why not
 _LEAST_TICKS = 8  # of a line
 _MOST_LINES = 1 << 16
+_MOST_SETTLE_LINES = 255
 
 
 class Differs(Exception):
@@ -37,7 +38,12 @@ class Differs(Exception):
 
 def objection(contents: Contents, *others: Any) -> Finding | None:
     """The first check of the loader that a program fails."""
-    if contents.scan("line_ticks") < _LEAST_TICKS or contents.scan("frame_lines") > _MOST_LINES:
+    scan = contents.scan
+    if (
+        scan("line_ticks") < _LEAST_TICKS
+        or scan("frame_lines") > _MOST_LINES
+        or scan("settle_lines") > _MOST_SETTLE_LINES
+    ):
         return Reason.SCHEDULE, 0
     found = first_objection(contents, *others)
     return None if found and found[0] in _NOT_CHECKED else found

@@ -123,6 +123,10 @@ MUTANTS = (
     Mutant("a window may end outside", _CHECKS, "ld4 t1 / cmp4 t0 / jnc no_schedule", "ld4 t1 / cmp4 t0", "uploads"),
     Mutant("a word may have more bits", _CHECKS, "cmp4 t3 / jc wide_word", "cmp4 t3", "uploads"),
     Mutant("a park code may lie outside", _CHECKS, "cmp4 t2 / jnc no_output / jmp checked", "jmp checked", "uploads"),
+    Mutant("settle_lines may be 256", _CHECKS, "ld #255 / cmp4 [p]", "ld #255 / add #1 / cmp4 [p]", "settle lines"),
+    Mutant("a program that does not fit stays", _CHECKS, "ld #WITHDRAW / request", "ld #0 / request", "refused"),
+    Mutant("the sequencer's refusal is not told", _UPLOAD, "ld1 IN_GONE", "ld #25", "refused"),
+    Mutant("an ABORT is told as a refusal", _UPLOAD, "ld1 aborting / jnz by_abort", "ld1 aborting", "refused"),
     Mutant("an ABORT does not withdraw", _UPLOAD, "ld #WITHDRAW / request", "ld #0 / request", "uploads"),
     Mutant(
         "a late answer goes to the wrong session",

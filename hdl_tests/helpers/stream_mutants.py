@@ -12,6 +12,7 @@ import mutants
 import numpy as np
 from mutants import Verdict
 from programs import random_dual
+from stream_benches import with_sine
 from stream_scripts import (
     counted_frames,
     counts_after_a_clear,
@@ -23,8 +24,6 @@ from stream_scripts import (
     sweep,
 )
 
-from tablegen.emit.memory import memory_file
-from tablegen.fixedpoint.synthesis import sine_quarter
 from tablegen.resources import verilog_runtime
 from tablegen.verification.bench import SequencerBench, SequencerShape
 from tablegen.verification.placement import Placement
@@ -36,7 +35,7 @@ Y_AXIS_AFTER_LOADS = """
                 .runnings(runnings_now[LATENCY-4:0]),
                 .bank(bank), .restart(frame_0)"""
 
-_SHAPES = {
+SHAPES = {
     "digits": SequencerShape(16, 1, 4, 16, 1, 3, 16),
     "plain": SequencerShape(20, 1, 3, 24, 1, 4, 18),
     "direct": SequencerShape(12, 0, 6, 12, 0, 6, 20),
@@ -44,7 +43,7 @@ _SHAPES = {
     "fourier": SequencerShape(16, 1, 4, 16, 1, 3, 14),
     "long table": SequencerShape(24, 1, 12, 24, 1, 2, 24),  # in which every bit of the phase counts
 }
-BENCHES = tuple(_SHAPES)
+BENCHES = tuple(SHAPES)
 
 
 @dataclass(frozen=True)
@@ -61,7 +60,7 @@ class Mutant(mutants.Mutant):
 @cache
 def script_of(bench: str) -> Script:
     """What a bench plays; the same every time."""
-    shape, rng = _SHAPES[bench], np.random.default_rng(4)
+    shape, rng = SHAPES[bench], np.random.default_rng(4)
     script = Script()
     if bench == "fourier":
         random_renderings(rng, script, shape, 12, HARMONICS, 1)
@@ -103,10 +102,8 @@ def bench_of(bench: str, folder: Path, mutant: Mutant | None = None) -> Sequence
     parameters: dict[str, int | str] = {"PLAIN_MULTIPLIER": int(bench in ("plain", "fourier", "long table"))}
     parameters["LOW_AREA"] = int(bench == "low area")
     if bench == "fourier":
-        sine = folder / "sine.mem"
-        sine.write_bytes(memory_file(sine_quarter(_SHAPES[bench].x_index_bits), 32))
-        parameters |= {"FOURIER": 1, "HARMONICS": HARMONICS, "SINE_FILE": str(sine)}
-    return SequencerBench("icarus", _SHAPES[bench], folder / "bench", parameters, sources)
+        parameters |= with_sine(folder, SHAPES[bench], HARMONICS)
+    return SequencerBench("icarus", SHAPES[bench], folder / "bench", parameters, sources)
 
 
 def judge(mutant: Mutant, folder: Path) -> Verdict:

@@ -10,6 +10,7 @@ from scipy.special import chdtrc
 from tablegen.calibration.branch import MeasuredBranch
 from tablegen.calibration.estimate import Estimate
 from tablegen.calibration.least_squares import few_points, solve
+from tablegen.compensation.models import UNCOMPENSATED
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 
@@ -18,7 +19,9 @@ _STRAIGHT_RHO = 1e-9  # below it (22) is a straight line to the last place
 _LARGEST_RHO, _OPEN_RHO = 60.0, 5.0  # beyond the first (22) is a step; a larger error than the second tells nothing
 _NOISE_LIMIT_ERRORS = 3.0  # standard errors of a residual that may be noise
 _CHI2_LIMIT = 4.0  # in chi squared, two standard errors
-_NO_HYSTERESIS = 'no hysteresis can be told from noise, and hence no u_peak; model = "triangle" does, or average more'
+_NO_HYSTERESIS = (
+    f'no hysteresis can be told from noise, and hence no u_peak; model = "{UNCOMPENSATED}" does, or average more'
+)
 _LEAST_BETA_ERROR = 1e-9  # least error of a measured beta: that of the fit's own arithmetic
 
 
@@ -53,7 +56,7 @@ def fit_growth(v: Floats, branches: Sequence[MeasuredBranch], rho: float) -> Gro
     found = None
     if float(np.max(v)) - float(np.min(v)) > 0.05:
         found = _both(v, beta, error, rho, remarks)
-    found_rho = found
+    freedom = max(len(v) - (1 if found is None else 2), 1)
     if found is None:
         steep = _steepest(v, beta, error, rho)
         found = _height(v, beta, error, steep or rho, remarks)
@@ -75,7 +78,6 @@ def fit_growth(v: Floats, branches: Sequence[MeasuredBranch], rho: float) -> Gro
     if top < 0.6:
         remarks.append(f"beta_max is extrapolated from {top:.2g} of v_max; it holds up to about there")
     missed = beta_max.value * _share(v, estimate.value) - beta
-    freedom = max(len(v) - (1 if found_rho is None else 2), 1)
     off_errors = sqrt(float(np.sum((missed / error) ** 2)) / freedom)
     off_share = sqrt(float(np.sum(missed**2)) / freedom) / float(np.max(np.abs(beta)))
     return Growth(beta_max, estimate, _peak(branches, beta, error, remarks), tuple(remarks), off_errors, off_share)

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from tablegen.calibration.gwyddion import data_fields
 from tablegen.calibration.table import Source, file_content, file_text, lines_of
 from tablegen.calibration.tiff import tiff_pages
-from tablegen.config.figures import shown_path
+from tablegen.figures import shown_path
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Problem, Rejected, shortened
 from tablegen.reading import IMAGE

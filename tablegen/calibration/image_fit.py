@@ -6,7 +6,7 @@ from math import sqrt
 import numpy as np
 from scipy.special import chdtrc
 
-from tablegen.calibration.branch import BINS, WINDOW, AmplitudeFit, measured_branch, peak
+from tablegen.calibration.branch import BINS, WINDOW, AmplitudeFit, measured_branch
 from tablegen.calibration.estimate import Curve, Estimate
 from tablegen.calibration.image_model import begin, check_signs, grown, prepared
 from tablegen.calibration.periodic import FitState, PeriodicModel
@@ -19,7 +19,7 @@ from tablegen.problems import Unphysical
 _MIN_EXPLAINED_VARIANCE = 0.03  # share of the variance
 _ARITHMETIC_ERROR = 1e-7  # share of the line that rounding may leave
 _MAX_MISFIT_PERCENT = 3.0  # percent of the line that the model may leave
-_MAX_XI_ERROR = 0.05  # largest standard error of xi
+_MAX_SHAPE_ERROR = 0.05  # largest standard error of the first coordinate of a branch
 _MISFIT_SIGNIFICANCE = 1e-3  # probability that noise alone is taken for misfit
 _MIN_SIGNED_BETA = 0.004  # least |beta| that is a sign
 
@@ -85,7 +85,7 @@ def _check(model: PeriodicModel, state: FitState, free: Bools) -> None:
     first = float(model.q(state.parameters)[0])
     if max(_carrying(model, state), first) < MIN_PERIODS - 0.2:
         raise Unphysical(f"the line has {first:.2g} periods; at least {MIN_PERIODS:g} are needed: scan more of them")
-    forward, backward = (peak(state.parameters[i : i + 2])[0] for i in (0, 2))
+    forward, backward = (BranchShape.at(state.parameters[i : i + 2]).peak()[0] for i in (0, 2))
     check_signs(forward, backward, _MIN_SIGNED_BETA, "try --retrace-mirrored")
 
 
@@ -104,11 +104,11 @@ def _result(model: PeriodicModel, state: FitState, free: Bools, v_scan: float) -
             f"and retrace of one scan, --window and --turn right, and the drive a triangle?"
         )
     covariance, widened = _covariance(model, state, free, misfit, clean)
-    if float(np.sqrt(np.max(np.diag(covariance)[[0, 2]]))) > _MAX_XI_ERROR:
+    if float(np.sqrt(np.max(np.diag(covariance)[[0, 2]]))) > _MAX_SHAPE_ERROR:
         raise Unphysical("these images do not determine the shape of the branches; scan more periods, or average")
     forward, backward = (measured_branch(x[i : i + 2], covariance[i : i + 2, i : i + 2]) for i in (0, 2))
     line = np.linspace(0.0, 1.0, 201)
-    lagging = [BranchShape(float(x[i]), float(x[i + 1])) for i in (0, 2)]
+    lagging = [BranchShape.at(x[i : i + 2]) for i in (0, 2)]
     apart = lagging[0].value(line) - line + lagging[1].value(1.0 - line) - (1.0 - line)
     carrying = _carrying(model, state)
     slope = max(float(np.max(model.columns(x, side).steep)) for side in (True, False))

@@ -5,7 +5,6 @@ from math import sqrt
 import numpy as np
 from scipy.optimize import least_squares
 
-from tablegen.calibration.branch import peak
 from tablegen.calibration.periodic import BASES, LAG, Columns, FitState, Geometry, PeriodicModel, settle
 from tablegen.calibration.spots import Bend, Spot, bend_of, column_phase, row_polynomial, second_base, strongest
 from tablegen.compensation.hysteresis import BranchShape
@@ -75,7 +74,7 @@ def prepared(
 def begin(geometry: Geometry, heights: list[Floats], mirrored: bool) -> tuple[Spot, tuple[Bend, Bend]]:
     """The strongest spot and each image's shape; whether the retrace is the trace's retrace."""
     spot = strongest(geometry, heights[0])
-    forward = bend_of(geometry, heights[0], True, spot, spot.xi)
+    forward = bend_of(geometry, heights[0], True, spot, spot.sharpest)
     backward = bend_of(geometry, heights[1], False, spot)
     turned = bend_of(geometry, heights[1][:, ::-1], False, spot)
     advice = "leave --retrace-mirrored out" if mirrored else "it needs --retrace-mirrored"
@@ -84,7 +83,7 @@ def begin(geometry: Geometry, heights: list[Floats], mirrored: bool) -> tuple[Sp
     if backward.match < 0.3 * forward.match:
         raise Unphysical("the retrace does not show the trace's pattern; are they from one scan?")
     # A grating square to the lines looks the same mirrored; then the bend tells.
-    signs = [peak(np.array([bend.xi, bend.xi_gamma]))[0] for bend in (forward, backward)]
+    signs = [bend.shape.peak()[0] for bend in (forward, backward)]
     check_signs(signs[0], signs[1], 0.02, advice)
     return spot, (forward, backward)
 
@@ -107,7 +106,7 @@ def grown(
     """The fit, first of the strongest spot, then with another base vector if there is one, and all spots seen."""
     images = list(zip((True, False), heights, strict=True))
     start = np.zeros(BASES + 1 + _ROW_POLYNOMIAL_ORDER)
-    start[:4] = [bends[0].xi, bends[0].xi_gamma, bends[1].xi, bends[1].xi_gamma]
+    start[:4] = np.concatenate([bend.shape.coordinates for bend in bends])
     start[LAG] = 1.0
     start[BASES] = 0.5 * (bends[0].q + bends[1].q)
     start[BASES + 1 :] = row_polynomial(geometry, heights[0], bends[0], spot, _ROW_POLYNOMIAL_ORDER)
@@ -168,12 +167,12 @@ def _tracked(
     phases = found[0][0], found[1][0] + turns
 
     def left(x: Floats) -> Floats:
-        if min(BranchShape(float(x[i]), float(x[i + 1])).least_slope() for i in (0, 2)) < 0.1:
+        if min(BranchShape.at(x[i : i + 2]).least_slope() for i in (0, 2)) < 0.1:
             return np.full(2 * geometry.columns, 1e3)
         columns = [Columns.of(geometry, forward, x[i : i + 2]) for i, forward in ((0, True), (2, False))]
         return np.concatenate([phase - x[4] * column.x - x[5] for phase, column in zip(phases, columns, strict=True)])
 
-    start = [bends[0].xi, bends[0].xi_gamma, bends[1].xi, bends[1].xi_gamma, q, float(phases[0][0])]
+    start = [*bends[0].shape.coordinates, *bends[1].shape.coordinates, q, float(phases[0][0])]
     best: Floats = least_squares(left, start, x_scale=[0.05, 0.1, 0.05, 0.1, 1.0, 0.3]).x
     off = left(best)
     if float(np.sqrt(np.mean(off**2))) < _PHASE_TOLERANCE:

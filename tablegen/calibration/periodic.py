@@ -22,8 +22,8 @@ from tablegen.problems import Unphysical
 
 Complexes = npt.NDArray[np.complex128]
 
-LAG, BASES = 4, 5  # indices of parameters; xi and xi gamma, forward and backward, come before them
-_COLUMN_TERMS = 5  # 1, x, and x by xi and xi gamma; the time within the line
+LAG, BASES = 4, 5  # indices of parameters; the coordinates of both branches come before them
+_COLUMN_TERMS = 5  # 1, x, and x by both coordinates; the time within the line
 _MIN_BRANCH_SLOPE = 0.05  # least du/dtau of a branch that is tried
 _ROW_PARABOLA_TERMS = 3  # terms of a row's parabola
 _MAX_STEPS = 100
@@ -71,7 +71,7 @@ class Geometry:
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """One direction: the position at each column, its derivatives by xi and xi gamma, the time in the line.
+    """One direction: the position at each column, its derivatives by the branch's coordinates, the time in the line.
 
     ``steep`` is dx/du.
     """
@@ -83,11 +83,11 @@ class Columns:
 
     @classmethod
     def of(cls, geometry: Geometry, forward: bool, shape: Floats) -> "Columns":
-        branch = BranchShape(float(shape[0]), float(shape[1]))
+        branch = BranchShape.at(shape)
         u = geometry.sweep(forward)
         tau = branch.inverse(u)
         steep = 1.0 / branch.slope(tau)
-        slopes = np.stack([-np.sin(pi * tau), 1.0 - 2.0 * tau - np.cos(pi * tau)]) * steep
+        slopes = -np.stack(BranchShape.basis(tau)) * steep
         if forward:
             return cls(tau, slopes, geometry.turn * u - 0.5, steep)
         return cls(1.0 - tau, -slopes, geometry.turn + (1.0 - geometry.turn) * u - 0.5, steep)
@@ -114,9 +114,9 @@ class PeriodicModel:
     """Levelled images, forward or backward each, and the spots: rows of whole numbers, one a base vector.
 
     ``order`` is that of the polynomial in y; ``off`` what is added to x, forward and backward: where it is known that
-    the branches are not (17), so that phases stay within a small part of a period. Parameters are xi and xi gamma
-    forward, the same backward, the lag of y within the line (1 where y is a ramp, 0 where it steps), then of each base
-    vector q and s_1, s_2, ...
+    the branches are not (17), so that phases stay within a small part of a period. Parameters are the
+    coordinates of the branch forward, then backward, the lag of y within the line (1 where y is a ramp, 0 where it
+    steps), then of each base vector q and s_1, s_2, ...
     """
 
     def __init__(
@@ -143,10 +143,7 @@ class PeriodicModel:
 
     def allowed(self, parameters: Floats) -> bool:
         """Whether both branches run forward."""
-        return all(
-            BranchShape(float(parameters[i]), float(parameters[i + 1])).least_slope() > _MIN_BRANCH_SLOPE
-            for i in (0, 2)
-        )
+        return all(BranchShape.at(parameters[i : i + 2]).least_slope() > _MIN_BRANCH_SLOPE for i in (0, 2))
 
     def at(self, parameters: Floats) -> FitState:
         """Everything at these parameters, the amplitudes the best for them."""

@@ -11,10 +11,11 @@ import tomlkit
 from tomlkit.items import AoT, InlineTable, Table
 
 from tablegen.calibration.hysteresis import TURN_TOLERANCE
+from tablegen.compensation.branch import LAW, MEASURED
 from tablegen.config.decode import decode
-from tablegen.config.schema import Scanner
-from tablegen.config.toml import parse_toml
+from tablegen.config.scanner import Scanner
 from tablegen.problems import Problem, Problems, Rejected
+from tablegen.toml import parse_toml
 
 _PROVENANCE_MARK = "# calibrate "
 _FIRST_MARK = re.compile(r"# calibrate (\w+)(?:, turn ([\d.]+))?: ")
@@ -109,14 +110,14 @@ def _put_branches(table: Any, branches: Sequence[Mapping[str, Any]]) -> None:
                 _set(entry, key, value)
                 continue
             # The two ways of a branch exclude each other.
-            old = {"beta_max", "rho", "u_peak"} if "points" in value else {"points"}
+            old = {*LAW} if {*MEASURED} & {*value} else {*MEASURED}
             present = entry.get(key)
             if not isinstance(present, Mapping) or (isinstance(present, InlineTable) and old & {*present}):
                 entry[key] = tomlkit.inline_table()
             for other in old:
                 entry[key].pop(other, None)
             for inner_key, inner in value.items():
-                _set(entry[key], inner_key, _points(inner) if inner_key == "points" else inner)
+                _set(entry[key], inner_key, _points(inner) if inner_key in MEASURED else inner)
 
 
 def _points(rows: Sequence[Mapping[str, Any]]) -> Any:

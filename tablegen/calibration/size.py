@@ -8,7 +8,7 @@ import numpy as np
 from tablegen.calibration.estimate import Curve, Estimate, Fit
 from tablegen.calibration.least_squares import Solution, solve
 from tablegen.calibration.outliers import outliers
-from tablegen.config.figures import at_most
+from tablegen.figures import at_most
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 

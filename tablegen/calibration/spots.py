@@ -17,8 +17,8 @@ from tablegen.problems import Unphysical
 
 MIN_PERIODS = 3.0
 _MIN_SEARCHED_PERIODS = 1.4  # periods; what is slower goes with the parabola of the rows
-_MAX_XI = 0.13  # |xi|: a tenth of the scan, and what a skew peak adds
-_MAX_XI_GAMMA = 0.2  # |xi gamma|
+_MAX_BEND = 0.13  # first coordinate of a branch: a tenth of the scan, and what a skew peak adds
+_MAX_SKEW = 0.2  # second coordinate
 _COARSE_STEP = 0.02
 _FINE_STEP_PERIODS = 0.25  # periods between neighbours of the search
 _MAX_PERIODS_PER_COLUMN = 0.33  # periods a column, where a branch may compress them by a third
@@ -29,20 +29,19 @@ _MIN_SPOT_POWER = 25.0  # times the mean power: what white noise does not reach
 
 @dataclass(frozen=True)
 class Spot:
-    """Periods in the line and in the frame, and xi with which it is sharpest."""
+    """Periods in the line and in the frame, and the first coordinate of the branch with which it is sharpest."""
 
     q: float
     s: float
-    xi: float
+    sharpest: float
 
 
 @dataclass(frozen=True)
 class Bend:
-    """One image's q, xi, xi gamma; ``match`` is how much of the spot follows it."""
+    """One image's q and branch; ``match`` is how much of the spot follows it."""
 
     q: float
-    xi: float
-    xi_gamma: float
+    shape: BranchShape
     match: float
 
 
@@ -51,17 +50,17 @@ def strongest(geometry: Geometry, heights: Floats) -> Spot:
     weight = np.hanning(geometry.rows + 2)[1:-1, None] * np.hanning(geometry.columns + 2)[1:-1]
     best = (0.0, 0, 0, 0.0, 1.0)
     kept = np.zeros((1, 1))
-    for xi in np.arange(-6, 7) * _COARSE_STEP:
-        straight, span = _straightened(geometry, heights, BranchShape(float(xi)))
+    for shape in np.arange(-6, 7) * _COARSE_STEP:
+        straight, span = _straightened(geometry, heights, BranchShape.at(np.array([shape, 0.0])))
         power = np.abs(np.fft.rfft2(weight * straight)) ** 2
         first = int(np.ceil(_MIN_SEARCHED_PERIODS * span))
         power[:, :first] = 0.0
         # The wave of a lattice along x is the most significant; the harmonics of a grating fall faster than 1 / q.
         row, column = divmod(int(np.argmax(power * np.arange(power.shape[1]))), power.shape[1])
         if power[row, column] * column > best[0]:
-            best = (float(power[row, column]) * column, row, column, float(xi), span)
+            best = (float(power[row, column]) * column, row, column, float(shape), span)
             kept = power
-    _, row, column, xi, span = best
+    _, row, column, sharpest, span = best
     # A rough surface has spectrum all around; held against what lies beside it, none of that stands out. The median,
     # as the mean of what is random, does not see another spot of a lattice.
     beside = np.concatenate([np.arange(3, 13), -np.arange(3, 13)])
@@ -77,34 +76,38 @@ def strongest(geometry: Geometry, heights: Floats) -> Spot:
         raise Unphysical(f"{q:.3g} periods in {geometry.columns} columns are too fine; scan less, or take more pixels")
     if q < MIN_PERIODS - 0.5:
         raise Unphysical(f"the line has about {q:.2g} periods; at least {MIN_PERIODS:g} are needed: scan more of them")
-    return Spot(q, s - count if s > count / 2 else s, xi)
+    return Spot(q, s - count if s > count / 2 else s, sharpest)
 
 
 def bend_of(geometry: Geometry, heights: Floats, forward: bool, spot: Spot, around: float | None = None) -> Bend:
-    """The shape with which a spot of this s is sharpest in a levelled image; xi near ``around``, or any."""
+    """The branch with which a spot of this s is sharpest in a levelled image.
+
+    Its first coordinate is near ``around``, or any.
+    """
     weight = np.hanning(geometry.rows + 2)[1:-1]
     profile = (weight * np.exp(-2j * np.pi * spot.s * geometry.y)) @ heights
     step = min(0.01, _FINE_STEP_PERIODS / spot.q)
-    reach = _MAX_XI if around is None else 1.5 * _COARSE_STEP
+    reach = _MAX_BEND if around is None else 1.5 * _COARSE_STEP
     centre = 0.0 if around is None else around
     count = int(np.ceil(reach / step))
     skew_count = int(
-        np.ceil(_MAX_XI_GAMMA / (2.4 * step))
-    )  # xi gamma moves the line by a fifth of what xi does, at two places
+        np.ceil(_MAX_SKEW / (2.4 * step))
+    )  # skew moves the line by a fifth of what bend does, at two places
     q = spot.q + np.arange(-8, 9) * _FINE_STEP_PERIODS
-    best = Bend(spot.q, 0.0, 0.0, 0.0)
+    best = Bend(spot.q, BranchShape(), 0.0)
     u = geometry.sweep(forward)
-    for xi, skew in product(
+    for bend, skew in product(
         centre + np.arange(-count, count + 1) * step, np.arange(-skew_count, skew_count + 1) * (2.4 * step)
     ):
-        tau = _inverse(float(xi), float(skew), u)
+        coordinates = np.array([bend, skew])
+        tau = _inverse(coordinates, u)
         if tau is None:
             continue
         x = tau if forward else 1.0 - tau
         match = np.abs(np.exp(-2j * np.pi * np.outer(q, x)) @ profile)
         at = int(np.argmax(match))
         if match[at] > best.match:
-            best = Bend(float(q[at]), float(xi), float(skew), float(match[at]))
+            best = Bend(float(q[at]), BranchShape.at(coordinates), float(match[at]))
     return best
 
 
@@ -112,7 +115,7 @@ def row_polynomial(
     geometry: Geometry, heights: Floats, bend: Bend, spot: Spot, order: int, smoothed: float = 0.01
 ) -> Floats:
     """s_1, s_2, ... of a forward image: the phase of the spot along the rows, ``smoothed`` over a part of the frame."""
-    tau = _inverse(bend.xi, bend.xi_gamma, geometry.sweep(True))
+    tau = _inverse(bend.shape.coordinates, geometry.sweep(True))
     assert tau is not None
     seen = (heights @ np.exp(-2j * np.pi * bend.q * tau)) * np.exp(-2j * np.pi * spot.s * geometry.y)
     box = np.ones(max(round(smoothed * geometry.rows), 1) | 1)
@@ -131,7 +134,7 @@ def column_phase(
     Over a whole period of x the harmonics, and the spot's other half, cancel. Within half a period of the ends the
     phase is that of the last whole one.
     """
-    tau = _inverse(bend.xi, bend.xi_gamma, geometry.sweep(forward))
+    tau = _inverse(bend.shape.coordinates, geometry.sweep(forward))
     assert tau is not None
     x = tau if forward else 1.0 - tau
     turns = np.polynomial.polynomial.polyval(geometry.y, np.append(0.0, polynomial))
@@ -157,13 +160,13 @@ def _straightened(geometry: Geometry, heights: Floats, branch: BranchShape) -> t
 @lru_cache(maxsize=1)
 def _grid() -> tuple[Floats, Floats, Floats]:
     tau = np.linspace(0.0, 1.0, 513)
-    return tau, np.sin(np.pi * tau), 2.0 * tau + np.cos(np.pi * tau) - 1.0
+    return tau, *BranchShape.basis(tau)
 
 
-def _inverse(xi: float, xi_gamma: float, u: Floats) -> Floats | None:
+def _inverse(coordinates: Floats, u: Floats) -> Floats | None:
     """tau(u) near enough to begin with; None where the branch runs backwards."""
     tau, first, second = _grid()
-    value = tau + xi * first + xi_gamma * second
+    value = tau + coordinates[0] * first + coordinates[1] * second
     if np.min(np.diff(value)) < 0.1 / 512:
         return None
     return np.interp(u, value, tau)
@@ -176,7 +179,7 @@ def second_base(
 
     With its polynomial in the rows; None where no spot has a tenth of ``amplitude``.
     """
-    branch = BranchShape(float(shape[0]), float(shape[1]))
+    branch = BranchShape.at(shape)
     straight, span = _straightened(geometry, left, branch)
     weight = np.hanning(geometry.rows + 2)[1:-1, None] * np.hanning(geometry.columns + 2)[1:-1]
     power = np.abs(np.fft.rfft2(weight * straight)) ** 2
@@ -192,5 +195,5 @@ def second_base(
     if not power[row, column] > least:
         return None
     spot = Spot(float(q[column]), float(row if row <= geometry.rows / 2 else row - geometry.rows), float(shape[0]))
-    bend = Bend(spot.q, float(shape[0]), float(shape[1]), 0.0)
+    bend = Bend(spot.q, branch, 0.0)
     return spot, row_polynomial(geometry, left, bend, spot, order, _MIN_SIDE_DISTANCE)

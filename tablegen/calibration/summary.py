@@ -17,6 +17,8 @@ from tablegen.calibration.scanner_file import Change
 from tablegen.calibration.size import SizeFit
 from tablegen.calibration.table import Source
 from tablegen.calibration.trace import TraceFit
+from tablegen.compensation.branch import LAW, MEASURED
+from tablegen.compensation.models.harmonic import HarmonicModel
 
 _DIRECTIONS = ("forward", "backward")
 
@@ -83,9 +85,9 @@ def change(
             for direction in _DIRECTIONS:
                 growth = getattr(branch, direction)
                 entry[direction] = (
-                    {"points": measured_points(branch, direction)}
+                    {key: measured_points(branch, direction) for key in MEASURED}
                     if points
-                    else {key: getattr(growth, key).rounded for key in ("beta_max", "rho", "u_peak")}
+                    else {key: getattr(growth, key).rounded for key in LAW}
                 )
             branches.append(entry)
             count = sum(trace.samples for trace in branch.traces)
@@ -94,7 +96,7 @@ def change(
             comments.append(
                 [f"{len(branch.traces)} {of}, {count} {what}, residual {fit.rms_percent:.2g} % rms{by_force}", *files]
             )
-        return Change("hysteresis", {"model": "harmonic"}, (), branches, comments)
+        return Change("hysteresis", {"model": HarmonicModel.model()}, (), branches, comments)
     values = {key: estimate.rounded for key, estimate, _ in parameters(fit) if not key.startswith("(")}
     match fit:
         case OffsetFit():
@@ -143,7 +145,7 @@ def _branch_record(branch: TurnFit) -> dict[str, Any]:
     data: dict[str, Any] = {"turn": _plain(branch.turn)}
     for direction in _DIRECTIONS:
         growth = getattr(branch, direction)
-        data[direction] = {key: _plain(getattr(growth, key)) for key in ("beta_max", "rho", "u_peak")}
+        data[direction] = {key: _plain(getattr(growth, key)) for key in LAW}
     data["traces"] = [_amplitude_record(trace) for trace in branch.traces]
     return data
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from tablegen.calibration.columns import Column, Conversion
-from tablegen.config.figures import shown_path
+from tablegen.figures import shown_path
 from tablegen.numerics.arrays import Floats, Ints
 from tablegen.problems import Problem, Rejected
 from tablegen.reading import MEASUREMENT, Kind, read_bytes

@@ -1,7 +1,6 @@
 """One trace, displacement against a triangular drive over one or more periods -> both branches of the model."""
 
 from dataclasses import dataclass
-from math import pi
 
 import numpy as np
 
@@ -83,7 +82,7 @@ def fit_trace(
 class _TraceModel:
     """displacement = low + height tau(t - delay) + drift.
 
-    Of the branches xi and xi gamma are fitted, in which (17) is linear, and not their peaks, which have poles.
+    Of the branches their coordinates are fitted, in which (17) is linear, and not their peaks, which have poles.
     """
 
     def __init__(self, triangle: Triangle, time_s: Floats, measured: Floats, order: int, delay_s: float | None) -> None:
@@ -96,7 +95,7 @@ class _TraceModel:
         self.given_delay = (delay_s or 0.0) / triangle.period_s  # in periods from here on
         s = 2.0 * (time_s - time_s[0]) / (time_s[-1] - time_s[0]) - 1.0
         self.drift = np.stack([s**n for n in range(1, order + 1)], axis=1) if order else np.zeros((len(s), 0))
-        shape = ["xi_f", "xi_gamma_f", "xi_b", "xi_gamma_b"]
+        shape = [f"{name}_{side}" for side in "fb" for name in BranchShape.COORDINATES]
         drifts = [f"drift_{n}" for n in range(1, order + 1)]
         self._last: tuple[Floats, tuple[Floats, Floats, Bools, Floats]] | None = None
         self.names = (*shape, "low", "height", *drifts, *(["delay"] if self.fits_delay else []))
@@ -116,7 +115,7 @@ class _TraceModel:
         rising = self.triangle.phase(delayed) < self.triangle.turn
         drive = self.triangle.value(delayed)
         u = np.where(rising, drive, 1.0 - drive)
-        forward, backward = (BranchShape(float(x[i]), float(x[i + 1])) for i in (0, 2))
+        forward, backward = _branches(x)
         tau = np.empty_like(u)
         tau[rising], tau[~rising] = forward.inverse(u[rising]), backward.inverse(u[~rising])
         return u, tau, rising, np.where(rising, tau, 1.0 - tau)
@@ -128,7 +127,7 @@ class _TraceModel:
 
     def residuals(self, x: Floats) -> Floats:
         """Model less measurement; far off where a branch would run backwards."""
-        if min(BranchShape(float(x[i]), float(x[i + 1])).least_slope() for i in (0, 2)) < 0.02:
+        if min(branch.least_slope() for branch in _branches(x)) < 0.02:
             return np.full(len(self.measured), _REVERSED_BRANCH_RESIDUAL)
         return self.expected(x) - self.measured
 
@@ -151,18 +150,18 @@ class _TraceModel:
 
     def _shape_columns(self, x: Floats) -> tuple[list[Floats], Floats]:
         _, tau, rising, position = self.position(x)
-        s, c = np.sin(pi * tau), np.cos(pi * tau)
+        basis = BranchShape.basis(tau)
         columns = []
         steep = np.empty_like(tau)
-        for i, side in ((0, rising), (2, ~rising)):
-            slope = BranchShape(float(x[i]), float(x[i + 1])).slope(tau)
-            sign = np.where(side, float(x[5]) / slope, 0.0) * (1.0 if i == 0 else -1.0)
-            columns += [-sign * s, -sign * (2.0 * tau + c - 1.0)]
+        for branch, side, way in zip(_branches(x), (rising, ~rising), (1.0, -1.0), strict=True):
+            slope = branch.slope(tau)
+            sign = np.where(side, float(x[5]) / slope, 0.0) * way
+            columns += [-sign * one for one in basis]
             steep = np.where(side, float(x[5]) / slope, steep)
         return [*columns, np.ones_like(tau), position, *self.drift.T], steep
 
     def solve(self) -> Solution:
-        """From a linear first guess: in u = tau + xi sin + ... the displacement itself is near enough to tau."""
+        """From a linear first guess: in u, tau and a small residual, the displacement itself is near enough to tau."""
         start = np.zeros(len(self.names))
         start[5] = 1.0
         u, _, rising, _ = self.position(start)
@@ -171,10 +170,10 @@ class _TraceModel:
             start[4], start[5] = 1.0, -1.0
         position = self.measured if upright else 1.0 - self.measured
         tau = np.clip(np.where(rising, position, 1.0 - position), 0.0, 1.0)
-        basis = np.stack([np.sin(pi * tau), 2.0 * tau + np.cos(pi * tau) - 1.0], axis=1)
+        basis = np.stack(BranchShape.basis(tau), axis=1)
         for i, side in ((0, rising), (2, ~rising)):
             guess = np.linalg.lstsq(basis[side], (u - tau)[side], rcond=None)[0]
-            while BranchShape(*guess.tolist()).least_slope() < 0.1:
+            while BranchShape.at(guess).least_slope() < 0.1:
                 guess = 0.7 * guess
             start[i : i + 2] = guess
         scales = np.full(len(start), 0.3)
@@ -219,6 +218,10 @@ def _result(model: _TraceModel, solution: Solution, triangle: Triangle, periods:
     )
 
 
+def _branches(x: Floats) -> tuple[BranchShape, BranchShape]:
+    return BranchShape.at(x[:2]), BranchShape.at(x[2:4])
+
+
 def correlation_length(residuals: Floats) -> float:
     """Over how many samples residuals depend on each other: 1 for white noise. Shape (n,), or (n, series) of one kind.
 
@@ -248,7 +251,7 @@ def _averaged(model: _TraceModel, x: Floats, left: Floats) -> tuple[Floats, tupl
         residuals.append(100.0 * mean)
         scaling.append(100.0 * float(np.ptp(np.diff(mean)[WINDOW]) * BINS))
         at = np.bincount(place, u[side], minlength=BINS) / count
-        fitted = BranchShape(*shape.tolist()).inverse(at)
+        fitted = BranchShape.at(shape).inverse(at)
         drawn.append((at, 100.0 * (mean + fitted - at), 100.0 * (fitted - at)))
     # As figure 5a has it: against the drive, the backward branch mirrored.
     (f_at, f_measured, f_fitted), (b_at, b_measured, b_fitted) = drawn

@@ -14,7 +14,7 @@ from tablegen.certificate.line_errors import (
     refined,
     scaling_error,
 )
-from tablegen.compensation.hysteresis import BranchShape
+from tablegen.compensation.line import Sweep
 from tablegen.planning.line_plan import LinePlan, Plan
 from tablegen.problems import Document, Problem
 
@@ -141,7 +141,7 @@ def _scaling(line: LinePlan, played: EmittedPeriod) -> dict[str, ScalingError]:
     return {side: scaling_error(line, played, side, branch) for side, branch in _directions(line).items()}
 
 
-def _directions(line: LinePlan) -> dict[str, BranchShape]:
+def _directions(line: LinePlan) -> dict[str, Sweep]:
     """The branches that image."""
     shape = line.drive.shape
     both = {"forward": shape.forward, "backward": shape.backward}

@@ -11,7 +11,7 @@ from math import ceil, floor, log10
 import numpy as np
 
 from tablegen.compensation.dynamics import capped_inverse
-from tablegen.compensation.hysteresis import BranchShape
+from tablegen.compensation.line import Sweep
 from tablegen.fixedpoint.runs import Runs, runs_of
 from tablegen.numerics.arrays import Floats, Ints, merged
 from tablegen.planning.line_plan import LinePlan
@@ -127,54 +127,52 @@ class EmittedPeriod:
         return merged(*(ticks[slice(*np.searchsorted(ticks, (first, stop)))] for ticks in both))
 
 
-def _times(line: LinePlan, side: str, position: Floats) -> Floats:
-    """When the sweep of one direction passes a normalised position, in periods."""
-    turn = line.drive.turn
-    return turn * position if side == "forward" else turn + (1.0 - turn) * (1.0 - position)
-
-
-def scaling_error(line: LinePlan, played: EmittedPeriod, side: str, branch: BranchShape) -> ScalingError:
+def scaling_error(line: LinePlan, played: EmittedPeriod, side: str, branch: Sweep) -> ScalingError:
     low, high = line.band_limit.window
     position = np.linspace(low, high, _POINTS_PER_HARMONIC * line.target.harmonics + 513)
-    times = _times(line, side, position)
-    ideal_slope = line.drive.shape.slope(times)
-    target_slope, reached_slope, value = _slopes_and_value(line, times)
-    # Where the modelled piezo is, to first order in a deviation of at most some percent: x - tau = (w - u) / u'. What
-    # the layer moves is no error: it is there for what the model does not know.
+    deviation, speed, wanted_speed = _followed(line, side, position)
     sweep = position if side == "forward" else 1.0 - position
     steepness = branch.slope(sweep)
-    deviation = (value - line.drive.shape.value(times)) / steepness
     chords, noise = _chords(line, played, side, position, deviation, steepness)
     # A triangle leaves the piezo at the inverse of the branch, whose slope is 1 / u'.
     triangle = 1.0 / branch.slope(branch.inverse(sweep))
     middle = float(1.0 / branch.slope(branch.inverse(0.5)))
     return ScalingError(
         total=_peak_to_peak(chords),
-        band_limit=_peak_to_peak(target_slope / ideal_slope),
+        band_limit=_peak_to_peak(wanted_speed),
         quantisation=_peak_to_peak(noise),
-        model=_peak_to_peak((reached_slope - target_slope) / ideal_slope),
+        model=_peak_to_peak(speed - wanted_speed),
         size=100.0 * float(deviation[-1] - deviation[0]) / (high - low),
         uncompensated=_peak_to_peak(triangle / middle),
     )
 
 
-def _slopes_and_value(line: LinePlan, times: Floats) -> tuple[Floats, Floats, Floats]:
-    """The slope of the target, and slope and value of what the piezo sees of it; all without the layer."""
-    reached = _reached(line)
-    target_slope, reached_slope, value = values(times, (line.target, 1), (reached, 1), (reached, 0))
-    if line.layer is None:
-        return target_slope, reached_slope, value
-    layer_value, layer_slope = values(times, (line.layer, 0), (line.layer, 1))
-    return target_slope - layer_slope, reached_slope - layer_slope, value - layer_value
+def _followed(line: LinePlan, side: str, position: Floats) -> tuple[Floats, Floats, Floats]:
+    """Where the modelled piezo is, less ``position``; its speed over the line's; and that if the target arrived.
+
+    What the layer moves is no error: it is there for what the model does not know. So all is taken without it.
+    """
+    shape, reached = line.drive.shape, _reached(line)
+    times = shape.times(side, position)
+
+    def follow(series: FourierSeries) -> tuple[Floats, Floats]:
+        value, slope = values(times, (series, 0), (series, 1))
+        if line.layer is not None:
+            layer_value, layer_slope = values(times, (line.layer, 0), (line.layer, 1))
+            series, value, slope = series.less(line.layer), value - layer_value, slope - layer_slope
+        return shape.followed(side, position, series, value, slope)
+
+    wanted = follow(line.target)
+    return *(wanted if reached is line.target else follow(reached)), wanted[1]
 
 
-def refined(line: LinePlan, side: str, branch: BranchShape) -> Refined:
+def refined(line: LinePlan, side: str, branch: Sweep) -> Refined:
     """What the layer does, to first order: it moves the modelled piezo by r / u'."""
     assert line.layer is not None
     low, high = line.band_limit.window
     position = np.linspace(low, high, _POINTS_PER_HARMONIC * line.target.harmonics + 513)
     steepness = branch.slope(position if side == "forward" else 1.0 - position)
-    moved = line.layer.value(_times(line, side, position)) / steepness
+    moved = line.layer.value(line.drive.shape.times(side, position)) / steepness
     return Refined(100.0 * float(np.max(np.abs(moved))), _peak_to_peak(np.gradient(moved, position)))
 
 
@@ -206,7 +204,7 @@ def _chords(
     """
     ticks, turn = line.program.ticks, line.drive.turn
     share = turn if side == "forward" else 1.0 - turn
-    ends = sorted(float(t) * ticks for t in _times(line, side, position[[0, -1]]))
+    ends = sorted(float(t) * ticks for t in line.drive.shape.times(side, position[[0, -1]]))
     first, stop = ceil(ends[0] - 0.5), floor(ends[1] - 0.5) + 1
     baseline = max(1, min(round(CHORD * share * ticks), stop - first - 1))
     if stop - first < 2:

@@ -15,9 +15,9 @@ from msgspec import structs
 from tablegen.certificate.certificate import scaling_errors
 from tablegen.certificate.excess import Cause, Excess, excess
 from tablegen.certificate.line_errors import EmittedPeriod
-from tablegen.config.figures import at_least, at_most
 from tablegen.config.load import Setup
 from tablegen.config.schema import FastAxis
+from tablegen.figures import at_least, at_most
 from tablegen.fixedpoint.phase import MAXIMUM_TICKS
 from tablegen.planning.line_plan import LinePlan, Plan, make_plan
 from tablegen.problems import Rejected

@@ -22,7 +22,8 @@ def scan_warnings(setup: Setup, plan: Plan, certificates: Mapping[str, Certifica
     """
     warnings = []
     for line, found in _found(plan, certificates):
-        why = f"{found.text(line.axis)}; {_share(line, found)}{_advice(setup, plan, line, found)}"
+        share = _share(line, found, certificates[line.axis])
+        why = f"{found.text(line.axis)}; {share}{_advice(setup, plan, line, found)}"
         warnings.append(setup.scan_file.problem(_key(setup, line, found), why))
     if apart := apart_warning(plan):
         given = setup.scan.timing.ticks_per_line is not None
@@ -56,13 +57,13 @@ def _found(plan: Plan, certificates: Mapping[str, Certificate]) -> list[tuple[Li
     return [(line, found) for line, found in every if found is not None]
 
 
-def _share(line: LinePlan, found: Excess) -> str:
+def _share(line: LinePlan, found: Excess, certificate: Certificate) -> str:
     """What of the converter, of the table or of the band the scan uses."""
     if found.cause == "quantisation":
-        codes, full = abs(line.codes_per_unit), 1 << line.converter.bits
-        word = codes * line.scale / 2.0**line.program.bits
+        codes, full = certificate.highest_code - certificate.lowest_code + 1, 1 << line.converter.bits
+        word = abs(line.codes_per_unit) * line.scale / 2.0**line.program.bits
         coarse = f", and a word of the table {word:.3g} codes" if word > 0.5 else ""
-        return f"the scan is {codes:.0f} of the converter's {full} codes{coarse}; "
+        return f"the scan spans {codes} of the converter's {full} codes{coarse}; "
     if found.cause == "model":
         return f"max_boost_db holds back {len(line.held_harmonics)} of {line.series.harmonics} harmonics; "
     return ""

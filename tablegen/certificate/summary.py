@@ -27,7 +27,7 @@ def drive_lines(line: LinePlan) -> list[tuple[str, str]]:
         ("m", f"{drive.m:.6f}   offset, (1)"),
         ("g", f"{drive.g:.6f}   frequency, (23)"),
         ("m g V_scan", f"{drive.v_amplitude:.6g} V peak to peak"),
-        ("branches", _branches(line)),
+        ("branches", line.drive.hysteresis.described(line.drive.shape)),
         ("line", f"{line.program.ticks} ticks, {rate(line.rate)}{_asked(line)}, turn {drive.turn:g}"),
         (
             "harmonics",
@@ -54,14 +54,6 @@ def _hold(line: LinePlan) -> str:
         return text
     raised = 20.0 * log10(float(np.hypot(*hold_inverse(line.series.harmonics, codes, steps=False))[-1]))
     return text if raised < 0.001 else f"{text}; the highest harmonic raised by {raised:.2g} dB"
-
-
-def _branches(line: LinePlan) -> str:
-    drive = line.drive
-    if drive.model == "triangle":
-        return "triangle, hysteresis not compensated"
-    sides = (("forward", drive.forward), ("backward", drive.backward))
-    return f"{drive.model}; " + ", ".join(f"{side} beta {b.beta:.5f} u_peak {b.u_peak:.4g}" for side, b in sides)
 
 
 def _method(line: LinePlan) -> str:
@@ -155,7 +147,7 @@ def notes(plan: Plan) -> list[str]:
         + f" pixels: the lines inside the window of y, of {schedule.lines} a frame"
     )
     for line in plan.lines:
-        if line.drive.model == "triangle":
+        if not line.drive.hysteresis.compensates:
             found.append(f"hysteresis of {line.axis} is not compensated: the scanner file has no model for it")
     return found
 

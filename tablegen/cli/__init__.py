@@ -109,7 +109,7 @@ def _run() -> int:
         error.show()
         return error.exit_code
     except (click.Abort, KeyboardInterrupt):
-        click.echo("interrupted; the output directory was left as it was", err=True)
+        click.echo("interrupted", err=True)
         return ExitStatus.INTERRUPTED
     except BrokenPipeError:
         return _reader_left()

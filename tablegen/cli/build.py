@@ -92,8 +92,11 @@ def build(
     if depfile is not None and only_check:
         raise click.UsageError("--check cannot be used with --depfile")
     rule = Depfile(depfile, depfile_target or str(output / "manifest.json"), scan) if depfile is not None else None
-    built = planned(scan, list(formats) or None, strict)
-    files = rendered(built)
+    try:
+        built = planned(scan, list(formats) or None, strict)
+        files = rendered(built)
+    except KeyboardInterrupt:
+        fail([f"interrupted; {output} was left as it was"], ExitStatus.INTERRUPTED)
     if only_check:
         from tablegen.cli.difference import differences
 

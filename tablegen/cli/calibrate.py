@@ -7,6 +7,7 @@ from typing import Literal
 
 import click
 
+from tablegen.cli.calibrate_operator import operator
 from tablegen.cli.calibration_run import (
     Common,
     finish,
@@ -225,6 +226,9 @@ def hysteresis(
     v_max = full_scale(common)
     traces = [trace for table in tables for trace in split_traces(table)]
     return finish(common, tables, lambda: fit_hysteresis(traces, v_max, rho, settle, drift, delay), points)
+
+
+calibrate.add_command(operator)
 
 
 @calibrate.command(short_help="Fit beta_max, rho, u_peak to trace and retrace images.")

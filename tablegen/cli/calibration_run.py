@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from tablegen.calibration.image_files import ScanImage
     from tablegen.calibration.resonance import ResonanceFit
     from tablegen.calibration.table import MeasuredTable, Source
+    from tablegen.compensation.dynamics import Response
+    from tablegen.compensation.offset import OffsetLaw
     from tablegen.compensation.size import SizeLaw
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -138,8 +140,8 @@ def within(table: "MeasuredTable", from_hz: float, to_hz: float) -> "MeasuredTab
 
 def _scanner_values(common: Common) -> dict[str, Any]:
     """What the scanner file says now; nothing where it is to be made."""
-    from tablegen.config.toml import read_toml
     from tablegen.problems import Rejected
+    from tablegen.toml import read_toml
 
     if common.scanner is None or (common.write and not common.scanner.exists()):
         return {}
@@ -176,9 +178,9 @@ def size_law(common: Common, v_max: float, size_v: float) -> "SizeLaw":
     """The size law of the scanner file, for images of ``size_v`` volts; the rest of the file may be incomplete."""
     from tablegen.compensation.size import SizeLaw
     from tablegen.config.decode import decode
-    from tablegen.config.schema import Scanner
-    from tablegen.config.toml import read_toml
+    from tablegen.config.scanner import Scanner
     from tablegen.problems import Problems, Unphysical
+    from tablegen.toml import read_toml
 
     path = f"{common.axis}.size"
     if in_file(common, "size", "k_nm_per_v") is None:
@@ -196,6 +198,33 @@ def size_law(common: Common, v_max: float, size_v: float) -> "SizeLaw":
         return SizeLaw.calibrated(size.k_nm_per_v, v_max, size.beta, size.base_nm, size.v_threshold)
     except Unphysical as reason:
         fail([f"{common.scanner}: {path}: {reason}"], ExitStatus.WRONG_INPUT)
+
+
+def scanner_axis(common: Common, v_max: float) -> "tuple[Response | None, OffsetLaw]":
+    """The dynamics and the offset law of the scanner file; without them, none and a constant."""
+    from tablegen.compensation.offset import OffsetLaw
+    from tablegen.config.decode import decode
+    from tablegen.config.scanner import Scanner
+    from tablegen.planning.drive import dynamics_of, offset_law_of
+    from tablegen.problems import Problems, Unphysical
+    from tablegen.toml import read_toml
+
+    if common.scanner is None or not common.scanner.exists():
+        return None, OffsetLaw()
+    values, document = read_toml(common.scanner, str(common.scanner))
+    tables: dict[str, Any] = {}
+    problems = Problems()
+    decode(Scanner, values, document, problems, lambda _kind, key, _values, built: tables.update({key: built}))
+    found = [problem for problem in problems.found if problem.key.startswith(f"{common.axis}.")]
+    used = [problem for problem in found if problem.key.split(".")[1] in ("offset", "resonance")]
+    if used:
+        fail(used, ExitStatus.WRONG_INPUT)
+    resonance, offset = (tables.get(f"{common.axis}.{name}") for name in ("resonance", "offset"))
+    try:
+        response = None if resonance is None else dynamics_of(resonance, common.scanner.parent)
+        return response, OffsetLaw() if offset is None else offset_law_of(offset, v_max)
+    except Unphysical as reason:
+        fail([f"{common.scanner}: {common.axis}: {reason}"], ExitStatus.WRONG_INPUT)
 
 
 def finish(

@@ -21,11 +21,11 @@ def schema(kind: str) -> None:
     """
     import json
 
-    from msgspec.json import schema as schema_of
+    from tablegen.config.describe import json_schema
+    from tablegen.config.scanner import Scanner
+    from tablegen.config.schema import Scan
 
-    from tablegen.config.schema import Scan, Scanner
-
-    described = schema_of(Scan if kind == "scan" else Scanner)
+    described = json_schema(Scan if kind == "scan" else Scanner)
     described = {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": f"tablegen {kind}",

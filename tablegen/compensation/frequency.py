@@ -1,6 +1,6 @@
 """Loss of amplitude with the scan rate, equation (23)."""
 
-from tablegen.config.figures import at_most
+from tablegen.figures import at_most
 from tablegen.numerics.elementary import log10
 from tablegen.problems import Unphysical
 

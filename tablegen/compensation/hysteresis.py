@@ -1,12 +1,15 @@
-"""Hysteresis of the line, equations (13)-(22): the shape of each branch, and how it grows with the scan size."""
+"""One harmonic of hysteresis, equations (13)-(22): the shape of a branch, and how it grows with the scan size."""
 
 from dataclasses import dataclass
 from math import atan, pi, sqrt
+from typing import ClassVar
 
 import numpy as np
 
-from tablegen.numerics.arrays import Bools, Floats, FloatsLike
+from tablegen.compensation.line import Sweep
+from tablegen.numerics.arrays import Floats, FloatsLike
 from tablegen.numerics.elementary import exp
+from tablegen.numerics.moments import plain_moment, ramp_moment
 from tablegen.numerics.turns import cosine, sine, sine_and_cosine
 from tablegen.problems import Unphysical
 
@@ -16,12 +19,14 @@ HIGHEST_PEAK = 1.0 - LOWEST_PEAK
 
 
 @dataclass(frozen=True, slots=True)
-class BranchShape:
+class BranchShape(Sweep):
     """u(tau) = lambda tau + xi sin(pi tau) + xi_gamma (cos(pi tau) - 1) with lambda = 1 + 2 xi_gamma, (17), (18).
 
     tau in [0, 1] runs with the sweep, for both directions; the backward branch of (17) is 1 - u(1 - tau).
     The sinusoidal model (15) has xi_gamma = 0, the triangle xi = 0 as well. Dimensionless.
     """
+
+    COORDINATES: ClassVar[tuple[str, ...]] = ("xi", "xi_gamma")
 
     xi: float = 0.0
     xi_gamma: float = 0.0
@@ -60,6 +65,41 @@ class BranchShape:
             raise Unphysical(f"{what} makes the branch run backwards, its slope falls to {steepness:.4g}; lower it")
         return self
 
+    @classmethod
+    def at(cls, coordinates: Floats) -> "BranchShape":
+        """The branch at a point of ``basis``, (2,), whether it runs forward or not."""
+        return cls(float(coordinates[0]), float(coordinates[1]))
+
+    @property
+    def coordinates(self) -> Floats:
+        """(2,): of the branch in ``basis``."""
+        return np.array([self.xi, self.xi_gamma])
+
+    @staticmethod
+    def basis(tau: Floats) -> tuple[Floats, Floats]:
+        """d u(tau) by each coordinate: the branch is tau and a sum of these, so that fits are linear and have no poles.
+
+        For calibration: numpy's sines, whose last bits differ between processors.
+        """
+        return np.sin(pi * tau), 2.0 * tau + np.cos(pi * tau) - 1.0
+
+    def peak(self) -> tuple[float, float]:
+        """beta and u_peak: u - tau turns once between the poles of (20)."""
+        tau = np.linspace(LOWEST_PEAK, HIGHEST_PEAK, 257)
+        slope = pi * self.xi * np.cos(pi * tau) + self.xi_gamma * (2.0 - pi * np.sin(pi * tau))
+        turning = np.flatnonzero(np.sign(slope[1:]) != np.sign(slope[:-1]))
+        if not len(turning):  # no hysteresis at all
+            return 0.0, 0.5
+        at = int(turning[0])
+        low, high = float(tau[at]), float(tau[at + 1])
+        rising = slope[at] > 0.0
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            value = pi * self.xi * np.cos(pi * middle) + self.xi_gamma * (2.0 - pi * np.sin(pi * middle))
+            low, high = (middle, high) if (value > 0.0) == rising else (low, middle)
+        beta = self.xi * np.sin(pi * low) + self.xi_gamma * (np.cos(pi * low) - 1.0 + 2.0 * low)
+        return float(beta), float(low + beta)
+
     def value(self, tau: FloatsLike) -> Floats:
         """u(tau), equation (17)."""
         tau = np.asarray(tau, dtype=np.float64)
@@ -71,14 +111,17 @@ class BranchShape:
         s, c = sine_and_cosine(0.5 * np.asarray(tau, dtype=np.float64))
         return self.linear + pi * (self.xi * c - self.xi_gamma * s)
 
-    def inverse(self, u: FloatsLike) -> Floats:
-        """tau(u): where the modelled piezo is when the normalised drive is u. Clipped to u in [0, 1]."""
-        u = np.clip(np.asarray(u, dtype=np.float64), 0.0, 1.0)
-        grid = np.linspace(0.0, 1.0, 1025)
-        tau = np.interp(u, self.value(grid), grid)
-        for _ in range(2):  # the grid is within 1e-6; each Newton step squares that
-            tau = tau - (self.value(tau) - u) / self.slope(tau)
-        return tau
+    def moments(self, y: Floats) -> tuple[Floats, Floats]:
+        """int_0^1 u(s) exp(-2 pi i y s) ds, real and imaginary part, in closed form."""
+        ramp, plain = ramp_moment(y), plain_moment(y)
+        below, above = plain_moment(y - 0.5), plain_moment(y + 0.5)  # of exp(+- i pi s) times the kernel
+        sine = 0.5 * (below[1] - above[1]), 0.5 * (above[0] - below[0])
+        cosine = 0.5 * (below[0] + above[0]), 0.5 * (below[1] + above[1])
+        linear, xi, xi_gamma = self.linear, self.xi, self.xi_gamma
+        return (
+            linear * ramp[0] + xi * sine[0] + xi_gamma * (cosine[0] - plain[0]),
+            linear * ramp[1] + xi * sine[1] + xi_gamma * (cosine[1] - plain[1]),
+        )
 
     def least_slope(self) -> float:
         """The least du/dtau over [0, 1]: at an end, or where xi cos + ... turns, that is tan(pi tau) = -xi_gamma/xi."""
@@ -87,32 +130,6 @@ class BranchShape:
             turning = (atan(-self.xi_gamma / self.xi) / pi) % 1.0 if self.xi else 0.5
             candidates.append(turning)
         return float(np.min(self.slope(candidates)))
-
-
-@dataclass(frozen=True, slots=True)
-class LineShape:
-    """The periodic normalised waveform of one line: forward for 0 < t <= turn, backward after, (14) and (17)."""
-
-    turn: float
-    forward: BranchShape
-    backward: BranchShape
-
-    def value(self, t: FloatsLike) -> Floats:
-        """w(t) with t in periods."""
-        going, tau = self._split(t)
-        return np.where(going, self.forward.value(tau), 1.0 - self.backward.value(tau))
-
-    def slope(self, t: FloatsLike) -> Floats:
-        """dw/dt per period."""
-        going, tau = self._split(t)
-        rise = self.forward.slope(tau) / self.turn
-        return np.where(going, rise, -self.backward.slope(tau) / (1.0 - self.turn))
-
-    def _split(self, t: FloatsLike) -> tuple[Bools, Floats]:
-        t = np.asarray(t, dtype=np.float64)
-        t = t - np.floor(t)
-        going = t <= self.turn
-        return going, np.where(going, t / self.turn, (t - self.turn) / (1.0 - self.turn))
 
 
 def beta_at(v_scan_normalised: float, beta_max: float, rho: float) -> float:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tablegen.config.figures import at_most
+from tablegen.figures import at_most
 from tablegen.numerics.arrays import tree_sum
 from tablegen.numerics.linear import Cholesky
 from tablegen.problems import Unphysical

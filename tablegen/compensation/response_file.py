@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from tablegen.compensation.dynamics import Measured
-from tablegen.config.figures import shown_path
+from tablegen.figures import shown_path
 from tablegen.problems import Unphysical
 from tablegen.reading import RESPONSE, read_bytes
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from math import sqrt
 
-from tablegen.config.figures import at_most
+from tablegen.figures import at_most
 from tablegen.problems import Unphysical
 
 

@@ -8,8 +8,10 @@ from typing import Any, TypeAlias, TypeVar
 import msgspec.inspect as types
 from msgspec import Struct
 
-from tablegen.config.toml import join_key
+from tablegen.compensation import models
+from tablegen.compensation.model import Hysteresis
 from tablegen.problems import Document, Problems
+from tablegen.toml import join_key
 
 T = TypeVar("T", bound=Struct)
 
@@ -70,12 +72,18 @@ class _Decoder:
         assert isinstance(kind, types.StructType)
         if not isinstance(value, dict):
             return self._wrong(key, f"{_shown(value)} is not a table")
-        known = {field.encode_name: field for field in kind.fields}
         good, built = True, {}
-        unknown = [name for name in value if name not in known]
+        if kind.cls is Hysteresis:
+            known_model = self._model(value, key)
+            if known_model is None:  # nobody knows its keys
+                return _ALREADY_REPORTED
+            kind = known_model
+        known = {field.encode_name: field for field in kind.fields}
+        tag = () if kind.tag_field is None else (kind.tag_field,)
+        unknown = [name for name in value if name not in known and name not in tag]
         for name in unknown:
             good = False
-            self._wrong(join_key(key, name), f"unknown key; {_suggestion(name, list(known), value)}")
+            self._wrong(join_key(key, name), f"unknown key; {_suggestion(name, [*tag, *known], value)}")
         for name, field in known.items():
             if name in value:
                 built[name] = self._any(field.type, value[name], join_key(key, name))
@@ -88,6 +96,19 @@ class _Decoder:
         made = kind.cls(**built) if good else None
         self._check(kind.cls, key, value, made)
         return made if good else _ALREADY_REPORTED
+
+    def _model(self, value: dict[str, Any], key: str) -> types.StructType | None:
+        """The type of a hysteresis table by the name in it; None where there is no such model."""
+        name = value.get("model", models.DEFAULT)
+        try:
+            if not isinstance(name, str):
+                raise models.UnknownModel(f"{_shown(name)} is not one of {', '.join(map(repr, models.names()))}")
+            kind = types.type_info(models.get(name))
+        except models.UnknownModel as why:
+            self._wrong(join_key(key, "model"), str(why))
+            return None
+        assert isinstance(kind, types.StructType)
+        return kind
 
     def _list(self, kind: types.ListType, value: Any, key: str) -> Any:
         if not isinstance(value, list):

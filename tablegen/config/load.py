@@ -9,28 +9,15 @@ from typing import Any
 
 from msgspec import Struct
 
+from tablegen.compensation.model import Parameters
 from tablegen.config.decode import decode, meant
-from tablegen.config.figures import shown_path
 from tablegen.config.names import why_not_a_name
-from tablegen.config.schema import (
-    MAXIMUM_FILE_NAME,
-    MAXIMUM_NAME,
-    Amplifier,
-    BandLimit,
-    Branch,
-    Dac,
-    FastAxis,
-    Hysteresis,
-    Offset,
-    Refinement,
-    Resonance,
-    Scan,
-    Scanner,
-    Table,
-    Timing,
-)
-from tablegen.config.toml import read_toml
+from tablegen.config.scanner import Offset, Resonance, Scanner
+from tablegen.config.schema import MAXIMUM_NAME, Amplifier, BandLimit, Dac, FastAxis, Refinement, Scan, Table, Timing
+from tablegen.figures import shown_path
 from tablegen.problems import Document, Problems, Rejected
+from tablegen.quantities import MAXIMUM_FILE_NAME
+from tablegen.toml import read_toml
 
 
 @dataclass(frozen=True, repr=False)
@@ -48,11 +35,14 @@ class Setup:
 
     @property
     def files(self) -> list[Path]:
-        """Every file that decides this scan, each once: the scan, the scanner, and the responses that it names."""
-        files = (Path(file.name) for file in (self.scan_file, self.scanner_file) if file.lines is not None)
-        resonances = (axis.resonance for axis in (self.scanner.x, self.scanner.y))
-        responses = (self.scanner_folder / r.response for r in resonances if r is not None and r.response is not None)
-        return list(dict.fromkeys((*files, *responses)))
+        """Every file that decides this scan, each once: the scan, the scanner, and the files that it names."""
+        files = [Path(file.name) for file in (self.scan_file, self.scanner_file) if file.lines is not None]
+        for axis in (self.scanner.x, self.scanner.y):
+            if axis.resonance is not None and axis.resonance.response is not None:
+                files.append(self.scanner_folder / axis.resonance.response)
+            if axis.hysteresis is not None:
+                files += [self.scanner_folder / name for name in axis.hysteresis.files()]
+        return list(dict.fromkeys(files))
 
 
 def load(path: str | Path) -> Setup:
@@ -62,11 +52,14 @@ def load(path: str | Path) -> Setup:
     """
     path = Path(path)
     values, scan_file = read_toml(path, str(path))
+    if "v_max" in values and "dac" not in values:  # else every key of it is a fault, and none says this
+        why = f"this is a scanner file; give the scan file that names it, scanner = '{shown_path(Path(path.name))}'"
+        raise Rejected([scan_file.problem("", why)])
     problems = Problems()
     scan = decode(Scan, values, scan_file, problems, partial(_check, scan_file, problems))
     name = values.get("name")
-    if isinstance(name, str) and 0 < len(name) <= MAXIMUM_NAME and (why := why_not_a_name(name)):
-        problems.add(scan_file, "name", why)
+    if isinstance(name, str) and 0 < len(name) <= MAXIMUM_NAME and (fault := why_not_a_name(name)):
+        problems.add(scan_file, "name", fault)
 
     named = values.get("scanner")
     if not isinstance(named, str) or not 0 < len(named) <= MAXIMUM_FILE_NAME:
@@ -81,6 +74,9 @@ def load(path: str | Path) -> Setup:
         scanner_values, scanner_file = read_toml(scanner_path, str(scanner_path))
     except Rejected as rejected:
         raise Rejected(problems.found + rejected.problems) from None
+    if "dac" in scanner_values and "v_max" not in scanner_values:
+        problems.add(scan_file, "scanner", f"{shown_path(scanner_path)} is a scan file, not a scanner file")
+        raise Rejected(problems.found)
     scanner = decode(Scanner, scanner_values, scanner_file, problems, partial(_check, scanner_file, problems))
     problems.stop_if_any()
     assert scan is not None
@@ -132,8 +128,9 @@ def _check(file: Document, problems: Problems, kind: type, key: str, written: Ma
         _check_ways(key, written, file, problems)
     elif kind is Resonance:
         _check_response(key, written, file, problems)
-    elif kind is Branch:
-        _check_branch(key, written, file, problems)
+    elif issubclass(kind, Parameters):
+        for name, why in kind.contradictions(written):
+            problems.add(file, f"{key}.{name}", why)
     if built is not None:
         for name, why in _faults(built):
             problems.add(file, f"{key}.{name}", why)
@@ -177,16 +174,6 @@ def _check_response(key: str, written: Mapping[str, Any], file: Document, proble
                 problems.add(file, f"{key}.{name}", f"missing beside {other}")
 
 
-def _check_branch(key: str, written: Mapping[str, Any], file: Document, problems: Problems) -> None:
-    if "points" not in written:
-        if "beta_max" not in written:
-            problems.add(file, f"{key}.beta_max", "missing; give beta_max, rho and u_peak of (22), or points")
-        return
-    for name in ("beta_max", "rho", "u_peak"):
-        if name in written:
-            problems.add(file, f"{key}.{name}", "points is given as well; keep one of the two")
-
-
 def _faults(built: Struct) -> list[tuple[str, str]]:
     """Keys of a table that contradict each other, and why."""
     match built:
@@ -208,8 +195,8 @@ def _faults(built: Struct) -> list[tuple[str, str]]:
                 return [("length", f"{built.length} is not a power of two; the nearest are {lower} and {2 * lower}")]
         case Refinement() if len(built.a) != len(built.b):
             return [("b", f"{len(built.b)} harmonics, and {len(built.a)} in a")]
-        case Hysteresis() if built.model != "triangle":
-            return _hysteresis_faults(built)
+        case Parameters():
+            return built.faults()
         case _:
             pass
     return []
@@ -223,25 +210,4 @@ def _dac_faults(dac: Dac) -> list[tuple[str, str]]:
         found.append(("v_max", f"{dac.v_max - dac.v_min:.3g} V above v_min is no range; at least 0.001 V is needed"))
     if dac.word_bits is not None and dac.word_bits < dac.bits:
         found.append(("word_bits", f"{dac.word_bits} is below bits = {dac.bits}; the code would not fit"))
-    return found
-
-
-def _hysteresis_faults(hysteresis: Hysteresis) -> list[tuple[str, str]]:
-    if not hysteresis.branches:
-        return [("branches", f"missing; the {hysteresis.model} model needs a calibrated branch")]
-    found = []
-    for i, branches in enumerate(hysteresis.branches):
-        if any(branches.turn == earlier.turn for earlier in hysteresis.branches[:i]):
-            found.append((f"branches[{i}].turn", f"{branches.turn:g} is calibrated twice"))
-        for side, branch in (("forward", branches.forward), ("backward", branches.backward)):
-            where = f"branches[{i}].{side}"
-            points = branch.points or []
-            for j, point in enumerate(points):
-                if any(point.size_v == earlier.size_v for earlier in points[:j]):
-                    found.append((f"{where}.points[{j}].size_v", f"{point.size_v:g} V is measured twice"))
-            if hysteresis.model == "harmonic":
-                lacking = [f"points[{j}].u_peak" for j, point in enumerate(points) if point.u_peak is None]
-                if not points and branch.u_peak is None:
-                    lacking = ["u_peak"]
-                found += [(f"{where}.{name}", "missing; the harmonic model needs it") for name in lacking]
     return found

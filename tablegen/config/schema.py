@@ -1,4 +1,4 @@
-"""The two input files as frozen types: a scanner is calibrated once and shared, a scan changes daily.
+"""The scan file as frozen types: it changes daily. ``config/scanner.py`` has those of the scanner file.
 
 Units are part of every name. The ranges stand here once: the decoder checks them, ``tablegen schema`` prints them.
 """
@@ -7,20 +7,11 @@ from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
 
-Name = Annotated[str, Meta(min_length=1, max_length=64)]
+from tablegen.quantities import FileName, Hertz, Nanometres, Normalised, PositiveVolts, Volts
+
 # Short enough to leave room for what is appended; reserved words are refused beside it, see ``why_not_a_name``.
 MAXIMUM_NAME = 48
 Identifier = Annotated[str, Meta(min_length=1, max_length=MAXIMUM_NAME, pattern="^[A-Za-z](_?[A-Za-z0-9])*$")]
-MAXIMUM_FILE_NAME = 1024
-FileName = Annotated[str, Meta(min_length=1, max_length=MAXIMUM_FILE_NAME)]
-Volts = Annotated[float, Meta(ge=-1e5, le=1e5)]
-PositiveVolts = Annotated[float, Meta(ge=1e-3, le=1e5)]
-Nanometres = Annotated[float, Meta(ge=1e-6, le=1e9)]
-Hertz = Annotated[float, Meta(ge=1e-6, le=1e10)]
-Normalised = Annotated[float, Meta(gt=0.0, lt=1.0)]
-Residual = Annotated[float, Meta(ge=0.0, lt=0.5)]
-Decay = Annotated[float, Meta(ge=1e-6, le=100.0)]
-Factor = Annotated[float, Meta(ge=0.1, le=10.0)]
 Percent = Annotated[float, Meta(gt=0.0, le=1000.0)]
 Harmonics = Annotated[list[Annotated[float, Meta(ge=-0.5, le=0.5)]], Meta(min_length=1, max_length=512)]
 Window = tuple[Annotated[float, Meta(ge=0.0, le=1.0)], Annotated[float, Meta(ge=0.0, le=1.0)]]
@@ -220,140 +211,3 @@ class Scan(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     y: SlowAxis
     limits: Limits = Limits()
     emit: Emit = Emit()
-
-
-class OffsetPoint(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The apparent size of one object at one offset voltage."""
-
-    offset_v: Annotated[Volts, Meta(description="offset voltage at which the image was taken")]
-    apparent_nm: Annotated[Nanometres, Meta(description="apparent size of the object, or apparent lattice constant")]
-
-
-class Offset(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Amplitude factor against offset voltage, (1)-(4): `m_minus` and `m_plus`, `alpha` and `beta`, or `points`."""
-
-    m_minus: Annotated[Factor, Meta(description="amplitude factor at an offset of 0 V")] | None = None
-    m_plus: Annotated[Factor, Meta(description="amplitude factor at an offset of v_max")] | None = None
-    alpha: Annotated[float, Meta(ge=-1.0, le=1.0, description="linear term of (1)")] | None = None
-    beta: Annotated[float, Meta(ge=-1.0, le=1.0, description="quadratic term of (1)")] | None = None
-    points: (
-        Annotated[
-            list[OffsetPoint],
-            Meta(min_length=3, max_length=1000, description="apparent sizes at three or more offsets"),
-        ]
-        | None
-    ) = None
-
-
-class Size(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Scan size against scan voltage, (5)-(12)."""
-
-    k_nm_per_v: Annotated[float, Meta(ge=1e-6, le=1e6, description="scanner constant at `base_nm`")]
-    beta: Annotated[float, Meta(gt=-0.5, le=100.0, description="nonlinearity of (6); 0 is a linear scanner")] = 0.0
-    base_nm: Annotated[Nanometres, Meta(description="scan size at which `k_nm_per_v` was calibrated")] = 200.0
-    v_threshold: Annotated[
-        float, Meta(gt=0.0, le=1.0, description="normalised scan voltage above which the size is linear, (10)")
-    ] = 0.5
-
-
-class HysteresisPoint(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Hysteresis of one direction as measured at one scan voltage."""
-
-    size_v: Annotated[PositiveVolts, Meta(description="scan voltage V_scan of the measurement, at the piezo")]
-    beta: Annotated[Residual, Meta(description="peak residual at this voltage, as a fraction of the scan")]
-    u_peak: Annotated[Normalised, Meta(description="position of the peak; harmonic model only")] | None = None
-
-
-class Branch(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Hysteresis of one direction, by (22) or by `points`. Both directions have u_peak in sweep-aligned coordinates."""
-
-    beta_max: (
-        Annotated[
-            Residual, Meta(description="peak residual at full scale, as a fraction of the scan; or give `points`")
-        ]
-        | None
-    ) = None
-    rho: Annotated[Decay, Meta(description="dimensionless decay constant of (22)")] = 1.5
-    u_peak: Annotated[Normalised, Meta(description="position of the peak residual; harmonic model only")] | None = None
-    points: (
-        Annotated[
-            list[HysteresisPoint],
-            Meta(
-                min_length=1,
-                max_length=64,
-                description="measured values that replace (22); interpolated linearly, from 0 at 0 V",
-            ),
-        ]
-        | None
-    ) = None
-
-
-class Branches(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Both directions, calibrated at one turning point."""
-
-    turn: Annotated[Normalised, Meta(description="turning point at which the branches were calibrated")]
-    forward: Branch
-    backward: Branch
-
-
-class Hysteresis(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Hysteresis of the line, (13)-(22)."""
-
-    model: Annotated[
-        Literal["harmonic", "sinusoidal", "triangle"],
-        Meta(description="harmonic: (17)-(21); sinusoidal: (15); triangle: not compensated"),
-    ] = "harmonic"
-    branches: Annotated[
-        list[Branches], Meta(max_length=64, description="one entry per calibrated turn; interpolated between them")
-    ] = []
-
-
-class Frequency(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Loss of amplitude with frequency, (23)."""
-
-    alpha: Annotated[float, Meta(ge=0.0, le=0.5, description="relative amplitude lost per decade")]
-    reference_hz: Annotated[Hertz, Meta(description="rate at which the scanner was calibrated")]
-
-
-class Resonance(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Inverse dynamics: each harmonic is divided by the response, which is second order with delay, or measured."""
-
-    frequency_hz: Annotated[Hertz, Meta(description="undamped resonance frequency")] | None = None
-    quality: Annotated[float, Meta(ge=0.1, le=1e5, description="quality factor")] | None = None
-    delay_s: Annotated[
-        float,
-        Meta(
-            ge=0.0, le=1.0, description="dead time of amplifier and scanner; the converter's half tick comes by itself"
-        ),
-    ] = 0.0
-    response: (
-        Annotated[
-            FileName,
-            Meta(description="CSV of the measured response, relative to the scanner file; header hz,gain,phase_deg"),
-        ]
-        | None
-    ) = None
-    max_boost_db: Annotated[
-        float, Meta(ge=0.0, le=60.0, description="largest gain that the inverse dynamics may apply to a harmonic")
-    ] = 6.0
-
-
-class ScannerAxis(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Calibration of one axis."""
-
-    size: Size
-    offset: Offset | None = None
-    hysteresis: Hysteresis | None = None
-    frequency: Frequency | None = None
-    resonance: Resonance | None = None
-
-
-class Scanner(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A calibrated scanner."""
-
-    name: Annotated[Name, Meta(description="name of the scanner in reports")]
-    v_max: Annotated[
-        PositiveVolts, Meta(description="maximum output of the piezo driver; normalised voltages refer to it")
-    ]
-    x: ScannerAxis
-    y: ScannerAxis

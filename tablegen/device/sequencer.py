@@ -124,6 +124,7 @@ class Sequencer:
             self.parked = True
         self._line_ticks: LineTicks | None = None
         self._clamped: Bools = np.zeros(0, dtype=np.bool_)
+        self._disturbed: Ints = np.zeros(0, dtype=np.int64)  # ticks of the line with a clamp, or a step too large
 
     @property
     def state(self) -> SequencerState:
@@ -189,6 +190,7 @@ class Sequencer:
         if self.tick == 0:
             self._line_ticks = play_line(self.playing, self.line)
             self._clamped = self._outside(self.playing, self.line)
+            self._disturbed = self._where_disturbed(self.playing, self._line_ticks)
         line = self._line_ticks
         assert line is not None
         k = self.tick
@@ -212,6 +214,32 @@ class Sequencer:
         )
         self._advance(self.playing.schedule)
         return out
+
+    def undisturbed(self, most: int) -> LineTicks | None:
+        """Play the next ticks of a line at once, at most so many, up to the first one that needs ``step``.
+
+        On such ticks the codes are those of the line, and no fault occurs: that is what ``step`` would make of each.
+        None where the next tick is not one.
+        """
+        line, program = self._line_ticks, self.playing
+        if not self.running or program is None or line is None or self.tick == 0:
+            return None
+        first = self.tick
+        next_one = int(np.searchsorted(self._disturbed, first + 1))
+        stop = int(self._disturbed[next_one]) if next_one < len(self._disturbed) else program.schedule.ticks
+        part = slice(first, min(first + most, stop))
+        targets, steps = (line.x[first], line.y[first]), (program.x.output.max_step, program.y.output.max_step)
+        ways = (abs(int(target) - now) for target, now in zip(targets, self.codes, strict=True))
+        if self._clamped[first] or any(way > step for way, step in zip(ways, steps, strict=True)):
+            return None
+        valid = line.valid[part] & (self.settle_left == 0 and not self.faults)
+        played = LineTicks(
+            line.x[part], line.y[part], line.line[part], line.frame[part], line.pixel[part], line.backward[part], valid
+        )
+        self.codes, self.catching_up = (int(played.x[-1]), int(played.y[-1])), False
+        self.tick = part.stop - 1
+        self._advance(program.schedule)
+        return played
 
     def _begin(self, program: DualProgram) -> None:
         """A program starts at its own line 0, unsettled, and away from where the output is."""
@@ -262,6 +290,13 @@ class Sequencer:
             code = program.output.unclamped(program.samples(at))
             out |= (code < program.output.code_min) | (code > program.output.code_max)
         return out
+
+    def _where_disturbed(self, playing: DualProgram, line: LineTicks) -> Ints:
+        """Ticks of a line that differ from the one before by more than a step, or that the clamp changes."""
+        out = self._clamped.copy()
+        for program, codes in ((playing.x, line.x), (playing.y, line.y)):
+            out[1:] |= np.abs(np.diff(codes)) > program.output.max_step
+        return np.flatnonzero(out)
 
     def _fault(self, fault: Fault) -> None:
         self.faults |= fault

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tablegen.fixedpoint.rounding import round_half_up, round_number, saturate, shift_round, signed_limits
-from tablegen.numerics.arrays import Floats, Ints, freeze
+from tablegen.numerics.arrays import Floats, Ints, freeze, multiples
 from tablegen.numerics.turns import sine
 
 WORD_BITS = 32
@@ -97,12 +97,9 @@ def synthesize(words: FourierWords, length: int, bits: int) -> Ints:
     # Word length - k has the cosines of word k, and its sines with the other sign.
     k = np.arange(length // 2 + 1, dtype=np.int64)
     even, odd = np.zeros_like(k), np.zeros_like(k)
-    at = np.zeros_like(k)
-    for n in range(1, words.harmonics + 1):
-        at += k  # n k modulo the length
-        at -= length * (at >= length)
-        even += words.a[n - 1] * cosines[at]
-        odd += words.b[n - 1] * sines[at]
+    for n, at in enumerate(multiples(k, length, words.harmonics)):
+        even += words.a[n] * cosines.take(at, mode="clip")
+        odd += words.b[n] * sines.take(at, mode="clip")
     accumulator[k] += even + odd
     accumulator[length - k[1 : (length + 1) // 2]] += (even - odd)[1 : (length + 1) // 2]
     return saturate(shift_round(accumulator, FRACTION_BITS + SINE_FRACTION_BITS - (bits - 1)), bits)

@@ -25,7 +25,7 @@ class Sent:
 
 
 class Flight:
-    """At most ``window`` requests; fewer where frames are lost, and one more again for as many as get through."""
+    """At most ``window`` requests; fewer where frames are lost, and one more again after two windows without a loss."""
 
     def __init__(self, window: int, now: float) -> None:
         self._most = self._allowed = window
@@ -104,7 +104,7 @@ class Flight:
         return self.in_vain > 1 and now - self.heard_at > max(_MIN_SILENCE_S, _SILENCE_WAITS * self._longest_wait)
 
     def got_through(self) -> None:
-        """A frame has arrived; after as many as may be on their way, one more may."""
+        """A frame has arrived; after twice as many as may be on their way, one more may."""
         self._through += 1
         if self._through >= 2 * self._allowed:
             self._through, self._allowed = 0, min(self._allowed + 1, self._most)

@@ -1,6 +1,6 @@
 """Array types, and sums whose order does not depend on the processor."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TypeAlias
 
 import numpy as np
@@ -45,3 +45,14 @@ def merged(*ascending: Ints) -> Ints:
     values = np.concatenate(ascending)
     values.sort(kind="stable")
     return values[np.append(True, values[1:] != values[:-1])] if len(values) else values
+
+
+def multiples(k: Ints, count: int, most: int) -> Iterator[Ints]:
+    """n k modulo count for n = 1..most, in one array that is written over; 0 <= k < count."""
+    at, step = np.zeros(k.shape, dtype=np.uint64), k.astype(np.uint64)
+    less = np.empty_like(at)
+    for _ in range(most):
+        at += step
+        np.subtract(at, np.uint64(count), out=less)  # wraps below 0, to more than anything else
+        np.minimum(at, less, out=at)
+        yield at.view(np.int64)

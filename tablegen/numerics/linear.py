@@ -35,11 +35,12 @@ class Cholesky:
             for begin in range(last, size, _COLUMNS):
                 end = min(begin + _COLUMNS, size)
                 for top in range(begin, size, _ROWS):
-                    tile = work[top : top + _ROWS, begin:end]
+                    stop = min(end, top + _ROWS)  # what is right of the diagonal is not used
+                    tile = work[top : top + _ROWS, begin:stop]
                     block = np.ascontiguousarray(tile)
                     product = np.empty_like(block)
                     for column in columns:
-                        np.multiply(column[top : top + _ROWS, None], column[None, begin:end], out=product)
+                        np.multiply(column[top : top + _ROWS, None], column[None, begin:stop], out=product)
                         np.subtract(block, product, out=block)
                     tile[...] = block
         self._factor = work

@@ -31,10 +31,11 @@ _COSINE = _reciprocal_factorials(0, _COSINE_TERMS)
 
 
 def _horner(coefficients: list[float], square: Floats) -> Floats:
-    value = np.full_like(square, coefficients[-1])
-    for coefficient in reversed(coefficients[:-1]):
-        value *= square
+    value = coefficients[-1] * square
+    for coefficient in reversed(coefficients[1:-1]):
         value += coefficient
+        value *= square
+    value += coefficients[0]
     return value
 
 
@@ -57,11 +58,12 @@ def _sine_and_cosine(x: Floats) -> tuple[Floats, Floats]:
     square = angle * angle
     sine = angle * _horner(_SINE, square)
     cosine = _horner(_COSINE, square)
-    odd = np.abs(quadrant) == 1.0  # a quadrant is -2..2
-    sine, cosine = np.where(odd, cosine, sine), np.where(odd, sine, cosine)
-    lower = (np.abs(quadrant) == 2.0) | (quadrant == -1.0)
-    left = (np.abs(quadrant) == 2.0) | (quadrant == 1.0)
-    return np.where(lower, -sine, sine), np.where(left, -cosine, cosine)
+    number = quadrant.astype(np.int64)  # -2..2
+    odd = (number & 1).astype(np.bool_)
+    sines, cosines = np.where(odd, cosine, sine), np.where(odd, sine, cosine)
+    sines *= 1 - (number & 2)  # quadrants 2 and 3 change the sign of the sine, 1 and 2 that of the cosine
+    cosines *= 1 - (number + 1 & 2)
+    return sines, cosines
 
 
 def sine(turns: FloatsLike) -> Floats:

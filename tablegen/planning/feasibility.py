@@ -8,12 +8,12 @@ from math import ceil, copysign, floor
 
 import numpy as np
 
-from tablegen.compensation.drive import Drive, outside_driver
-from tablegen.config.figures import at_least, at_most
 from tablegen.config.load import Setup
 from tablegen.config.schema import Amplifier, Dac, FastAxis
+from tablegen.figures import at_least, at_most
 from tablegen.fixedpoint.converter import Converter
 from tablegen.fixedpoint.interpolation import guard_bits
+from tablegen.planning.drive import Drive, outside_driver
 from tablegen.problems import Problems
 from tablegen.waveform.series import FourierSeries
 

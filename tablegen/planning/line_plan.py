@@ -7,7 +7,6 @@ from typing import Literal
 
 import numpy as np
 
-from tablegen.compensation.drive import Drive, compensate
 from tablegen.compensation.dynamics import capped_inverse
 from tablegen.compensation.hold import hold_inverse
 from tablegen.config.load import Setup
@@ -19,11 +18,12 @@ from tablegen.fixedpoint.phase import RationalPhase
 from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.synthesis import FourierWords, encode, synthesize
 from tablegen.numerics.arrays import Floats, Ints
-from tablegen.planning.feasibility import Feasibility
+from tablegen.planning.band_limit import band_limited
+from tablegen.planning.drive import Drive, compensate
+from tablegen.planning.feasibility import DEFAULT_HARMONICS, Feasibility
 from tablegen.planning.refinement_layer import learnt_layer
 from tablegen.planning.timing import make_schedule
 from tablegen.problems import Problems
-from tablegen.waveform.band_limit import band_limited
 from tablegen.waveform.series import FourierSeries
 
 # Peaks are rounded up to this grid before they enter the scale: it then does not depend on the last bit of a maximum.
@@ -119,8 +119,8 @@ def make_plan(setup: Setup) -> Plan:
     if schedule is None:
         # The rest is examined at the rates asked for, so that its problems are reported in the same run.
         line_rate = setup.scan.timing.line_rate_hz
-        compensate(setup, "x", line_rate, problems)
-        compensate(setup, "y", line_rate / setup.scan.timing.lines, problems)
+        compensate(setup, "x", line_rate, DEFAULT_HARMONICS, problems)
+        compensate(setup, "y", line_rate / setup.scan.timing.lines, DEFAULT_HARMONICS, problems)
         problems.stop_if_any()
         raise AssertionError("a schedule fails with a problem")  # pragma: no cover
     x = _line_plan(setup, "x", schedule, problems)
@@ -149,11 +149,11 @@ def _line_plan(setup: Setup, axis: Literal["x", "y"], schedule: Schedule, proble
     hold = schedule.ticks if isinstance(scan, SlowAxis) and scan.motion == "step" else 1
     period = (schedule.ticks if axis == "x" else schedule.frame_ticks) // hold
 
-    drive = compensate(setup, axis, float(rate), problems)
     before = len(problems.found)
     feasible = Feasibility(setup, axis, problems)
     harmonics = feasible.harmonics(rate, period)
     length = feasible.table_length(period)
+    drive = compensate(setup, axis, float(rate), harmonics, problems)
     if drive is None or len(problems.found) > before:
         return None
 

@@ -7,10 +7,11 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from tablegen.compensation.drive import Drive
 from tablegen.compensation.dynamics import Measured
 from tablegen.config.load import Setup
-from tablegen.config.schema import FastAxis, Refinement, ScannerAxis
+from tablegen.config.scanner import ScannerAxis
+from tablegen.config.schema import FastAxis, Refinement
+from tablegen.planning.drive import Drive
 from tablegen.problems import Problems
 from tablegen.waveform.series import FourierSeries
 
@@ -29,6 +30,8 @@ def model_digest(setup: Setup, axis: str, drive: Drive) -> str:
     """
     scanner: ScannerAxis = getattr(setup.scanner, axis)
     below = ["hold", *(_given(msgspec.to_builtins(part)) for part in (scanner.hysteresis, scanner.resonance))]
+    if scanner.hysteresis is not None:
+        below += scanner.hysteresis.contents(setup.scanner_folder)
     if isinstance(drive.response, Measured):  # the content of the file that it names
         below += [drive.response.f_hz.tolist(), drive.response.gain.tolist(), drive.response.phase_turns.tolist()]
     plain = json.dumps(below, sort_keys=True, separators=(",", ":"), ensure_ascii=True)

@@ -6,10 +6,10 @@ All of it is decided in exact fractions: a window edge at 0.1 of the line is 1/1
 from fractions import Fraction
 from math import ceil, floor, gcd
 
-from tablegen.config.figures import at_least, at_most
 from tablegen.config.load import Setup
 from tablegen.config.schema import FastAxis, Timing
 from tablegen.device.schedule import MAXIMUM_LINE_TICKS, Schedule, Window
+from tablegen.figures import at_least, at_most
 from tablegen.fixedpoint.phase import MAXIMUM_TICKS
 from tablegen.planning.windows import line_windows
 from tablegen.problems import Problems

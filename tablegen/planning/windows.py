@@ -22,7 +22,8 @@ def line_windows(
     """Trace and retrace of the part ``low``..``high`` of a line that turns at ``turn``; the second may be empty.
 
     Each has the nearest whole number of ticks. The trace is put within a tick of where it was asked for, and the
-    retrace where its pixels are at those of the trace, on average over the line; of all such, the nearest pair.
+    retrace where its pixels are at those of the trace, on average over the line, or as near to it as the trace and the
+    end of the line allow; of all such, the nearest pair.
     """
     middle = (low + high) / 2
     counts = [_nearest(share * (high - low) * ticks) for share in (turn, 1 - turn)]

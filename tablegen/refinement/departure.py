@@ -54,6 +54,13 @@ def imaged(line: LinePlan, share: Floats) -> Imaged:
     return Imaged(sides, times, np.tile(x, len(sides)), np.concatenate(asked), np.concatenate(steepness))
 
 
+def asked_position(line: LinePlan, times: Floats) -> Floats:
+    """Where the model puts the piezo at times 0..1 of a period, as a share of the line: in the turnarounds too."""
+    shape = line.drive.shape
+    w = line.described.value(times)
+    return np.where(times <= shape.turn, shape.forward.inverse(w), 1.0 - shape.backward.inverse(1.0 - w))
+
+
 @dataclass(frozen=True, eq=False)
 class Departure:
     """What is left: ``error`` is reached less asked at the points, in lines; ``size_nm`` of the best line, negative

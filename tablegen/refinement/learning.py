@@ -8,7 +8,7 @@ import numpy as np
 from tablegen.certificate.line_errors import CHORD
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan
-from tablegen.refinement.departure import Departure, departure, straight_line
+from tablegen.refinement.departure import Departure, asked_position, departure, straight_line
 from tablegen.refinement.displacement import Displacement
 from tablegen.waveform.series import FourierSeries
 from tablegen.waveform.window_fit import normal_equations
@@ -18,6 +18,8 @@ DEFAULT_HARMONICS = 16
 DIGITS = 8  # digits of a coefficient in the scan file: a 24-bit converter has 7
 # Weight of the mean square acceleration: it decides what the windows leave open, and costs nothing inside them.
 _SMOOTHNESS = 1e-9
+_NOISE_CHI = 2.0  # chi squared of the two numbers of a harmonic that are nothing but noise, on average
+_GRID = 1024  # points of a period at which the asked position is taken
 _AKAIKE_COST = 4.0  # cost of the two numbers of a harmonic, after Akaike: the noise that learning it adds
 
 
@@ -43,8 +45,8 @@ def learn(line: LinePlan, measured: Displacement, gain: float, harmonics: int) -
     """Learn harmonics 1..``harmonics`` at most from a period of the running scan, at a gain in (0, 2).
 
     The position error in the imaged windows, times the slope of the model's branch there, is what the drive lacks. It
-    is fitted by harmonics, the gentlest of those that fit, up to the one beyond which there is nothing but the
-    sensor's noise. Raises ``Unphysical`` where the displacement is not that of the scan.
+    is fitted by harmonics, the gentlest of those that fit, after what noise explains of each harmonic of the error was
+    taken off. Raises ``Unphysical`` where the displacement is not that of the scan.
     """
     before = departure(line, measured)
     nodes = 4 * max(harmonics, measured.series.harmonics) + 32
@@ -55,12 +57,15 @@ def learn(line: LinePlan, measured: Displacement, gain: float, harmonics: int) -
     basis = _basis(points.times, measured.series.harmonics)
     line_of = np.column_stack([np.ones_like(points.asked), points.asked])
     errors: Floats = (basis - line_of @ (straight_line(points.asked) @ basis)) / seen.size_nm
-    lacking = -gain * points.steepness * seen.error
+    noisy = -gain * points.steepness * seen.error
     fits = _fits(points.times, harmonics)
     spread = [fit @ (gain * points.steepness[:, None] * errors) for fit in fits]
-    kept = _worth_learning([fit @ lacking for fit in fits], [s @ measured.covariance @ s.T for s in spread])
+    stands_out = _stands_out([fit @ noisy for fit in fits], [s @ measured.covariance @ s.T for s in spread])
+    kept = harmonics if stands_out else 0
+    noise_part = _noise_share(line, measured, seen.size_nm)
+    lacking = noisy + gain * points.steepness * (errors @ noise_part)
     # The mean is not learnt: no sensor sees an origin.
-    c = fits[kept - 1] @ lacking if kept else np.zeros(1)
+    c = fits[-1] @ lacking if kept else np.zeros(1)
     change = FourierSeries(0.0, c[1 : kept + 1].copy(), c[kept + 1 :].copy())
     old = line.layer if line.layer is not None else FourierSeries(0.0, np.zeros(0), np.zeros(0))
     whole = old.plus(change)
@@ -81,18 +86,39 @@ def _chords(line: LinePlan, seen: Departure, measured: Displacement) -> Floats:
     return found
 
 
-def _worth_learning(coefficients: list[Floats], covariances: list[Floats]) -> int:
-    """How many harmonics to learn, of fits with 1, 2, ... harmonics: the next ones explain no more than noise does.
+def _stands_out(coefficients: list[Floats], covariances: list[Floats]) -> bool:
+    """Whether there is more than noise, by fits with 1, 2, ... harmonics.
 
-    The highest harmonic of each fit explains chi squared of its cosine and sine; what is left out costs the sum of
-    these, what is learnt costs noise.
+    The highest harmonic of each fit explains chi squared of its cosine and sine, and costs as much as noise would on
+    average, after Akaike; there is nothing to learn where no number of harmonics explains more than it costs.
     """
     explained = []
     for count, (c, covariance) in enumerate(zip(coefficients, covariances, strict=True), 1):
         top = [count, 2 * count]
         explained.append(float(c[top] @ np.linalg.solve(covariance[np.ix_(top, top)], c[top])))
-    cost = np.cumsum([0.0, *(_AKAIKE_COST - chi for chi in explained)])
-    return int(np.argmin(cost))
+    cost = np.cumsum([_AKAIKE_COST - chi for chi in explained])
+    return bool(np.min(cost) < 0.0)
+
+
+def _noise_share(line: LinePlan, measured: Displacement, size_nm: float) -> Floats:
+    """What of the coefficients of the displacement less what was asked, in nm, its noise explains.
+
+    The error of a harmonic is taken for Gaussian, with a variance of its own. The likeliest variance is what chi
+    squared of cosine and sine exceeds 2 by, which noise alone has on average; the mean of the error is then
+    max(0, 1 - 2 / chi squared) of what was measured (empirical Bayes, as James and Stein). The rest is noise.
+    """
+    count = measured.series.harmonics
+    times = (np.arange(_GRID) + 0.5) / _GRID
+    asked = asked_position(line, times)
+    series = np.concatenate([[0.0], measured.series.a, measured.series.b])
+    error = series - size_nm * (2.0 / _GRID) * (_basis(times, count).T @ asked)
+    share = np.zeros(2 * count + 1)
+    for n in range(1, count + 1):
+        pair = [n, count + n]
+        explained = float(error[pair] @ np.linalg.solve(measured.covariance[np.ix_(pair, pair)], error[pair]))
+        share[pair] = min(_NOISE_CHI / explained, 1.0) if explained > 0.0 else 1.0
+    found: Floats = share * error
+    return found
 
 
 def _basis(times: Floats, harmonics: int) -> Floats:

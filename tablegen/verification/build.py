@@ -10,7 +10,7 @@ from tablegen.emit.content import Content
 from tablegen.emit.format import Comparison, Format
 from tablegen.emit.stored import stored_content
 from tablegen.manifest.read import NotABuild, StoredBuild, read_build
-from tablegen.problems import Unphysical
+from tablegen.problems import Unphysical, shortened
 from tablegen.verification.certificate_checks import check_certificates
 from tablegen.verification.checks import Check
 from tablegen.verification.derived import wrong_derived
@@ -116,6 +116,9 @@ def verify_build(folder: Path, work: Path, target: Target, most_ticks: int, seed
             f"built by tablegen {stored.manifest.tablegen}, verified by {__version__}: its runtime was not compared "
             "with the installed one, nor its scaling errors with the words"
         )
+    if same and certificates.unknown_models:
+        names = " and ".join(map(shortened, certificates.unknown_models))
+        notes.append(f"scaling errors of the model {names} were not compared: its equations are not those of tablegen")
     if outcome.session is not None:
         notes += _coverage(stored, outcome)
     return Report(stored.manifest.name, checks, outcome.difference, notes + outcome.notes, watch.seconds)

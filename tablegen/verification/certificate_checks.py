@@ -4,11 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tablegen.manifest.read import ManifestAxis, StoredBuild
+from tablegen.manifest.fields import ManifestAxis
+from tablegen.manifest.read import StoredBuild
 from tablegen.verification.certified import PlayedPeriod, different_figures
 from tablegen.verification.checks import Check
 from tablegen.verification.directory import some
-from tablegen.verification.scaling import refinement_figures, scaling_figures
+from tablegen.verification.scaling import knows, refinement_figures, scaling_figures
 
 
 @dataclass(frozen=True)
@@ -17,21 +18,25 @@ class Certificates:
 
     checks: list[Check]
     limits: dict[str, float]
+    unknown_models: list[str]
 
 
 def check_certificates(stored: StoredBuild, same_version: bool) -> Certificates:
-    """Every figure of both axes; those of scaling errors only where this version of tablegen stated them."""
+    """Every figure of both axes; those of scaling errors only of this version of tablegen and of its own models."""
     checks: list[Check] = []
     limits: dict[str, float] = {}
+    unknown: set[str] = set()
     for name, axis in stored.axes:
         try:
             with np.errstate(over="raise", divide="raise", invalid="raise"):
                 check, limits[name] = _check(name, axis, stored, same_version)
+                if same_version and not knows(axis.drive.model):
+                    unknown.add(axis.drive.model)
         except (ArithmeticError, ValueError) as error:  # figures that no build states, whatever their types allow
             why = f"{name}: axes.{name} makes no certificate: {error}"
             check, limits[name] = Check(name, "its certificate", "0 figures", "all differ", "0", why), 0.0
         checks.append(check)
-    return Certificates(checks, limits)
+    return Certificates(checks, limits, sorted(unknown))
 
 
 def _check(name: str, axis: ManifestAxis, stored: StoredBuild, same_version: bool) -> tuple[Check, float]:
@@ -40,7 +45,7 @@ def _check(name: str, axis: ManifestAxis, stored: StoredBuild, same_version: boo
     found = period.figures(float(schedule.line_rate if name == "x" else schedule.frame_rate))
     told = {key: getattr(axis.certificate, key) for key in found}
     wrong, count = different_figures(told, found, period.is_whole), len(found)
-    if same_version:
+    if same_version and knows(axis.drive.model):
         for key, sides in (
             ("scaling_error_percent", scaling_figures(axis, period)),
             ("refinement_percent", refinement_figures(axis)),

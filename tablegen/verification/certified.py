@@ -10,7 +10,7 @@ from math import log10, tau
 import numpy as np
 
 from tablegen.fixedpoint.runs import runs_of
-from tablegen.manifest.read import ManifestAxis, ManifestSeries
+from tablegen.manifest.fields import ManifestAxis, ManifestSeries
 from tablegen.numerics.arrays import Floats, Ints
 
 _MOST_ADVANCES = 1 << 22  # of a period whose every advance is looked at

@@ -6,7 +6,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from tablegen.manifest.read import ManifestAxis, StoredBuild
+from tablegen.manifest.fields import ManifestAxis
+from tablegen.manifest.read import StoredBuild
 from tablegen.numerics.arrays import Floats, Ints
 from tablegen.verification.capture import UNDEFINED, Capture, part, without_faults
 from tablegen.verification.stream import FAULTS, FLAGS, STATES, Sample, StoredState

@@ -9,11 +9,11 @@ from tablegen.fixedpoint.interpolation import guard_bits
 from tablegen.fixedpoint.output import UNIT_GAIN_BITS
 from tablegen.fixedpoint.rounding import round_number
 from tablegen.fixedpoint.synthesis import FourierWords, encode, synthesize
-from tablegen.manifest.read import Manifest, ManifestAxis, StoredBuild
+from tablegen.manifest.fields import Manifest, ManifestAxis
+from tablegen.manifest.read import StoredBuild
 
 _RELATIVE = 1e-9  # of floats that went through JSON and a handful of operations
 _WINDOW_TICKS = 2  # a window of a line is placed to the tick, and not more than so far from where it was asked for
-_CODINGS, _ALIGNS = ("offset-binary", "twos-complement"), ("right", "left")
 
 
 def wrong_derived(stored: StoredBuild) -> tuple[int, list[str]]:
@@ -103,8 +103,6 @@ def _axis(manifest: Manifest, name: str, axis: ManifestAxis) -> Found:
         ("output.gain_word", output.gain_word * amplitude > 0.0, f"{output.gain_word}, of the wrong sign"),
         ("output.offset_word", output.offset_word == offset, f"{output.offset_word}, v_offset makes it {offset}"),
         ("output.offset_code", output.offset_code == middle, f"{output.offset_code}, the word makes it {middle}"),
-        ("output.coding", output.coding in _CODINGS, f"{output.coding!r}"),
-        ("output.align", output.align in _ALIGNS, f"{output.align!r}"),
         ("output.word_bits", output.dac_bits <= output.word_bits <= 32, f"{output.word_bits}"),
         ("fourier.words", words is not None and _same_words(axis, words), "not (2 w - 1) / scale of its coefficients"),
         ("table.words", rendered, "not what the Fourier words make"),

@@ -10,6 +10,7 @@ from tablegen.verification.stream import PROGRAM, X_FOURIER, X_TABLE, Y_FOURIER,
 from tablegen.verification.variation import Kind, variation
 
 _LOADING_PACE, _LOADING_TICKS = 7, 500  # clocks between ticks while words are written, at least, and how many at most
+_OWN_TABLE = 0  # in place of the length of a variation's table
 VARIATION = 1  # as the argument of a commit, to a device that has the program of the build already
 
 
@@ -34,7 +35,7 @@ class Loader:
     placement: Placement
     _tables: dict[tuple[int, int], int] = field(
         default_factory=dict
-    )  # length of a variation's table, by bank and region
+    )  # length of a variation's table, or that of the build, by bank and region
 
     @property
     def own_commit_clocks(self) -> int:
@@ -45,11 +46,11 @@ class Loader:
         )
 
     def load_own(self) -> None:
-        """Write the program of the build, word for word as its files have it."""
+        """Write the program of the build, word for word as its files have it; tables unless the bank has them still."""
         memories, script = self.memories, self.script
         self._begin()
-        for region in (X_TABLE, Y_TABLE):
-            self._tables.pop((self._bank, region), None)
+        bank_has = {region: self._tables.get((self._bank, region)) for region in (X_TABLE, Y_TABLE)}
+        self._tables |= {(self._bank, region): _OWN_TABLE for region in bank_has}
         if memories is None:
             return
         script.write(PROGRAM, list(memories.program))
@@ -57,7 +58,8 @@ class Loader:
             (memories.x, memories.x_harmonics, 1, X_TABLE, X_FOURIER),
             (memories.y, memories.y_harmonics, 2, Y_TABLE, Y_FOURIER),
         ):
-            script.write(fourier if harmonics else table, list(words))
+            if harmonics or bank_has[table] != _OWN_TABLE:
+                script.write(fourier if harmonics else table, list(words))
             if harmonics:  # 0 in the file, which is for uploaded tables
                 script.write(PROGRAM, [harmonics], first=page * PAGE_WORDS + AXIS_WORDS.index("harmonics"))
 

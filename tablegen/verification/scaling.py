@@ -4,13 +4,15 @@ The shape of a branch is u = lambda s + xi sin(pi s) + xi_gamma (cos(pi s) - 1),
 its beta and u_peak; docs/manifest.md says what each figure is.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import ceil, cos, floor, pi, sin
 
 import numpy as np
 
-from tablegen.manifest.read import ManifestAxis, ManifestBranch, ManifestSeries
+from tablegen.manifest.fields import ManifestAxis, ManifestBranch, ManifestSeries
 from tablegen.numerics.arrays import Floats
+from tablegen.problems import shortened
 from tablegen.verification.certified import PlayedPeriod, at, played_series
 
 CHORD = 0.05  # share of the line
@@ -28,8 +30,11 @@ class ModelBranch:
     @classmethod
     def of(cls, branch: ManifestBranch, model: str) -> "ModelBranch":
         """From the peak of its residual, and where that is."""
-        if model != "harmonic":
-            return cls(branch.beta if model == "sinusoidal" else 0.0, 0.0)
+        return _EQUATIONS[model](branch)
+
+    @classmethod
+    def harmonic(cls, branch: ManifestBranch) -> "ModelBranch":
+        """Equations (17) to (21)."""
         at_peak = branch.u_peak - branch.beta
         c, s = cos(0.5 * pi * 2.0 * at_peak), sin(pi * at_peak)
         # The residual is xi s + xi_gamma (c - 1 + 2 at_peak); it is beta at its peak, and flat there.
@@ -52,6 +57,28 @@ class ModelBranch:
         for _ in range(3):
             s = s - (self.value(s) - u) / self.slope(s)
         return s
+
+
+# Written once more, beside the build's own. Of models that are not here scaling errors are not compared.
+_EQUATIONS: dict[str, Callable[[ManifestBranch], ModelBranch]] = {
+    "triangle": lambda branch: ModelBranch(0.0, 0.0),
+    "sinusoidal": lambda branch: ModelBranch(branch.beta, 0.0),
+    "harmonic": ModelBranch.harmonic,
+}
+
+
+def knows(model: str) -> bool:
+    """Whether the scaling errors of this model can be worked out here; those of installed packages cannot.
+
+    Raises ``ValueError`` for a model that nobody has: no build states it.
+    """
+    if model in _EQUATIONS:
+        return True
+    from importlib.metadata import entry_points  # seldom needed; nothing of the model itself is loaded
+
+    if not entry_points(group="tablegen.models", name=model):
+        raise ValueError(f"drive.model is {shortened(repr(model))}, which neither tablegen nor a package here has")
+    return False
 
 
 def hold_response(harmonics: int, advances: int, steps: bool) -> tuple[Floats, Floats]:

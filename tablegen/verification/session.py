@@ -189,5 +189,7 @@ def _swap_and_back(own: _Own, line: int, settle_lines: int) -> bool:
     script.wait(int(own.random.integers(1, 100)))  # ticks may stop, and come at another rate
     script.pace(own.pace * int(own.random.integers(1, 3, endpoint=True)), own.pace)
     own.catch_up(budget)
-    script.wait_ticks(max(min((settle_lines + 1) * line, budget - own.played), 0))
+    script.wait_ticks(max(min(line, budget - own.played), 0))
+    script.pace(own.pace, own.pace)
+    script.wait_ticks(max(min(settle_lines * line, budget - own.played), 0))
     return True

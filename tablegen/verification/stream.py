@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.registers import program_words
-from tablegen.device.sequencer import Fault, Sequencer, Tick
+from tablegen.device.sequencer import Fault, LineTicks, Sequencer, Tick
 from tablegen.fixedpoint.synthesis import FourierWords
 from tablegen.numerics.arrays import Ints
 
@@ -35,6 +35,15 @@ def pack(tick: Tick) -> int:
     """A tick as the bench captures it: faults, flags, y code, x code."""
     flags = sum(1 << i for i, name in enumerate(FLAGS) if getattr(tick, name))
     return tick.faults.value << 56 | flags << 48 | tick.y << 24 | tick.x
+
+
+def pack_line(ticks: LineTicks, faults: Fault) -> Words:
+    """The same for ticks of a line, all of which play, with the faults so far."""
+    markers = {"line": ticks.line, "frame": ticks.frame, "pixel": ticks.pixel, "backward": ticks.backward}
+    words = faults.value << _FAULTS_AT | 1 << 48 + FLAGS.index("playing") | ticks.y << 24 | ticks.x
+    for name, marker in {**markers, "valid": ticks.valid}.items():
+        words |= marker.astype(np.int64) << 48 + FLAGS.index(name)
+    return words.astype(np.uint64)
 
 
 @dataclass(frozen=True)
@@ -253,6 +262,12 @@ class Script:
             self.clocks += self._until + 1
             self._until = self._period - 1
             self._ticked_at = self.clocks
+            at_once = self.model.undisturbed((end - self.clocks) // self._period + 1)
+            if at_once is not None:
+                words = pack_line(at_once, self.model.faults).tolist()
+                self.expected.extend(map(self._with_reported, words) if any(self._reported.values()) else words)
+                self._ticked_at = self.clocks = self.clocks + (len(words) - 1) * self._period
+                continue
             tick = self.model.step()
             if tick.swapped:
                 assert self.model.playing is not None

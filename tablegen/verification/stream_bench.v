@@ -45,9 +45,12 @@ module stream_bench #(
 
     reg finished = 0;
     integer strobes = 0, ticks = 0;
-    reg [255:0] history = 0;  // of ticks
-    integer jitter = 0;       // clocks on which a strobe came, or did not, other than `latency` clocks after a tick
-    integer now = 0, first_tick = -1, latency = -1;
+    integer first_tick = -1, latency = -1;
+    integer jitter = 0;  // how often strobes began or ended other than `latency` clocks after ticks did
+    integer edges [0:255];  // clocks at which ticks began and ended to come with every clock
+    reg [7:0] ticked_edges = 0, strobed_edges = 0;
+    reg ticked = 0, strobed = 0;
+    reg [31:0] alike;  // clocks with the same inputs
 
     wire writable, refused, committed, armed, running, busy, strobe, playing, parked;
     wire line_marker, frame_marker, pixel_marker, backward_marker, valid_marker, swapped_marker;
@@ -69,8 +72,8 @@ module stream_bench #(
         .write(write), .write_region(command[50:48]), .write_address(command[47:32]), .write_data(command[31:0]),
         .writable(writable), .refused(refused), .commit(requests[1]), .withdraw(requests[2]), .committed(committed),
         .arm(requests[3]), .arm_frames(command[15:0]), .trigger(requests[4]), .park(requests[5]),
-        .clear_faults(requests[6]), .armed(armed), .running(running), .tick(tick || extra), .underrun(requests[7]), .busy(busy),
-        .strobe(strobe), .x_code(x_code), .y_code(y_code), .line_marker(line_marker), .frame_marker(frame_marker),
+        .clear_faults(requests[6]), .armed(armed), .running(running), .tick(tick || extra),
+        .underrun(requests[7]), .busy(busy), .strobe(strobe), .x_code(x_code), .y_code(y_code), .line_marker(line_marker), .frame_marker(frame_marker),
         .pixel_marker(pixel_marker), .backward_marker(backward_marker), .valid_marker(valid_marker),
         .swapped_marker(swapped_marker), .playing(playing), .parked(parked), .faults(faults), .fault_counts(counts)
     );
@@ -78,6 +81,14 @@ module stream_bench #(
     wire [23:0] x_wide = x_code, y_wide = y_code;
     wire [63:0] sample = {4'd0, faults, parked, playing, swapped_marker, valid_marker, backward_marker, pixel_marker,
                           frame_marker, line_marker, y_wide, x_wide};
+
+    always @(strobe)
+        if (strobe !== strobed) begin
+            if (latency < 0) latency = $time / 10 + 1 - first_tick;
+            if (edges[strobed_edges] !== $time / 10 + 1 - latency) jitter = jitter + 1;
+            strobed_edges = strobed_edges + 1;
+            strobed = strobe;
+        end
 
     initial begin
         script = $fopen(SCRIPT, "r");
@@ -94,9 +105,17 @@ module stream_bench #(
             extra = 0;
             tick = period != 0 && until_tick == 0;
             if (period != 0) until_tick = until_tick == 0 ? period - 1 : until_tick - 1;
-            if (wait_left != 0)
-                wait_left = wait_left - 1;
-            else begin
+            alike = 1;
+            if (wait_left != 0) begin
+                // As many clocks at once as have the same inputs: this loop takes longer than they do.
+                if (period <= 1)
+                    alike = wait_left;
+                else if (!tick) begin
+                    alike = until_tick < wait_left ? until_tick + 1 : wait_left;
+                    until_tick = until_tick - (alike - 1);
+                end
+                wait_left = wait_left - alike;
+            end else begin
                 fields = $fscanf(script, "%h", command);
                 if (fields != 1) command = 0;
                 case (command[63:60])
@@ -119,19 +138,22 @@ module stream_bench #(
                 endcase
             end
             if (tick) begin
-                if (first_tick < 0) first_tick = now;
-                ticks = ticks + 1;
+                if (first_tick < 0) first_tick = $time / 10;
+                ticks = ticks + alike;
             end
-            #5 clock = 1;
-            #5 clock = 0;
-            now = now + 1;
-            history = {history[254:0], tick};
-            if (strobe) begin
-                $fwrite(capture, "%016x\n", sample);
-                if (latency < 0) latency = now - first_tick;
-                strobes = strobes + 1;
+            if (tick != ticked) begin
+                edges[ticked_edges] = $time / 10;
+                ticked_edges = ticked_edges + 1;
+                ticked = tick;
             end
-            if (latency > 0 && strobe != history[latency-1]) jitter = jitter + 1;
+            repeat (alike) begin
+                #5 clock = 1;
+                #5 clock = 0;
+                if (strobe) begin
+                    $fwrite(capture, "%016x\n", sample);
+                    strobes = strobes + 1;
+                end
+            end
         end
         $fclose(capture);
         if (STATES != "") $fclose(states);

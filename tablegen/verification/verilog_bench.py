@@ -24,9 +24,9 @@ _MODULE = """\
 
 module verify_bench #(
     parameter SCRIPT = "", parameter CAPTURE = "", parameter STATES = "", parameter WORDS = "", parameter WIRES = "",
-    parameter CONSTANTS = "", parameter COUNT_BITS = 16, parameter PLAIN_MULTIPLIER = 0, parameter LOW_AREA = 0,
-    parameter FOURIER = 0, parameter HARMONICS = 64, parameter SINE_FILE = "", parameter X_POWER_UP_CODE = 0,
-    parameter Y_POWER_UP_CODE = 0
+    parameter CONSTANTS = "", parameter CONVERTERS = 1, parameter COUNT_BITS = 16, parameter PLAIN_MULTIPLIER = 0,
+    parameter LOW_AREA = 0, parameter FOURIER = 0, parameter HARMONICS = 64, parameter SINE_FILE = "",
+    parameter X_POWER_UP_CODE = 0, parameter Y_POWER_UP_CODE = 0
 );
 `include "{header}"
     localparam WORD_BITS = {X}_DAC_WORD_BITS;
@@ -46,57 +46,72 @@ module verify_bench #(
     wire [31:0] strobes = bench.strobes, ticks = bench.ticks, jitter = bench.jitter, latency = bench.latency;
     wire refused = bench.refused;
 
-    wire clock = bench.clock, strobe = bench.strobe;
-    wire [WORD_BITS-1:0] x_word, y_word;
-    dac_coding #(
-        .BITS({X}_DAC_BITS), .WORD_BITS(WORD_BITS), .TWOS_COMPLEMENT({X}_DAC_TWOS_COMPLEMENT),
-        .LEFT_ALIGNED({X}_DAC_LEFT_ALIGNED)
-    ) x_coding (.code(bench.x_code), .word(x_word));
-    dac_coding #(
-        .BITS({Y}_DAC_BITS), .WORD_BITS(WORD_BITS), .TWOS_COMPLEMENT({Y}_DAC_TWOS_COMPLEMENT),
-        .LEFT_ALIGNED({Y}_DAC_LEFT_ALIGNED)
-    ) y_coding (.code(bench.y_code), .word(y_word));
-
-    // Strobes that come late enough are sent to two serial converters.
-    reg [31:0] since = 32'hffff_ff00, number = 0, sent_number = 0, x_shift = 0, y_shift = 0;
-    wire sends = strobe && since >= {spacing};
-    wire sclk, cs_n, unused_cs, mosi_x, mosi_y, ldac_n, busy, missed;
-    dac_spi #(.WORD_BITS(WORD_BITS), .FRAME_BITS(WORD_BITS)) spi (
-        .clock(clock), .reset(1'b0), .strobe(sends), .x_word(x_word), .y_word(y_word), .sclk(sclk),
-        .cs_x_n(cs_n), .cs_y_n(unused_cs), .mosi_x(mosi_x), .mosi_y(mosi_y), .ldac_n(ldac_n), .busy(busy),
-        .missed(missed)
-    );
-
-    integer words, wires, constants;
-    wire [31:0] x_wide = x_word, y_wide = y_word;
+    integer constants;
     initial begin
-        words = $fopen(WORDS, "w");
-        wires = $fopen(WIRES, "w");
         constants = $fopen(CONSTANTS, "w");
 {constants}
         $fclose(constants);
     end
-    always @(posedge clock) begin
-        since <= strobe ? 0 : since == 32'hffff_ffff ? since : since + 1;
-        if (strobe) number <= number + 1;
-        if (sends) sent_number <= number;
-        if (strobe) $fwrite(words, "%08x%08x\\n", y_wide, x_wide);
-    end
-    always @(posedge sclk)
-        if (!cs_n) begin
-            x_shift <= {{x_shift[30:0], mosi_x}};
-            y_shift <= {{y_shift[30:0], mosi_y}};
+
+    generate
+        if (CONVERTERS) begin : converters
+            wire clock = bench.clock, strobe = bench.strobe;
+            wire [WORD_BITS-1:0] x_word, y_word;
+            dac_coding #(
+                .BITS({X}_DAC_BITS), .WORD_BITS(WORD_BITS), .TWOS_COMPLEMENT({X}_DAC_TWOS_COMPLEMENT),
+                .LEFT_ALIGNED({X}_DAC_LEFT_ALIGNED)
+            ) x_coding (.code(bench.x_code), .word(x_word));
+            dac_coding #(
+                .BITS({Y}_DAC_BITS), .WORD_BITS(WORD_BITS), .TWOS_COMPLEMENT({Y}_DAC_TWOS_COMPLEMENT),
+                .LEFT_ALIGNED({Y}_DAC_LEFT_ALIGNED)
+            ) y_coding (.code(bench.y_code), .word(y_word));
+
+            // Strobes that come late enough are sent to two serial converters.
+            integer words, wires, last = -{spacing} - 1;  // the clock of the last strobe
+            reg [31:0] number = 0, sent_number = 0, x_shift = 0, y_shift = 0;
+            reg sends = 0;
+            wire sclk, cs_n, unused_cs, mosi_x, mosi_y, ldac_n, busy, missed;
+            dac_spi #(.WORD_BITS(WORD_BITS), .FRAME_BITS(WORD_BITS)) spi (
+                .clock(clock), .reset(1'b0), .strobe(sends), .x_word(x_word), .y_word(y_word), .sclk(sclk),
+                .cs_x_n(cs_n), .cs_y_n(unused_cs), .mosi_x(mosi_x), .mosi_y(mosi_y), .ldac_n(ldac_n), .busy(busy),
+                .missed(missed)
+            );
+
+            wire [31:0] x_wide = x_word, y_wide = y_word;
+            initial begin
+                words = $fopen(WORDS, "w");
+                wires = $fopen(WIRES, "w");
+            end
+            always @(negedge clock)
+                if (strobe) begin
+                    $fwrite(words, "%08x%08x\\n", y_wide, x_wide);
+                    if ($time / 10 - last > {spacing}) begin
+                        sends = 1;
+                        sent_number = number;
+                    end else
+                        sends = 0;
+                    last = $time / 10;
+                    number = number + 1;
+                end else
+                    sends = 0;
+            always @(posedge sclk)
+                if (!cs_n) begin
+                    x_shift <= {{x_shift[30:0], mosi_x}};
+                    y_shift <= {{y_shift[30:0], mosi_y}};
+                end
+            always @(negedge cs_n) begin
+                x_shift <= 0;
+                y_shift <= 0;
+            end
+            always @(negedge ldac_n)
+                if (cs_n) $fwrite(wires, "%016x\\n%08x%08x\\n", {{32'd0, sent_number}}, y_shift, x_shift);
+            always @(posedge missed) $fwrite(wires, "ffffffffffffffff\\nffffffffffffffff\\n");
+            always @(posedge bench.finished) begin
+                $fclose(words);
+                $fclose(wires);
+            end
         end
-    always @(negedge cs_n) begin
-        x_shift <= 0;
-        y_shift <= 0;
-    end
-    always @(negedge ldac_n) if (cs_n) $fwrite(wires, "%016x\\n%08x%08x\\n", {{32'd0, sent_number}}, y_shift, x_shift);
-    always @(posedge missed) $fwrite(wires, "ffffffffffffffff\\nffffffffffffffff\\n");
-    always @(posedge finished) begin
-        $fclose(words);
-        $fclose(wires);
-    end
+    endgenerate
 endmodule
 
 `default_nettype wire
@@ -125,11 +140,11 @@ def bench_text(content: Content, index_bits: tuple[int, int]) -> str:
     )
 
 
-def bench_parameters(folder: Path, script: str, capture: str) -> dict[str, int | str]:
-    """The files that the bench reads and writes, all in its folder."""
+def bench_parameters(folder: Path, script: str, capture: str, converters: bool) -> dict[str, int | str]:
+    """The files that the bench reads and writes, all in its folder; words and wires only with ``converters``."""
     names = {"SCRIPT": script, "CAPTURE": capture, "STATES": STATES, "WORDS": WORDS, "WIRES": WIRES}
     files: dict[str, int | str] = {key: str(folder / name) for key, name in names.items()}
-    return {**files, "CONSTANTS": str(folder / CONSTANTS), "COUNT_BITS": COUNT_BITS}
+    return {**files, "CONSTANTS": str(folder / CONSTANTS), "CONVERTERS": int(converters), "COUNT_BITS": COUNT_BITS}
 
 
 def different_constants(folder: Path, content: Content) -> list[str]:

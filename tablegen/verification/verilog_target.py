@@ -48,7 +48,7 @@ from tablegen.verification.verilog_bench import (
     wanted_constants,
 )
 
-_SESSION_TICKS = 39_000  # of the program of a build, in a session that has its frame apart
+_SESSION_TICKS = 30_000  # of the program of a build, in a session that has its frame apart
 _CAPTURED_TICK_BYTES = 17  # bytes of a captured tick
 _SINE = "sine.mem"
 _MAX_TABLE_WORDS = 1 << 16  # words of a table that the sequencer can address
@@ -181,7 +181,7 @@ class SimulatedRun:
             "sources": [str(path) for path in (*sources, STREAM_BENCH, bench)],
             "includes": [str(sources[0].parent)],
             "parameters": {
-                **bench_parameters(folder, SCRIPT, CAPTURE),
+                **bench_parameters(folder, SCRIPT, CAPTURE, self.session.wired_ticks > 0),
                 "X_POWER_UP_CODE": script.power_up[0],
                 "Y_POWER_UP_CODE": script.power_up[1],
                 **self.placement.parameters(harmonics, str(folder / _SINE)),

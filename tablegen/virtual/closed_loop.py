@@ -7,7 +7,8 @@ import msgspec
 import numpy as np
 
 from tablegen.config.load import Setup
-from tablegen.config.schema import BandLimit, ScannerAxis
+from tablegen.config.scanner import ScannerAxis
+from tablegen.config.schema import BandLimit
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import make_plan
 from tablegen.virtual.laboratory import OFFSETS

@@ -6,6 +6,7 @@ Needs scipy, of the extra ``calibrate``.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import pi
 from typing import Any, Literal, TypeVar
 
 import msgspec
@@ -16,12 +17,13 @@ from tablegen.calibration.frequency import fit_frequency
 from tablegen.calibration.hysteresis import HysteresisFit, Trace, fit_hysteresis
 from tablegen.calibration.images import Pair, fit_images
 from tablegen.calibration.offset import fit_offset
-from tablegen.calibration.resonance import fit_resonance
+from tablegen.calibration.resonance import ResonanceFit, fit_resonance
 from tablegen.calibration.size import SizeFit, fit_size
 from tablegen.calibration.summary import change
+from tablegen.compensation import models
 from tablegen.compensation.size import SizeLaw
 from tablegen.config.load import Setup
-from tablegen.config.schema import Frequency, Hysteresis, Offset, Resonance, ScannerAxis, Size
+from tablegen.config.scanner import Frequency, Offset, Resonance, ScannerAxis, Size
 from tablegen.virtual.experiments import actual_sizes, apparent_sizes, frequency_response, sensor_trace
 from tablegen.virtual.imaging import grating, hexagonal, image_pair
 from tablegen.virtual.scanner import VirtualAxis, VirtualScanner
@@ -95,14 +97,18 @@ class _Day:
     def fits(self, amplitudes: Sequence[float], images: bool) -> dict[str, Fit]:
         """Everything that can be calibrated; a resonance only where the scanner file has one."""
         size = self._size()
-        fits: dict[str, Fit] = {
-            "offset": self._offset(size),
-            "size": size,
-            "hysteresis": self._imaged_hysteresis(amplitudes) if images else self._hysteresis(amplitudes),
-            "frequency": self._frequency(),
-        }
+        fits: dict[str, Fit] = {"offset": self._offset(size), "size": size}
+        if images:
+            fits["hysteresis"] = self._imaged_hysteresis(amplitudes)
+        traces = [] if images else self._traces(amplitudes)
+        fits["frequency"] = self._frequency()
+        delay_s = 0.0
         if self._before.resonance is not None:
-            fits["resonance"] = self._resonance(self._before.resonance)
+            fits["resonance"] = found = self._resonance(self._before.resonance)
+            # A build undoes this lag by the resonance; left in the loops, it would be undone by them once more.
+            delay_s = found.delay_s.value + 1.0 / (2.0 * pi * found.frequency_hz.value * found.quality.value)
+        if traces:
+            fits["hysteresis"] = fit_hysteresis(traces, self._v_max, delay_s=delay_s)
         return fits
 
     def scanner_axis(self, fits: dict[str, Fit], points: bool) -> ScannerAxis:
@@ -116,7 +122,7 @@ class _Day:
         return ScannerAxis(
             size=_as(Size, changes["size"].values),
             offset=_as(Offset, changes["offset"].values),
-            hysteresis=_as(Hysteresis, {"model": "harmonic", "branches": branches}),
+            hysteresis=_as(models.get(changes["hysteresis"].values["model"]), {"branches": branches}),
             frequency=_as(Frequency, changes["frequency"].values),
             resonance=resonance,
         )
@@ -147,7 +153,7 @@ class _Day:
             found["nominal_nm"] / size.k_nm_per_v, found["actual_nm"], self._v_max, size.base_nm, None, "relative"
         )
 
-    def _hysteresis(self, amplitudes: Sequence[float]) -> HysteresisFit:
+    def _traces(self, amplitudes: Sequence[float]) -> list[Trace]:
         traces = []
         for share in amplitudes:
             volts = share * self._v_max
@@ -158,7 +164,7 @@ class _Day:
                 self._axis, volts, 0.5 * self._v_max, rate, PERIODS, SAMPLES, turn=self._turn, sensor=sensor
             )
             traces.append(Trace(f"{volts:g} V", found["time_s"], found["drive_v"], found["displacement_nm"]))
-        return fit_hysteresis(traces, self._v_max)
+        return traces
 
     def _imaged_hysteresis(self, amplitudes: Sequence[float]) -> HysteresisFit:
         """The same from images: of a lattice where the line is short, of a grating where it is long."""
@@ -182,7 +188,7 @@ class _Day:
         found = frequency_response(self._axis, f, noise=self._noise, seed=self._next())
         return fit_frequency(found["frequency_hz"], found["gain"], self._reference_hz)
 
-    def _resonance(self, before: Resonance) -> Fit:
+    def _resonance(self, before: Resonance) -> ResonanceFit:
         near = before.frequency_hz or 1e4
         f = near * np.geomspace(0.2, 3.0, 200)
         found = frequency_response(self._axis, f, noise=self._noise, seed=self._next())

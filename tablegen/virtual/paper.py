@@ -7,7 +7,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from tablegen.compensation.hysteresis import BranchShape, LineShape, beta_at
+from tablegen.compensation.hysteresis import BranchShape, beta_at
+from tablegen.compensation.line import LineShape
+from tablegen.compensation.models.harmonic import HarmonicModel
+from tablegen.compensation.models.sinusoidal import SinusoidalModel
 from tablegen.numerics.arrays import Floats
 from tablegen.virtual.experiments import apparent_sizes, triangle_size
 from tablegen.virtual.identify import OFFSETS_V, X_TARGETS
@@ -49,8 +52,8 @@ def comparison(axis: VirtualAxis) -> Iterator[tuple[str, str, str]]:
     for name, branch, paper in (("forward", whole.forward, "30 %"), ("backward", whole.backward, "60 %")):
         yield f"its scaling error, {name}", f"about {paper}", f"{branch.scaling_peak_to_peak:.0f} %"
     for model, shape, papers in (
-        ("sinusoidal", SINUSOIDAL, (("1.5", "15"), ("1.5", "15"))),
-        ("harmonic", SECTION_8, (("0.5", "5"), ("1", "11"))),
+        (SinusoidalModel.model(), SINUSOIDAL, (("1.5", "15"), ("1.5", "15"))),
+        (HarmonicModel.model(), SECTION_8, (("0.5", "5"), ("1", "11"))),
     ):
         line = played_line(axis, shape.value(t), 100.0)
         for (residual, scaling), name in zip(papers, ("forward", "backward"), strict=True):

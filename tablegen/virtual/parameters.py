@@ -10,10 +10,10 @@ import numpy as np
 from msgspec import Meta, Struct
 
 from tablegen.config.decode import decode
-from tablegen.config.schema import Hertz, Name, PositiveVolts
-from tablegen.config.toml import read_toml
 from tablegen.numerics.arrays import Floats, FloatsLike
 from tablegen.problems import Document, Problems
+from tablegen.quantities import Hertz, Name, PositiveVolts
+from tablegen.toml import read_toml
 from tablegen.virtual.duhem import Duhem, Lag
 from tablegen.virtual.preisach import Preisach
 

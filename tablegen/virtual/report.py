@@ -7,13 +7,14 @@ from typing import Any
 
 import numpy as np
 
+from tablegen.compensation import models
 from tablegen.virtual.line_error import BranchError, LineError, ideal_triangle
 from tablegen.virtual.parameters import Truth
 from tablegen.virtual.simulation import AxisRun, Run
 
 LABEL = "simulation on a virtual scanner"
 _MAX_CSV_ROWS = 10_000
-_COLOURS = {"triangle": "#c23b22", "sinusoidal": "#d98e04", "harmonic": "#1f5fa8"}
+_COLOURS = ("#c23b22", "#d98e04", "#1f5fa8", "#2e7d4f", "#7b4fa3")  # by the order of models
 
 
 @dataclass(frozen=True)
@@ -170,7 +171,7 @@ def figure(title: str, stages: Sequence[SimulationStage]) -> bytes:
 
 
 def _draw(axes: Sequence[Any], one: AxisRun, model: str) -> None:
-    colour = _COLOURS[model]
+    colour = _COLOURS[models.get(model).order % len(_COLOURS)]
     thin = slice(None, None, max(1, len(one.displacement_nm) // 4000))
     axes[0].plot(one.drive.time_s[thin], one.displacement_nm[thin], color=colour, lw=1.4, label=model)
     error: LineError = one.error

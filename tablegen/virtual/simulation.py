@@ -5,16 +5,15 @@ from typing import Literal
 
 import msgspec
 
+from tablegen.compensation import models
+from tablegen.compensation.model import Hysteresis
 from tablegen.config.load import Setup
-from tablegen.config.schema import Branch, Hysteresis, ScannerAxis
+from tablegen.config.scanner import ScannerAxis
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, make_plan
 from tablegen.virtual.line_error import LineError, about_window_line, line_error
 from tablegen.virtual.played import PlayedDrive, intended, played
 from tablegen.virtual.scanner import VirtualAxis, VirtualScanner
-
-Model = Literal["triangle", "sinusoidal", "harmonic"]
-MODELS: tuple[Model, ...] = ("triangle", "sinusoidal", "harmonic")
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +44,7 @@ class AxisRun:
 class Run:
     """A scan with one hysteresis model. ``asked`` are the axes on which it is that of the scanner file."""
 
-    model: Model
+    model: str
     asked: tuple[str, ...]
     x: AxisRun
     y: AxisRun
@@ -70,8 +69,8 @@ def run_line(line: LinePlan, axis: VirtualAxis) -> AxisRun:
     )
 
 
-def with_model(setup: Setup, model: Model) -> Setup:
-    """The same scan with another hysteresis model on both axes; one without calibrated branches stays a triangle.
+def with_model(setup: Setup, model: str) -> Setup:
+    """The same scan with another hysteresis model on both axes; one that has no parameters for it keeps its own.
 
     A refinement was learnt over the scanner file's own model, and stays on axes that keep it.
     """
@@ -79,30 +78,29 @@ def with_model(setup: Setup, model: Model) -> Setup:
     for name in ("x", "y"):
         axis: ScannerAxis = getattr(scanner, name)
         h = axis.hysteresis
-        if h is None or h.model == model or (not h.branches and model != "triangle"):
+        other = None if h is None or h.model() == model else models.get(model).like(h)
+        if other is None:
             continue
-        axis = msgspec.structs.replace(axis, hysteresis=Hysteresis(model=model, branches=h.branches))
+        axis = msgspec.structs.replace(axis, hysteresis=other)
         scanner = msgspec.structs.replace(scanner, **{name: axis})
         scan = msgspec.structs.replace(scan, **{name: msgspec.structs.replace(getattr(scan, name), refinement=None)})
     return replace(setup, scan=scan, scanner=scanner)
 
 
-def models_of(setup: Setup) -> tuple[Model, ...]:
-    """Models for which the scanner file has parameters on at least one axis."""
-    calibrated = [h for h in (setup.scanner.x.hysteresis, setup.scanner.y.hysteresis) if h is not None and h.branches]
-    if not calibrated:
-        return ("triangle",)
-    branches = [b for h in calibrated for entry in h.branches for b in (entry.forward, entry.backward)]
-    return MODELS if all(_has_peak(branch) for branch in branches) else MODELS[:2]
+def models_of(setup: Setup) -> tuple[str, ...]:
+    """Models that can be compared, the simplest first: for which all axes that are calibrated have parameters.
+
+    And those of the scanner file itself.
+    """
+    both = (setup.scanner.x.hysteresis, setup.scanner.y.hysteresis)
+    calibrated = [h for h in both if h is not None and h.calibrated]
+    found: set[type[Hysteresis]] = {models.get(models.UNCOMPENSATED), *map(type, calibrated)}
+    if calibrated:
+        found |= {kind for kind in models.own() if all(kind.like(h) is not None for h in calibrated)}
+    return tuple(kind.model() for kind in sorted(found, key=lambda kind: (kind.order, kind.model())))
 
 
-def _has_peak(branch: Branch) -> bool:
-    if branch.points is None:
-        return branch.u_peak is not None
-    return all(point.u_peak is not None for point in branch.points)
-
-
-def simulate(setup: Setup, scanner: VirtualScanner, model: Model) -> Run:
+def simulate(setup: Setup, scanner: VirtualScanner, model: str) -> Run:
     """Plan a scan with a hysteresis model, and play it on both axes.
 
     Raises ``Rejected`` where it cannot be played so, and ``ValueError`` where it leaves the virtual scanner's range.
@@ -111,6 +109,6 @@ def simulate(setup: Setup, scanner: VirtualScanner, model: Model) -> Run:
     asked = tuple(
         axis
         for axis, h in (("x", setup.scanner.x.hysteresis), ("y", setup.scanner.y.hysteresis))
-        if (h.model if h is not None else "triangle") == model
+        if (h.model() if h is not None else models.UNCOMPENSATED) == model
     )
     return Run(model, asked, run_line(plan.x, scanner.x), run_line(plan.y, scanner.y))

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from typing import Protocol
 
-from tablegen.compensation.hysteresis import LineShape
 from tablegen.numerics.arrays import Floats, FloatsLike
 from tablegen.waveform.series import FourierSeries
 
@@ -26,7 +25,7 @@ class WaveformShape(Protocol):
 class RefinedShape:
     """u(t) + r(t): the model's shape, and the layer, both dimensionless, t in periods."""
 
-    model: LineShape
+    model: WaveformShape
     layer: FourierSeries
 
     @property

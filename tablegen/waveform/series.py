@@ -6,7 +6,7 @@ from math import tau
 
 import numpy as np
 
-from tablegen.numerics.arrays import Floats, FloatsLike, freeze
+from tablegen.numerics.arrays import Floats, FloatsLike, freeze, multiples
 from tablegen.numerics.turns import sine_and_cosine
 
 _BLOCK = 1 << 12  # times that are worked out together
@@ -35,13 +35,9 @@ class FourierSeries:
     def on_grid(self, count: int, derivative: int = 0) -> Floats:
         """As ``value`` at k / count for k in [0, count), by one table of sines for all harmonics."""
         s, c = sine_and_cosine(np.arange(count) / count)
-        k = np.arange(count)
         total = np.full(count, self.a0 if derivative == 0 else 0.0)
-        at = np.zeros_like(k)
-        for n in range(1, self.harmonics + 1):
-            at += k  # n k modulo count
-            at -= count * (at >= count)
-            total += self.term(n, derivative, s[at], c[at])
+        for n, at in enumerate(multiples(np.arange(count), count, self.harmonics), 1):
+            total += self.term(n, derivative, s.take(at, mode="clip"), c.take(at, mode="clip"))
         return total
 
     def term(self, n: int, derivative: int, s: Floats, c: Floats) -> Floats:

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from variants import setup_of
 
@@ -34,6 +34,7 @@ CASES: dict[str, tuple[dict[str, str], dict[str, str], str, str, str, str]] = {
         "quantisation",
         "amplifier.gain",
     ),
+    "small, inverted": ({**SMALL, "amplifier.gain": "-10.0"}, {}, "x", "x.size_nm", "quantisation", "amplifier.gain"),
     "coarse words": ({"x.table.bits": "8"}, {}, "x", "x.size_nm", "quantisation", "x.table.bits"),
     "few words": (
         {"x.table.length": "32", "x.band_limit.harmonics": "15"},
@@ -106,6 +107,10 @@ def test_a_warning_has_its_place_its_cause_and_a_remedy_that_holds(tmp_path: Pat
     assert "above 1 %" in text
     advice = text.split("; tried: ")[1].split("; or ")
     assert advice[0].startswith(f"{remedy} = ")
+    assert len(advice) == (
+        2 if remedy == "amplifier.gain" else 1
+    )  # where the scan itself can help, nothing else is named
+    assert ("amplifier.gain = -" in text) == ("inverted" in case)
     for one in advice:  # as a user would: each is written into the file, built, and measured
         edits, _, left = one.rpartition(" leaves ")
         change = tomllib.loads(edits.replace(" with ", "\n"))
@@ -119,10 +124,13 @@ def test_a_warning_has_its_place_its_cause_and_a_remedy_that_holds(tmp_path: Pat
 
 
 def test_the_small_scan_is_worse_than_none_and_says_so(tmp_path: Path) -> None:
-    x, y = warned(setup_of(tmp_path, {**FREE, **SMALL}))
-    for text in (x, y):
+    setup = setup_of(tmp_path, {**FREE, **SMALL})
+    plan = make_plan(setup)
+    certificates = certify(plan)
+    for text, certificate in zip(warned(setup), certificates.values(), strict=True):
+        span = certificate.highest_code - certificate.lowest_code + 1
         assert re.search(r"above 1 % and above the [12](\.\d+)? % of the uncompensated line; ", text)
-        assert re.search(r"the scan is 14\d\d of the converter's 65536 codes; tried: amplifier\.gain = 3", text)
+        assert f"the scan spans {span} of the converter's 65536 codes; tried: amplifier.gain = 3" in text
         assert "; or dac.bits = 18 leaves 0." in text
 
 
@@ -147,6 +155,21 @@ def test_what_nothing_helps_ends_after_few_trials(tmp_path: Path, monkeypatch: p
     assert len(texts) == 2
     assert all("no remedy that was tried" in text for text in texts)
     assert len(trials) <= 40
+
+
+@pytest.mark.parametrize(
+    ("left", "said"),
+    [
+        (2.6, "no remedy that was tried helps"),
+        (1.5, "no remedy that was tried is enough; the best: a = 1 leaves 1.5 %"),
+    ],
+)
+def test_a_remedy_that_changes_little_is_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, left: float, said: str
+) -> None:
+    one = remedies.Remedy("a = 1", left, low=False, within_limits=True)
+    monkeypatch.setattr(remedies, "tried", lambda *_: [one])
+    assert all(text.endswith(said) for text in warned(setup_of(tmp_path, {**FREE, **SMALL})))
 
 
 def test_a_trial_that_cannot_be_planned_is_no_remedy(tmp_path: Path) -> None:
@@ -180,6 +203,11 @@ def test_without_hysteresis_there_is_no_line_to_be_worse_than(tmp_path: Path, mo
 PERCENT = st.floats(0.0, 50.0)
 
 
+@example(total=0.0, band=0.0, rest=0.0, size=-1.1, before=2.0)
+@example(total=0.0, band=0.0, rest=0.0, size=1.1, before=2.0)
+@example(total=0.0, band=1.1, rest=0.0, size=0.0, before=2.0)
+@example(total=1.1, band=0.0, rest=0.0, size=0.0, before=2.0)
+@example(total=0.6, band=0.0, rest=0.0, size=0.0, before=0.5)
 @given(total=PERCENT, band=PERCENT, rest=PERCENT, size=st.floats(-5.0, 5.0), before=st.floats(0.01, 50.0))
 def test_when_a_scan_is_warned_of(total: float, band: float, rest: float, size: float, before: float) -> None:
     parts = ScalingError(total, band, rest, 0.0, size, before)
@@ -192,6 +220,27 @@ def test_when_a_scan_is_warned_of(total: float, band: float, rest: float, size: 
         assert found.cause == ("band limit" if band > rest else "quantisation")
         text = found.text("x")
         assert ("of the uncompensated line" in text) == (found.what == "scaling error" and max(total, band) > before)
+
+
+def test_the_worst_of_all_errors_is_told() -> None:
+    """Of both directions, and of scaling and size, by how far each is above what it may be."""
+    parts = {
+        "forward": ScalingError(2.0, 0.0, 2.0, 0.0, -1.5, 5.0),
+        "backward": ScalingError(3.0, 0.0, 3.0, 0.0, 2.5, 5.0),
+    }
+    found = excess(parts)
+    assert found is not None
+    assert (found.side, found.what, found.times) == ("backward", "scaling error", 3.0)
+    parts["forward"] = replace(parts["forward"], size=-3.5)
+    found = excess(parts)
+    assert found is not None
+    assert (found.side, found.what, found.percent) == ("forward", "size error", -3.5)
+    found = excess(parts, most=4.0)
+    assert found is None
+    parts["backward"] = replace(parts["backward"], uncompensated=0.1)
+    found = excess(parts)
+    assert found is not None
+    assert (found.side, found.times) == ("backward", 30.0)
 
 
 def test_brief_warnings_are_the_same_without_remedies(tmp_path: Path) -> None:

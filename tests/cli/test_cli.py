@@ -572,7 +572,7 @@ def test_an_interruption_before_writing_leaves_the_build_that_was_there(scan: Pa
     moment = event.format(scan=scan, scanner=scan.parent / "scanner.toml")
     done = interrupted(moment, count, "build", scan, "-o", out)
     assert done.returncode == 130
-    assert done.stderr.strip() == "interrupted; the output directory was left as it was"
+    assert done.stderr.strip() == f"interrupted; {out} was left as it was"
     assert done.stdout == ""
     assert contents(out) == before
     assert stamps(out) == when
@@ -621,7 +621,7 @@ def test_a_signal_from_outside_interrupts_a_build(scan: Path, number: signal.Sig
         process.send_signal(number)
         printed, told = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 130
-    assert (printed, told.strip()) == ("", "interrupted; the output directory was left as it was")
+    assert (printed, told.strip()) == ("", f"interrupted; {out} was left as it was")
     assert not out.exists()
 
 

@@ -1,5 +1,6 @@
 """What others wrote never steers a terminal: tried on one."""
 
+import io
 import json
 import os
 import pty
@@ -14,7 +15,7 @@ from editing import SCAN, edited, run, write_pair
 from gwyfile.objects import GwyContainer, GwyDataField
 from limits import PATIENCE_S
 
-from tablegen.cli.terminal import visible
+from tablegen.cli.terminal import GuardedStream, erase, guard_streams, redraw, tell, visible
 
 EVIL = "\x1b]0;owned\x07\x1b[31m\r\x9b2J\u202e\x7f"
 SHOWN = "\\u001b]0;owned\\u0007\\u001b[31m\\u000d\\u009b2J\\u202e\\u007f"
@@ -55,8 +56,44 @@ def test_what_is_visible() -> None:
 
 
 def test_every_control_of_unicode_is_seen() -> None:
-    controls = [*range(0x20), *range(0x7F, 0xA0), *range(0x202A, 0x202F), *range(0x2066, 0x206A), 0x2028, 0x2029]
+    controls = [*range(0x20), *range(0x7F, 0xA0), *range(0x200B, 0x2010), *range(0x2028, 0x202F)]
+    controls += [*range(0x2060, 0x206A), 0x061C, 0xFEFF]
     assert [c for c in controls if visible(chr(c)) == chr(c)] == [ord("\t"), ord("\n")]
+
+
+class Terminal(io.StringIO):
+    """A stream that says that it is one."""
+
+    encoding = "ANSI_X3.4-1968"  # type: ignore[assignment]
+
+    def isatty(self) -> bool:
+        return True
+
+
+def test_nothing_gets_past_the_guard_but_what_draws(monkeypatch: pytest.MonkeyPatch) -> None:
+    out, err = Terminal(), Terminal()
+    monkeypatch.setattr(sys, "stdout", out)
+    monkeypatch.setattr(sys, "stderr", err)
+    guard_streams()
+    guard_streams()
+    assert isinstance(sys.stdout, GuardedStream)
+    assert sys.stdout.stream is out
+    sys.stdout.writelines([EVIL, "a\n"])
+    tell(EVIL)
+    tell(EVIL, bold=True)
+    assert out.getvalue() == f"{SHOWN}a\n{SHOWN}\n\x1b[1m{SHOWN}\x1b[0m\n"
+    redraw(EVIL)
+    erase(3)
+    assert err.getvalue() == f"\r{SHOWN}\r   \r"
+    assert sys.stdout.encoding == "iso8859-1"  # beside one of ASCII click would write past the guard
+    assert GuardedStream(io.TextIOWrapper(io.BytesIO(), "utf-8")).encoding == "utf-8"
+
+
+def test_no_output_at_all_is_no_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stdout", None)
+    guard_streams()
+    tell("a")
+    assert sys.stdout is None
 
 
 @pytest.mark.common

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from tablegen.compensation.hysteresis import HIGHEST_PEAK, LOWEST_PEAK, BranchShape, LineShape, beta_at
+from tablegen.compensation.hysteresis import HIGHEST_PEAK, LOWEST_PEAK, BranchShape, beta_at
+from tablegen.compensation.line import LineShape
 from tablegen.problems import Unphysical
 
 betas = st.floats(1e-4, 0.12)

@@ -8,10 +8,10 @@ from editing import SCAN, SCANNER, edited, write_pair
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tablegen.compensation.branch import Branch, ResidualLaw
 from tablegen.compensation.hysteresis import beta_at
-from tablegen.compensation.residual import SIZE_REACH, ResidualLaw
+from tablegen.compensation.points import SIZE_REACH, HysteresisPoint
 from tablegen.config.load import load
-from tablegen.config.schema import Branch, HysteresisPoint
 from tablegen.planning.line_plan import make_plan
 from tablegen.problems import Rejected, Unphysical
 

@@ -345,7 +345,8 @@ CHOICES = [
     case("y.motion = 'jump'", says="scan.toml:39: y.motion: 'jump' is not one of 'ramp', 'step'"),
     case(
         scanner="x.hysteresis.model = 'preisach'",
-        says="scanner.toml:16: x.hysteresis.model: 'preisach' is not one of 'harmonic', 'sinusoidal', 'triangle'",
+        says="scanner.toml:16: x.hysteresis.model: 'preisach' is not one of "
+        "'harmonic', 'operator', 'sinusoidal', 'triangle'",
     ),
 ]
 

@@ -17,7 +17,8 @@ from editing import SCAN, SCANNER, Outcome, edited, run
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
-from tablegen.config.schema import Scan, Scanner
+from tablegen.config.scanner import Scanner
+from tablegen.config.schema import Scan
 
 pytestmark = [pytest.mark.filterwarnings("error"), pytest.mark.common]  # numpy says so where it makes an inf or a nan
 STEADY = settings(derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow], print_blob=False)

@@ -16,8 +16,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tablegen.config.toml import read_toml
 from tablegen.problems import Rejected
+from tablegen.toml import read_toml
 
 Path_ = tuple[str | int, ...]
 

@@ -15,9 +15,9 @@ from tablegen.certificate.certificate import certify
 from tablegen.cli import cli
 from tablegen.config.load import load
 from tablegen.config.schema import BandLimit
+from tablegen.planning.band_limit import band_limited
 from tablegen.planning.line_plan import make_plan
 from tablegen.problems import Rejected
-from tablegen.waveform.band_limit import band_limited
 
 README = (REPOSITORY / "README.md").read_text(encoding="utf-8")
 

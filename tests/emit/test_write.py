@@ -171,6 +171,33 @@ def test_a_lock_ends_with_its_process(tmp_path: Path) -> None:
     assert write_files(tmp_path, FILES) == list(FILES)
 
 
+@pytest.mark.parametrize("made_again", [False, True])
+def test_a_directory_that_went_meanwhile_is_locked_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, made_again: bool
+) -> None:
+    """Another writer failed, and removed what it had made, between the opening and the lock."""
+    folder, lock, calls = tmp_path / "out", directory_lock._lock, 0
+    folder.mkdir()
+
+    def late(handle: int) -> bool:
+        nonlocal calls
+        calls += 1
+        if calls == 1:
+            folder.rmdir()
+            if made_again:
+                folder.mkdir()
+        return lock(handle)
+
+    monkeypatch.setattr(directory_lock, "_lock", late)
+    before = set(os.listdir("/proc/self/fd"))
+    with locked(folder):
+        assert calls == 2
+        other = os.open(folder, os.O_RDONLY)
+        assert not lock(other)  # it is the directory that stands there now
+        os.close(other)
+    assert set(os.listdir("/proc/self/fd")) == before
+
+
 def test_patience_ends_with_a_word(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(directory_lock, "_PATIENCE_S", 0.0)
     with (

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from tablegen.compensation.hysteresis import BranchShape, LineShape
+from tablegen.compensation.hysteresis import BranchShape
+from tablegen.compensation.line import LineShape
 from tablegen.fixedpoint.converter import fit_gain
 from tablegen.fixedpoint.interpolation import FRACTION_BITS, guard_bits, interpolate
 from tablegen.fixedpoint.output import Output

@@ -124,6 +124,7 @@ def the_largest_schedules(libraries: Libraries) -> None:
     device.alive.append(blank)
     for interpolated, index_bits, bits, length, result in (
         (1, 16, 24, 65536, LOADED), (1, 16, 25, 65536, BAD_TABLE), (1, 3, 8, 8, LOADED),
+        (1, 17, 24, 131072, BAD_TABLE), (1, 2, 24, 4, BAD_TABLE),
         (0, 0, 24, 131072, LOADED), (0, 0, 24, 131073, BAD_TABLE),
         (0, 0, 24, 1, LOADED),
     ):  # fmt: skip
@@ -207,6 +208,11 @@ def converters_that_do_not_fit(libraries: Libraries) -> None:
                 assert result == ((bits, word_bits, code) in accepted), (bits, word_bits, code)
                 if not result:
                     assert device.load(flat(1)) == OTHER_CONVERTER
+                    program, axes = library.program(flat(1))
+                    refused_axis = program.x if pair[0] is other else program.y
+                    refused_axis.dac_bits = refused_axis.word_bits = 0
+                    assert device.load(program) == OTHER_CONVERTER, "a program for no converter"
+                    device.alive.append(axes)
                     assert device.steps(3)[0].tolist() == [0, 0, 0]
 
 

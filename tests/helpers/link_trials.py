@@ -42,11 +42,14 @@ def trials() -> Iterator[str]:
     key = test_c_link_key
     key.test_nonces_are_of_key_identity_boot_and_count()
     key.test_a_challenge_expires()
+    for before in ("used by a request", "used by a commit", "expired"):
+        key.test_a_commit_needs_a_challenge_of_its_own(before)
     for how in ({}, {"boot_persists": False, "random": key.urandom}):
         key.test_a_recorded_trigger_is_worth_nothing_after_a_power_cycle(how)
         key.test_it_is_worth_nothing_on_another_instrument(how)
     yield "what is refused at the start"
     key.test_a_configuration_with_one_fault_is_refused()
+    key.test_a_key_without_what_it_needs_is_refused(*key.UNSTARTED[0])
     yield "the ring"
     parts.test_no_answer_is_lost_where_nothing_can_leave()
     parts.test_what_the_ring_has_no_room_for_is_counted_and_recovered_from()

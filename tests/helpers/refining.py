@@ -12,7 +12,7 @@ import numpy as np
 from editing import SCAN, edited, write_pair
 
 from tablegen.config.load import Setup, load
-from tablegen.config.schema import Scanner
+from tablegen.config.scanner import Scanner
 from tablegen.planning.line_plan import LinePlan, make_plan
 from tablegen.refinement.departure import Departure, departure
 from tablegen.refinement.displacement import Displacement

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from tablegen.compensation.hysteresis import BranchShape, LineShape
+from tablegen.compensation.hysteresis import BranchShape
+from tablegen.compensation.line import LineShape
 from tablegen.waveform.series import FourierSeries
 
 SECTION_8 = LineShape(0.5, BranchShape.harmonic(0.035, 0.37), BranchShape.harmonic(0.085, 0.48))

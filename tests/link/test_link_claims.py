@@ -16,6 +16,7 @@ from tablegen.link.errors import LinkError, LinkLost, OutOfTime
 from tablegen.link.frames import FrameReader
 from tablegen.link.messages import ANSWER, REFUSAL, Request, Upload
 from tablegen.link.model import ModelDevice
+from tablegen.link.outcome import UploadState, out_of_time
 from tablegen.link.upload import Uploader
 
 SIZE = len(TABLE.data)
@@ -169,3 +170,29 @@ def test_errors_of_a_line_that_loses_most_are_of_the_line(seed: int) -> None:
     with pytest.raises(LinkError, match=r"answer|timeout"):
         use()
     assert line.now_s < 60.0
+
+
+PART, ALL = UploadState(5, 9, False), UploadState(9, 9, True)
+
+
+@pytest.mark.parametrize(
+    ("state", "upload", "busy", "silence_s", "said"),
+    [
+        (PART, None, False, 0.0, "by its last answer the device has 5 of 9 bytes and keeps them: repeat the upload"),
+        (PART, None, False, 7.0, "no answer for 7 s; by its last answer the device has 5 of 9 bytes and keeps them"),
+        (PART, None, True, 0.0, "the device is busy with another upload; try again when that is active"),
+        (UploadState(5, 9, True), None, False, 0.0, "5 of 9 bytes: repeat the upload to continue (if more has"),
+        (ALL, None, False, 0.0, "9 of 9 bytes, and the scan may become active: see"),
+        (ALL, Upload.CHECKING, False, 0.0, "has received everything, but has not ended its checks"),
+        (ALL, Upload.WAITING, False, 0.0, "has received everything, but has not reached the start of a line"),
+    ],
+)
+def test_what_is_said_when_the_time_is_over(
+    state: UploadState, upload: Upload | None, busy: bool, silence_s: float, said: str
+) -> None:
+    text = str(out_of_time(state, upload, busy, silence_s, None))
+    assert said in text
+    assert ("no answer" in text) == (silence_s > 0.0)
+    slow = str(out_of_time(state, upload, busy, silence_s, 9600))
+    assert slow.startswith(text.removesuffix(", or increase --timeout"))
+    assert slow.endswith("; the line is slow, answers come at about 9600 baud: give --baud 9600, or increase --timeout")

@@ -296,6 +296,17 @@ def test_a_request_that_was_sent_twice_teaches_nothing() -> None:
     assert pace.late_s == 0.0
 
 
+def test_small_frames_tell_no_rate() -> None:
+    """Latency drowns them: sixteen answers to short requests, 10 ms apart, are no slow line."""
+    for size, slow in ((20, None), (200, 20_000)):
+        pace = Pace(0.016)
+        for seq in range(16):
+            pace.sent((Request.STATUS, seq), 0.0, 115200, (size, 8), learn=True)
+        for seq in range(16):
+            pace.answered((Request.STATUS, seq), 0.1 + 0.005 * seq * (size / 10), 8)
+        assert pace.slow_baud(115200) == slow
+
+
 def test_a_delay_that_was_once_fades() -> None:
     pace = Pace(0.016)
     _answered(pace, 0.0, 0, 2.0)
@@ -322,6 +333,35 @@ def test_requests_on_their_way_have_a_bound_of_their_own() -> None:
     assert flight.take((Request.DATA, 0), 6.0) is not None, "late, and it counts"
     flight.forget(Request.DATA)
     assert flight.take((Request.DATA, 1), 6.0) is None
+
+
+def test_the_window_grows_back_to_that_of_the_device_and_no_further() -> None:
+    flight = Flight(3, 0.0)
+    flight.lost()
+
+    def room() -> int:
+        flight.clear(0.0)
+        count = 0
+        while flight.has_room() and count < 10:
+            flight.add(Sent(Request.DATA, count, 0.0, 1.0))
+            count += 1
+        return count
+
+    assert room() == 2
+    for _ in range(4):  # two windows of two
+        flight.got_through()
+    assert room() == 3
+    for _ in range(100):
+        flight.got_through()
+    assert room() == 3
+
+
+def test_one_wait_in_vain_is_no_silence() -> None:
+    flight = Flight(8, 0.0)
+    for count in range(2):
+        flight.add(Sent(Request.STATUS, count, 10.0 * count, 10.0 * count + 0.1))
+        assert len(flight.overdue(10.0 * count + 9.0)) == 1
+        assert flight.is_silent(10.0 * count + 9.0) == (count == 1)
 
 
 @pytest.mark.parametrize(("tries_in_vain", "left"), [(0, 2), (2, 1)])

@@ -13,11 +13,11 @@ import tablegen
 PACKAGE = Path(tablegen.__file__).parent
 # From the lowest to the highest; a module imports from its own layer and from those before it.
 LAYERS = (
-    "version problems interruption reading resources installation",
+    "version problems interruption reading resources installation figures quantities toml",
     "numerics",
-    "config",
-    "compensation",
     "waveform",
+    "compensation",
+    "config",
     "fixedpoint",
     "device",
     "planning",

@@ -40,7 +40,7 @@ ALLOWED = {
 PARSERS = {"json.loads", "tomllib.loads", "tomlkit.parse", "msgspec.json.decode"}
 PARSED = {
     ("manifest/format.py", "json.loads"): "the one reader of manifests",
-    ("config/toml.py", "tomllib.loads"): "the one reader of TOML, which has bounded the keys",
+    ("toml.py", "tomllib.loads"): "the one reader of TOML, which has bounded the keys",
     ("calibration/scanner_file.py", "tomllib.loads"): "text that parse_toml has read",
     ("calibration/scanner_file.py", "tomlkit.parse"): "text that parse_toml has read",
     ("refinement/scan_file.py", "tomllib.loads"): "text that parse_toml has read",

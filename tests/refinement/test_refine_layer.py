@@ -10,18 +10,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tablegen.certificate.certificate import certify
-from tablegen.compensation.hysteresis import BranchShape, LineShape
+from tablegen.compensation.hysteresis import BranchShape
+from tablegen.compensation.line import LineShape
 from tablegen.config.load import load
 from tablegen.config.schema import BandLimit
 from tablegen.emit.render import render
 from tablegen.fixedpoint.synthesis import FourierWords, synthesize
 from tablegen.link.prepare import PreparedScan
 from tablegen.manifest.read import read_build
+from tablegen.planning.band_limit import band_limited
 from tablegen.planning.line_plan import Plan, make_plan
 from tablegen.planning.refinement_layer import model_digest
 from tablegen.problems import Rejected
 from tablegen.virtual.played import intended, played
-from tablegen.waveform.band_limit import band_limited
 from tablegen.waveform.series import FourierSeries
 
 A, B = [0.001, -0.0004, 0.0, 0.0002], [-0.0015, 0.0006, 0.0003, -0.0001]

@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from building import REPOSITORY
-from c_mutants import Mutant, runtime_with
+from c_faults import Mutant
+from c_mutants import runtime_with
 from following import Differs, Follower
 from programs import random_dual
 

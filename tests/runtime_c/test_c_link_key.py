@@ -137,15 +137,39 @@ def test_nonces_are_of_key_identity_boot_and_count() -> None:
             assert nonce == derived_nonce(KEY, boot, count, identity)
 
 
-@pytest.mark.parametrize(
-    ("how", "why"),
-    [
-        ({"boot_persists": False}, Started.NO_RANDOM),
-        ({"identity": b""}, Started.NO_IDENTITY),
-        ({"identity": b"abc"}, Started.NO_IDENTITY),
-        ({"key": bytes(15)}, Started.BAD_KEY),
-    ],
-)
+@pytest.mark.parametrize("before", ["used by a request", "used by a commit", "expired", "no tag"])
+def test_a_commit_needs_a_challenge_of_its_own(before: str) -> None:
+    """Its tag is right but for the nonce, which was good for something else, or long ago; and then there is none."""
+    image = SCAN.image(False)
+    made, talk = started(), Talk(key=KEY)
+    asked(made, talk, talk.hello())
+
+    def upload() -> None:
+        assert all(asked(made, talk, wire)[:1] != b"r" for wire in talk.upload(image))
+
+    upload()
+    nonce = asked(made, talk, talk.request(Request.CHALLENGE))
+    if before == "used by a request":
+        assert asked(made, talk, talk.acting(Request.PARK, nonce=nonce)) == b""
+    elif before == "used by a commit":
+        assert len(asked(made, talk, talk.commit(image, nonce))) == 8
+        upload()
+    elif before == "expired":
+        made.set_clock(CHALLENGE_MS)
+    assert asked(made, talk, talk.commit(image, b"" if before == "no tag" else nonce)) == refused_by(Reason.KEY)
+    nonce = asked(made, talk, talk.request(Request.CHALLENGE))
+    assert len(asked(made, talk, talk.commit(image, nonce))) == 8, "the control"
+
+
+UNSTARTED = [
+    ({"boot_persists": False}, Started.NO_RANDOM),
+    ({"identity": b""}, Started.NO_IDENTITY),
+    ({"identity": b"abc"}, Started.NO_IDENTITY),
+    ({"key": bytes(15)}, Started.BAD_KEY),
+]
+
+
+@pytest.mark.parametrize(("how", "why"), UNSTARTED)
 def test_a_key_without_what_it_needs_is_refused(how: dict[str, object], why: Started) -> None:
     made = started(**how)
     assert made.started is why

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from building import run_clean
 from c_benches import words_of
-from c_mutants import Mutant, runtime_with
+from c_faults import Mutant
+from c_mutants import runtime_with
 from c_scripts import IN_C, LONG, long_play, renderings, shape_in_c
 from programs import random_dual
 from stream_scripts import sweep

@@ -167,10 +167,13 @@ def leaves(value: Any, path: tuple[str | int, ...] = ()) -> Iterator[tuple[tuple
         yield path, value
 
 
+CHOICES = (("offset-binary", "twos-complement"), ("right", "left"), ("forward", "both"), ("interpolated", "direct"))
+
+
 def changed(value: Any) -> Any:
-    """A little more of it."""
+    """A little more of it, or another choice."""
     if isinstance(value, str):
-        return value + "x"
+        return next((pair[value == pair[0]] for pair in CHOICES if value in pair), value + "x")
     if value is None:
         return 1.0
     return value + 1 if isinstance(value, int) else value * 1.0001 + 1e-6

@@ -6,7 +6,8 @@ import pytest
 from tablegen.calibration.branch import AmplitudeFit
 from tablegen.calibration.image_fit import fit_pair
 from tablegen.calibration.trace import fit_trace
-from tablegen.compensation.hysteresis import BranchShape, LineShape
+from tablegen.compensation.hysteresis import BranchShape
+from tablegen.compensation.line import LineShape
 from tablegen.numerics.arrays import Floats
 from tablegen.virtual.experiments import sensor_trace
 from tablegen.virtual.imaging import grating, hexagonal, image_pair

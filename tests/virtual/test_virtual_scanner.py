@@ -7,7 +7,8 @@ import pytest
 from building import REPOSITORY
 from variants import plan_of, setup_of
 
-from tablegen.compensation.hysteresis import BranchShape, LineShape, beta_at
+from tablegen.compensation.hysteresis import BranchShape, beta_at
+from tablegen.compensation.line import LineShape
 from tablegen.device.sequencer import play_line
 from tablegen.numerics.arrays import Floats
 from tablegen.virtual.experiments import actual_sizes, apparent_sizes, frequency_response, sensor_trace, triangle_size

@@ -4,7 +4,8 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from tablegen.compensation.hysteresis import BranchShape, LineShape
+from tablegen.compensation.hysteresis import BranchShape
+from tablegen.compensation.line import LineShape
 from tablegen.waveform.closed_form import fourier_series
 
 TURNS = [0.05, 0.3, 0.5, 0.7, 0.9, 0.95, 0.999]

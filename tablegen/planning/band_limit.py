@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tablegen.compensation.hysteresis import LineShape
+from tablegen.compensation.line import LineShape
 from tablegen.config.schema import BandLimit
 from tablegen.numerics.turns import sinc
 from tablegen.waveform.closed_form import fourier_series
@@ -18,9 +18,12 @@ def band_limited(
 
     ``truncate`` keeps the Fourier coefficients as they are and rings; ``lanczos`` multiplies them by sigma factors
     sinc(n / (H + 1)); ``window`` is straight inside the imaging window and leaves the turnarounds free.
-    A ``layer`` is added: inside the window to what is fitted, by the other methods to the coefficients as it is.
+    A model that makes the whole waveform itself has done all this. A ``layer`` is added: inside the window to what is
+    fitted, otherwise to the coefficients as it is.
     Raises ``Unphysical`` where the fit cannot stay inside [0, 1].
     """
+    if shape.waveform is not None:
+        return shape.waveform if layer is None else shape.waveform.plus(layer)
     if limit.method == "window":
         asked = shape if layer is None else RefinedShape(shape, layer)
         return fit_window(asked, harmonics, limit.window, limit.directions == "both")

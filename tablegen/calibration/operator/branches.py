@@ -1,0 +1,44 @@
+"""What a line leaves of a family: both branches as Chebyshev series of the position along the drive."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tablegen.calibration.operator.periodic_line import PeriodicLine
+from tablegen.compensation.operator.plays import Plays
+from tablegen.numerics.arrays import Floats
+
+DEGREE = 20  # of each branch
+_CLOSURE = 1e3  # weight of the two places at which the branches meet
+
+
+@dataclass(frozen=True, eq=False)
+class Left:
+    """``coefficients`` of both branches, 2 ``DEGREE`` + 2 of them; ``extent_nm`` between the turns."""
+
+    coefficients: Floats
+    extent_nm: float
+
+
+def left_of(line: PeriodicLine, family: Plays) -> Left:
+    """Measured less family, both about from 0 to 1 between the turns: ``Operator.loop`` closes their sum."""
+    u, rising = line.drive, line.rising
+    low, high = line.low, line.high
+    x = 2.0 * (u - low) / (high - low) - 1.0
+    modelled = np.where(rising, *(family.branch(u, low, high, going) for going in (True, False)))
+    ends = [family.branch(np.array([at]), low, high, True)[0] for at in (low, high)]
+    modelled = (modelled - ends[0]) / (ends[1] - ends[0])
+    measured = line.displacement_nm
+    # A first extent by least squares, then the ends that the smooth branches have.
+    scale, offset = np.polyfit(modelled, measured, 1)
+    count = DEGREE + 1
+    basis = np.polynomial.chebyshev.chebvander(np.clip(x, -1.0, 1.0), DEGREE)
+    matrix = np.zeros((len(u) + 2, 2 * count))
+    matrix[: len(u)][rising, :count] = basis[rising]
+    matrix[: len(u)][~rising, count:] = basis[~rising]
+    edges = np.polynomial.chebyshev.chebvander(np.array([-1.0, 1.0]), DEGREE)
+    matrix[len(u) :] = _CLOSURE * np.hstack([edges, -edges])
+    right = np.append((measured - offset) / scale - modelled, [0.0, 0.0])
+    found = np.linalg.lstsq(matrix, right, rcond=None)[0]
+    begin, end = (float(edge @ (found[:count] + found[count:])) / 2.0 for edge in edges)
+    return Left(found, float(scale) * (1.0 + end - begin))

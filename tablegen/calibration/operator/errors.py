@@ -1,0 +1,49 @@
+"""A predicted loop against a measured line, in the measures of the certificate: percent of the line over the window."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tablegen.calibration.operator.periodic_line import PeriodicLine
+from tablegen.compensation.operator.loop import Loop
+from tablegen.numerics.arrays import Floats
+
+WINDOW = (0.1, 0.9)
+_CHORD = 0.05  # of the line
+_POINTS = 321  # over the window
+_SMOOTHING = 12  # Chebyshev series over the window, which noise of single samples does not pass
+
+
+@dataclass(frozen=True, slots=True)
+class LineErrors:
+    """Rms and largest scaling error of both directions, largest distance of trace and retrace, error of the size."""
+
+    rms: float
+    scaling: float
+    mismatch: float
+    size: float
+
+
+WORST = LineErrors(100.0, 100.0, 100.0, 100.0)  # of a loop that cannot be
+
+
+def compare(line: PeriodicLine, loop: Loop) -> LineErrors:
+    """What a scan would be off that was made straight by ``loop``, where the axis does what ``line`` measured."""
+    predicted = np.where(line.rising, loop.position(line.drive, True), loop.position(line.drive, False))
+    measured = line.displacement_nm
+    inside = (predicted > WINDOW[0]) & (predicted < WINDOW[1])
+    scale, offset = np.polyfit(predicted[inside], measured[inside], 1)
+    error = 100.0 * ((measured - offset) / scale - predicted)
+    x = np.linspace(*WINDOW, _POINTS)
+    sides = [_smooth(predicted[side & inside], error[side & inside], x) for side in (line.rising, ~line.rising)]
+    step = round(_CHORD / (x[1] - x[0]))
+    scaling = max(float(np.ptp(one[step:] - one[:-step])) / (x[step] - x[0]) for one in sides)
+    rms = float(np.sqrt(np.mean(np.square(sides))))
+    return LineErrors(
+        rms, scaling, float(np.max(np.abs(sides[0] - sides[1]))), 100.0 * (loop.extent_nm / float(scale) - 1.0)
+    )
+
+
+def _smooth(at: Floats, error: Floats, x: Floats) -> Floats:
+    fit = np.polynomial.Chebyshev.fit(at, error, min(_SMOOTHING, max(len(at) // 8, 1)), domain=list(WINDOW))
+    return np.asarray(fit(x), dtype=np.float64)

@@ -1,0 +1,155 @@
+"""One trace to one settled period: drive and displacement on an even grid of phases, drift taken out."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tablegen.calibration.hysteresis import Trace
+from tablegen.compensation.dynamics import Response
+from tablegen.compensation.operator.creep import LogarithmicCreep
+from tablegen.numerics.arrays import Bools, Floats
+from tablegen.problems import Unphysical
+
+PHASES = 1024  # of the grid
+_MIN_SAMPLES = 40  # samples a period
+_MAX_DRIFT_ORDER = 3
+_LEVEL = 0.25  # of the drive's span: how far about the middle a crossing has to go to count
+_RESONANCE_SHARE = 0.3  # dynamics are taken out up to this share of the resonance; what lies above is noise
+_BACKWARDS = 0.02  # of the span: how far a sweep may go back, as noise of the record does
+
+
+@dataclass(frozen=True, eq=False)
+class PeriodicLine:
+    """One period of a settled line, from the minimum of the drive on; arrays have ``PHASES`` values.
+
+    ``drive`` is normalised to v_max, ``displacement_nm`` a mean over ``periods``; ``noise_nm`` is the standard
+    deviation of that mean, and ``drift_nm`` what was taken out over the record.
+    """
+
+    name: str
+    rate_hz: float
+    periods: int
+    drive: Floats
+    displacement_nm: Floats
+    noise_nm: float
+    drift_nm: float
+
+    @property
+    def low(self) -> float:
+        """The least normalised drive."""
+        return float(np.min(self.drive))
+
+    @property
+    def high(self) -> float:
+        """The largest normalised drive."""
+        return float(np.max(self.drive))
+
+    @property
+    def stroke(self) -> float:
+        """Peak to peak, of v_max."""
+        return self.high - self.low
+
+    @property
+    def centre(self) -> float:
+        """The middle between the turns, of v_max."""
+        return 0.5 * (self.low + self.high)
+
+    @property
+    def rising(self) -> Bools:
+        """Where the drive is on its way from its minimum to its maximum."""
+        return np.arange(PHASES) < int(np.argmax(self.drive))
+
+    def without(self, response: Response | None, creep: LogarithmicCreep | None) -> "PeriodicLine":
+        """The same with the displacement before the dynamics, which come behind the hysteresis."""
+        n = np.arange(PHASES // 2 + 1, dtype=np.float64)
+        spectrum = np.fft.rfft(self.displacement_nm)
+        f_hz: Floats = n * self.rate_hz
+        if response is not None:
+            inside = f_hz <= _RESONANCE_SHARE * response.resonance_hz
+            real, imaginary = response.inverse(f_hz[inside])
+            spectrum[inside] = spectrum[inside] * (real + 1j * imaginary)
+        if creep is not None:
+            real, imaginary = creep.response(f_hz[1:])
+            spectrum[1:] = spectrum[1:] / (real + 1j * imaginary)
+        values = np.fft.irfft(spectrum, PHASES)
+        return PeriodicLine(self.name, self.rate_hz, self.periods, self.drive, values, self.noise_nm, self.drift_nm)
+
+
+def periodic_line(trace: Trace, v_max: float) -> PeriodicLine:
+    """Average the periods of a trace: times ascending in s, drive at the piezo in V, displacement in nm.
+
+    The first of three periods or more is left out. Raises ``Unphysical``, without the trace's name.
+    """
+    time, drive = trace.time_s, trace.drive_v / v_max
+    if len(time) < _MIN_SAMPLES or not np.all(np.diff(time) > 0.0):
+        raise Unphysical(f"{len(time)} samples whose times ascend are needed, at least {_MIN_SAMPLES} a period")
+    if not (np.ptp(drive) > 0.0 and np.ptp(trace.displacement_nm) > 0.0):
+        raise Unphysical("the drive or the displacement does not move")
+    if np.min(drive) < -0.02 or np.max(drive) > 1.02:
+        low, high = float(np.min(trace.drive_v)), float(np.max(trace.drive_v))
+        raise Unphysical(f"a drive of {low:.4g}..{high:.4g} V is outside the driver's 0..{v_max:g} V")
+    period = _period(time, drive)
+    # Whole periods from the first sample on; the grid then begins at a minimum.
+    periods = int((time[-1] - time[0]) / period + 1e-3)
+    if periods < 1:
+        raise Unphysical(f"{(time[-1] - time[0]) / period:.3g} of a period are recorded; at least one is needed")
+    if len(time) / ((time[-1] - time[0]) / period) < _MIN_SAMPLES:
+        raise Unphysical(f"fewer than {_MIN_SAMPLES} samples a period")
+    settle = 1 if periods >= 3 else 0
+    start = float(time[0]) + settle * period
+    grid = start + period * (np.arange((periods - settle) * PHASES) / PHASES)
+    rows = [np.interp(grid, time, values).reshape(-1, PHASES) for values in (drive, trace.displacement_nm)]
+    kept = periods - settle
+    centres = np.arange(kept) - 0.5 * (kept - 1)
+    means = rows[1].mean(axis=1)
+    order = min(kept - 1, _MAX_DRIFT_ORDER)
+    drift = np.polynomial.Polynomial.fit(centres, means, order) if order else np.polynomial.Polynomial([means[0]])
+    at = centres[:, None] + (np.arange(PHASES) / PHASES - 0.5)[None, :]
+    level = rows[1] - drift(at)
+    displacement, shape = level.mean(axis=0), rows[0].mean(axis=0)
+    spread = float(np.sqrt(np.mean((level - displacement) ** 2) / max(kept - 1, 1))) if kept > 1 else 0.0
+    begin = int(np.argmin(shape))
+    shape, displacement = np.roll(shape, -begin), np.roll(displacement, -begin)
+    if np.corrcoef(shape, displacement)[0, 1] < 0.0:
+        displacement = -displacement
+    _check_sweeps(shape)
+    return PeriodicLine(
+        trace.name, 1.0 / period, kept, shape, displacement, spread, float(np.ptp(drift(at))) if order else 0.0
+    )
+
+
+def _period(time: Floats, drive: Floats) -> float:
+    """The period in s, from all rises and falls of the record through the middle."""
+    middle = 0.5 * (float(np.max(drive)) + float(np.min(drive)))
+    level = (drive - middle) / float(np.ptp(drive))
+    side = np.where(level > _LEVEL, 1, np.where(level < -_LEVEL, -1, 0))
+    known = np.flatnonzero(side)
+    rises = known[1:][(side[known[1:]] > 0) & (side[known[:-1]] < 0)]
+    falls = known[1:][(side[known[1:]] < 0) & (side[known[:-1]] > 0)]
+    crossings = []
+    for edges, sign in ((rises, 1.0), (falls, -1.0)):
+        at = []
+        for edge in edges.tolist():
+            before = known[np.searchsorted(known, edge) - 1]
+            part = slice(int(before), edge + 1)
+            slope, offset = np.polyfit(time[part] - time[before], level[part] * sign, 1)
+            at.append(float(time[before]) - offset / slope)
+        crossings.append(np.array(at))
+    several = [at for at in crossings if len(at) >= 2]
+    if several:
+        slopes = [float(np.polyfit(np.arange(len(at)), at, 1)[0]) for at in several]
+        return float(np.mean(slopes))
+    raise Unphysical("no whole period: the drive has to rise and to fall, at least one and a half times")
+
+
+def _check_sweeps(drive: Floats) -> None:
+    """One rise and one fall: other waveforms have inner loops, which the closed form of a line does not know."""
+    top = int(np.argmax(drive))
+    span = float(np.ptp(drive))
+    for sweep in (drive[: top + 1], -drive[top:]):
+        back = float(np.max(np.maximum.accumulate(sweep) - sweep)) if len(sweep) else 0.0
+        if back > _BACKWARDS * span:
+            raise Unphysical(
+                f"the drive goes back by {100.0 * back / span:.2g} % in the middle of a sweep; one rise and "
+                "one fall a period are understood"
+            )

@@ -1,0 +1,64 @@
+"""An operator fit as the file that the scanner file names."""
+
+from collections.abc import Sequence
+
+from tablegen.calibration.operator.fit import OperatorFit
+from tablegen.compensation.operator.file import (
+    VERSION,
+    CreepTable,
+    LengthsTable,
+    LineTable,
+    OperatorFile,
+    PlaysTable,
+    operator_text,
+)
+
+_HEAD = (
+    "An operator of the piezo, written by tablegen calibrate operator; docs/operator.md says what the numbers are.",
+    "Strokes, centres and thresholds are shares of v_max, weights nm.",
+)
+
+
+def operator_file(fit: OperatorFit, axis: str, v_max: float, sources: Sequence[str] = ()) -> bytes:
+    """The file's bytes; ``sources`` says where the traces came from, a line each."""
+    operator, creep, lengths = fit.operator, fit.operator.creep, fit.operator.residual.lengths
+    lines = []
+    for i, line in enumerate(operator.lines):
+        row = fit.rows[i]
+        half = len(row) // 2
+        rms, scaling, mismatch, size = line.left_out
+        lines.append(
+            LineTable(
+                name=line.name,
+                stroke=line.stroke,
+                centre=line.centre,
+                rate_hz=line.rate_hz,
+                size=float(fit.sizes[i]),
+                rising=row[:half].tolist(),
+                falling=row[half:].tolist(),
+                rms_percent=rms,
+                scaling_percent=scaling,
+                mismatch_percent=mismatch,
+                size_percent=size,
+            )
+        )
+    file = OperatorFile(
+        version=VERSION,
+        axis="x" if axis == "x" else "y",
+        v_max=v_max,
+        centre=operator.centre,
+        creep=CreepTable(
+            loss_per_decade=creep.loss_per_decade,
+            fastest_s=creep.fastest_s,
+            slowest_s=creep.slowest_s,
+            reference_hz=creep.reference_hz,
+        ),
+        plays=PlaysTable(
+            thresholds=operator.family.thresholds.tolist(),
+            weights=operator.family.weights.tolist(),
+            reversible=operator.family.reversible.tolist(),
+        ),
+        lengths=LengthsTable(stroke=lengths.stroke, centre=lengths.centre, noise=lengths.noise),
+        lines=lines,
+    )
+    return operator_text(file, [*_HEAD, *sources]).encode("utf-8")

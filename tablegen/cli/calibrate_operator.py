@@ -1,0 +1,180 @@
+"""``tablegen calibrate operator``: traces of a sensor to an operator of the piezo, in a file of its own."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from tablegen.cli.calibration_run import Common, full_scale, read_columns, scanner_axis, shared_options
+from tablegen.cli.common import fail, written
+from tablegen.cli.exit_status import ExitStatus
+from tablegen.reading import CONFIGURATION, read_text
+
+if TYPE_CHECKING:
+    from tablegen.calibration.operator.advice import NextTrace
+    from tablegen.calibration.operator.fit import OperatorFit
+    from tablegen.calibration.operator.periodic_line import PeriodicLine
+    from tablegen.calibration.table import MeasuredTable
+
+
+_MEASURES = "    rms   scaling  mismatch"
+
+
+@click.command(short_help="Identify an operator of the piezo from sensor traces.")
+@shared_options
+@click.argument("data", type=click.Path(path_type=Path), metavar="DATA.CSV...", nargs=-1, required=True)
+def operator(common: Common, data: tuple[Path, ...]) -> int:
+    """Identify what the piezo does at every size and offset from sensor traces: an operator.
+
+    Builds then find waveforms that are straight on this operator, and `show` says what to expect on the scanner. The
+    laws (1) to (23) of the scanner file stay: m of (1) gives the size at offsets without a trace.
+
+    Record three settled periods or more, at six sizes from 10 % of v_max to its full range, all at the offset that you
+    use most. Two sizes at each further offset make scans there as good. One rise and one fall a period; any shape, rate
+    and turn.
+
+    \b
+    Columns: time_s, drive_v, displacement_nm. A file with several traces also has the column
+    trace, a number for each trace; without it, a new trace starts where time_s goes back.
+
+    Calibrate `resonance` and `offset` first: their parts of the scanner file are used.
+
+    \b
+    Example:
+      tablegen calibrate operator --axis x 10v.csv 25v.csv 50v.csv 75v.csv 97v.csv --scanner scanner.toml --write
+    """
+    from tablegen.calibration.columns import DISPLACEMENT, DRIVE, TIME, TRACE
+    from tablegen.calibration.operator.advice import next_trace
+    from tablegen.calibration.operator.fit import fit_operator
+    from tablegen.calibration.operator.periodic_line import periodic_line
+    from tablegen.calibration.traces import split_traces
+    from tablegen.problems import Unphysical
+
+    if common.plot is not None:
+        raise click.UsageError("--plot is not available for operator")
+    tables = [read_columns(path, [TIME, DRIVE, DISPLACEMENT], [TRACE]) for path in data]
+    v_max = full_scale(common)
+    response, offset_law = scanner_axis(common, v_max)
+    lines = []
+    for table in tables:
+        for trace in split_traces(table):
+            try:
+                lines.append(periodic_line(trace, v_max))
+            except Unphysical as reason:
+                fail([f"{table.file}: {trace.name}: {reason}"], ExitStatus.WRONG_INPUT)
+    try:
+        fit = fit_operator(lines, response, lambda centre: offset_law.factor(2.0 * centre - 1.0))
+    except Unphysical as reason:
+        fail([f"{', '.join(table.file for table in tables)}: {reason}"], ExitStatus.WRONG_INPUT)
+    further = next_trace(fit, lines, v_max)
+    if common.as_json:
+        click.echo(json.dumps(_record(fit, lines, further, common.axis, tables), indent=2, allow_nan=False))
+    else:
+        click.echo("\n".join(_text(fit, lines, further, common.axis, v_max)))
+    if common.write:
+        _write(common, fit, tables, v_max)
+    return ExitStatus.OK
+
+
+def _text(
+    fit: "OperatorFit", lines: "Sequence[PeriodicLine]", further: "NextTrace", axis: str, v_max: float
+) -> list[str]:
+    """What was found, what it leaves of every trace, and what to measure next."""
+    creep = fit.operator.creep
+    tried = ", ".join(f"{name} {score:.3g} %" for name, score in fit.candidates.items())
+    out = [
+        f"operator of {axis} from {len(lines)} traces",
+        "",
+        f"family   {fit.family}  (median rms of a trace left out: {tried})",
+        f"creep    {100.0 * creep.loss_per_decade:.2g} % a decade",
+        "",
+        f"{'':41}  {'in the fit':<23}   left out",
+        f"size [V]  offset [V]  rate [Hz]  noise [%]{_MEASURES}  {_MEASURES}  size [%]  trace",
+    ]
+    for line, left, without in zip(lines, fit.left, fit.left_out, strict=True):
+        noise = 100.0 * line.noise_nm / float(line.displacement_nm.max() - line.displacement_nm.min())
+        out.append(
+            f"{line.stroke * v_max:8.4g}  {line.centre * v_max:10.4g}  {line.rate_hz:9.4g}  {noise:9.2g}  "
+            f"{left.rms:5.2f}  {left.scaling:8.2f}  {left.mismatch:8.2f}   {without.rms:5.2f}  {without.scaling:8.2f}  "
+            f"{without.mismatch:8.2f}  {without.size:+8.2f}  {line.name}"
+        )
+    out += [
+        "percent of the line over x = 0.1..0.9; left out: predicted from the other traces",
+        "",
+        f"next trace: {further.size_v:.3g} V at {further.offset_v:.3g} V would help most",
+    ]
+    if further.rate_hz is not None:
+        out.append(f"next rate: a trace at {further.rate_hz:.3g} Hz would tell creep from hysteresis")
+    return out
+
+
+def _record(
+    fit: "OperatorFit",
+    lines: "Sequence[PeriodicLine]",
+    further: "NextTrace",
+    axis: str,
+    tables: "Sequence[MeasuredTable]",
+) -> dict[str, Any]:
+    """The same for programs."""
+    from tablegen.compensation.models.operator import OperatorModel
+
+    traces = [
+        {
+            "name": line.name,
+            "size_share": line.stroke,
+            "offset_share": line.centre,
+            "rate_hz": line.rate_hz,
+            "left": {"rms_percent": left.rms, "scaling_percent": left.scaling, "mismatch_percent": left.mismatch},
+            "left_out": {
+                "rms_percent": out.rms,
+                "scaling_percent": out.scaling,
+                "mismatch_percent": out.mismatch,
+                "size_percent": out.size,
+            },
+        }
+        for line, left, out in zip(lines, fit.left, fit.left_out, strict=True)
+    ]
+    return {
+        "kind": OperatorModel.model(),
+        "axis": axis,
+        "family": fit.family,
+        "candidates_percent": dict(fit.candidates),
+        "creep_loss_per_decade": fit.operator.creep.loss_per_decade,
+        "traces": traces,
+        "next_trace": {"size_v": further.size_v, "offset_v": further.offset_v, "rate_hz": further.rate_hz},
+        "sources": [{"file": table.source.name, "sha256": table.source.sha256} for table in tables],
+    }
+
+
+def _write(common: Common, fit: "OperatorFit", tables: "Sequence[MeasuredTable]", v_max: float) -> None:
+    """The operator's file, then the scanner file that names it."""
+    from tablegen.calibration.operator.record import operator_file
+    from tablegen.calibration.scanner_file import Change, new_file, updated
+    from tablegen.compensation.models.operator import OperatorModel
+    from tablegen.problems import Rejected
+
+    assert common.scanner is not None
+    name = str(common.scanner)
+    beside = common.scanner.with_name(f"{common.scanner.stem}_{common.axis}_operator.toml")
+    sources = list(dict.fromkeys(f"from {t.source.name}, sha256 {t.source.sha256}" for t in tables))
+    content = operator_file(fit, common.axis, v_max, sources)
+    try:
+        path = common.scanner.resolve()
+        text = read_text(path, CONFIGURATION) if path.exists() else new_file(path.stem, v_max)
+        summary = f"operator of {len(fit.operator.lines)} traces, family {fit.family}"
+        change = Change(
+            "hysteresis", {"model": OperatorModel.model(), "file": beside.name}, provenance=[[summary, *sources]]
+        )
+        scanner = updated(text, name, common.axis, change).encode("utf-8")
+    except Rejected as rejected:
+        fail(rejected.problems, ExitStatus.WRONG_INPUT)
+    except UnicodeDecodeError:
+        fail([f"{name}: is not UTF-8"], ExitStatus.WRONG_INPUT)
+    except OSError as error:
+        fail([f"{name}: {error.strerror or error}"], ExitStatus.WRONG_INPUT)
+    changed = written(beside.parent, {beside.name: content})
+    changed += written(path.parent, {path.name: scanner})
+    done = "written" if changed else "up to date"
+    click.echo(f"{name}: {common.axis}.hysteresis and {beside.name} {done}", err=common.as_json)

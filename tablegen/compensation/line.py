@@ -1,0 +1,217 @@
+"""The line that a model makes: a sweep each way, what the drive is to follow, and how the piezo follows a drive.
+
+Most models give the shape of two sweeps (``LineShape``), and the band limit is fitted to it. A model that works out the
+whole periodic waveform itself gives a ``WholeLine``.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+from tablegen.compensation.dynamics import Response
+from tablegen.numerics.arrays import Bools, Floats, FloatsLike
+from tablegen.problems import Document, Problems, Unphysical
+from tablegen.waveform.series import FourierSeries
+
+_GRID = 1025  # points on which a sweep is inverted first
+
+
+class Sweep(ABC):
+    """One direction of a line: the normalised drive u at the place tau of the line; both run 0..1 with the sweep.
+
+    The backward direction of the line is 1 - u(1 - x) at the place x. A subclass has ``value`` and ``slope``.
+    """
+
+    __slots__ = ()
+
+    @abstractmethod
+    def value(self, tau: FloatsLike) -> Floats:
+        """u(tau); of the shape of ``tau``."""
+
+    @abstractmethod
+    def slope(self, tau: FloatsLike) -> Floats:
+        """du/dtau, above 0."""
+
+    def inverse(self, u: FloatsLike) -> Floats:
+        """tau(u): where the modelled piezo is when the normalised drive is u. Clipped to u in [0, 1]."""
+        u = np.clip(np.asarray(u, dtype=np.float64), 0.0, 1.0)
+        grid = np.linspace(0.0, 1.0, _GRID)
+        tau = np.interp(u, self.value(grid), grid)
+        for _ in range(2):  # the grid is within 1e-6; each Newton step squares that
+            tau = tau - (self.value(tau) - u) / self.slope(tau)
+        return tau
+
+    def moments(self, y: Floats) -> tuple[Floats, Floats]:
+        """int_0^1 u(s) exp(-2 pi i y s) ds, real and imaginary part: what a Fourier series in closed form needs.
+
+        Raises ``Unphysical`` where a model has no closed form.
+        """
+        raise Unphysical("this model of the piezo has no Fourier series in closed form; use method = 'window'")
+
+
+@dataclass(frozen=True, slots=True)
+class AppliedBranch:
+    """Hysteresis of one branch at this scan size; ``u_peak`` in sweep-aligned coordinates."""
+
+    beta: float
+    u_peak: float
+
+    @classmethod
+    def of(cls, sweep: Sweep) -> "AppliedBranch":
+        """The largest residual u - tau of any sweep, on a grid."""
+        tau = np.linspace(0.0, 1.0, _GRID)
+        u = sweep.value(tau)
+        at = int(np.argmax(np.abs(u - tau)))
+        return cls(float(u[at] - tau[at]), float(u[at]))
+
+
+@dataclass(frozen=True, slots=True)
+class LineShape:
+    """The periodic normalised waveform of one line: forward for 0 < t <= turn, backward after, (14) and (17).
+
+    ``applied`` is what the manifest and ``tablegen show`` say of the sweeps; without it, it is read off them.
+    """
+
+    turn: float
+    forward: Sweep
+    backward: Sweep
+    applied: tuple[AppliedBranch, AppliedBranch] | None = None
+
+    @property
+    def peaks(self) -> tuple[AppliedBranch, AppliedBranch]:
+        """The residual of each sweep, forward and backward."""
+        return self.applied or (AppliedBranch.of(self.forward), AppliedBranch.of(self.backward))
+
+    @property
+    def waveform(self) -> FourierSeries | None:
+        """The band-limited waveform, where the model itself makes it; None leaves it to ``band_limit`` of the scan."""
+        return None
+
+    def value(self, t: FloatsLike) -> Floats:
+        """w(t) with t in periods."""
+        going, tau = self._split(t)
+        return np.where(going, self.forward.value(tau), 1.0 - self.backward.value(tau))
+
+    def slope(self, t: FloatsLike) -> Floats:
+        """dw/dt per period."""
+        going, tau = self._split(t)
+        rise = self.forward.slope(tau) / self.turn
+        return np.where(going, rise, -self.backward.slope(tau) / (1.0 - self.turn))
+
+    def followed(
+        self, side: str, position: Floats, drive: FourierSeries, value: Floats, slope: Floats
+    ) -> tuple[Floats, Floats]:
+        """How the piezo follows a drive where the line is at ``position`` in one direction, (n,) each.
+
+        Its place less ``position``, as a fraction of the line, and its speed over the line's. ``value`` and ``slope``
+        are those of ``drive`` at these times. To first order in a deviation of at most some percent: x - tau =
+        (w - u) / u'. A model that knows more of the drive than its values there overrides this.
+        """
+        times = self.times(side, position)
+        sweep = self.forward if side == "forward" else self.backward
+        steepness = sweep.slope(position if side == "forward" else 1.0 - position)
+        return (value - self.value(times)) / steepness, slope / self.slope(times)
+
+    def times(self, side: str, position: Floats) -> Floats:
+        """When the sweep of one direction passes a normalised position, in periods."""
+        return self.turn * position if side == "forward" else self.turn + (1.0 - self.turn) * (1.0 - position)
+
+    def _split(self, t: FloatsLike) -> tuple[Bools, Floats]:
+        t = np.asarray(t, dtype=np.float64)
+        t = t - np.floor(t)
+        going = t <= self.turn
+        return going, np.where(going, t / self.turn, (t - self.turn) / (1.0 - self.turn))
+
+
+@dataclass(frozen=True, slots=True)
+class SweptSeries(Sweep):
+    """One sweep of a waveform that rises once and falls once; only where it does can it be inverted."""
+
+    series: FourierSeries
+    turn: float
+    forward: bool
+
+    def value(self, tau: FloatsLike) -> Floats:
+        """u(tau)."""
+        w = self.series.value(self._times(tau))
+        return w if self.forward else 1.0 - w
+
+    def slope(self, tau: FloatsLike) -> Floats:
+        """du/dtau."""
+        rise = self.series.value(self._times(tau), 1)
+        return self.turn * rise if self.forward else (self.turn - 1.0) * rise
+
+    def _times(self, tau: FloatsLike) -> Floats:
+        tau = np.asarray(tau, dtype=np.float64)
+        return self.turn * tau if self.forward else self.turn + (1.0 - self.turn) * tau
+
+
+@dataclass(frozen=True, slots=True)
+class WholeLine(LineShape):
+    """A line whose waveform the model itself has worked out, in the harmonics that are played."""
+
+    series: FourierSeries = field(kw_only=True)
+
+    @classmethod
+    def of(cls, series: FourierSeries, turn: float, **more: Any) -> "Self":
+        """The line of a waveform w(t), straight on the scanner as far as the model knows; ``more`` of a subclass."""
+        return cls(turn, SweptSeries(series, turn, True), SweptSeries(series, turn, False), series=series, **more)
+
+    @property
+    def waveform(self) -> FourierSeries | None:
+        """What was worked out."""
+        return self.series
+
+    def value(self, t: FloatsLike) -> Floats:
+        """w(t) with t in periods."""
+        return self.series.value(t)
+
+    def slope(self, t: FloatsLike) -> Floats:
+        """dw/dt per period."""
+        return self.series.value(t, 1)
+
+
+@dataclass(frozen=True, slots=True)
+class WantedLine:
+    """What a scan wants of the model of one axis, and where a fault is reported.
+
+    ``v`` is the normalised scan voltage V_scan / V_max, in [0, 1]; ``v_amplitude`` = m g V_scan, volts peak to peak at
+    the piezo for w from 0 to 1; ``harmonics`` the highest that is played; ``both`` whether both directions image.
+    ``response`` are the dynamics, whose inverse gives no harmonic more than ``max_boost_db``; ``factor_at`` is m of (1)
+    at an offset as a share of v_max, ``rate_gain`` g of (23) at a rate in Hz, None where it is not calibrated.
+    """
+
+    axis: str
+    turn: float
+    v: float
+    v_max: float
+    v_amplitude: float
+    v_offset: float
+    size_nm: float
+    rate_hz: float
+    harmonics: int
+    window: tuple[float, float]
+    both: bool
+    response: Response | None
+    max_boost_db: float
+    factor_at: Callable[[float], float]
+    rate_gain: Callable[[float], float] | None
+    folder: Path
+    scan_file: Document
+    scanner_file: Document
+    problems: Problems
+
+    @contextmanager
+    def at(self, key: str) -> Iterator[None]:
+        """Turn an ``Unphysical`` raised inside into a problem of this key of the hysteresis table."""
+        with self.problems.at(self.scanner_file, f"{self.axis}.hysteresis.{key}"):
+            yield
+
+    def problem(self, key: str, why: str) -> None:
+        """Note a fault of a key of the hysteresis table."""
+        self.problems.add(self.scanner_file, f"{self.axis}.hysteresis.{key}", why)

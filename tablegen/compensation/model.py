@@ -1,0 +1,72 @@
+"""A model of what a piezo does with a drive: the table of the scanner file, and the line that it makes of it.
+
+Each is one file in ``tablegen/compensation/models/``, or an entry point. Everything else (the decoder, the JSON
+Schema, the page of keys, the build, the certificate, ``tablegen show`` and ``simulate``) goes through all alike.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, ClassVar, Self
+
+from msgspec import Struct
+
+from tablegen.compensation.line import LineShape, WantedLine
+from tablegen.reading import file_sha256
+
+
+class Parameters(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A table of the scanner file that checks itself, beyond the types and ranges of its keys."""
+
+    @classmethod
+    def contradictions(cls, written: Mapping[str, Any]) -> list[tuple[str, str]]:
+        """Keys of the table, as it is written, that contradict each other or lack, and why."""
+        return []
+
+    def faults(self) -> list[tuple[str, str]]:
+        """Keys whose values contradict each other, and why."""
+        return []
+
+
+class Hysteresis(Parameters, frozen=True, tag_field="model"):
+    """Hysteresis of the line, (13)-(22)."""
+
+    purpose: ClassVar[str] = ""
+    """What it is, in a few words or equations, for the list of models."""
+    calibration: ClassVar[str] = ""
+    """What measures its parameters, in Markdown."""
+    order: ClassVar[int] = 9
+    """Its place among models that are compared: the simplest is 0."""
+    compensates: ClassVar[bool] = True
+    """Whether it corrects anything."""
+
+    @classmethod
+    def model(cls) -> str:
+        """Its name: the tag of the class."""
+        return str(cls.__struct_config__.tag)
+
+    @classmethod
+    def like(cls, other: "Hysteresis") -> "Self | None":
+        """This model with what another one's table holds; None where that does not serve."""
+        return other if isinstance(other, cls) else None
+
+    @property
+    def calibrated(self) -> bool:
+        """Whether the table holds a calibration."""
+        return True
+
+    def files(self) -> tuple[str, ...]:
+        """Files that the table names, relative to the scanner file: builds depend on them."""
+        return ()
+
+    def line(self, wanted: WantedLine) -> LineShape | None:
+        """The line of one axis; None where ``wanted.problems`` grew."""
+        raise NotImplementedError(type(self))
+
+    def described(self, line: LineShape) -> str:
+        """What is applied, in a line of text."""
+        sides = zip(("forward", "backward"), line.peaks, strict=True)
+        return f"{self.model()}; " + ", ".join(f"{side} beta {b.beta:.5f} u_peak {b.u_peak:.4g}" for side, b in sides)
+
+    def contents(self, folder: Path) -> list[str]:
+        """Digests of those files: a refinement belongs to one model with one content."""
+        return [file_sha256(folder / name) for name in self.files()]

@@ -1,0 +1,156 @@
+"""An identified operator: the waveform that it follows straight, found when a scan is built."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, ClassVar
+
+import numpy as np
+from msgspec import Meta
+
+from tablegen.compensation.branches import WithBranches
+from tablegen.compensation.dynamics import capped_inverse
+from tablegen.compensation.hysteresis import BranchShape
+from tablegen.compensation.line import LineShape, WantedLine, WholeLine
+from tablegen.compensation.operator.file import read_operator
+from tablegen.compensation.operator.operator import Operator
+from tablegen.compensation.operator.scan_line import Expected, Found, Wanted, find_waveform
+from tablegen.figures import shown_path
+from tablegen.numerics.arrays import Floats
+from tablegen.problems import Rejected, Unphysical
+from tablegen.quantities import FileName
+from tablegen.waveform.series import FourierSeries
+from tablegen.waveform.window_fit import fit_window
+
+# An operator serves strokes this far beyond the largest that was measured, and centres this far from any, of v_max.
+STROKE_REACH = 0.05
+CENTRE_REACH = 0.4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OperatorLine(WholeLine):
+    """The line, what the operator expects of it, and how far it is from what was measured.
+
+    ``uncertainty`` is what the operator is wrong by where it predicts a trace that it was not made of; ``distance`` is
+    that of stroke or centre to the nearest trace, of v_max.
+    """
+
+    expected: Expected
+    uncertainty: Expected
+    distance: float
+
+
+class OperatorModel(WithBranches, frozen=True, kw_only=True, tag="operator"):
+    """What `tablegen calibrate operator` identified: in a file, for every size, offset and rate. Branches may stay."""
+
+    purpose: ClassVar[str] = "identified from traces"
+    calibration: ClassVar[str] = "`calibrate operator`"
+    order: ClassVar[int] = 3
+
+    file: Annotated[FileName, Meta(description="the operator's file, relative to the scanner file")]
+
+    @property
+    def calibrated(self) -> bool:
+        """It is."""
+        return True
+
+    @classmethod
+    def like(cls, other: object) -> "OperatorModel | None":
+        """Branches make no operator."""
+        return other if isinstance(other, cls) else None
+
+    def files(self) -> tuple[str, ...]:
+        """The operator's."""
+        return (self.file,)
+
+    def line(self, wanted: WantedLine) -> LineShape | None:
+        """Learnt on the operator, from a straight line on."""
+        path = wanted.folder / self.file
+        try:
+            operator, file = read_operator(path, shown_path(path))
+        except Rejected as rejected:
+            wanted.problems.found.extend(rejected.problems)
+            return None
+        if file.axis != wanted.axis:
+            wanted.problem("file", f"{self.file} is the operator of {file.axis}")
+        if abs(file.v_max - wanted.v_max) > 1e-6 * wanted.v_max:
+            wanted.problem("file", f"{self.file} was identified with v_max = {file.v_max:g} V, not {wanted.v_max:g} V")
+        with wanted.at("file"):
+            return _line(operator, wanted)
+        return None
+
+    def described(self, line: LineShape) -> str:
+        """What is expected."""
+        if not isinstance(line, OperatorLine):
+            return self.model()
+        e = line.expected
+        return f"{self.model()} {Path(self.file).name}; expected rms {max(e.rms):.3g} %, mismatch {e.mismatch:.3g} %"
+
+
+def _line(operator: Operator, wanted: WantedLine) -> OperatorLine:
+    centre = wanted.v_offset / wanted.v_max
+    factor = wanted.factor_at(centre) / wanted.factor_at(operator.centre)
+    if wanted.rate_gain is not None:  # (23) says what the rate does to the size; creep then only bends the line
+        reference = operator.creep.reference_hz
+        factor *= wanted.rate_gain(wanted.rate_hz) / wanted.rate_gain(reference)
+        operator = replace(operator, creep=replace(operator.creep, reference_hz=wanted.rate_hz))
+    line = Wanted(wanted.size_nm, wanted.turn, wanted.window, wanted.both, wanted.rate_hz, centre, factor)
+    response, boost = wanted.response, wanted.max_boost_db
+    n = np.arange(1.0, wanted.harmonics + 1.0) * wanted.rate_hz
+
+    def through(series: FourierSeries) -> FourierSeries:
+        return series
+
+    def dynamics(f_hz: Floats) -> tuple[Floats, Floats]:
+        assert response is not None
+        real, imaginary = response.inverse(f_hz)
+        square = real * real + imaginary * imaginary
+        return real / square, -imaginary / square
+
+    if response is not None:
+        real, imaginary, _ = capped_inverse(response, n, boost)
+
+        def through(series: FourierSeries) -> FourierSeries:
+            return series.times(real, imaginary)
+
+    straight = LineShape(wanted.turn, BranchShape(), BranchShape())
+    start = fit_window(straight, wanted.harmonics, wanted.window, wanted.both)
+    found = find_waveform(operator, line, start, through, None if response is None else dynamics)
+    _check_reach(operator, found, wanted.v_max)
+    # w = 0 and 1 are the ends of the laws' amplitude everywhere else.
+    scale = found.v_amplitude * wanted.v_max / wanted.v_amplitude
+    series = FourierSeries(0.5 + scale * (found.series.a0 - 0.5), scale * found.series.a, scale * found.series.b)
+    return OperatorLine.of(
+        series,
+        wanted.turn,
+        expected=found.expected,
+        uncertainty=_uncertainty(operator),
+        distance=operator.distance(found.stroke, found.centre),
+    )
+
+
+def _check_reach(operator: Operator, found: Found, v_max: float) -> None:
+    """Refuse what is far from everything that was measured."""
+    largest = max(line.stroke for line in operator.lines)
+    if found.stroke > largest + STROKE_REACH:
+        raise Unphysical(
+            f"measured up to {largest * v_max:.4g} V, which serves scans up to "
+            f"{(largest + STROKE_REACH) * v_max:.4g} V; this one takes {found.stroke * v_max:.4g} V; "
+            "measure a larger trace"
+        )
+    nearest = min((abs(line.centre - found.centre), line.centre) for line in operator.lines)
+    if nearest[0] > CENTRE_REACH:
+        raise Unphysical(
+            f"measured at an offset of {nearest[1] * v_max:.4g} V, which serves {CENTRE_REACH * v_max:.4g} V to either "
+            f"side; this scan is at {found.centre * v_max:.4g} V; measure a trace there"
+        )
+
+
+def _uncertainty(operator: Operator) -> Expected:
+    """Of the traces that were left out the median: the outermost are predicted from one side alone."""
+    rms, scaling, mismatch, size = (
+        float(np.median([abs(line.left_out[i]) for line in operator.lines])) for i in range(4)
+    )
+    return Expected((rms, rms), (scaling, scaling), mismatch, size)
+
+
+MODEL = OperatorModel

@@ -1,0 +1,27 @@
+"""No hysteresis: the drive is the triangle itself."""
+
+from typing import ClassVar
+
+from tablegen.compensation.branches import WithBranches
+from tablegen.compensation.hysteresis import BranchShape
+from tablegen.compensation.line import AppliedBranch, LineShape, WantedLine
+
+
+class TriangleModel(WithBranches, frozen=True, tag="triangle"):
+    """A linear piezo, or a line that is not compensated. Branches may stay in the table."""
+
+    purpose: ClassVar[str] = "not compensated"
+    order: ClassVar[int] = 0
+    compensates: ClassVar[bool] = False
+
+    def line(self, wanted: WantedLine) -> LineShape:
+        """A straight line each way."""
+        straight, none = BranchShape(), AppliedBranch(0.0, 0.5)
+        return LineShape(wanted.turn, straight, straight, (none, none))
+
+    def described(self, line: LineShape) -> str:
+        """In words."""
+        return f"{self.model()}, hysteresis not compensated"
+
+
+MODEL = TriangleModel

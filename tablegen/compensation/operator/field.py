@@ -1,0 +1,80 @@
+"""What was measured at some strokes and centres, interpolated over both without a formula: a Gaussian process.
+
+The covariance of two points is Matern's of order 5/2 in the distance of their strokes and centres, each over its own
+length; at the points themselves the field is what was measured, but for the noise. Far from all of them it goes back to
+0, that is to the hysteresis family over which it lies.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+
+from tablegen.numerics.arrays import Floats
+from tablegen.numerics.elementary import exp
+from tablegen.numerics.linear import Cholesky
+
+SAME_CENTRE = 0.02  # of v_max: lines whose centres differ by less have one centre
+
+
+@dataclass(frozen=True, slots=True)
+class Lengths:
+    """Over which difference of stroke and of centre, as shares of v_max, the field changes; and the noise's variance.
+
+    ``noise`` is relative to the variance of the field.
+    """
+
+    stroke: float
+    centre: float
+    noise: float
+
+
+def covariance(points: Floats, others: Floats, lengths: Lengths) -> Floats:
+    """Of shape (n, m) for points (stroke, centre) of shapes (n, 2) and (m, 2); 1 where they coincide."""
+    out = np.empty((len(points), len(others)))
+    for i, (stroke, centre) in enumerate(points.tolist()):
+        for j, (other_stroke, other_centre) in enumerate(others.tolist()):
+            along, across = (stroke - other_stroke) / lengths.stroke, (centre - other_centre) / lengths.centre
+            d = sqrt(5.0 * (along * along + across * across))
+            out[i, j] = (1.0 + d + d * d / 3.0) * exp(-d)
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class Field:
+    """Rows of numbers known at ``points``, shape (n, 2) of (stroke, centre); ``weights`` has shape (n, columns)."""
+
+    points: Floats
+    weights: Floats
+    lengths: Lengths
+
+    def at(self, stroke: float, centre: float) -> Floats:
+        """The interpolated row, shape (columns,)."""
+        near = covariance(np.array([[stroke, centre]]), self.points, self.lengths)[0]
+        total = np.zeros(self.weights.shape[1])
+        for weight, row in zip(near.tolist(), self.weights, strict=True):
+            total = total + weight * row
+        return total
+
+
+def through(points: Floats, rows: Floats, lengths: Lengths) -> Field:
+    """The field that has these rows at these points, but for the noise."""
+    factor = Cholesky(covariance(points, points, lengths) + lengths.noise * np.eye(len(points)))
+    return Field(points, np.stack([factor.solve(column) for column in rows.T], axis=1), lengths)
+
+
+def shape_field(points: Floats, rows: Floats, lengths: Lengths) -> Field:
+    """The same of shapes: at each centre a stroke of 0 leaves nothing, since the smallest lines are straight."""
+    still = np.array([(0.0, centre) for centre in distinct(points[:, 1].tolist())])
+    nothing = np.zeros((len(still), rows.shape[1]))
+    return through(np.concatenate([points, still]), np.concatenate([rows, nothing]), lengths)
+
+
+def distinct(centres: Sequence[float]) -> list[float]:
+    """The first of all centres that are the same within ``SAME_CENTRE``."""
+    found: list[float] = []
+    for centre in centres:
+        if all(abs(centre - other) >= SAME_CENTRE for other in found):
+            found.append(centre)
+    return found

@@ -1,0 +1,183 @@
+"""The operator's file: TOML that `tablegen calibrate operator` writes beside the scanner file, which names it."""
+
+import os
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from msgspec import Meta, Struct, ValidationError, convert
+
+from tablegen.compensation.operator.creep import LogarithmicCreep
+from tablegen.compensation.operator.field import Lengths, shape_field, through
+from tablegen.compensation.operator.operator import MeasuredLine, Operator
+from tablegen.compensation.operator.plays import TRANSFORMS, Plays
+from tablegen.problems import Problem, Problems, Rejected
+from tablegen.toml import read_toml
+
+VERSION = 1
+_Number = Annotated[float, Meta(ge=-1e9, le=1e9)]
+_Share = Annotated[float, Meta(ge=0.0, le=1.0)]
+_Length = Annotated[float, Meta(ge=0.01, le=100.0)]
+_Time = Annotated[float, Meta(ge=1e-9, le=1e9)]
+_Row = Annotated[list[_Number], Meta(min_length=2, max_length=128)]
+
+
+class _Table(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A table of the file."""
+
+
+class CreepTable(_Table, frozen=True, kw_only=True):
+    """Logarithmic creep; see ``LogarithmicCreep``."""
+
+    loss_per_decade: Annotated[float, Meta(ge=0.0, le=0.5)]
+    fastest_s: _Time
+    slowest_s: _Time
+    reference_hz: Annotated[float, Meta(ge=1e-6, le=1e9)]
+
+
+class PlaysTable(_Table, frozen=True, kw_only=True):
+    """The hysteresis family; see ``Plays``. Weights in nm."""
+
+    thresholds: Annotated[list[Annotated[float, Meta(gt=0.0, lt=1.0)]], Meta(max_length=256)]
+    weights: Annotated[list[list[_Number]], Meta(min_length=len(TRANSFORMS), max_length=len(TRANSFORMS))]
+    reversible: Annotated[list[_Number], Meta(min_length=1, max_length=16)]
+
+
+class LengthsTable(_Table, frozen=True, kw_only=True):
+    """Over which differences the fields change; see ``Lengths``."""
+
+    stroke: _Length
+    centre: _Length
+    noise: Annotated[float, Meta(ge=1e-9, le=1.0)]
+
+
+class LineTable(_Table, frozen=True, kw_only=True):
+    """A trace: where it was, what the family leaves of it, and by how much it is missed where it is left out."""
+
+    name: Annotated[str, Meta(max_length=200)]
+    stroke: Annotated[float, Meta(gt=0.0, le=1.1)]
+    centre: _Share
+    rate_hz: Annotated[float, Meta(ge=1e-6, le=1e9)]
+    size: _Number
+    rising: _Row
+    falling: _Row
+    rms_percent: _Number
+    scaling_percent: _Number
+    mismatch_percent: _Number
+    size_percent: _Number
+
+
+class OperatorFile(_Table, frozen=True, kw_only=True):
+    """The whole file. Strokes, centres and thresholds are shares of v_max."""
+
+    version: int
+    axis: Literal["x", "y"]
+    v_max: Annotated[float, Meta(ge=1e-3, le=1e5)]
+    centre: _Share
+    creep: CreepTable
+    plays: PlaysTable
+    lengths: LengthsTable
+    lines: Annotated[list[LineTable], Meta(min_length=1, max_length=1000)]
+
+
+def read_operator(path: Path, name: str) -> tuple[Operator, OperatorFile]:
+    """The operator of a file, and the file. Raises ``Rejected``, at the line of the first fault."""
+    if not os.path.isfile(path):  # a pipe would be waited for
+        raise Rejected([Problem(name, 0, "", "is not a file; the path is relative to the scanner file")])
+    values, document = read_toml(path, name)
+    problems = Problems()
+    version = values.get("version")
+    if version != VERSION:
+        problems.add(document, "version", f"{version!r} is not {VERSION}, the only one that this tablegen knows")
+        problems.stop_if_any()
+    try:
+        found = convert(values, OperatorFile)
+    except ValidationError as error:
+        why, _, place = str(error).partition(" - at ")
+        problems.add(document, re.sub(r"^\$\.?", "", place.strip("`")), f"{why[:1].lower()}{why[1:]}")
+        raise Rejected(problems.found) from None
+    for key, why in _contradictions(found):
+        problems.add(document, key, why)
+    problems.stop_if_any()
+    return _operator(found), found
+
+
+def _contradictions(file: OperatorFile) -> list[tuple[str, str]]:
+    """What the types cannot say."""
+    plays, found = file.plays, []
+    if any(b <= a for a, b in zip(plays.thresholds, plays.thresholds[1:], strict=False)):
+        found.append(("plays.thresholds", "do not ascend"))
+    if any(len(row) != len(plays.thresholds) for row in plays.weights):
+        found.append(("plays.weights", f"need {len(plays.thresholds)} numbers a row, one for each threshold"))
+    if any(weight < 0.0 for row in plays.weights for weight in row):
+        found.append(("plays.weights", "a weight below 0 would let a branch run backwards"))
+    if file.creep.slowest_s < file.creep.fastest_s:
+        found.append(("creep.slowest_s", "is below fastest_s"))
+    if len({len(row) for line in file.lines for row in (line.rising, line.falling)}) > 1:
+        found.append(("lines", "have rows of different lengths"))
+    return found
+
+
+def _operator(file: OperatorFile) -> Operator:
+    lengths = Lengths(file.lengths.stroke, file.lengths.centre, file.lengths.noise)
+    family = Plays(np.array(file.plays.thresholds), np.array(file.plays.weights), np.array(file.plays.reversible))
+    creep = LogarithmicCreep(
+        file.creep.loss_per_decade, file.creep.fastest_s, file.creep.slowest_s, file.creep.reference_hz
+    )
+    points = np.array([(line.stroke, line.centre) for line in file.lines])
+    rows = np.array([[*line.rising, *line.falling] for line in file.lines])
+    residual = shape_field(points, rows, lengths)
+    size = through(points, np.array([[line.size] for line in file.lines]), lengths)
+    lines = tuple(
+        MeasuredLine(
+            line.name,
+            line.stroke,
+            line.centre,
+            line.rate_hz,
+            (line.rms_percent, line.scaling_percent, line.mismatch_percent, line.size_percent),
+        )
+        for line in file.lines
+    )
+    return Operator(family, residual, size, creep, file.centre, lines)
+
+
+def operator_text(file: OperatorFile, comments: Sequence[str]) -> str:
+    """The file, with the comments at its head."""
+
+    def numbers(values: Sequence[float]) -> str:
+        return "[" + ", ".join(f"{value:.9g}" if value else "0.0" for value in _floats(values)) + "]"
+
+    out = [*(f"# {line}" for line in comments), f"version = {file.version}", f'axis = "{file.axis}"']
+    out += [f"v_max = {float(file.v_max)!r}", f"centre = {_float(file.centre)}", "", "[creep]"]
+    out += [f"{name} = {_float(getattr(file.creep, name))}" for name in file.creep.__struct_fields__]
+    out += [
+        "",
+        "[plays]  # of u, u^2 and 1 - (1 - u)^2",
+        f"thresholds = {numbers(file.plays.thresholds)}",
+        "weights = [",
+    ]
+    out += [f"    {numbers(row)}," for row in file.plays.weights]
+    out += ["]", f"reversible = {numbers(file.plays.reversible)}", "", "[lengths]"]
+    out += [f"{name} = {_float(getattr(file.lengths, name))}" for name in file.lengths.__struct_fields__]
+    for line in file.lines:
+        out += ["", "[[lines]]", f"name = {_text(line.name)}"]
+        for name in line.__struct_fields__[1:]:
+            value = getattr(line, name)
+            out.append(f"{name} = {numbers(value) if isinstance(value, list) else _float(value)}")
+    return "\n".join(out) + "\n"
+
+
+def _floats(values: Sequence[float]) -> list[float]:
+    return [float(value) for value in values]
+
+
+def _float(value: float) -> str:
+    shown = f"{float(value):.9g}"
+    return shown if any(mark in shown for mark in ".en") else f"{shown}.0"
+
+
+def _text(value: str) -> str:
+    plain = "".join(c if c.isprintable() and c not in '"\\' else "_" for c in value)
+    return f'"{plain[:200]}"'

@@ -1,0 +1,45 @@
+"""One settled loop: where the axis is on its way up and on its way down, against the drive."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tablegen.numerics.arrays import Floats, FloatsLike, Ints
+
+POINTS = 1025  # points of a branch; linear between them
+
+
+@dataclass(frozen=True, eq=False)
+class Loop:
+    """A line between the normalised drives ``low`` and ``high``.
+
+    ``rising`` and ``falling`` are positions from 0 to 1 at ``POINTS`` drives, evenly from ``low`` to ``high``; of these
+    1 is ``extent_nm``. Beyond its ends a branch goes on straight.
+    """
+
+    low: float
+    high: float
+    rising: Floats
+    falling: Floats
+    extent_nm: float
+
+    def position(self, u: Floats, rising: bool) -> Floats:
+        """The position at normalised drives."""
+        values = self.rising if rising else self.falling
+        v = (u - self.low) * ((POINTS - 1) / (self.high - self.low))
+        left = np.clip(v, 0.0, POINTS - 2).astype(np.int64)
+        return values[left] + (v - left) * (values[left + 1] - values[left])
+
+    def drive(self, position: FloatsLike, rising: bool) -> Floats:
+        """The normalised drive at positions: the inverse of ``position``."""
+        values = self.rising if rising else self.falling
+        p = np.asarray(position, dtype=np.float64)
+        left: Ints = np.clip(np.searchsorted(values, p, side="right") - 1, 0, POINTS - 2)
+        v = left + (p - values[left]) / (values[left + 1] - values[left])
+        return self.low + (self.high - self.low) / (POINTS - 1) * v
+
+    @property
+    def least_slope(self) -> float:
+        """The least slope of both branches, of a straight line's."""
+        steps = min(float(np.min(np.diff(branch))) for branch in (self.rising, self.falling))
+        return steps * (POINTS - 1)

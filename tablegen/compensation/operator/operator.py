@@ -1,0 +1,134 @@
+"""The operator: a hysteresis family, the measured residual over it, the size at every offset, and creep."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from tablegen.compensation.operator.creep import LogarithmicCreep
+from tablegen.compensation.operator.field import Field
+from tablegen.compensation.operator.loop import POINTS, Loop
+from tablegen.compensation.operator.plays import Plays
+from tablegen.numerics.arrays import Floats
+from tablegen.problems import Unphysical
+
+SMALL_STROKE = 0.1  # of v_max: the size of the scans from which m of (1) is taken to come
+_END_POINTS = 48  # of a branch at either end
+_LEAST_SLOPE = 0.05  # of a straight line's; below it a branch nearly stands still, and cannot be inverted
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuredLine:
+    """One trace that the operator rests on: where it was, and by how much it is missed when it is left out.
+
+    Strokes and centres are shares of v_max. ``left_out`` is the rms residual, the scaling error and the mismatch of
+    trace and retrace inside the window, in percent, and the error of the size in percent.
+    """
+
+    name: str
+    stroke: float
+    centre: float
+    rate_hz: float
+    left_out: tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Operator:
+    """What a settled line of one axis does.
+
+    ``residual`` has rows of 2 K + 2 Chebyshev coefficients, those of the rising branch first: measured less family, of
+    positions from 0 to 1. ``size`` has one column: the measured extent over ``expected_extent``, less 1. ``centre`` is
+    the one at which most lines were measured, of v_max.
+    """
+
+    family: Plays
+    residual: Field
+    size: Field
+    creep: LogarithmicCreep
+    centre: float
+    lines: tuple[MeasuredLine, ...]
+
+    def loop(self, low: float, high: float, factor: float = 1.0) -> Loop:
+        """The settled loop between two normalised drives.
+
+        ``factor`` is m of (1) at this offset over that at ``self.centre``. Raises ``Unphysical`` where a branch would
+        stand still or run backwards.
+        """
+        stroke, centre = high - low, 0.5 * (low + high)
+        rising, falling, _ = self._family(low, high)
+        row = self.residual.at(stroke, centre)
+        half = len(row) // 2
+        x = 2.0 * self._grid - 1.0
+        rising, falling = rising + chebyshev(row[:half], x), falling + chebyshev(row[half:], x)
+        extent = self.expected_extent(stroke, centre, factor) * (1.0 + float(self.size.at(stroke, centre)[0]))
+        rising, falling = _closed(rising, falling)
+        loop = Loop(low, high, _monotonic_ends(rising), _monotonic_ends(falling), extent)
+        if not loop.least_slope > 0.5 * _LEAST_SLOPE:
+            raise Unphysical(
+                f"at a stroke of {stroke:.3g} and a centre of {centre:.3g} of v_max the operator's branches run "
+                f"{'backwards' if loop.least_slope < 0.0 else 'nearly flat'}; measure a trace there"
+            )
+        return loop
+
+    def expected_extent(self, stroke: float, centre: float, factor: float) -> float:
+        """nm between the turns, by the family and the offset law, without the field of sizes.
+
+        What the factor has beyond the family, at a small stroke, is taken for a sensitivity that depends on the offset.
+        """
+        here = extent_of(self.family, stroke, centre)
+        small = extent_of(self.family, SMALL_STROKE, self.centre) / extent_of(self.family, SMALL_STROKE, centre)
+        return here * small / factor
+
+    def distance(self, stroke: float, centre: float) -> float:
+        """How far a line is from the nearest measured one, in shares of v_max."""
+        return min(max(abs(stroke - line.stroke), abs(centre - line.centre)) for line in self.lines)
+
+    @property
+    def nm_per_drive(self) -> float:
+        """About how far the axis moves for the whole of v_max: a first guess of amplitudes."""
+        return extent_of(self.family, SMALL_STROKE, self.centre) / SMALL_STROKE
+
+    @cached_property
+    def _grid(self) -> Floats:
+        return np.arange(POINTS) / (POINTS - 1)
+
+    def _family(self, low: float, high: float) -> tuple[Floats, Floats, float]:
+        """Both branches of the family from 0 to 1, and the extent in nm."""
+        u = low + (high - low) * self._grid
+        rising, falling = (self.family.branch(u, low, high, going) for going in (True, False))
+        extent = float(rising[-1] - rising[0])
+        return (rising - rising[0]) / extent, (falling - rising[0]) / extent, extent
+
+
+def extent_of(family: Plays, stroke: float, centre: float) -> float:
+    """nm between the turns of a settled line."""
+    low, high = centre - 0.5 * stroke, centre + 0.5 * stroke
+    ends = family.branch(np.array([low, high]), low, high, True)
+    return float(ends[1] - ends[0])
+
+
+def _closed(rising: Floats, falling: Floats) -> tuple[Floats, Floats]:
+    """Both from 0 to 1: they meet where the drive turns, since a settled loop is closed."""
+    low, high = 0.5 * (rising[0] + falling[0]), 0.5 * (rising[-1] + falling[-1])
+    return (rising - low) / (high - low), (falling - low) / (high - low)
+
+
+def _monotonic_ends(branch: Floats) -> Floats:
+    """The branch with its outermost parts, which nobody images, no flatter than ``_LEAST_SLOPE``.
+
+    There the series of the residual follow the noise.
+    """
+    out = branch.copy()
+    step = _LEAST_SLOPE / (POINTS - 1)
+    for i in range(_END_POINTS, 0, -1):
+        out[i - 1] = min(out[i - 1], out[i] - step)
+        out[-i] = max(out[-i], out[-i - 1] + step)
+    return out
+
+
+def chebyshev(coefficients: Floats, x: Floats) -> Floats:
+    """sum_k c_k T_k(x), by Clenshaw's recurrence."""
+    one, two = np.zeros_like(x), np.zeros_like(x)
+    for coefficient in coefficients[:0:-1]:
+        one, two = float(coefficient) + 2.0 * x * one - two, one
+    return float(coefficients[0]) + x * one - two

@@ -1,0 +1,222 @@
+"""The waveform that an operator's axis follows straight: found by learning on the operator, before anything is built.
+
+A round plays the waveform on the operator: the settled loop of its stroke, then creep and dynamics. What the position
+lacks of the wanted line inside the imaging windows, over the slope of the branch, is projected on the harmonics with a
+penalty on n^4, and added; the amplitude is scaled to the size. Turns are rounded, so that the stroke differs from the
+line; the loop is that of the stroke.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from tablegen.compensation.operator.loop import POINTS, Loop
+from tablegen.compensation.operator.operator import Operator
+from tablegen.numerics.arrays import Bools, Floats, tree_sum
+from tablegen.numerics.linear import Cholesky
+from tablegen.numerics.turns import sine_and_cosine
+from tablegen.problems import Unphysical
+from tablegen.waveform.series import FourierSeries
+
+CHORD = 0.05  # of the line, for scaling errors
+_ROUNDS = 60
+_CONVERGED = 1e-5  # of the line: the largest change of the position inside the windows in a round
+_GRID_PER_HARMONIC = 16
+_MIN_GRID = 1024
+_SMOOTHNESS = 1e-8  # of the penalty on n^4, against the mean square of the error
+_SLOPE_STEPS = 4  # points of the loop over which its slope is taken
+_BEYOND = 0.01  # of v_max: what a round may leave the driver's range by
+_ROUNDING = 2.0**40  # coefficients are multiples of its inverse: the last bits of a round do not matter then
+
+Linear = Callable[[Floats], tuple[Floats, Floats]]  # real and imaginary part of a response at frequencies in Hz
+ThroughInverse = Callable[[FourierSeries], FourierSeries]  # what has to arrive at the piezo for a target
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """A line: ``size_nm`` from x = 0 to 1, turn in periods, imaged over ``window``, backward too if ``both``.
+
+    ``centre`` is the offset, of v_max; ``factor`` m of (1) there over that at the operator's centre.
+    """
+
+    size_nm: float
+    turn: float
+    window: tuple[float, float]
+    both: bool
+    rate_hz: float
+    centre: float
+    factor: float
+
+
+@dataclass(frozen=True, slots=True)
+class Expected:
+    """What the operator says of the scan: percent of the line, forward and backward, but for ``mismatch``.
+
+    ``rms`` is the residual about the common best line of all windows, ``scaling`` peak to peak of chords of 1/20 of the
+    line, ``mismatch`` the largest distance of trace and retrace, ``size`` the error of the size.
+    """
+
+    rms: tuple[float, float]
+    scaling: tuple[float, float]
+    mismatch: float
+    size: float
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """The waveform, about 0..1, of which 1 is ``v_amplitude`` of v_max; what it leaves; and where it turned."""
+
+    series: FourierSeries
+    v_amplitude: float
+    expected: Expected
+    stroke: float
+    centre: float
+    rounds: int
+
+
+def find_waveform(
+    operator: Operator, wanted: Wanted, start: FourierSeries, inverse: ThroughInverse, dynamics: Linear | None
+) -> Found:
+    """The waveform that the operator follows straight, from ``start`` on, in the harmonics of that.
+
+    Coefficients are multiples of 2^-40. Raises ``Unphysical`` where it does not converge, or is larger than the driver
+    or the operator reach.
+    """
+    learner = _Learner(operator, wanted, start.harmonics, inverse, dynamics)
+    series, amplitude = start, wanted.size_nm / operator.nm_per_drive
+    before: Floats | None = None
+    for turn in range(1, _ROUNDS + 1):
+        played = learner.play(series, amplitude)
+        line = learner.line_of(played.position)
+        inside = played.position[learner.imaged] - line[1]
+        if before is not None and float(np.max(np.abs(inside - before))) < _CONVERGED * wanted.size_nm:
+            at = 0.5 * (played.loop.low + played.loop.high)
+            expected = learner.expected(played.position)
+            return Found(_rounded(series), amplitude, expected, played.loop.high - played.loop.low, at, turn)
+        before = inside
+        amplitude *= wanted.size_nm / line[0]
+        series = series.plus(learner.correction(played, amplitude, line))
+    raise Unphysical(
+        f"the waveform did not settle within {_ROUNDS} rounds on the operator; a smaller scan, a lower line rate or "
+        "fewer harmonics may"
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Played:
+    """One round: the drive on the grid, of v_max; the loop; where it rises; the position in nm."""
+
+    drive: Floats
+    loop: Loop
+    rising: Bools
+    position: Floats
+
+
+class _Learner:
+    """What the rounds share: the grid of times, the projection, and the operator behind its dynamics."""
+
+    def __init__(
+        self, operator: Operator, wanted: Wanted, harmonics: int, inverse: ThroughInverse, dynamics: Linear | None
+    ) -> None:
+        self._operator, self._wanted, self._harmonics, self._inverse = operator, wanted, harmonics, inverse
+        self._count = max(_MIN_GRID, 1 << (_GRID_PER_HARMONIC * harmonics - 1).bit_length())
+        times = np.arange(self._count) / self._count
+        self._going = times <= wanted.turn
+        self._x = np.where(self._going, times / wanted.turn, (1.0 - times) / (1.0 - wanted.turn))
+        low, high = wanted.window
+        inside = (self._x >= low) & (self._x <= high)
+        self.imaged: Bools = inside & (self._going | wanted.both)
+        self._sines, self._cosines = sine_and_cosine(times)
+        n = np.arange(1.0, harmonics + 1.0)
+        real, imaginary = operator.creep.response(n * wanted.rate_hz)
+        if dynamics is not None:
+            r, i = dynamics(n * wanted.rate_hz)
+            real, imaginary = real * r - imaginary * i, real * i + imaginary * r
+        self._real, self._imaginary = real, imaginary
+        self._late = bool(np.any(real != 1.0) or np.any(imaginary != 0.0))
+        k = np.arange(self._count)[self.imaged]
+        at = (np.arange(1, harmonics + 1)[:, None] * k) % self._count
+        # Denser towards the edges of a window, as Chebyshev's points are, or the error piles up there.
+        edge = np.clip((self._x[self.imaged] - low) / (high - low), 1e-3, 1.0 - 1e-3)
+        self._weight = 1.0 / np.sqrt(edge * (1.0 - edge))
+        self._weight = self._weight / float(tree_sum(self._weight))
+        basis = np.concatenate([np.ones((1, len(k))), self._cosines[at], self._sines[at]])
+        normal = np.stack([tree_sum(basis * (row * self._weight)) for row in basis])
+        square = n * n
+        penalty = _SMOOTHNESS * np.concatenate([[0.0], square * square, square * square])
+        self._basis = basis
+        self._factor = Cholesky(normal + np.diag(penalty + 1e-14))
+
+    def play(self, series: FourierSeries, amplitude: float) -> _Played:
+        """A waveform on the operator."""
+        wanted = self._wanted
+        u = wanted.centre + amplitude * (self._inverse(series).on_grid(self._count) - 0.5)
+        low, high = float(np.min(u)), float(np.max(u))
+        if low < -_BEYOND or high > 1.0 + _BEYOND:
+            reach = 2.0 * min(wanted.centre, 1.0 - wanted.centre)
+            raise Unphysical(
+                f"{wanted.size_nm:.6g} nm take {100.0 * (high - low):.3g} % of v_max by the operator; at this offset "
+                f"{100.0 * reach:.3g} % are left; lower the size, or move the offset to the middle"
+            )
+        loop = self._operator.loop(low, high, wanted.factor)
+        bottom, top = int(np.argmin(u)), int(np.argmax(u))
+        k = np.arange(self._count)
+        rising = (k - bottom) % self._count < (top - bottom) % self._count
+        place = np.where(rising, loop.position(u, True), loop.position(u, False))
+        if self._late:
+            place = place + self._analysed(place).times(self._real - 1.0, self._imaginary).on_grid(self._count)
+        return _Played(u, loop, rising, loop.extent_nm * place)
+
+    def line_of(self, position: Floats) -> tuple[float, float]:
+        """Slope in nm from x = 0 to 1, and position at x = 1/2, of the best common line through the windows."""
+        x, y, weight = self._x[self.imaged] - 0.5, position[self.imaged], self._weight
+        mean_x, mean_y = float(tree_sum(weight * x)), float(tree_sum(weight * y))
+        slope = float(tree_sum(weight * (x - mean_x) * y)) / float(tree_sum(weight * (x - mean_x) * x))
+        return slope, mean_y - slope * mean_x
+
+    def correction(self, played: _Played, amplitude: float, line: tuple[float, float]) -> FourierSeries:
+        """What the waveform lacks, projected on its harmonics."""
+        imaged, loop = self.imaged, played.loop
+        lacking = line[0] * (self._x[imaged] - 0.5) + line[1] - played.position[imaged]
+        step = (loop.high - loop.low) / (POINTS - 1) * _SLOPE_STEPS
+        u, rising = played.drive[imaged], played.rising[imaged]
+        ahead, behind = (
+            np.where(rising, loop.position(u + by, True), loop.position(u + by, False)) for by in (step, -step)
+        )
+        slope = loop.extent_nm * (ahead - behind) / (2.0 * step) * amplitude  # nm for 1 of w
+        right = tree_sum(self._basis * (lacking / slope * self._weight))
+        c = self._factor.solve(right)
+        return FourierSeries(0.0, c[1 : self._harmonics + 1], c[self._harmonics + 1 :])
+
+    def expected(self, position: Floats) -> Expected:
+        """The measures of a position in nm; approximate sums will do for figures."""
+        slope, middle = self.line_of(position)
+        error = 100.0 * ((position - middle) / slope - (self._x - 0.5))
+        grid = np.linspace(*self._wanted.window, 401)
+        sides = []
+        for going in (self._going, ~self._going):
+            order = np.argsort(self._x[going])
+            sides.append(np.interp(grid, self._x[going][order], error[going][order]))
+        step = max(1, min(round(CHORD / (grid[1] - grid[0])), 400))
+        scaling = [float(np.ptp((one[step:] - one[:-step]) / (grid[step] - grid[0]))) for one in sides]
+        rms = [float(np.sqrt(np.mean(one * one))) for one in sides]
+        mismatch = float(np.max(np.abs(sides[0] - sides[1])))
+        return Expected(
+            (rms[0], rms[1]), (scaling[0], scaling[1]), mismatch, 100.0 * (slope / self._wanted.size_nm - 1.0)
+        )
+
+    def _analysed(self, place: Floats) -> FourierSeries:
+        """Its harmonics; the same bits on every machine, unlike those of a fast transform."""
+        a, b = np.empty(self._harmonics), np.empty(self._harmonics)
+        k = np.arange(self._count)
+        for n in range(1, self._harmonics + 1):
+            at = (n * k) % self._count
+            a[n - 1] = 2.0 * float(tree_sum(place * self._cosines[at])) / self._count
+            b[n - 1] = 2.0 * float(tree_sum(place * self._sines[at])) / self._count
+        return FourierSeries(0.0, a, b)
+
+
+def _rounded(series: FourierSeries) -> FourierSeries:
+    a, b = (np.rint(values * _ROUNDING) / _ROUNDING for values in (series.a, series.b))
+    return FourierSeries(round(series.a0 * _ROUNDING) / _ROUNDING, a, b)

@@ -1,0 +1,98 @@
+"""The scanner file as frozen types: a scanner is calibrated once and shared by its scans.
+
+What ``[x.hysteresis]`` takes stands with the models, in ``compensation/models/``.
+"""
+
+from typing import Annotated
+
+from msgspec import Meta, Struct
+
+from tablegen.compensation.model import Hysteresis
+from tablegen.quantities import FileName, Hertz, Name, Nanometres, PositiveVolts, Volts
+
+Factor = Annotated[float, Meta(ge=0.1, le=10.0)]
+
+
+class OffsetPoint(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The apparent size of one object at one offset voltage."""
+
+    offset_v: Annotated[Volts, Meta(description="offset voltage at which the image was taken")]
+    apparent_nm: Annotated[Nanometres, Meta(description="apparent size of the object, or apparent lattice constant")]
+
+
+class Offset(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Amplitude factor against offset voltage, (1)-(4): `m_minus` and `m_plus`, `alpha` and `beta`, or `points`."""
+
+    m_minus: Annotated[Factor, Meta(description="amplitude factor at an offset of 0 V")] | None = None
+    m_plus: Annotated[Factor, Meta(description="amplitude factor at an offset of v_max")] | None = None
+    alpha: Annotated[float, Meta(ge=-1.0, le=1.0, description="linear term of (1)")] | None = None
+    beta: Annotated[float, Meta(ge=-1.0, le=1.0, description="quadratic term of (1)")] | None = None
+    points: (
+        Annotated[
+            list[OffsetPoint],
+            Meta(min_length=3, max_length=1000, description="apparent sizes at three or more offsets"),
+        ]
+        | None
+    ) = None
+
+
+class Size(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Scan size against scan voltage, (5)-(12)."""
+
+    k_nm_per_v: Annotated[float, Meta(ge=1e-6, le=1e6, description="scanner constant at `base_nm`")]
+    beta: Annotated[float, Meta(gt=-0.5, le=100.0, description="nonlinearity of (6); 0 is a linear scanner")] = 0.0
+    base_nm: Annotated[Nanometres, Meta(description="scan size at which `k_nm_per_v` was calibrated")] = 200.0
+    v_threshold: Annotated[
+        float, Meta(gt=0.0, le=1.0, description="normalised scan voltage above which the size is linear, (10)")
+    ] = 0.5
+
+
+class Frequency(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Loss of amplitude with frequency, (23)."""
+
+    alpha: Annotated[float, Meta(ge=0.0, le=0.5, description="relative amplitude lost per decade")]
+    reference_hz: Annotated[Hertz, Meta(description="rate at which the scanner was calibrated")]
+
+
+class Resonance(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Inverse dynamics: each harmonic is divided by the response, which is second order with delay, or measured."""
+
+    frequency_hz: Annotated[Hertz, Meta(description="undamped resonance frequency")] | None = None
+    quality: Annotated[float, Meta(ge=0.1, le=1e5, description="quality factor")] | None = None
+    delay_s: Annotated[
+        float,
+        Meta(
+            ge=0.0, le=1.0, description="dead time of amplifier and scanner; the converter's half tick comes by itself"
+        ),
+    ] = 0.0
+    response: (
+        Annotated[
+            FileName,
+            Meta(description="CSV of the measured response, relative to the scanner file; header hz,gain,phase_deg"),
+        ]
+        | None
+    ) = None
+    max_boost_db: Annotated[
+        float, Meta(ge=0.0, le=60.0, description="largest gain that the inverse dynamics may apply to a harmonic")
+    ] = 6.0
+
+
+class ScannerAxis(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Calibration of one axis."""
+
+    size: Size
+    offset: Offset | None = None
+    hysteresis: Hysteresis | None = None
+    frequency: Frequency | None = None
+    resonance: Resonance | None = None
+
+
+class Scanner(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A calibrated scanner."""
+
+    name: Annotated[Name, Meta(description="name of the scanner in reports")]
+    v_max: Annotated[
+        PositiveVolts, Meta(description="maximum output of the piezo driver; normalised voltages refer to it")
+    ]
+    x: ScannerAxis
+    y: ScannerAxis

@@ -1,0 +1,271 @@
+"""What ``manifest.json`` holds, field by field: types with their ranges, and the programs that these fields are."""
+
+from fractions import Fraction
+from typing import Annotated, Literal
+
+import numpy as np
+from msgspec import Meta, Struct
+
+from tablegen.device.schedule import MAXIMUM_LINE_TICKS, Schedule, Window
+from tablegen.fixedpoint.output import Output
+from tablegen.fixedpoint.phase import MAXIMUM_TICKS, RationalPhase
+from tablegen.fixedpoint.program import Program
+from tablegen.numerics.arrays import Floats, Ints
+
+_CHUNK_PRODUCTS = 1 << 22  # products of harmonics and ticks that are worked out at a time
+
+Natural = Annotated[int, Meta(ge=0, le=MAXIMUM_TICKS)]
+Positive = Annotated[int, Meta(ge=1, le=MAXIMUM_TICKS)]
+Code = Annotated[int, Meta(ge=0, lt=1 << 24)]
+Word = Annotated[int, Meta(ge=-(1 << 31), lt=1 << 31)]
+Bits = Annotated[int, Meta(ge=8, le=24)]
+Pair = tuple[Natural, Natural]
+Digest = Annotated[str, Meta(pattern=r"^[0-9a-f]{64}\Z")]
+# Never outside the directory.
+FileName = Annotated[str, Meta(max_length=200, pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]*\Z")]
+Version = Annotated[str, Meta(max_length=64, pattern=r"^[A-Za-z0-9][A-Za-z0-9.+!-]*\Z")]
+Number = Annotated[int, Meta(ge=-(1 << 43), lt=1 << 43)]
+Volts = Annotated[float, Meta(ge=-1e9, le=1e9)]
+Coefficient = Annotated[float, Meta(ge=-1e3, le=1e3)]  # of a waveform from 0 to 1
+LEAST_V_PER_CODE = 1e-15  # a range of 1 mV in 24 bits, behind an amplifier of 1e-4, is 6e-15 V
+
+
+class ManifestBranch(Struct):
+    """Hysteresis of one branch: the peak of its residual, and where that is."""
+
+    beta: float
+    u_peak: float
+
+
+class ManifestResonance(Struct):
+    """Where the response is largest, and half its width there."""
+
+    hz: float
+    half_width_hz: float
+
+
+class ManifestDrive(Struct):
+    """Volts at the piezo, and the shape that they follow."""
+
+    v_offset: Volts
+    v_amplitude: Volts
+    v_scan: Volts
+    v_scan_normalised: Annotated[float, Meta(gt=0.0)]
+    m: float
+    g: float
+    size_nm: float
+    window_nm: float
+    turn: Annotated[float, Meta(gt=0.0, lt=1.0)]
+    model: str
+    forward: ManifestBranch
+    backward: ManifestBranch
+    resonance: ManifestResonance | None = None
+
+
+class ManifestLine(Struct):
+    """The period of an axis."""
+
+    ticks: Positive
+    hold_ticks: Positive
+    phase_step: Annotated[int, Meta(ge=0, le=1 << 32)]
+    phase_remainder: Natural
+    rate_hz: float
+    requested_hz: float
+    rate_exact: tuple[int, Positive]
+
+
+class ManifestSeries(Struct):
+    """A waveform w(t) in float64; a layer has no mean."""
+
+    a: list[float]
+    b: list[float]
+    a0: float = 0.0
+
+
+class ManifestFourier(Struct):
+    """w(t) in float64, its words, and what the piezo is to follow where dynamics or a layer make that another one."""
+
+    harmonics: Annotated[int, Meta(ge=1, le=4096)]
+    a0: Coefficient
+    a: list[Coefficient]
+    b: list[Coefficient]
+    a0_word: Word
+    a_words: list[Word]
+    b_words: list[Word]
+    band_limit: Literal["truncate", "lanczos", "window"]
+    q_format: Literal["Q2.30"]
+    window: tuple[float, float]
+    directions: Literal["forward", "both"]
+    held_harmonics: list[Positive] = []
+    held_factors: list[float] = []
+    target: ManifestSeries | None = None
+    refinement: ManifestSeries | None = None
+
+
+class ManifestTable(Struct):
+    """The words that are played."""
+
+    mode: Literal["interpolated", "direct"]
+    bits: Bits
+    guard_bits: Number
+    scale: Annotated[float, Meta(gt=0.0, le=1e9)]
+    words: Annotated[list[Annotated[int, Meta(ge=-(1 << 23), lt=1 << 23)]], Meta(min_length=1, max_length=1 << 20)]
+
+
+class ManifestOutput(Struct):
+    """The output stage, and volts of its codes."""
+
+    gain_word: Number
+    gain_q: Number
+    offset_word: Annotated[int, Meta(gt=-(1 << 43), lt=1 << 43)]
+    offset_code: Number
+    code_min: Code
+    code_max: Code
+    max_step: Annotated[int, Meta(ge=1, lt=1 << 24)]
+    park_code: Code
+    v_zero: Volts
+    v_per_code: Volts
+    dac_bits: Bits
+    coding: Literal["offset-binary", "twos-complement"]
+    align: Literal["right", "left"]
+    word_bits: Annotated[int, Meta(ge=8, le=32)]
+
+
+class ManifestCertificate(Struct):
+    """What the build promised of an axis."""
+
+    max_error_lsb: Annotated[float, Meta(ge=0.0)]
+    ticks: int | None = None
+    rms_error_lsb: float | None = None
+    lowest_code: int | None = None
+    highest_code: int | None = None
+    headroom_low: int | None = None
+    headroom_high: int | None = None
+    largest_step: int | None = None
+    max_step: int | None = None
+    peak_slew_v_per_s: float | None = None
+    beyond_cutoff_db: float | None = None
+    at_resonance_db: float | None = None
+    scaling_error_percent: dict[str, dict[str, float]] | None = None
+    refinement_percent: dict[str, dict[str, float]] | None = None
+
+
+class ManifestAxis(Struct):
+    """One axis of a manifest."""
+
+    drive: ManifestDrive
+    line: ManifestLine
+    fourier: ManifestFourier
+    table: ManifestTable
+    output: ManifestOutput
+    certificate: ManifestCertificate
+
+    @property
+    def fourier_words(self) -> Ints:
+        """In the order in which devices hold them."""
+        fourier = self.fourier
+        return np.array([fourier.a0_word, *fourier.a_words, *fourier.b_words], dtype=np.int64)
+
+    @property
+    def program(self) -> Program:
+        """What the device plays."""
+        output = self.output
+        return Program(
+            RationalPhase(self.line.ticks // self.line.hold_ticks),
+            self.line.hold_ticks,
+            self.table.mode,
+            self.table.bits,
+            np.array(self.table.words, dtype=np.int64),
+            Output(
+                gain_word=output.gain_word,
+                gain_q=output.gain_q,
+                offset_word=output.offset_word,
+                code_min=output.code_min,
+                code_max=output.code_max,
+                max_step=output.max_step,
+                park_code=output.park_code,
+                dac_bits=output.dac_bits,
+                coding=output.coding,
+                align=output.align,
+                word_bits=output.word_bits,
+            ),
+        )
+
+    def asked(self, k: Ints) -> Floats:
+        """The codes, unrounded, that the float waveform asks for at ticks k in [0, ticks) of the period.
+
+        V = v_offset + v_amplitude (w - 1/2), code = (V - v_zero) / v_per_code. Evaluated term by term with exact
+        phases, in none of the ways in which the build does it.
+        """
+        advances, which = np.unique(k // self.line.hold_ticks, return_inverse=True)
+        period = self.line.ticks // self.line.hold_ticks
+        n = np.arange(1, self.fourier.harmonics + 1, dtype=np.int64)
+        a, b = np.array(self.fourier.a), np.array(self.fourier.b)
+        w = np.full(len(advances), self.fourier.a0)
+        if period <= 4 * len(advances):  # a cosine of every phase costs less than one of every product
+            angle = 2.0 * np.pi / period * np.arange(period)
+            cosines, sines = np.cos(angle), np.sin(angle)
+            for harmonic in range(len(n)):
+                phase = advances * n[harmonic] % period
+                w += a[harmonic] * cosines[phase] + b[harmonic] * sines[phase]
+            advances = advances[:0]
+        rows = max(_CHUNK_PRODUCTS // len(n), 1)
+        for first in range(0, len(advances), rows):
+            angle = 2.0 * np.pi / period * (np.outer(advances[first : first + rows], n) % period)
+            w[first : first + rows] += np.cos(angle) @ a + np.sin(angle) @ b
+        volts = self.drive.v_offset + self.drive.v_amplitude * (w - 0.5)
+        codes: Floats = (volts - self.output.v_zero) / self.output.v_per_code
+        return codes[which.reshape(-1)]
+
+
+class ManifestSequence(Struct):
+    """The schedule."""
+
+    update_rate_hz: tuple[Annotated[int, Meta(ge=1)], Annotated[int, Meta(ge=1)]]
+    line_ticks: Annotated[int, Meta(ge=1, le=MAXIMUM_LINE_TICKS)]
+    frame_lines: Annotated[int, Meta(ge=1, le=1 << 16)]
+    pixels: Annotated[int, Meta(ge=1, le=1 << 16)]
+    settle_lines: Annotated[int, Meta(ge=0, le=255)]
+    turn_tick: Natural
+    turn_line: Natural
+    forward_ticks: Pair
+    backward_ticks: Pair
+    up_lines: Pair
+    down_lines: Pair
+
+    @property
+    def schedule(self) -> Schedule:
+        """As the model has it."""
+        return Schedule(
+            ticks=self.line_ticks,
+            lines=self.frame_lines,
+            update_rate_hz=Fraction(*self.update_rate_hz),
+            requested_hz=float(Fraction(*self.update_rate_hz) / self.line_ticks),
+            pixels=self.pixels,
+            settle_lines=self.settle_lines,
+            turn_tick=self.turn_tick,
+            forward=Window(*self.forward_ticks),
+            backward=Window(*self.backward_ticks),
+            turn_line=self.turn_line,
+            up=Window(*self.up_lines),
+            down=Window(*self.down_lines),
+        )
+
+
+class ManifestAxes(Struct, forbid_unknown_fields=True):
+    """Both axes; a third one has nothing to play it."""
+
+    x: ManifestAxis
+    y: ManifestAxis
+
+
+class Manifest(Struct):
+    """What is read of a manifest; keys that were added since are passed over."""
+
+    tablegen: Version
+    hash: Digest
+    name: FileName
+    files: dict[FileName, Digest]
+    sequence: ManifestSequence
+    axes: ManifestAxes
+    formats: list[Annotated[str, Meta(min_length=1, max_length=64)]] = []

@@ -1,0 +1,214 @@
+"""What is applied to one axis, factor by factor: V(t) = V_offset + m g V_scan (w(t) - 1/2)."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from tablegen.compensation import models
+from tablegen.compensation.dynamics import Response, SecondOrder
+from tablegen.compensation.frequency import frequency_gain
+from tablegen.compensation.line import AppliedBranch, LineShape, WantedLine
+from tablegen.compensation.model import Hysteresis
+from tablegen.compensation.offset import OffsetLaw, normalised_offset
+from tablegen.compensation.response_file import read_response
+from tablegen.compensation.size import SizeLaw
+from tablegen.config.load import Setup
+from tablegen.config.scanner import Offset, Resonance, ScannerAxis
+from tablegen.config.schema import FastAxis
+from tablegen.figures import at_most
+from tablegen.problems import Problems, Unphysical
+
+
+@dataclass(frozen=True)
+class Drive:
+    """The voltages at the piezo, and every factor that went into them.
+
+    ``v_scan`` is from (9)/(12), before ``m`` of (1) and ``g`` of (23). The amplitude played is m g v_scan, peak to
+    peak, for w from 0 to 1. ``position_nm`` is that of the offset, above the one at 0 V.
+    """
+
+    v_max: float
+    v_offset: float
+    position_nm: float
+    size_nm: float
+    window_nm: float
+    v_scan: float
+    v_scan_normalised: float
+    p_offset: float
+    m: float
+    g: float
+    hysteresis: Hysteresis
+    turn: float
+    offset_law: OffsetLaw
+    size_law: SizeLaw
+    shape: LineShape
+    response: Response | None
+    max_boost_db: float
+
+    @property
+    def model(self) -> str:
+        """The name of the hysteresis model."""
+        return self.hysteresis.model()
+
+    @property
+    def forward(self) -> AppliedBranch:
+        """The residual that is applied on the way there."""
+        return self.shape.peaks[0]
+
+    @property
+    def backward(self) -> AppliedBranch:
+        """And on the way back."""
+        return self.shape.peaks[1]
+
+    @property
+    def v_amplitude(self) -> float:
+        """m g V_scan: volts peak to peak at the piezo for w from 0 to 1."""
+        return self.m * self.g * self.v_scan
+
+    def v_amplitude_at(self, v_offset: float) -> float:
+        """What ``v_amplitude`` would be at another offset voltage."""
+        return self.offset_law.factor(normalised_offset(v_offset, self.v_max)) * self.g * self.v_scan
+
+
+def compensate(setup: Setup, axis: str, rate_hz: float, harmonics: int, problems: Problems) -> Drive | None:
+    """Apply the scanner's calibration to one axis ("x" or "y") at its rate; None where ``problems`` grew.
+
+    ``harmonics`` is the highest that is played.
+    """
+    scan: FastAxis = getattr(setup.scan, axis)
+    scanner: ScannerAxis = getattr(setup.scanner, axis)
+    v_max = setup.scanner.v_max
+    scan_file, scanner_file = setup.scan_file, setup.scanner_file
+    before = len(problems.found)
+
+    offset_law = OffsetLaw()
+    if scanner.offset is not None:
+        _check_points(setup, axis, problems)
+        with problems.at(scanner_file, f"{axis}.offset{'.points' if scanner.offset.points is not None else ''}"):
+            offset_law = offset_law_of(scanner.offset, v_max)
+    size_law = None
+    with problems.at(scanner_file, f"{axis}.size.base_nm"):
+        s = scanner.size
+        size_law = SizeLaw.calibrated(s.k_nm_per_v, v_max, s.beta, s.base_nm, s.v_threshold)
+
+    v_offset = 0.5 * v_max
+    if scan.offset_v is not None:
+        v_offset = scan.offset_v
+        with problems.at(scan_file, f"{axis}.offset_v"):
+            if not 0.0 <= v_offset <= v_max:
+                raise Unphysical(outside_driver(v_offset, v_max))
+    elif scan.offset_nm is not None:
+        with problems.at(scan_file, f"{axis}.offset_nm"):
+            v_offset = offset_law.voltage_at(scan.offset_nm, v_max, scanner.size.k_nm_per_v)
+
+    low, high = scan.band_limit.window
+    v, size_nm = 0.0, 0.0
+    if size_law is not None and scan.size_nm is not None:
+        with problems.at(scan_file, f"{axis}.size_nm"):
+            size_nm = scan.size_nm / (high - low) if scan.size_of == "window" else scan.size_nm
+            try:
+                v = size_law.voltage(size_nm)
+            except Unphysical as reason:
+                if scan.size_of == "line":
+                    raise
+                window_nm = at_most(size_law.size_nm(1.0) * (high - low), 6)
+                raise Unphysical(f"its line of {reason}, a window of {window_nm} nm") from None
+    elif size_law is not None and scan.size_v is not None:
+        with problems.at(scan_file, f"{axis}.size_v"):
+            if scan.size_v > v_max:
+                raise Unphysical(f"{scan.size_v:g} V is above v_max = {v_max:g} V")
+            v = scan.size_v / v_max
+            size_nm = size_law.size_nm(v)
+
+    g = 1.0
+    if scanner.frequency is not None:
+        with problems.at(scanner_file, f"{axis}.frequency.alpha"):
+            g = frequency_gain(rate_hz, scanner.frequency.alpha, scanner.frequency.reference_hz)
+
+    p = normalised_offset(v_offset, v_max)
+    m = offset_law.factor(p)
+    response, max_boost_db, law = None, 0.0, scanner.frequency
+    if scanner.resonance is not None:
+        max_boost_db = scanner.resonance.max_boost_db
+        key = f"{axis}.resonance.response" if scanner.resonance.response is not None else f"{axis}.resonance"
+        with problems.at(scanner_file, key):
+            response = dynamics_of(scanner.resonance, setup.scanner_folder)
+    hysteresis = models.get(models.UNCOMPENSATED)() if scanner.hysteresis is None else scanner.hysteresis
+    shape = hysteresis.line(
+        WantedLine(
+            axis=axis,
+            turn=scan.turn,
+            v=v,
+            v_max=v_max,
+            v_amplitude=m * g * v * v_max,
+            v_offset=v_offset,
+            size_nm=size_nm,
+            rate_hz=rate_hz,
+            harmonics=harmonics,
+            window=(low, high),
+            both=scan.band_limit.directions == "both",
+            response=response,
+            max_boost_db=max_boost_db,
+            factor_at=lambda share: offset_law.factor(normalised_offset(share * v_max, v_max)),
+            rate_gain=None if law is None else lambda hz: frequency_gain(hz, law.alpha, law.reference_hz),
+            folder=setup.scanner_folder,
+            scan_file=scan_file,
+            scanner_file=scanner_file,
+            problems=problems,
+        )
+    )
+    if len(problems.found) > before or shape is None or size_law is None:
+        return None
+    return Drive(
+        v_max=v_max,
+        v_offset=v_offset,
+        position_nm=offset_law.position_nm(v_offset, v_max, scanner.size.k_nm_per_v),
+        size_nm=size_nm,
+        window_nm=size_nm * (high - low),
+        v_scan=v * v_max,
+        v_scan_normalised=v,
+        p_offset=p,
+        m=m,
+        g=g,
+        hysteresis=hysteresis,
+        turn=scan.turn,
+        offset_law=offset_law,
+        size_law=size_law,
+        shape=shape,
+        response=response,
+        max_boost_db=max_boost_db,
+    )
+
+
+def outside_driver(volts: float, v_max: float) -> str:
+    """Say that a voltage is outside the driver's range, and by how much."""
+    by = max(-volts, volts - v_max)
+    return f"{volts:.6g} V is outside the driver's 0..{v_max:g} V, by {by:.4g} V"
+
+
+def _check_points(setup: Setup, axis: str, problems: Problems) -> None:
+    """No point can have been measured where the driver does not reach."""
+    v_max = setup.scanner.v_max
+    offset: Offset = getattr(setup.scanner, axis).offset
+    for i, point in enumerate(offset.points or []):
+        if not 0.0 <= point.offset_v <= v_max:
+            key = f"{axis}.offset.points[{i}].offset_v"
+            problems.add(setup.scanner_file, key, outside_driver(point.offset_v, v_max))
+
+
+def offset_law_of(offset: Offset, v_max: float) -> OffsetLaw:
+    """The law of a scanner file. Raises ``Unphysical``."""
+    if offset.points is not None:
+        p = [normalised_offset(point.offset_v, v_max) for point in offset.points]
+        return OffsetLaw.fit(p, [point.apparent_nm for point in offset.points])
+    if offset.m_minus is not None and offset.m_plus is not None:
+        return OffsetLaw.from_ends(offset.m_minus, offset.m_plus)
+    return OffsetLaw(offset.alpha or 0.0, offset.beta or 0.0)
+
+
+def dynamics_of(resonance: Resonance, folder: Path) -> Response:
+    """The dynamics of a scanner file in ``folder``. Raises ``Unphysical``."""
+    if resonance.response is None:
+        assert resonance.frequency_hz is not None
+        assert resonance.quality is not None
+        return SecondOrder(resonance.frequency_hz, resonance.quality, resonance.delay_s)
+    return read_response(folder / resonance.response)

@@ -1,0 +1,158 @@
+"""Operators of piezos that the project does not contain: what they predict of lines that were never measured."""
+
+from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+import pytest
+from foreign_plants import SIX, TEN, BoucWen, ForeignPlant, ManyPlays, record, triangle
+
+from tablegen.calibration.hysteresis import Trace
+from tablegen.calibration.operator.errors import compare
+from tablegen.calibration.operator.fit import OperatorFit, fit_operator
+from tablegen.calibration.operator.nonnegative import nonnegative
+from tablegen.calibration.operator.periodic_line import PeriodicLine, periodic_line
+from tablegen.numerics.arrays import Floats
+from tablegen.problems import Unphysical
+
+pytestmark = pytest.mark.common
+
+
+class Response:
+    """The dynamics as `calibrate resonance` would have measured them."""
+
+    resonance_hz = 60e3
+    half_width_hz = 2e3
+
+    def __init__(self, plant: ForeignPlant) -> None:
+        self._plant = plant
+
+    def inverse(self, f_hz: Floats) -> tuple[Floats, Floats]:
+        response = 1.0 / self._plant.dynamics(f_hz)
+        return response.real, response.imag
+
+
+def factor_of(plant: ForeignPlant) -> Callable[[float], float]:
+    """m of (1), from images of 10 V at nine offsets."""
+    centres = np.linspace(0.1, 0.9, 9)
+    sizes = [float(np.ptp(plant.settled(triangle(200, centre, 0.1), 100.0))) for centre in centres]
+    bent = np.polyfit(2.0 * centres - 1.0, 1.0 / np.array(sizes), 2)
+    return lambda centre: float(np.polyval(bent, 2.0 * centre - 1.0))
+
+
+def line(plant: ForeignPlant, centre: float, stroke: float, seed: int, noise: float = 0.001) -> PeriodicLine:
+    return periodic_line(
+        Trace(f"{stroke:g} at {centre:g}", *record(plant, centre, stroke, seed=seed, noise=noise)), 100.0
+    )
+
+
+@cache
+def identified(kind: type, protocol: tuple[tuple[float, float], ...]) -> tuple[ForeignPlant, OperatorFit]:
+    plant = ForeignPlant(kind())
+    lines = [line(plant, centre, stroke, seed) for seed, (centre, stroke) in enumerate(protocol)]
+    return plant, fit_operator(lines, Response(plant), factor_of(plant))
+
+
+def test_weights_are_those_of_scipy() -> None:
+    from scipy.optimize import nnls
+
+    random = np.random.default_rng(5)
+    matrix, right = random.normal(size=(80, 30)), random.normal(size=80)
+    expected, _ = nnls(matrix, right)
+    assert nonnegative(matrix.T @ matrix, matrix.T @ right) == pytest.approx(expected, abs=1e-9)
+
+
+def test_the_family_and_the_creep_are_found() -> None:
+    _, plays = identified(ManyPlays, SIX)
+    assert plays.family == "plays"
+    assert plays.operator.creep.loss_per_decade == pytest.approx(0.026, abs=0.002)
+    _, other = identified(BoucWen, SIX)
+    assert other.family == "none"
+    assert other.candidates["none"] < 0.3 * other.candidates["plays"]
+
+
+@pytest.mark.parametrize(
+    ("kind", "protocol", "centre", "strokes", "scaling", "mismatch", "size"),
+    [
+        (ManyPlays, SIX, 0.5, (0.15, 0.35, 0.55, 0.75, 0.9), 2.5, 0.5, 0.5),
+        (ManyPlays, SIX, 0.85, (0.15, 0.28), 5.0, 1.0, 3.0),
+        (ManyPlays, TEN, 0.85, (0.15, 0.28), 4.0, 0.3, 0.5),
+        (BoucWen, SIX, 0.5, (0.15, 0.35, 0.55, 0.75, 0.9), 3.0, 0.4, 0.5),
+        (BoucWen, TEN, 0.7, (0.15, 0.35, 0.55), 3.0, 0.4, 0.5),
+    ],
+)
+def test_lines_that_were_not_measured(
+    kind: type,
+    protocol: tuple[tuple[float, float], ...],
+    centre: float,
+    strokes: tuple[float, ...],
+    scaling: float,
+    mismatch: float,
+    size: float,
+) -> None:
+    plant, fit = identified(kind, protocol)
+    factor, main = factor_of(plant), fit.operator.centre
+    for stroke in strokes:
+        noiseless = line(plant, centre, stroke, 0, noise=0.0).without(Response(plant), fit.operator.creep)
+        loop = fit.operator.loop(noiseless.low, noiseless.high, factor(centre) / factor(main))
+        found = compare(noiseless, loop)
+        assert found.scaling < scaling, stroke
+        assert found.mismatch < mismatch, stroke
+        assert abs(found.size) < size, stroke
+
+
+def test_what_was_measured_is_met_within_its_noise() -> None:
+    for kind in (ManyPlays, BoucWen):
+        _, fit = identified(kind, SIX)
+        assert max(errors.rms for errors in fit.left) < 0.03
+
+
+def test_what_is_left_out_is_larger_than_what_is_left() -> None:
+    _, fit = identified(ManyPlays, TEN)
+    assert np.median([e.rms for e in fit.left_out]) > np.median([e.rms for e in fit.left])
+    assert len(fit.operator.lines) == len(TEN)
+
+
+def test_too_few_and_too_similar_traces_are_refused() -> None:
+    plant = ForeignPlant(ManyPlays())
+    two = [line(plant, 0.5, stroke, 0) for stroke in (0.3, 0.9)]
+    with pytest.raises(Unphysical, match="2 traces are not enough"):
+        fit_operator(two, None, lambda _: 1.0)
+    alike = [line(plant, 0.5, stroke, 0) for stroke in (0.5, 0.55, 0.6)]
+    with pytest.raises(Unphysical, match=r"strokes of 50 to 60 % of v_max are too much alike"):
+        fit_operator(alike, None, lambda _: 1.0)
+
+
+def test_a_noisy_trace_is_refused_by_its_name() -> None:
+    plant = ForeignPlant(ManyPlays())
+    lines = [line(plant, 0.5, stroke, 0, noise) for stroke, noise in ((0.2, 0.001), (0.5, 0.2), (0.9, 0.001))]
+    with pytest.raises(Unphysical, match=r"0\.5 at 0\.5: [\d.]+ % of the line differ from period to period"):
+        fit_operator(lines, None, lambda _: 1.0)
+
+
+def test_a_drive_with_inner_loops_is_refused() -> None:
+    t = np.arange(5000) / 1000.0
+    drive = 50.0 + 20.0 * np.sin(2 * np.pi * t) + 12.0 * np.sin(6 * np.pi * t)
+    with pytest.raises(Unphysical, match="the drive goes back by"):
+        periodic_line(Trace("", t, drive, 10.0 * drive), 100.0)
+
+
+def test_a_record_without_a_period_is_refused() -> None:
+    t = np.linspace(0.0, 1.0, 500)
+    with pytest.raises(Unphysical, match="no whole period"):
+        periodic_line(Trace("", t, 10.0 + 50.0 * t, 100.0 * t), 100.0)
+
+
+@pytest.mark.parametrize(("periods", "samples", "turn"), [(2, 333, 0.5), (5, 800, 0.8), (7, 190, 0.3)])
+def test_a_line_is_averaged_from_any_record(periods: int, samples: int, turn: float) -> None:
+    plant = ForeignPlant(ManyPlays(count=40))
+    trace = Trace("", *record(plant, 0.5, 0.6, 37.0, turn=turn, periods=periods, samples=samples))
+    found = periodic_line(trace, 100.0)
+    assert found.rate_hz == pytest.approx(37.0, rel=1e-3)
+    assert found.stroke == pytest.approx(0.6, rel=0.01)
+    assert found.centre == pytest.approx(0.5, abs=0.005)
+    exact = plant.settled(triangle(4096, 0.5, 0.6, turn), 37.0)
+    phase = np.arange(len(found.displacement_nm)) / len(found.displacement_nm)
+    expected = np.interp(phase, np.arange(4096) / 4096, exact, period=1.0)
+    difference = found.displacement_nm - expected
+    assert float(np.std(difference)) < 0.004 * float(np.ptp(exact))

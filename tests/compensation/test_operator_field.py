@@ -1,0 +1,58 @@
+"""Fields between measured points, and creep against its definition."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tablegen.compensation.operator.creep import NO_CREEP, LogarithmicCreep
+from tablegen.compensation.operator.field import Lengths, covariance, distinct, shape_field, through
+
+POINTS = np.array([(0.1, 0.5), (0.4, 0.5), (0.9, 0.5), (0.3, 0.7)])
+LENGTHS = Lengths(0.8, 1.0, 1e-8)
+
+
+def test_a_field_goes_through_what_was_measured() -> None:
+    rows = np.random.default_rng(1).normal(size=(4, 3))
+    field = through(POINTS, rows, LENGTHS)
+    for point, row in zip(POINTS.tolist(), rows, strict=True):
+        assert field.at(*point) == pytest.approx(row, abs=1e-4)
+
+
+def test_the_smallest_lines_are_straight() -> None:
+    field = shape_field(POINTS, np.ones((4, 2)), LENGTHS)
+    assert field.at(0.0, 0.5) == pytest.approx([0.0, 0.0], abs=1e-4)
+    assert field.at(0.0, 0.7) == pytest.approx([0.0, 0.0], abs=1e-4)
+
+
+def test_far_from_all_points_a_field_is_nothing() -> None:
+    assert through(POINTS, np.ones((4, 1)), Lengths(0.05, 0.05, 1e-6)).at(5.0, 5.0)[0] == pytest.approx(0.0, abs=1e-12)
+
+
+@given(st.floats(0.2, 3.0), st.floats(0.2, 3.0))
+def test_a_covariance_is_positive(stroke: float, centre: float) -> None:
+    matrix = covariance(POINTS, POINTS, Lengths(stroke, centre, 1e-8))
+    assert matrix == pytest.approx(matrix.T)
+    assert float(np.min(np.linalg.eigvalsh(matrix))) > -1e-12
+
+
+def test_centres_that_are_the_same() -> None:
+    assert distinct([0.5, 0.51, 0.7, 0.499]) == [0.5, 0.7]
+
+
+def test_creep_loses_its_share_a_decade() -> None:
+    creep = LogarithmicCreep(0.03, 1e-5, 1e3, 1.0)
+    f = np.array([0.1, 1.0, 10.0])
+    real, imaginary = creep.response(f)
+    size = np.hypot(real, imaginary)
+    assert size[1] == pytest.approx(1.0)
+    # 3 % of what moves at once, which is 1 / (1 + creep until then) of what moves at 1 Hz.
+    assert (size[0] - size[1]) / (size[1] - size[2]) == pytest.approx(1.0, abs=0.02)
+    assert size[0] - size[1] == pytest.approx(0.03 / (1.0 + 5.0 * 0.03), rel=0.05)
+    assert np.all(imaginary < 0.0)
+
+
+def test_without_creep_nothing_is_late() -> None:
+    real, imaginary = NO_CREEP.response(np.array([1.0, 100.0]))
+    assert real.tolist() == [1.0, 1.0]
+    assert imaginary.tolist() == [0.0, 0.0]

@@ -1,0 +1,59 @@
+"""Plays in closed form against plays that are stepped, and the loops that they make."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tablegen.compensation.operator.loop import POINTS, Loop
+from tablegen.compensation.operator.operator import chebyshev
+from tablegen.compensation.operator.plays import Plays, plays, transformed
+from tablegen.numerics.arrays import Floats
+
+THRESHOLDS = np.array([0.01, 0.07, 0.2, 0.45])
+
+
+def stepped(u: Floats, transform: int, threshold: float) -> Floats:
+    """A play by its definition, sample by sample, over the second of two periods."""
+    state, out = 0.0, np.empty(len(u))
+    for _ in range(3):
+        for k, g in enumerate(transformed(u)[transform]):
+            state = min(max(state, g - threshold), g + threshold)
+            out[k] = state
+    return out
+
+
+@given(st.floats(0.0, 0.6), st.floats(0.05, 0.4))
+def test_settled_plays_are_those_that_are_stepped(low: float, stroke: float) -> None:
+    up = np.linspace(low, low + stroke, 60)
+    u = np.concatenate([up, up[-2:0:-1]])
+    rising, falling = (plays(u, low, low + stroke, going, THRESHOLDS) for going in (True, False))
+    for transform in range(3):
+        g = transformed(np.array([low, low + stroke]))[transform]
+        for i, threshold in enumerate(THRESHOLDS.tolist()):
+            expected = stepped(u, transform, threshold)
+            moving = 2.0 * threshold < g[1] - g[0]
+            found = np.where(np.arange(len(u)) < len(up), rising[transform, i], falling[transform, i])
+            # One that stands still may stand anywhere that its history left it.
+            assert np.ptp(expected) < 1e-12 if not moving else np.allclose(found, expected, atol=1e-12)
+
+
+def test_branches_meet_where_the_drive_turns() -> None:
+    family = Plays(THRESHOLDS, np.array([[3.0, 0.0, 2.0, 1.0], [0.0, 1.0, 0.0, 0.0], [0.5, 0.0, 0.0, 0.0]]), np.ones(2))
+    ends = np.array([0.2, 0.9])
+    rising, falling = (family.branch(ends, 0.2, 0.9, going) for going in (True, False))
+    assert rising == pytest.approx(falling, abs=1e-12)
+
+
+@given(st.floats(0.0, 1.0), st.booleans())
+def test_a_loop_and_its_inverse(position: float, rising: bool) -> None:
+    grid = np.linspace(0.0, 1.0, POINTS)
+    loop = Loop(0.2, 0.9, grid + 0.1 * np.sin(np.pi * grid), grid - 0.08 * np.sin(np.pi * grid), 700.0)
+    drive = loop.drive(np.array([position]), rising)
+    assert loop.position(drive, rising)[0] == pytest.approx(position, abs=1e-12)
+
+
+def test_clenshaw_is_the_sum_of_chebyshev_polynomials() -> None:
+    x = np.linspace(-1.0, 1.0, 41)
+    coefficients = np.random.default_rng(3).normal(size=21)
+    assert chebyshev(coefficients, x) == pytest.approx(np.polynomial.chebyshev.chebval(x, coefficients), abs=1e-12)

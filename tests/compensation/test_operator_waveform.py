@@ -1,0 +1,112 @@
+"""The waveform that an operator follows straight: what it leaves on its own operator, and where it is refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tablegen.compensation.dynamics import SecondOrder
+from tablegen.compensation.hysteresis import BranchShape
+from tablegen.compensation.line import LineShape
+from tablegen.compensation.operator.creep import NO_CREEP, LogarithmicCreep
+from tablegen.compensation.operator.field import Field, Lengths
+from tablegen.compensation.operator.operator import Operator
+from tablegen.compensation.operator.plays import Plays, transformed
+from tablegen.compensation.operator.scan_line import Wanted, find_waveform
+from tablegen.numerics.arrays import Floats
+from tablegen.problems import Unphysical
+from tablegen.waveform.series import FourierSeries
+from tablegen.waveform.window_fit import fit_window
+
+HARMONICS = 24
+WINDOW = (0.1, 0.9)
+_NOTHING = Field(np.zeros((0, 2)), np.zeros((0, 42)), Lengths(1.0, 1.0, 1.0))
+_NO_SIZES = Field(np.zeros((0, 2)), np.zeros((0, 1)), Lengths(1.0, 1.0, 1.0))
+THRESHOLDS = np.geomspace(0.01, 0.4, 30)
+WEIGHTS = np.stack([np.full(30, 12.0), np.full(30, 3.0), np.full(30, 5.0)])
+
+
+def operator(creep: LogarithmicCreep = NO_CREEP) -> Operator:
+    return Operator(Plays(THRESHOLDS, WEIGHTS, np.array([700.0, 60.0])), _NOTHING, _NO_SIZES, creep, 0.5, ())
+
+
+def wanted(size_nm: float = 400.0, turn: float = 0.5, rate_hz: float = 500.0) -> Wanted:
+    return Wanted(size_nm, turn, WINDOW, True, rate_hz, 0.5, 1.0)
+
+
+def straight(turn: float) -> FourierSeries:
+    return fit_window(LineShape(turn, BranchShape(), BranchShape()), HARMONICS, WINDOW, both=True)
+
+
+def same(series: FourierSeries) -> FourierSeries:
+    return series
+
+
+def stepped(u: Floats) -> Floats:
+    """The plays of the operator by their definition, and the line that they lie over, in nm; settled."""
+    transforms = transformed(u)
+    state = np.zeros((3, len(THRESHOLDS)))
+    out = np.empty(len(u))
+    for _ in range(2):
+        for k in range(len(u)):
+            g = np.array([[transform[k]] for transform in transforms])
+            state = np.minimum(np.maximum(state, g - THRESHOLDS), g + THRESHOLDS)
+            out[k] = float(np.sum(WEIGHTS * state)) + 700.0 * u[k] + 60.0 * u[k] ** 2
+    return out
+
+
+@pytest.mark.parametrize("turn", [0.5, 0.7])
+@pytest.mark.parametrize("size_nm", [100.0, 600.0])
+def test_plays_that_are_stepped_follow_it_straight(turn: float, size_nm: float) -> None:
+    found = find_waveform(operator(), wanted(size_nm, turn), straight(turn), same, None)
+    t = np.arange(4096) / 4096
+    position = stepped(0.5 + found.v_amplitude * (found.series.on_grid(4096) - 0.5))
+    x = np.where(t <= turn, t / turn, (1.0 - t) / (1.0 - turn))
+    inside = (x >= WINDOW[0]) & (x <= WINDOW[1])
+    slope, offset = np.polyfit(x[inside], position[inside], 1)
+    assert slope == pytest.approx(size_nm, rel=1e-3)
+    assert float(np.std(position[inside] - slope * x[inside] - offset)) < 3e-4 * size_nm
+    assert max(found.expected.rms) < 0.03
+    assert found.expected.mismatch < 0.1
+    # Not so before: the same drive without hysteresis in mind.
+    before = stepped(0.5 + found.v_amplitude * (straight(turn).on_grid(4096) - 0.5))
+    slope, offset = np.polyfit(x[inside], before[inside], 1)
+    assert float(np.std(before[inside] - slope * x[inside] - offset)) > 20 * 3e-4 * size_nm
+
+
+def test_creep_and_dynamics_are_undone() -> None:
+    late = LogarithmicCreep(0.05, 1e-5, 10.0, 500.0)
+    response = SecondOrder(40e3, 12.0, 4e-6)
+    real, imaginary = response.inverse(np.arange(1.0, HARMONICS + 1.0) * 500.0)
+
+    def dynamics(f_hz: Floats) -> tuple[Floats, Floats]:
+        real, imaginary = response.inverse(f_hz)
+        return real / (real**2 + imaginary**2), -imaginary / (real**2 + imaginary**2)
+
+    def inverse(series: FourierSeries) -> FourierSeries:
+        return series.times(real, imaginary)
+
+    found = find_waveform(operator(late), wanted(), straight(0.5), inverse, dynamics)
+    without = find_waveform(operator(), wanted(), straight(0.5), same, None)
+    assert max(found.expected.rms) < 0.03
+    assert found.expected.mismatch < 0.1
+    assert float(np.max(np.abs(found.series.b - without.series.b))) > 1e-3
+
+
+def test_the_expected_size_is_the_wanted_one() -> None:
+    found = find_waveform(operator(), wanted(), straight(0.5), same, None)
+    assert found.expected.size == pytest.approx(0.0, abs=0.05)
+    again = find_waveform(operator(), wanted(), straight(0.5), same, None)
+    assert again.series.a.tobytes() == found.series.a.tobytes()
+
+
+def test_a_factor_makes_the_drive_larger() -> None:
+    found, more = (
+        find_waveform(operator(), replace(wanted(), factor=factor), straight(0.5), same, None) for factor in (1.0, 1.1)
+    )
+    assert more.v_amplitude / found.v_amplitude == pytest.approx(1.1, abs=0.03)
+
+
+def test_a_scan_beyond_the_driver_is_refused() -> None:
+    with pytest.raises(Unphysical, match=r"take \d+ % of v_max by the operator; at this offset 100 % are left"):
+        find_waveform(operator(), wanted(5000.0), straight(0.5), same, None)

@@ -1,0 +1,210 @@
+"""Faults of one axis: table, rounding, clamp, slew guard; and the same by runs."""
+
+from c_faults import Mutant, changed, removed
+
+MUTANTS: tuple[Mutant, ...] = (
+    *changed(
+        "dac_axis.h",
+        "fill",
+        {
+            "the carry of the position is lost": ("(low < step->low ? 1u : 0u)", "0u"),
+            "the sample is rounded down": ("((dac_wide)1 << (14u - (guard)))", "((dac_wide)0)"),
+            "the sample's ties are rounded down": (
+                "((dac_wide)1 << (14u - (guard)))",
+                "(((dac_wide)1 << (14u - (guard))) - 1)",
+            ),
+            "the rise has no guard bits": (">> (15u - guard);", ">> 15u;"),
+            "the word has no guard bits": ("(dac_wide)here * ((dac_wide)1 << guard)", "(dac_wide)here"),
+        },
+    ),
+    *changed(
+        "dac_axis.h",
+        "wide",
+        {
+            "wide words have narrow guard bits": (
+                "#define DAC_GUARD(bank) ((bank)->guard)",
+                "#define DAC_GUARD(bank) 4",
+            ),
+        },
+    ),
+    *changed(
+        "dac_axis.h",
+        "checks",
+        {
+            "a carry too many": ("low < step->low", "low <= step->low"),
+            "two's complement is not coded": ("((uint32_t)code ^ axis->flip)", "((uint32_t)code)"),
+            "words are not aligned": ("<< axis->shift)", "<< 0)"),
+        },
+    ),
+    *removed(
+        "dac_axis.c",
+        "fill",
+        {
+            "the position does not follow a run": "        dac_axis_skip(axis, bank, played);\n",
+        },
+    ),
+    *changed(
+        "dac_axis.c",
+        "fill",
+        {
+            "a run's window reaches below the limit": (
+                "(uint32_t)(base - bank->code_min) <= (uint32_t)bank->run_room",
+                "base <= bank->code_min + bank->run_room",
+            ),
+            "runs do not heed the limits": ("(uint32_t)(base - bank->code_min) <= (uint32_t)bank->run_room", "true"),
+            "runs do not heed the slew guard": ("if (strayed >> bank->run_bits != 0)", "if (false)"),
+            "a run's window is twice as wide": (
+                "if (strayed >> bank->run_bits != 0)",
+                "if (strayed >> (bank->run_bits + 1) != 0)",
+            ),
+            "only the last code of a run counts": (
+                "strayed |= (uint32_t)(code - base)",
+                "strayed = (uint32_t)(code - base)",
+            ),
+            "a run begins where the last one was refused": (
+                "axis->code = code;\n        done += length;",
+                "done += length;",
+            ),
+            "a run that ends early is a whole one": ("ticks < DAC_RUN ? ticks : DAC_RUN", "DAC_RUN"),
+            "runs move y while it is held": ("step = bank->holds ? 0 : ", "step = "),
+            "y is skipped while it is held": (
+                "    if (bank->holds)\n        return;\n    const uint64_t first",
+                "    const uint64_t first",
+            ),
+            "a skip loses its upper carry": (
+                "bank->step.high * ticks + (uint32_t)(second >> 32)",
+                "bank->step.high * ticks",
+            ),
+        },
+    ),
+    *removed(
+        "dac_axis.c",
+        "step",
+        {
+            "there is no guard upwards": "rise > most ? most :",
+        },
+    ),
+    *changed(
+        "dac_axis.c",
+        "step",
+        {
+            "the guard lets a code too many pass upwards": ("rise > most ? most :", "rise > most ? most + 1 :"),
+            "there is no guard downwards": ("rise < -most ? -most : rise", "rise"),
+            "the guard is one off downwards": ("rise < -most ? -most", "rise < -most ? 1 - most"),
+            "a code is always there": ("return axis->code == target;", "return true;"),
+            "a step reads no next word": ("bank->table[index + 1]", "bank->table[index]"),
+            "nothing is held at code_min": ("code < bank->code_min ? bank->code_min : code >", "code >"),
+            "nothing is held at code_max": (": code > bank->code_max ? bank->code_max : code;", ": code;"),
+            "the upper limit is one off": (
+                "code > bank->code_max ? bank->code_max",
+                "code >= bank->code_max ? bank->code_max - 1",
+            ),
+            "the lower limit is one off": (
+                "code < bank->code_min ? bank->code_min :",
+                "code <= bank->code_min ? bank->code_min + 1 :",
+            ),
+            "what is held is no fault": ("        *outside = true;", "        *outside = *outside;"),
+            "what is not held is a fault": ("if (clamped != code)", "if (clamped == code)"),
+            "y moves on while it is held": ("    if (!bank->holds)\n        dac_advance", "    dac_advance"),
+            "the position does not move": (
+                "    if (!bank->holds)\n        dac_advance",
+                "    if (false)\n        dac_advance",
+            ),
+        },
+    ),
+    *removed(
+        "dac_axis.c",
+        "short",
+        {
+            "short: the slew guard is not heeded": "strayed >> gain_q >> bank->run_bits != 0 || ",
+            "short: the first of two words is lost": "            low += (uint32_t)here << 15;\n",
+            "short: codes follow no run": "        axis->code = (int32_t)last;\n",
+        },
+    ),
+    *changed(
+        "dac_axis.c",
+        "short",
+        {
+            "short: the sample is rounded down": (
+                "(UINT32_C(1) << (ABOVE - 1)) - (origin << ABOVE)",
+                "0u - (origin << ABOVE)",
+            ),
+            "short: only the last code counts": ("    strayed |= last; ", "    strayed = last; "),
+            "short: a window is twice as wide": (
+                "strayed >> gain_q >> bank->run_bits != 0",
+                "strayed >> gain_q >> bank->run_bits > 1",
+            ),
+            "short: two words for all ticks": ("(at + (DAC_RUN - 1) * step) >> 47 == at >> 47", "true"),
+            "short: two words for too many ticks": ("(DAC_RUN - 1) * step", "DAC_RUN / 2 * step"),
+            "short: the offset is lost": ("+ (uint32_t)bank->offset - ", "- "),
+        },
+    ),
+    *removed(
+        "dac_axis.c",
+        "checks",
+        {
+            "a converter of 7 bits": "c->bits >= 8 && ",
+            "a converter of 25 bits": "c->bits <= 24 && ",
+            "a converter whose word is too short": "c->bits <= c->word_bits && ",
+            "a code below zero at power-up": "c->power_up_code >= 0 && ",
+            "a code too high at power-up": " && c->power_up_code < INT32_C(1) << c->bits",
+        },
+    ),
+    *changed(
+        "dac_axis.c",
+        "checks",
+        {
+            "a converter too wide for its storage": (
+                "c->word_bits <= DAC_OUTPUT_STORAGE_BITS\n        && ",
+                "true\n        && ",
+            ),
+            "a run's window reaches above the limit": (
+                "<= (uint32_t)bank->run_room;",
+                "<= (uint32_t)bank->run_room + 1;",
+            ),
+            "runs step by steps rounded down": (
+                "(uint64_t)bank->step.high << 32 | bank->step.low >> 32) + 1",
+                "(uint64_t)bank->step.high << 32 | bank->step.low >> 32)",
+            ),
+            "runs are as long as one likes": (
+                "ticks - done < bank->run_most ? ticks - done : bank->run_most",
+                "ticks - done",
+            ),
+            "a second run overwrites the first": ("out + done * DAC_STRIDE, most)", "out, most)"),
+            "a skip loses its middle carry": ("+ (first >> 32);", ";"),
+            "a skip loses its lowest bits": ("second << 32 | (first & 0xffffffffu)", "second << 32"),
+        },
+    ),
+    *removed(
+        "dac_axis.c",
+        "checks short",
+        {
+            "short: a wide rise is not seen": " || risen > 2 * spread - 1",
+        },
+    ),
+    *changed(
+        "dac_axis.c",
+        "checks short",
+        {
+            "short: only the last rise counts": ("    risen |= rise; ", "    risen = rise; "),
+            "short: a run may begin anywhere": (
+                ("if ((uint32_t)(code_of(bank, begin) - axis->code + bank->run_half) >> bank->run_bits != 0)"),
+                "if (false)",
+            ),
+        },
+    ),
+)
+
+# Changes after which everything is as before, and why.
+EQUIVALENT: dict[Mutant, str] = {
+    Mutant(
+        "a run's window is centred above the code", "dac_axis.c", "base = code - bank->run_half", "base = code"
+    ): "The window is as wide, has the last code in it, and is held inside the limits; it is left sooner.",
+    Mutant(
+        "runs begin at positions rounded down",
+        "dac_axis.c",
+        "(uint64_t)axis->at.high << 32 | axis->at.low >> 32) + 1",
+        "(uint64_t)axis->at.high << 32 | axis->at.low >> 32)",
+    ): "Where a position is a whole fraction the parts cut off from start and steps add up to a whole unit, "
+    "which the steps, rounded up, make good; where it is none it is further from one than any unit.",
+}

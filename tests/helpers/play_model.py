@@ -1,0 +1,72 @@
+"""A model of somebody else, in one file: a piezo that is one play. Its waveform is found by learning on the play."""
+
+import json
+from dataclasses import dataclass
+from typing import Annotated, ClassVar
+
+import numpy as np
+from msgspec import Meta
+
+from tablegen.compensation.line import WantedLine, WholeLine
+from tablegen.compensation.model import Hysteresis
+from tablegen.problems import Unphysical
+from tablegen.quantities import FileName
+from tablegen.reading import RESPONSE, read_text
+from tablegen.waveform.series import FourierSeries
+from tablegen.waveform.window_fit import fit_window
+
+ROUNDS = 4
+
+
+@dataclass(frozen=True)
+class Learning:
+    """What the next drive is fitted to: the last one, and what its displacement lacks; w, t and ``play`` as there."""
+
+    turn: float
+    play: float
+    series: FourierSeries
+
+    def value(self, t):
+        line = np.where(t <= self.turn, t / self.turn, (1.0 - t) / (1.0 - self.turn))
+        return self.series.value(t) + line - displacement(self.series, self.play, t <= self.turn, self.series.value(t))
+
+    def slope(self, t):
+        return np.where(t <= self.turn, 1.0 / self.turn, -1.0 / (1.0 - self.turn))
+
+
+def displacement(series, play, rising, w):
+    """One rise and one fall a period: the play follows a fixed distance behind, once it has been crossed."""
+    grid = series.on_grid(32 * series.harmonics)
+    return np.where(rising, np.maximum(w - play, np.min(grid) + play), np.minimum(w + play, np.max(grid) - play))
+
+
+@dataclass(frozen=True, slots=True)
+class PlayLine(WholeLine):
+    play: float = 0.0
+
+    def followed(self, side, position, drive, value, slope):
+        place = displacement(drive, self.play, side == "forward", value)
+        return place - position, slope * (self.turn if side == "forward" else self.turn - 1.0)
+
+
+class Play(Hysteresis, frozen=True, tag="play"):
+    """One play of the half-width that a file names."""
+
+    purpose: ClassVar[str] = "one play"
+    operator: Annotated[FileName, Meta(description="JSON file with the half-width of the play, as share of the line")]
+
+    def files(self):
+        return (self.operator,)
+
+    def line(self, wanted: WantedLine):
+        with wanted.at("operator"):
+            try:
+                play = float(json.loads(read_text(wanted.folder / self.operator, RESPONSE))["play"])
+            except (OSError, ValueError, KeyError) as error:
+                raise Unphysical(f"{self.operator} cannot be read: {error!r}") from None
+            straight = FourierSeries(0.5, np.zeros(1), np.zeros(1))
+            series = fit_window(Learning(wanted.turn, 0.0, straight), wanted.harmonics, wanted.window, wanted.both)
+            for _ in range(ROUNDS):
+                learning = Learning(wanted.turn, play, series)
+                series = fit_window(learning, wanted.harmonics, wanted.window, wanted.both)
+            return PlayLine.of(series, wanted.turn, play=play)
