@@ -21,7 +21,7 @@ _STRAIGHT = Modes(1.0)
 _DRIVE_LEVELS = 2.0**36  # levels of the drive
 
 
-class Operator(Protocol):
+class HysteresisOperator(Protocol):
     """Hysteresis: a drive of 0..1 to nm above rest at drive 0, whatever the family."""
 
     def play(self, drive: Floats, memory: Any = None) -> tuple[Floats, Any]:
@@ -40,7 +40,7 @@ class VirtualAxis:
 
     v_max: float
     amplifier: Modes
-    hysteresis: Operator
+    hysteresis: HysteresisOperator
     sensitivity: tuple[float, ...]
     creep: Modes
     resonance: Modes
