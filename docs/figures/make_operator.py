@@ -1,9 +1,8 @@
 """Draw the picture of docs/operator.md and write its table of scans: a simulation. Usage: make figures"""
 
 import os
-import re
-import sys
 from collections.abc import Sequence
+from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -11,8 +10,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
-from foreign_scan import Line, calibrated, scanned
-
+from calibrated_plant import Line, calibrated, scanned
 from foreign_plants import SIX, TEN, BoucWen, ForeignPlant, ManyPlays
 
 FOLDER = Path(__file__).parent
@@ -30,6 +28,14 @@ LINES = (  # name, protocol, scanner file, model
     ("operator, six traces", SIX, "operator.toml", ""),
     ("operator, ten traces", TEN, "operator.toml", ""),
 )
+HEAD = (
+    "| piezo | offset | line | rms [% of the line] | scaling error [% p-p] | trace-retrace [%] | size [%] |",
+    "|---|---|---|---|---|---|---|",
+)
+WORSE = (
+    "| piezo | scan | laws: rms, scaling, trace-retrace [%] | operator, six traces | operator, ten traces |",
+    "|---|---|---|---|---|",
+)
 DRAWN = (("many plays", 50.0, 500.0), ("Bouc-Wen", 70.0, 300.0))
 
 
@@ -42,9 +48,18 @@ def row(plant: str, offsets: str, name: str, lines: Sequence[Line]) -> str:
     return f"| {plant} | {offsets} | {name} | {' | '.join(cells)} |"
 
 
-def table(folder: Path) -> tuple[list[str], dict[tuple[str, str], Line]]:
-    """The rows, and the lines of the picture by plant and name."""
-    rows, drawn = [], {}
+def worse(plant: str, offset_v: float, size_nm: float, rate_hz: float, lines: dict[str, Line]) -> list[str]:
+    """A row for a scan of which the operator leaves a larger residual or mismatch than the laws."""
+    laws, six, ten = (lines[name] for name, *_ in LINES[1:])
+    if six.rms <= laws.rms and six.mismatch <= laws.mismatch:
+        return []
+    cells = [f"{line.rms:.2f}, {line.scaling:.1f}, {line.mismatch:.2f}" for line in (laws, six, ten)]
+    return [f"| {plant} | {size_nm:g} nm at {offset_v:g} V, {rate_hz:g} Hz | {' | '.join(cells)} |"]
+
+
+def table(folder: Path) -> tuple[list[str], list[str], dict[tuple[str, str], Line]]:
+    """The rows of both tables, and the lines of the picture by plant and name."""
+    rows, worst, drawn = [], [], {}
     for plant_name, kind in PLANTS.items():
         plant = ForeignPlant(kind())
         folders = {}
@@ -53,16 +68,19 @@ def table(folder: Path) -> tuple[list[str], dict[tuple[str, str], Line]]:
             folders[protocol].mkdir()
             calibrated(plant, folders[protocol], protocol)
         for offsets, scans in SCANS.items():
-            for name, protocol, scanner, model in LINES:
-                lines = []
-                for offset_v, size_nm in scans:
-                    for rate_hz in RATES_HZ:
-                        line = scanned(plant, folders[protocol], scanner, size_nm, offset_v, rate_hz, model)
-                        lines.append(line)
-                        if (plant_name, offset_v, size_nm) in DRAWN and rate_hz == RATES_HZ[0]:
-                            drawn[plant_name, name] = line
-                rows.append(row(plant_name, offsets, name, lines))
-    return rows, drawn
+            found: dict[str, list[Line]] = {name: [] for name, *_ in LINES}
+            for (offset_v, size_nm), rate_hz in product(scans, RATES_HZ):
+                scan = {
+                    name: scanned(plant, folders[protocol], scanner, size_nm, offset_v, rate_hz, model)
+                    for name, protocol, scanner, model in LINES
+                }
+                worst += worse(plant_name, offset_v, size_nm, rate_hz, scan)
+                for name, line in scan.items():
+                    found[name].append(line)
+                    if (plant_name, offset_v, size_nm) in DRAWN and rate_hz == RATES_HZ[0]:
+                        drawn[plant_name, name] = line
+            rows += [row(plant_name, offsets, name, lines) for name, lines in found.items()]
+    return rows, worst, drawn
 
 
 def draw(drawn: dict[tuple[str, str], Line]) -> None:
@@ -78,13 +96,12 @@ def draw(drawn: dict[tuple[str, str], Line]) -> None:
                 x, error = drawn[plant, name].side(forward)
                 label = f"{name}, {'forward' if forward else 'backward'}"
                 axes.plot(x, error, "-" if forward else "--", color=colour, lw=1.6, label=label)
-        for axes in (before, after):
+        for axes, most in ((before, 7.0), (after, 1.0)):
             axes.axhline(0.0, color="#bbbbbb", lw=0.6)
             axes.set(xlim=(0.1, 0.9), ylabel="residual [% of the line]", xlabel="position in the line")
             axes.legend(frameon=False, fontsize=8, ncols=2, loc="upper center")
+            axes.set_ylim(-most, 1.4 * most)
         for axes, what in ((before, "a triangle"), (after, "compensated")):
-            low, high = axes.get_ylim()
-            axes.set_ylim(low, high + 0.25 * (high - low))
             axes.set_title(f"{plant}: {size_nm:g} nm at {offset_v:g} V, {what}")
     figure.savefig(FOLDER / "operator.png", dpi=100, metadata={"Software": None})
 
@@ -92,20 +109,18 @@ def draw(drawn: dict[tuple[str, str], Line]) -> None:
 def main() -> None:
     """Write both."""
     with TemporaryDirectory() as folder:
-        rows, drawn = table(Path(folder))
+        rows, worst, drawn = table(Path(folder))
     draw(drawn)
-    head = [
-        "| piezo | offset | line | rms [% of the line] | scaling error [% p-p] | trace-retrace [% of the line] | size [%] |",
-        "|---|---|---|---|---|---|---|",
-    ]
-    made = "\n".join([*head, *rows])
-    print(made)
+    parts = {
+        "measured": "\n".join([*HEAD, *rows]),
+        "worse": "\n".join([*WORSE, *worst]) if worst else "There is none.",
+    }
     text = PAGE.read_text(encoding="utf-8")
-    if "--write" in sys.argv:
-        PAGE.write_text(
-            re.sub(r"<!-- measured -->\n.*?\n<!-- /measured -->", f"<!-- measured -->\n{made}\n<!-- /measured -->", text, flags=re.S),
-            encoding="utf-8",
-        )
+    for name, part in parts.items():
+        begin, end = f"<!-- {name} -->\n", f"<!-- /{name} -->"
+        before, _, rest = text.partition(begin)
+        text = before + begin + part + "\n" + end + rest.partition(end)[2]
+    PAGE.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

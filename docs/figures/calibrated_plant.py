@@ -1,4 +1,4 @@
-"""A piezo that the project does not contain, calibrated by the commands of docs/operator.md and scanned: a simulation."""
+"""A simulated piezo that the project does not contain: calibrated by the commands of tablegen, and scanned."""
 
 import sys
 from dataclasses import dataclass
@@ -65,7 +65,7 @@ LAG_S = 2e-6 + 1.0 / (2.0 * np.pi * 60e3 * 14.0)  # of the resonance, that `cali
 
 @dataclass(frozen=True)
 class Line:
-    """One scanned line over time: place on the line, where it goes forward, the error of place and of size in percent."""
+    """One scanned line over time: place on the line, where it goes forward, errors of place and size in percent."""
 
     x: Floats
     forward: Bools
