@@ -1,8 +1,8 @@
 """What laws and operators leave on piezos that the project does not contain, as a table for docs/operator.md.
 
 ``python benchmarks/reach.py`` prints it, ``--write`` puts it into the page. Traces, sizes and responses of simulated
-plants go through ``tablegen calibrate``; each scan is planned, its emitted 16-bit integers are held, played on the plant
-and judged there. A simulation.
+plants go through ``tablegen calibrate``; each scan is planned, its emitted 16-bit integers are held, and the plant that
+they play is judged. A simulation.
 """
 
 import argparse
@@ -19,8 +19,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 from click.testing import CliRunner
 
-ROOT = Path(__file__).parent.parent
-sys.path.insert(0, str(ROOT / "tests" / "helpers"))
+sys.path.insert(0, str(Path(__file__).parent.parent / "tests" / "helpers"))
 
 from foreign_plants import SIX, TEN, V_MAX, BoucWen, Floats, ForeignPlant, ManyPlays, record, triangle
 
@@ -32,6 +31,7 @@ from tablegen.problems import Rejected
 from tablegen.virtual.closed_loop import with_scan
 from tablegen.virtual.played import played
 
+ROOT = Path(__file__).parent.parent
 PAGE = ROOT / "docs" / "operator.md"
 MARK = "reach"
 NOISE = 0.001
@@ -69,7 +69,7 @@ class Judged:
 
 
 def calibrated(plant: ForeignPlant, folder: Path, protocol: Sequence[tuple[float, float]] | None) -> Setup:
-    """The example's scan with the plant's scanner file: of the laws, or of an operator from the traces of a protocol."""
+    """The example's scan with the plant's scanner file: of laws, or of an operator from a protocol's traces."""
     folder.mkdir(exist_ok=True)
     random = np.random.default_rng(99)
     scanner = folder / "scanner.toml"
