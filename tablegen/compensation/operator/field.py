@@ -15,6 +15,7 @@ from tablegen.numerics.arrays import Floats
 from tablegen.numerics.elementary import exp
 from tablegen.numerics.linear import Cholesky
 
+_STRAIGHT = 0.9  # share of the covariance that vanishes at a stroke of 0; creep bends even the smallest lines
 SAME_CENTRE = 0.02  # of v_max: lines whose centres differ by less have one centre
 
 
@@ -33,14 +34,14 @@ class Lengths:
 def covariance(points: Floats, others: Floats, lengths: Lengths, straight: bool = False) -> Floats:
     """Of shape (n, m) for points (stroke, centre) of shapes (n, 2) and (m, 2).
 
-    Without ``straight`` it is 1 where they coincide; with it there is nothing to know at a stroke of 0.
+    Without ``straight`` it is 1 where they coincide; with it a stroke of 0 is nearly known, to be 0.
     """
     out = np.empty((len(points), len(others)))
     for i, (stroke, centre) in enumerate(points.tolist()):
         for j, (other_stroke, other_centre) in enumerate(others.tolist()):
             along = _matern((stroke - other_stroke) / lengths.stroke)
             if straight:
-                along -= _matern(stroke / lengths.stroke) * _matern(other_stroke / lengths.stroke)
+                along -= _STRAIGHT * _matern(stroke / lengths.stroke) * _matern(other_stroke / lengths.stroke)
             out[i, j] = along * _matern((centre - other_centre) / lengths.centre)
     return out
 
@@ -54,7 +55,7 @@ def _matern(distance: float) -> float:
 class Field:
     """Rows of numbers known at ``points``, shape (n, 2) of (stroke, centre); ``weights`` has shape (n, columns).
 
-    A ``straight`` one is 0 at a stroke of 0.
+    A ``straight`` one goes towards 0 with the stroke, but for what all strokes have in common.
     """
 
     points: Floats
