@@ -51,7 +51,8 @@ def test_the_limits_are_those_of_the_code() -> None:
     assert f"more than {STROKE_REACH:g} v_max above the largest trace" in WORDS
     assert f"{CENTRE_REACH:g} v_max away from every trace" in WORDS
     assert f"at most {CONFIGURATION.most_bytes >> 20} MiB" in WORDS
-    assert f"{family.THRESHOLDS} thresholds from {family._LOWEST} to {family._HIGHEST}" in WORDS
+    assert f"{family.THRESHOLDS} thresholds up to {family._HIGHEST}" in WORDS
+    assert f"linear between {family.NODES} nodes" in WORDS
     assert f"Chebyshev series of degree {branches.DEGREE}" in WORDS
     assert f"These {2 * branches.DEGREE + 2} numbers" in WORDS
     assert f"s0 is {operators.SMALL_STROKE}" in WORDS
