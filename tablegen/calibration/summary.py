@@ -177,6 +177,7 @@ def _amplitude_record(trace: AmplitudeFit) -> dict[str, Any]:
     match trace:
         case TraceFit():
             data |= {
+                "v_offset": trace.v_offset,
                 "rate_hz": 1.0 / trace.triangle.period_s,
                 "periods": trace.periods,
                 "delay_s": _plain(trace.delay_s),
