@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from building import EXAMPLE
 from editing import SCAN, SCANNER, edited, write_pair
+from foreign_plants import ForeignPlant, ManyPlays, triangle
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tablegen.calibration.size import fit_size
 from tablegen.compensation.offset import OffsetLaw
-from tablegen.compensation.offset_sizes import OffsetSurface, law_of_sizes
+from tablegen.compensation.offset_sizes import OffsetSurface, law_of_sizes, surface_of
 from tablegen.compensation.size import SizeLaw
 from tablegen.config.load import load
 from tablegen.planning.drive import Drive
@@ -116,3 +118,32 @@ def test_points_with_a_size_are_images_of_that_scan(tmp_path: Path) -> None:
 def test_sizes_that_cannot_be_are_refused(edit: str, said: str, tmp_path: Path) -> None:
     with pytest.raises(Rejected, match=said):
         drive_of(tmp_path, *WITHOUT, edit)
+
+
+def test_on_a_foreign_plant_sizes_are_right_where_one_m_is_not_enough() -> None:
+    """Plays that nobody made for (1): at 70 and 85 % within 0.5 % of the size; by m of 13 V alone, up to 1.5 % off."""
+    plant = ForeignPlant(ManyPlays())
+
+    def size_nm(centre: float, v: float) -> float:
+        return float(np.ptp(plant.settled(triangle(200, centre, v), 100.0)))
+
+    volts = np.array([0.06, 0.13, 0.25, 0.4, 0.55])
+    drives = np.linspace(0.1, 1.0, 10)
+    middle = np.array([size_nm(0.5, v) for v in drives.tolist()])
+    fit = fit_size(100.0 * drives, middle, 100.0, 200.0)
+    size = SizeLaw.calibrated(fit.k_nm_per_v.value, 100.0, fit.beta.value, 200.0, fit.v_threshold.value)
+    images = [
+        (50.0 * (1.0 + p), 1.0 / size_nm(0.5 * (1.0 + p), v), 100.0 * v)
+        for v in volts.tolist()
+        for p in (min(0.86, 0.97 * (1.0 - v)) * np.array([-1.0, -0.5, 0.0, 0.5, 1.0])).tolist()
+    ]
+    surface = surface_of(images, size, 100.0)
+    one = surface_of([image for image in images if image[2] == 13.0], size, 100.0)
+    worst = []
+    for law in (one, surface):
+        errors = [
+            100.0 * (size_nm(centre, law.at(v).factor(2.0 * centre - 1.0) * v) / size_nm(0.5, v) - 1.0)
+            for centre, v in ((0.7, 0.15), (0.7, 0.3), (0.7, 0.5), (0.85, 0.15), (0.85, 0.3))
+        ]
+        worst.append(max(map(abs, errors)))
+    assert worst[1] < 0.5 < 1.0 < worst[0]
