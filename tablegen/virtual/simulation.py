@@ -1,7 +1,7 @@
 """A scan on the virtual scanner: emitted integers in, displacement and its errors out, model by model."""
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, Protocol
 
 import msgspec
 
@@ -13,7 +13,7 @@ from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, make_plan
 from tablegen.virtual.line_error import LineError, about_window_line, line_error
 from tablegen.virtual.played import PlayedDrive, intended, played
-from tablegen.virtual.scanner import VirtualAxis, VirtualScanner
+from tablegen.virtual.scanner import VirtualScanner
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,14 @@ class Run:
     y: AxisRun
 
 
-def run_line(line: LinePlan, axis: VirtualAxis) -> AxisRun:
+class SettledAxis(Protocol):
+    """An axis on which a period is played."""
+
+    def settled(self, volts: Floats, tick_s: float) -> Floats:
+        """Displacement in nm in the middle of each tick of a period of volts, (ticks,), that are held tick by tick."""
+
+
+def run_line(line: LinePlan, axis: SettledAxis) -> AxisRun:
     """Play one axis until it has settled."""
     drive = played(line)
     displacement = axis.settled(drive.volts, drive.tick_s)

@@ -1,0 +1,87 @@
+"""What a simulation on the scanner file's own operator says, as text and as plain data."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from tablegen.virtual.own_run import MEASURES, SEEDS, OwnRow, OwnRun
+
+LABEL = "simulation on the scanner file's own operator"
+
+
+def text(name: str, runs: Sequence[OwnRun], without: Sequence[str]) -> list[str]:
+    """A table for the terminal; ``without`` are the axes that have no operator."""
+    asked = " and ".join(f"{run.nominal_nm:g} nm in {run.axis}" for run in runs)
+    lines = [
+        f"{name}: {LABEL}; {asked} asked for",
+        f"mean (worst) of {SEEDS} scanners that depart from the operator at random, by its own uncertainty:",
+    ]
+    for run in runs:
+        e = run.uncertainty
+        lines.append(
+            f"  {run.axis}: rms {e.rms[0]:.3g} % and size {e.size:.3g} %, as the operator is wrong on a trace left out "
+            f"of its {run.traces}"
+        )
+    lines += [
+        "",
+        "axis  correction        rms               scaling error     mismatch          size",
+        "                        [% of the line]   [%, peak to peak] [% of the line]   [%]",
+    ]
+    for run in runs:
+        lines += [_row(run.axis, row) for row in run.rows]
+    lines += [f"{axis:<4}  has no operator; --scanner-truth default plays it on a built-in scanner" for axis in without]
+    lines += [
+        "",
+        "A simulation, not a measurement: it knows of the scanner what the traces show, and no drift, coupling or aging.",
+    ]
+    return lines
+
+
+def _row(axis: str, row: OwnRow) -> str:
+    start = f"{axis:<4}  {_called(row):<18}"
+    if not row.errors:
+        return f"{start}none: {row.rejected}"
+    found = row.summary()
+    cells = []
+    for name in MEASURES:
+        if name not in found:
+            cells.append("-")
+            continue
+        mean, worst = found[name]
+        sign = "+" if name == "size" else ""
+        cells.append(f"{mean:{sign}.3f} ({worst:{sign}.3f})")
+    return (start + "".join(f"{cell:<18}" for cell in cells)).rstrip()
+
+
+def _called(row: OwnRow) -> str:
+    return f"{row.correction}, {row.model}" if row.correction == "laws" and row.model else row.correction
+
+
+def data(name: str, runs: Sequence[OwnRun], without: Sequence[str]) -> dict[str, Any]:
+    """The same for JSON: by axis and correction; ``null`` where a correction cannot be played, and why."""
+
+    def row(one: OwnRow) -> dict[str, Any]:
+        return {
+            "model": one.model or None,
+            "rejected": one.rejected or None,
+            "errors_percent": {name: {"mean": mean, "worst": worst} for name, (mean, worst) in one.summary().items()}
+            if one.errors
+            else None,
+        }
+
+    return {
+        "simulation": True,
+        "label": LABEL,
+        "scan": name,
+        "virtual_scanner": "own",
+        "scanners": SEEDS,
+        "axes": {
+            run.axis: {
+                "nominal_nm": run.nominal_nm,
+                "traces": run.traces,
+                "uncertainty_percent": {"rms": run.uncertainty.rms[0], "size": run.uncertainty.size},
+                "corrections": {one.correction: row(one) for one in run.rows},
+            }
+            for run in runs
+        },
+        "without_operator": list(without),
+    }
