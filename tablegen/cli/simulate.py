@@ -26,10 +26,10 @@ OWN, BUILT_IN = "own", "default"
     "--scanner-truth",
     "truth_file",
     metavar="own|default|FILE",
-    help="The scanner to play on. own: the operator of the scanner file, wrong by its own uncertainty, several times at "
-    "random. default: built in, identified from the paper's figures, and scaled to the drive range and the nm per V of "
-    "the scanner file. FILE: parameters as in docs/virtual.md.  [default: own if the scanner file has an operator, else "
-    "default]",
+    help="Scanner to play on. own: the operator of the scanner file, wrong by its own uncertainty, several times at "
+    "random. default: built in, identified from the paper's figures, scaled to the drive range and the nm per V of the "
+    "scanner file. FILE: parameters as in docs/virtual.md.  [default: own if the scanner file has an operator, "
+    "else default]",
 )
 @click.option(
     "--csv",

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
+from tablegen.compensation.operator.field import SAME_CENTRE
 from tablegen.virtual.own_run import MEASURES, SEEDS, OwnRow, OwnRun
 
 LABEL = "simulation on the scanner file's own operator"
@@ -21,6 +22,11 @@ def text(name: str, runs: Sequence[OwnRun], without: Sequence[str]) -> list[str]
             f"  {run.axis}: rms {e.rms[0]:.3g} % and size {e.size:.3g} %, as the operator is wrong on a trace left out "
             f"of its {run.traces}"
         )
+        if run.distance > SAME_CENTRE:
+            lines.append(
+                f"  {run.axis}: the nearest trace is {100.0 * run.distance:.3g} % of v_max from this offset; what the "
+                "operator is wrong by here is not known, and more than that"
+            )
     lines += [
         "",
         "axis  correction        rms               scaling error     mismatch          size",
@@ -29,9 +35,14 @@ def text(name: str, runs: Sequence[OwnRun], without: Sequence[str]) -> list[str]
     for run in runs:
         lines += [_row(run.axis, row) for row in run.rows]
     lines += [f"{axis:<4}  has no operator; --scanner-truth default plays it on a built-in scanner" for axis in without]
+    lines.append("")
     lines += [
-        "",
-        "A simulation, not a measurement: it knows of the scanner what the traces show, and no drift, coupling or aging.",
+        f"{run.axis} is without the refinement of the scan file, which was learnt on the piezo itself"
+        for run in runs
+        if run.refined
+    ]
+    lines += [
+        "A simulation, not a measurement: it knows of the scanner what the traces show; not drift, coupling, aging.",
     ]
     return lines
 
@@ -78,6 +89,8 @@ def data(name: str, runs: Sequence[OwnRun], without: Sequence[str]) -> dict[str,
             run.axis: {
                 "nominal_nm": run.nominal_nm,
                 "traces": run.traces,
+                "refinement_left_out": run.refined,
+                "offset_distance_percent": 100.0 * run.distance,
                 "uncertainty_percent": {"rms": run.uncertainty.rms[0], "size": run.uncertainty.size},
                 "corrections": {one.correction: row(one) for one in run.rows},
             }

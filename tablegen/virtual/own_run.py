@@ -10,18 +10,16 @@ import numpy as np
 from tablegen.compensation import models
 from tablegen.compensation.model import Hysteresis
 from tablegen.compensation.models.operator import OperatorModel
-from tablegen.compensation.operator.file import read_operator
-from tablegen.compensation.operator.operator import Operator
 from tablegen.compensation.operator.scan_line import Expected
 from tablegen.config.load import Setup
 from tablegen.config.scanner import ScannerAxis
-from tablegen.figures import shown_path
 from tablegen.planning.line_plan import LinePlan, make_plan
 from tablegen.problems import Rejected, Unphysical
-from tablegen.virtual.own_scanner import OwnAxis, departing, uncertainty_of
-from tablegen.virtual.simulation import AxisRun, run_line, with_model
+from tablegen.virtual.own_scanner import OwnAxis, departing, operator_line
+from tablegen.virtual.simulation import AxisRun, run_on_each, with_model
 
 SEEDS = 20
+_MOST_TICKS = 1 << 13  # of a period that are looked at
 MEASURES = ("rms", "scaling", "mismatch", "size")
 
 
@@ -49,11 +47,17 @@ class OwnRow:
 
 @dataclass(frozen=True, slots=True)
 class OwnRun:
-    """One axis: what was asked for, what the operator is uncertain by, and the corrections."""
+    """One axis: what was asked for, what the operator is uncertain by, and the corrections.
+
+    ``distance`` is that of the offset to the nearest one of a trace, of v_max. ``refined``: the scan file has a
+    refinement, which was learnt on the piezo itself and is left out.
+    """
 
     axis: str
     nominal_nm: float
     traces: int
+    distance: float
+    refined: bool
     uncertainty: Expected
     rows: tuple[OwnRow, ...]
 
@@ -78,16 +82,16 @@ def simulate_own(setup: Setup, seed: int, tell: Callable[[str], None] = lambda _
     )
     tell("finding the waveform on the operator")
     plan = make_plan(plain)
-    return [_axis(plain, name, getattr(plan, name), seed, tell) for name in own_axes(setup)]
+    runs = [_axis(plain, name, getattr(plan, name), seed, tell) for name in own_axes(setup)]
+    return [replace(run, refined=getattr(scan, run.axis).refinement is not None) for run in runs]
 
 
 def _axis(setup: Setup, name: str, line: LinePlan, seed: int, tell: Callable[[str], None]) -> OwnRun:
     table = _table(setup, name)
     assert isinstance(table, OperatorModel)
-    path = setup.scanner_folder / table.file
-    operator, _ = read_operator(path, shown_path(path))
-    uncertainty = uncertainty_of(line)
-    plants = [departing(operator, uncertainty, (seed, k)) for k in range(SEEDS)]
+    found = operator_line(line)
+    operator, centre = found.operator, line.drive.v_offset / line.drive.v_max
+    plants = [OwnAxis.of(line, departing(operator, found.uncertainty, (seed, k))) for k in range(SEEDS)]
     rows = []
     for correction, model in (("uncompensated", models.UNCOMPENSATED), ("laws", _laws(table)), (table.model(),) * 2):
         tell(f"playing {name}, {correction}, on its own operator")
@@ -100,20 +104,17 @@ def _axis(setup: Setup, name: str, line: LinePlan, seed: int, tell: Callable[[st
         except Rejected as faults:
             rows.append(OwnRow(correction, model, rejected="; ".join(map(str, faults.problems))))
             continue
-        rows.append(OwnRow(correction, model, errors_on(setup, name, played, plants)))
-    return OwnRun(name, line.drive.size_nm, len(operator.lines), uncertainty, tuple(rows))
+        rows.append(OwnRow(correction, model, errors_on(played, plants)))
+    nearest = min(abs(one.centre - centre) for one in operator.lines)
+    return OwnRun(name, line.drive.size_nm, len(operator.lines), nearest, False, found.uncertainty, tuple(rows))
 
 
-def errors_on(setup: Setup, name: str, line: LinePlan, plants: Sequence[Operator]) -> tuple[tuple[float, ...], ...]:
-    """Of a line that is played on several operators: a row each, of ``MEASURES``."""
-    axis: ScannerAxis = getattr(setup.scanner, name)
-    out = []
-    for plant in plants:
-        try:
-            out.append(measured(run_line(line, OwnAxis.of(plant, line, axis.frequency))))
-        except Unphysical as reason:
-            raise Unphysical(f"{name}: with a random departure of its own uncertainty, {reason}") from None
-    return tuple(out)
+def errors_on(line: LinePlan, plants: Sequence[OwnAxis]) -> tuple[tuple[float, ...], ...]:
+    """Of a line that is played on several scanners: a row each, of ``MEASURES``."""
+    try:
+        return tuple(measured(run) for run in run_on_each(line, plants, _MOST_TICKS))
+    except Unphysical as reason:
+        raise Unphysical(f"{line.axis}: with a random departure of its own uncertainty, {reason}") from None
 
 
 def measured(run: AxisRun) -> tuple[float, float, float, float]:

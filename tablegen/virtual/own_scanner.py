@@ -9,13 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tablegen.compensation.dynamics import Response
-from tablegen.compensation.frequency import frequency_gain
-from tablegen.compensation.models.operator import OperatorLine, at_offset_and_rate
-from tablegen.compensation.offset import normalised_offset
+from tablegen.compensation.models.operator import OperatorLine
 from tablegen.compensation.operator.field import Field, Lengths, covariance
 from tablegen.compensation.operator.operator import Operator
 from tablegen.compensation.operator.scan_line import Expected
-from tablegen.config.scanner import Frequency
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan
 
@@ -41,7 +38,7 @@ class DepartingField(Field):
 
 @dataclass(frozen=True, eq=False)
 class OwnAxis:
-    """An axis that does what an operator says, as far as the harmonics of ``line`` go; nm from the lower turn on."""
+    """An axis that does what an operator says; creep and dynamics up to ``harmonics``; nm from the lower turn on."""
 
     operator: Operator
     factor: float
@@ -50,25 +47,11 @@ class OwnAxis:
     harmonics: int
 
     @classmethod
-    def of(cls, operator: Operator, line: LinePlan, law: Frequency | None) -> "OwnAxis":
-        """At the offset and the rate of a line; ``law`` is (23) of the scanner file."""
+    def of(cls, line: LinePlan, operator: Operator | None = None) -> "OwnAxis":
+        """At the offset and the rate of a line that was found on an operator; ``operator`` replaces that one."""
+        shape = operator_line(line)
         drive = line.drive
-
-        def factor_at(share: float) -> float:
-            return drive.offset_law.factor(normalised_offset(share * drive.v_max, drive.v_max))
-
-        def rate_gain(hz: float) -> float:
-            assert law is not None
-            return frequency_gain(hz, law.alpha, law.reference_hz)
-
-        found, factor = at_offset_and_rate(
-            operator,
-            drive.v_offset / drive.v_max,
-            float(line.rate),
-            factor_at,
-            None if law is None else rate_gain,
-        )
-        return cls(found, factor, drive.v_max, drive.response, line.series.harmonics)
+        return cls(operator or shape.operator, shape.factor, drive.v_max, drive.response, line.series.harmonics)
 
     def settled(self, volts: Floats, tick_s: float) -> Floats:
         """Where the axis is, in the middle of each tick, in a period that has been held tick by tick for ever.
@@ -92,10 +75,10 @@ class OwnAxis:
         return loop.extent_nm * np.fft.irfft(spectrum, count)
 
 
-def uncertainty_of(line: LinePlan) -> Expected:
-    """By how much the operator is wrong on traces that were left out; ``line`` is one that was found on it."""
+def operator_line(line: LinePlan) -> OperatorLine:
+    """What the model made of a line that was found on an operator."""
     assert isinstance(line.drive.shape, OperatorLine)
-    return line.drive.shape.uncertainty
+    return line.drive.shape
 
 
 def departing(operator: Operator, uncertainty: Expected, seed: tuple[int, ...]) -> Operator:

@@ -1,6 +1,5 @@
 """An identified operator: the waveform that it follows straight, found when a scan is built."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, ClassVar
@@ -32,12 +31,15 @@ class OperatorLine(WholeLine):
     """The line, what the operator expects of it, and how far it is from what was measured.
 
     ``uncertainty`` is what the operator is wrong by where it predicts a trace that it was not made of; ``distance`` is
-    that of stroke or centre to the nearest trace, of v_max.
+    that of stroke or centre to the nearest trace, of v_max. ``operator`` is that of this rate, ``factor`` that of its
+    loops at this offset.
     """
 
     expected: Expected
     uncertainty: Expected
     distance: float
+    operator: Operator
+    factor: float
 
 
 class OperatorModel(WithBranches, frozen=True, kw_only=True, tag="operator"):
@@ -87,27 +89,13 @@ class OperatorModel(WithBranches, frozen=True, kw_only=True, tag="operator"):
         return f"{self.model()} {Path(self.file).name}; expected rms {max(e.rms):.3g} %, mismatch {e.mismatch:.3g} %"
 
 
-def at_offset_and_rate(
-    operator: Operator,
-    centre: float,
-    rate_hz: float,
-    factor_at: Callable[[float], float],
-    rate_gain: Callable[[float], float] | None,
-) -> tuple[Operator, float]:
-    """The operator of a rate, and the factor of its loops at an offset, a share of v_max, by the laws of (1) and (23).
-
-    Where (23) says what the rate does to the size, creep only bends the line.
-    """
-    factor = factor_at(centre) / factor_at(operator.centre)
-    if rate_gain is not None:
-        factor *= rate_gain(rate_hz) / rate_gain(operator.creep.reference_hz)
-        operator = replace(operator, creep=replace(operator.creep, reference_hz=rate_hz))
-    return operator, factor
-
-
 def _line(operator: Operator, wanted: WantedLine) -> OperatorLine:
     centre = wanted.v_offset / wanted.v_max
-    operator, factor = at_offset_and_rate(operator, centre, wanted.rate_hz, wanted.factor_at, wanted.rate_gain)
+    factor = wanted.factor_at(centre) / wanted.factor_at(operator.centre)
+    if wanted.rate_gain is not None:  # (23) says what the rate does to the size; creep then only bends the line
+        reference = operator.creep.reference_hz
+        factor *= wanted.rate_gain(wanted.rate_hz) / wanted.rate_gain(reference)
+        operator = replace(operator, creep=replace(operator.creep, reference_hz=wanted.rate_hz))
     line = Wanted(wanted.size_nm, wanted.turn, wanted.window, wanted.both, wanted.rate_hz, centre, factor)
     response, boost = wanted.response, wanted.max_boost_db
     n = np.arange(1.0, wanted.harmonics + 1.0) * wanted.rate_hz
@@ -140,6 +128,8 @@ def _line(operator: Operator, wanted: WantedLine) -> OperatorLine:
         expected=found.expected,
         uncertainty=_uncertainty(operator),
         distance=operator.distance(found.stroke, found.centre),
+        operator=operator,
+        factor=factor,
     )
 
 
