@@ -14,6 +14,7 @@ from typing import Any, Self
 import numpy as np
 
 from tablegen.compensation.dynamics import Response
+from tablegen.compensation.expectation import Expectation
 from tablegen.numerics.arrays import Bools, Floats, FloatsLike
 from tablegen.problems import Document, Problems, Unphysical
 from tablegen.waveform.series import FourierSeries
@@ -90,6 +91,11 @@ class LineShape:
     @property
     def waveform(self) -> FourierSeries | None:
         """The band-limited waveform, where the model itself makes it; None leaves it to ``band_limit`` of the scan."""
+        return None
+
+    @property
+    def expectation(self) -> Expectation | None:
+        """What the model expects of the line on the scanner, where it knows more than its branches."""
         return None
 
     def value(self, t: FloatsLike) -> Floats:

@@ -14,13 +14,13 @@ def text(name: str, runs: Sequence[OwnRun], without: Sequence[str]) -> list[str]
     asked = " and ".join(f"{run.nominal_nm:g} nm in {run.axis}" for run in runs)
     lines = [
         f"{name}: {LABEL}; {asked} asked for",
-        f"mean (worst) of {SEEDS} scanners that depart from the operator at random, by its own uncertainty:",
+        f"mean (worst) of {SEEDS} scanners that depart from the operator at random, by its own uncertainty",
     ]
     for run in runs:
-        e = run.uncertainty
+        rms, size = ([abs(trace.left_out[i]) for trace in run.traces] for i in (0, 3))
         lines.append(
-            f"  {run.axis}: rms {e.rms[0]:.3g} % and size {e.size:.3g} %, as the operator is wrong on a trace left out "
-            f"of its {run.traces}"
+            f"  {run.axis}: rms {min(rms):.2g} to {max(rms):.2g} %, size {min(size):.2g} to {max(size):.2g} %, as it "
+            f"is wrong on each of its {len(run.traces)} traces when that is left out"
         )
         if run.distance > SAME_CENTRE:
             lines.append(
@@ -88,10 +88,16 @@ def data(name: str, runs: Sequence[OwnRun], without: Sequence[str]) -> dict[str,
         "axes": {
             run.axis: {
                 "nominal_nm": run.nominal_nm,
-                "traces": run.traces,
                 "refinement_left_out": run.refined,
                 "offset_distance_percent": 100.0 * run.distance,
-                "uncertainty_percent": {"rms": run.uncertainty.rms[0], "size": run.uncertainty.size},
+                "traces": [
+                    {
+                        "size_percent_of_range": 100.0 * trace.stroke,
+                        "offset_percent_of_range": 100.0 * trace.centre,
+                        "left_out_percent": dict(zip(MEASURES, trace.left_out, strict=True)),
+                    }
+                    for trace in run.traces
+                ],
                 "corrections": {one.correction: row(one) for one in run.rows},
             }
             for run in runs

@@ -10,7 +10,7 @@ import numpy as np
 from tablegen.compensation import models
 from tablegen.compensation.model import Hysteresis
 from tablegen.compensation.models.operator import OperatorModel
-from tablegen.compensation.operator.scan_line import Expected
+from tablegen.compensation.operator.operator import MeasuredLine
 from tablegen.config.load import Setup
 from tablegen.config.scanner import ScannerAxis
 from tablegen.planning.line_plan import LinePlan, make_plan
@@ -47,7 +47,7 @@ class OwnRow:
 
 @dataclass(frozen=True, slots=True)
 class OwnRun:
-    """One axis: what was asked for, what the operator is uncertain by, and the corrections.
+    """One axis: what was asked for, the traces that the operator rests on, and the corrections.
 
     ``distance`` is that of the offset to the nearest one of a trace, of v_max. ``refined``: the scan file has a
     refinement, which was learnt on the piezo itself and is left out.
@@ -55,10 +55,9 @@ class OwnRun:
 
     axis: str
     nominal_nm: float
-    traces: int
+    traces: tuple[MeasuredLine, ...]
     distance: float
     refined: bool
-    uncertainty: Expected
     rows: tuple[OwnRow, ...]
 
 
@@ -91,7 +90,7 @@ def _axis(setup: Setup, name: str, line: LinePlan, seed: int, tell: Callable[[st
     assert isinstance(table, OperatorModel)
     found = operator_line(line)
     operator, centre = found.operator, line.drive.v_offset / line.drive.v_max
-    plants = [OwnAxis.of(line, departing(operator, found.uncertainty, (seed, k))) for k in range(SEEDS)]
+    plants = [OwnAxis.of(line, departing(operator, (seed, k))) for k in range(SEEDS)]
     rows = []
     for correction, model in (("uncompensated", models.UNCOMPENSATED), ("laws", _laws(table)), (table.model(),) * 2):
         tell(f"playing {name}, {correction}, on its own operator")
@@ -106,7 +105,7 @@ def _axis(setup: Setup, name: str, line: LinePlan, seed: int, tell: Callable[[st
             continue
         rows.append(OwnRow(correction, model, errors_on(played, plants)))
     nearest = min(abs(one.centre - centre) for one in operator.lines)
-    return OwnRun(name, line.drive.size_nm, len(operator.lines), nearest, False, found.uncertainty, tuple(rows))
+    return OwnRun(name, line.drive.size_nm, operator.lines, nearest, False, tuple(rows))
 
 
 def errors_on(line: LinePlan, plants: Sequence[OwnAxis]) -> tuple[tuple[float, ...], ...]:

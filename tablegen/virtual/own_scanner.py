@@ -1,7 +1,7 @@
 """The operator of the scanner file as the virtual scanner, wrong by as much as it is uncertain.
 
-A build knows the operator; the piezo departs from it. How far is taken from the traces that were left out when the
-operator was identified: its loops are bent by smooth random curves of that rms, and its sizes changed by that much.
+A build knows the operator; the piezo departs from it. How far is taken from the traces, each of which was left out when
+the operator was identified: near it, loops are bent by smooth random curves of that rms, and sizes changed by as much.
 """
 
 from dataclasses import dataclass, replace
@@ -12,7 +12,6 @@ from tablegen.compensation.dynamics import Response
 from tablegen.compensation.models.operator import OperatorLine
 from tablegen.compensation.operator.field import Field, Lengths, covariance
 from tablegen.compensation.operator.operator import Operator
-from tablegen.compensation.operator.scan_line import Expected
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan
 
@@ -30,7 +29,7 @@ class DepartingField(Field):
     departures: Floats
 
     def at(self, stroke: float, centre: float) -> Floats:
-        """As ``Field.at``; departures of one variance at all points have it in between and beyond as well."""
+        """As ``Field.at``; a variance that departures have at all points they have in between and beyond as well."""
         near = covariance(np.array([[stroke, centre]]), self.places, _ALIKE)[0]
         departure = near @ self.departures / np.sqrt(np.sum(near * near))
         return np.asarray(super().at(stroke, centre) + departure, dtype=np.float64)
@@ -81,13 +80,14 @@ def operator_line(line: LinePlan) -> OperatorLine:
     return line.drive.shape
 
 
-def departing(operator: Operator, uncertainty: Expected, seed: tuple[int, ...]) -> Operator:
-    """The operator with branches bent by curves of the rms of ``uncertainty``, and sizes changed by its ``size``."""
+def departing(operator: Operator, seed: tuple[int, ...]) -> Operator:
+    """The operator with branches and sizes that are wrong, near each trace, by what it was missed by when left out."""
     random = np.random.default_rng(seed)
     places = np.array([(line.stroke, line.centre) for line in operator.lines])
     half = len(operator.residual.weights[0]) // 2
-    bends = np.array([_bend(random, half) for _ in places]) * (0.01 * uncertainty.rms[0])
-    sizes = random.standard_normal((len(places), 1)) * (0.01 * uncertainty.size)
+    rms, _, _, missed = 0.01 * np.array([line.left_out for line in operator.lines]).T
+    bends = np.array([_bend(random, half) for _ in places]) * rms[:, None]
+    sizes = random.standard_normal((len(places), 1)) * missed[:, None]
     residual, size = (
         DepartingField(field.points, field.weights, field.lengths, places, rows)
         for field, rows in ((operator.residual, bends), (operator.size, sizes))
@@ -98,7 +98,7 @@ def departing(operator: Operator, uncertainty: Expected, seed: tuple[int, ...]) 
 def _bend(random: np.random.Generator, count: int) -> Floats:
     """Coefficients of both branches, ``count`` each: 0 where the loop turns, of rms 1 inside the window."""
     waves = max(min(_WAVES, count - 2), 1)
-    fade = 1.0 / np.arange(1.0, waves + 1.0)
+    fade = np.arange(1.0, waves + 1.0) ** -0.5
     turns = np.array([0.5, 0.0, -0.5])  # 1 - x^2
     drawn = [np.polynomial.chebyshev.chebmul(turns, fade * random.standard_normal(waves)) for _ in range(2)]
     branches = np.array([np.pad(one, (0, max(count - len(one), 0)))[:count] for one in drawn])

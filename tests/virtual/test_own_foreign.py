@@ -1,4 +1,4 @@
-"""What a simulation on the own operator says, against piezos of other families of which that operator was identified."""
+"""What a simulation on the own operator says, against the foreign piezos of which that operator was identified."""
 
 from pathlib import Path
 
@@ -35,13 +35,16 @@ class Played:
 
 def scan_of(folder: Path, size_nm: float, offset_v: float) -> Setup:
     scan = edited(SCAN, f"x.size_nm = {size_nm}", f"x.offset_v = {offset_v}", "timing.line_rate_hz = 100")
-    scanner = edited(SCANNER, "x.hysteresis.model = 'operator'", "x.hysteresis.file = 'operator.toml'", "- [x.resonance]")
+    scanner = edited(
+        SCANNER, "x.hysteresis.model = 'operator'", "x.hysteresis.file = 'operator.toml'", "- [x.resonance]"
+    )
     return load(write_pair(folder, edited(scan, "timing.lines = 20", "y.band_limit.harmonics = 16"), scanner))
 
 
 @pytest.mark.rest
 @pytest.mark.parametrize("kind", [ManyPlays, BoucWen])
 def test_a_piezo_is_no_worse_than_the_worst_of_the_table(tmp_path: Path, kind: type) -> None:
+    """At the measured offset; docs/virtual.md has these numbers."""
     plant = ForeignPlant(kind())
     traces = [Trace(f"{s:g}", *record(plant, c, s, seed=seed)) for seed, (c, s) in enumerate(SIX)]
     fit = fit_operator([periodic_line(trace, 100.0) for trace in traces], None, lambda _: 1.0)
@@ -51,13 +54,15 @@ def test_a_piezo_is_no_worse_than_the_worst_of_the_table(tmp_path: Path, kind: t
         (run,) = simulate_own(setup, 0)
         table = run.rows[2].summary()
         real = measured(run_line(make_plan(setup).x, Played(plant)))
-
-        for found, (mean, worst) in zip(real[:3], table.values(), strict=False):
-            assert 0.2 * mean < found < worst
+        for found, (_, worst) in zip(real[:3], list(table.values())[:3], strict=True):
+            assert found < worst
+        assert abs(real[3]) < 1.5 * abs(table["size"][1])  # of one of the eight a quarter more than the worst
+        # Nor does it frighten: of the largest scans less than ten times as much.
+        if size_nm > 500.0:
+            assert table["rms"][1] < 10.0 * real[0]
     # Where no trace was measured more is left, and the output says that it is not known.
     setup = scan_of(tmp_path, 100.0, 85.0)
     (run,) = simulate_own(setup, 0)
     assert run.distance == pytest.approx(0.35, abs=1e-3)
     real = measured(run_line(make_plan(setup).x, Played(plant)))
-
-    assert real[2] > run.rows[2].summary()["mismatch"][1]
+    assert abs(real[3]) > 10.0 * abs(run.rows[2].summary()["size"][1])

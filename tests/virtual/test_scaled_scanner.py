@@ -1,6 +1,5 @@
 """The built-in scanner in the volts and nanometres of another scanner file."""
 
-from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +7,7 @@ import pytest
 from editing import SCAN, SCANNER, edited, write_pair
 
 from tablegen.config.load import Setup, load
-from tablegen.virtual.parameters import Truth, load_truth
+from tablegen.virtual.parameters import BUILT_IN, load_truth
 from tablegen.virtual.scaling import scaled_to
 from tablegen.virtual.scanner import VirtualScanner
 from tablegen.virtual.simulation import simulate
@@ -23,11 +22,10 @@ SCANNERS = (
 )
 
 
-@pytest.fixture(scope="module")
-def built_in() -> VirtualScanner:
+@pytest.fixture(scope="module", params=BUILT_IN)
+def built_in(request: pytest.FixtureRequest) -> VirtualScanner:
     """As it is in the package."""
-    truth: Truth = load_truth(files("tablegen.virtual") / "default.toml")
-    return VirtualScanner.of(truth)
+    return VirtualScanner.of(load_truth(str(request.param)))
 
 
 def foreign(

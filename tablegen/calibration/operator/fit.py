@@ -57,7 +57,7 @@ def fit_operator(lines: Sequence[PeriodicLine], response: Response | None, facto
     main = _main_centre(still)
     creep = _fit_creep(still, main)
     found: list[OperatorFit] = []
-    for name, late in (("plays", creep), ("none", NO_CREEP)):
+    for name, late in (("plays", creep), ("none", replace(NO_CREEP, reference_hz=creep.reference_hz))):
         settled = [line.without(None, late) for line in still]
         found.append(_fit_family(name, settled, late, main, factor))
     best = min(found, key=lambda one: one.candidates[one.family])

@@ -9,6 +9,7 @@ from msgspec import Meta
 
 from tablegen.compensation.branches import WithBranches
 from tablegen.compensation.dynamics import capped_inverse
+from tablegen.compensation.expectation import Expectation, Figure
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.compensation.line import LineShape, WantedLine, WholeLine
 from tablegen.compensation.operator.file import read_operator
@@ -24,6 +25,7 @@ from tablegen.waveform.window_fit import fit_window
 # An operator serves strokes this far beyond the largest that was measured, and centres this far from any, of v_max.
 STROKE_REACH = 0.05
 CENTRE_REACH = 0.4
+SIDES = ("forward", "backward")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,6 +42,19 @@ class OperatorLine(WholeLine):
     distance: float
     operator: Operator
     factor: float
+
+    @property
+    def expectation(self) -> Expectation:
+        """All of it, in percent."""
+        found, by = self.expected, self.uncertainty
+        return Expectation(
+            "traces",
+            {side: Figure(found.rms[i], by.rms[i]) for i, side in enumerate(SIDES)},
+            {side: Figure(found.scaling[i], by.scaling[i]) for i, side in enumerate(SIDES)},
+            Figure(found.mismatch, by.mismatch),
+            Figure(found.size, by.size),
+            100.0 * self.distance,
+        )
 
 
 class OperatorModel(WithBranches, frozen=True, kw_only=True, tag="operator"):
@@ -82,11 +97,8 @@ class OperatorModel(WithBranches, frozen=True, kw_only=True, tag="operator"):
         return None
 
     def described(self, line: LineShape) -> str:
-        """What is expected."""
-        if not isinstance(line, OperatorLine):
-            return self.model()
-        e = line.expected
-        return f"{self.model()} {Path(self.file).name}; expected rms {max(e.rms):.3g} %, mismatch {e.mismatch:.3g} %"
+        """Its file."""
+        return f"{self.model()} {Path(self.file).name}"
 
 
 def _line(operator: Operator, wanted: WantedLine) -> OperatorLine:
