@@ -139,7 +139,7 @@ def simulate(
     with Progress() as progress:
         heading = "with the scanner file as it is"
         if own_axes(setup):
-            heading += "; its operator is not that of this virtual scanner"
+            heading += "; its operator is that of the piezo on which it was measured"
         stages = [_play("given", heading, setup, scanner, truth_file, progress)]
         if not stages[0].runs:
             fail(

@@ -217,7 +217,7 @@ def test_what_goes_with_the_own_operator(tmp_path: Path) -> None:
         assert f"{name} does not go with the scanner file's own operator; give --scanner-truth default" in outcome.err
     built_in = run("simulate", scan, "--scanner-truth", "default", "--no-calibration")
     assert (built_in.status, built_in.err) == (0, "")
-    assert "its operator is not that of this virtual scanner" in built_in.out
+    assert "its operator is that of the piezo on which it was measured" in built_in.out
     none = run("simulate", write_pair(tmp_path, SHORT), "--scanner-truth", "own")
     assert none.status == ExitStatus.WRONG_INPUT
     assert "scanner.toml has no operator; identify one with tablegen calibrate operator" in none.err

@@ -92,7 +92,8 @@ def test_the_example_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
     _, file = read_operator(tmp_path / "scanner_x_operator.toml", "")
     assert [line.name for line in file.lines] == [f"{volts}v.csv" for volts in (10, 25, 45, 65, 82, 97)]
-    simulated = CliRunner().invoke(cli, ["simulate", EXAMPLE.name, "--no-calibration", "--json"])
+    on_it = ["--scanner-truth", "default", "--no-calibration", "--json"]
+    simulated = CliRunner().invoke(cli, ["simulate", EXAMPLE.name, *on_it])
     assert '"operator"' in simulated.stdout
 
 
