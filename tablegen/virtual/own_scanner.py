@@ -21,7 +21,7 @@ _WAVES = 8  # Chebyshev polynomials of a departure
 _WINDOW = np.linspace(-0.8, 0.8, 161)  # x = 0.1..0.9, where the rms holds
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class DepartingField(Field):
     """A field, and rows by which it is wrong near each of its points; ``departures`` is of the shape of the rows."""
 
@@ -81,15 +81,19 @@ def operator_line(line: LinePlan) -> OperatorLine:
 
 
 def departing(operator: Operator, seed: tuple[int, ...]) -> Operator:
-    """The operator with branches and sizes that are wrong, near each trace, by what it was missed by when left out."""
+    """The operator with branches and sizes that are wrong, near each trace, by what it was missed by when left out.
+
+    By the median of all traces at least: one alone may be met by chance.
+    """
     random = np.random.default_rng(seed)
     places = np.array([(line.stroke, line.centre) for line in operator.lines])
     half = len(operator.residual.weights[0]) // 2
-    rms, _, _, missed = 0.01 * np.array([line.left_out for line in operator.lines]).T
+    missed_by = 0.01 * np.abs([line.left_out for line in operator.lines])
+    rms, _, _, missed = np.maximum(missed_by, np.median(missed_by, axis=0)).T
     bends = np.array([_bend(random, half) for _ in places]) * rms[:, None]
     sizes = random.standard_normal((len(places), 1)) * missed[:, None]
     residual, size = (
-        DepartingField(field.points, field.weights, field.lengths, places, rows)
+        DepartingField(field.points, field.weights, field.lengths, field.straight, places=places, departures=rows)
         for field, rows in ((operator.residual, bends), (operator.size, sizes))
     )
     return replace(operator, residual=residual, size=size)

