@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+from click.core import ParameterSource
 
 from tablegen.cli.common import OutputFile, fail, finite, require, scan_argument, written
 from tablegen.cli.exit_status import ExitStatus
@@ -16,17 +17,20 @@ if TYPE_CHECKING:
     from tablegen.virtual.scanner import VirtualScanner
     from tablegen.virtual.simulation import Run
 
+OWN, DEFAULT = "own", "default"
+
 
 @click.command(short_help="Simulate a scan on a virtual scanner; print its accuracy.")
 @scan_argument
 @click.option(
     "--scanner-truth",
     "truth_file",
-    metavar="default|duhem|FILE",
-    default="default",
-    show_default=True,
-    help="The virtual scanner: default has a Preisach operator, duhem another kind of hysteresis, two resonances and a "
-    "memory of the offset; both were identified on numbers of the paper. docs/virtual.md describes a FILE.",
+    metavar="own|default|duhem|FILE",
+    help="Scanner to play on. own: the operator of the scanner file, wrong by its own uncertainty, several times at "
+    "random. default: built in, with a Preisach operator. duhem: built in, with another kind of hysteresis, two "
+    "resonances and a memory of the offset. Both were identified on numbers of the paper, and are scaled to the drive "
+    "range and the nm per V of the scanner file. FILE: parameters as in docs/virtual.md.  [default: own if the scanner "
+    "file has an operator, else default]",
 )
 @click.option(
     "--csv",
@@ -61,11 +65,18 @@ if TYPE_CHECKING:
     help="Noise of the simulated measurements in percent, rms.",
 )
 @click.option(
-    "--seed", type=click.IntRange(min=0), default=0, show_default=True, metavar="N", help="Random seed of that noise."
+    "--seed",
+    type=click.IntRange(min=0),
+    default=0,
+    show_default=True,
+    metavar="N",
+    help="Random seed of that noise, and of what own is wrong by.",
 )
+@click.pass_context
 def simulate(
+    context: click.Context,
     scan: Path,
-    truth_file: str,
+    truth_file: str | None,
     csv_file: Path | None,
     plot_file: Path | None,
     as_json: bool,
@@ -75,27 +86,42 @@ def simulate(
 ) -> None:
     """Simulate a scan on a virtual scanner, and print the scan errors that remain.
 
-    The virtual scanner plays the integer codes of the build. It has its own models of hysteresis, creep, resonance and
-    sensitivity, different from the equations that a build inverts.
+    The virtual scanner plays the integer codes of the build. A built-in scanner has its own models of hysteresis,
+    creep, resonance and sensitivity, different from the equations that a build inverts. The command plays the
+    uncompensated triangle, and each hysteresis model for which the scanner file has parameters: first with the scanner
+    file as it is, then with parameters calibrated on simulated sensor data.
 
-    The command plays the uncompensated triangle, and each hysteresis model for which the scanner file has parameters:
-    first with the scanner file as it is, then with parameters calibrated on simulated sensor data.
+    Where the scanner file has an operator, your own scanner is simulated: the command plays the uncompensated triangle,
+    the laws and the operator on scanners that depart from the operator as much as it is uncertain.
 
     \b
     Examples:
       tablegen simulate annexin_200nm.toml
       tablegen simulate annexin_200nm.toml --no-calibration --plot errors.png
+      tablegen simulate own_scan.toml --scanner-truth default
 
     Exit status: 0 done, 2 wrong input, 4 cannot write, 6 a library is missing.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    from msgspec.structs import replace
+
     from tablegen.config.load import load
     from tablegen.problems import Rejected, Unphysical
     from tablegen.virtual import report
-    from tablegen.virtual.parameters import load_truth
+    from tablegen.virtual.own_run import own_axes
+    from tablegen.virtual.parameters import BUILT_IN, load_truth
     from tablegen.virtual.report import SimulationStage
+    from tablegen.virtual.scaling import scaled_to
     from tablegen.virtual.scanner import VirtualScanner
 
+    try:
+        setup = load(scan)
+    except Rejected as faults:
+        fail(faults.problems, ExitStatus.WRONG_INPUT)
+    if _plays_own(context, setup, truth_file):
+        _simulate_own(setup, seed, as_json)
+        return
+    truth_file = truth_file or DEFAULT
     if plot_file is not None:
         if plot_file.suffix != ".png":
             raise click.UsageError(f"--plot {plot_file}: the name has to end in .png")
@@ -103,13 +129,18 @@ def simulate(
     if calibrated:
         require("scipy", extra="calibrate", otherwise="; or give --no-calibration")
     try:
-        setup = load(scan)
         truth = load_truth(truth_file)
     except Rejected as faults:
         fail(faults.problems, ExitStatus.WRONG_INPUT)
     scanner = VirtualScanner.of(truth)
+    if truth_file in BUILT_IN:
+        scanner, how = scaled_to(scanner, setup.scanner)
+        truth = replace(truth, name=f"{truth.name}, {how}" if how else truth.name)
     with Progress() as progress:
-        stages = [_play("given", "with the scanner file as it is", setup, scanner, truth_file, progress)]
+        heading = "with the scanner file as it is"
+        if own_axes(setup):
+            heading += "; its operator is that of the piezo on which it was measured"
+        stages = [_play("given", heading, setup, scanner, truth_file, progress)]
         if not stages[0].runs:
             fail(
                 list(dict.fromkeys(why for _, reasons in stages[0].rejected for why in reasons)), ExitStatus.WRONG_INPUT
@@ -134,6 +165,52 @@ def simulate(
         click.echo(json.dumps(report.data(setup.scan.name, truth, stages), indent=2))
         return
     for line in report.text(setup.scan.name, truth, stages):
+        click.echo(line)
+
+
+def _plays_own(context: click.Context, setup: "Setup", truth_file: str | None) -> bool:
+    """Whether the operator of the scanner file is the scanner; what does not go with that is a usage error."""
+    from tablegen.virtual.own_run import own_axes
+
+    if truth_file not in (None, OWN) or not (own_axes(setup) or truth_file):
+        return False
+    if not own_axes(setup):
+        path = setup.scanner_file.name
+        raise click.UsageError(
+            f"--scanner-truth {OWN}: {path} has no operator; identify one with tablegen calibrate operator"
+        )
+    for parameter, name in (
+        ("csv_file", "--csv"),
+        ("plot_file", "--plot"),
+        ("noise", "--noise"),
+        ("calibrated", "--calibration"),
+    ):
+        if context.get_parameter_source(parameter) is not ParameterSource.DEFAULT:
+            raise click.UsageError(
+                f"{name} does not go with the scanner file's own operator; give --scanner-truth {DEFAULT} as well"
+            )
+    return True
+
+
+def _simulate_own(setup: "Setup", seed: int, as_json: bool) -> None:
+    from tablegen.problems import Rejected, Unphysical
+    from tablegen.virtual import own_report
+    from tablegen.virtual.own_run import own_axes, simulate_own
+
+    try:
+        with Progress() as progress:
+            runs = simulate_own(setup, seed, progress.now)
+    except Rejected as faults:
+        fail(faults.problems, ExitStatus.WRONG_INPUT)
+    except Unphysical as reason:
+        fail([str(reason)], ExitStatus.WRONG_INPUT)
+    found = setup.scan.name, runs, [axis for axis in ("x", "y") if axis not in own_axes(setup)]
+    if as_json:
+        import json
+
+        click.echo(json.dumps(own_report.data(*found), indent=2))
+        return
+    for line in own_report.text(*found):
         click.echo(line)
 
 

@@ -1,7 +1,8 @@
 """A scan on the virtual scanner: emitted integers in, displacement and its errors out, model by model."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, Protocol
 
 import msgspec
 
@@ -12,8 +13,8 @@ from tablegen.config.scanner import ScannerAxis
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, make_plan
 from tablegen.virtual.line_error import LineError, about_window_line, line_error
-from tablegen.virtual.played import PlayedDrive, intended, played
-from tablegen.virtual.scanner import VirtualAxis, VirtualScanner
+from tablegen.virtual.played import MAX_TICKS, PlayedDrive, intended, played
+from tablegen.virtual.scanner import VirtualScanner
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,11 +51,27 @@ class Run:
     y: AxisRun
 
 
-def run_line(line: LinePlan, axis: VirtualAxis) -> AxisRun:
+class SettledAxis(Protocol):
+    """An axis on which a period is played."""
+
+    def settled(self, volts: Floats, tick_s: float) -> Floats:
+        """Displacement in nm in the middle of each tick of a period of volts, (ticks,), that are held tick by tick."""
+
+
+def run_line(line: LinePlan, axis: SettledAxis) -> AxisRun:
     """Play one axis until it has settled."""
-    drive = played(line)
-    displacement = axis.settled(drive.volts, drive.tick_s)
-    error = line_error(displacement, line.drive.turn, line.band_limit.window, intended(line, drive), 0.5)
+    return run_on_each(line, [axis])[0]
+
+
+def run_on_each(line: LinePlan, axes: Sequence[SettledAxis], most_ticks: int = MAX_TICKS) -> list[AxisRun]:
+    """The same line on several axes, at no more ticks than that of a period."""
+    drive = played(line, most_ticks)
+    asked = intended(line, drive)
+    return [_axis_run(line, drive, asked, axis.settled(drive.volts, drive.tick_s)) for axis in axes]
+
+
+def _axis_run(line: LinePlan, drive: PlayedDrive, asked: Floats, displacement: Floats) -> AxisRun:
+    error = line_error(displacement, line.drive.turn, line.band_limit.window, asked, 0.5)
     directions = ("forward", "backward") if line.band_limit.directions == "both" else ("forward",)
     return AxisRun(
         axis=line.axis,

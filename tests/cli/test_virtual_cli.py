@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from editing import SCAN, SCANNER, edited, run, write_pair
+from operator_files import operator_file, write_operator_scan
 
 from tablegen.cli.exit_status import ExitStatus
 from tablegen.problems import Rejected
@@ -149,6 +150,90 @@ def test_a_figure_needs_matplotlib(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 
 
 @pytest.mark.common
+def test_a_scanner_of_another_range(tmp_path: Path) -> None:
+    """150 V and 67 nm/V: the built-in one is scaled, which is said; before, sizes were 85 % too small."""
+    edits = ["v_max = 150", *(f"{a}.size.{key}" for a in "xy" for key in ("k_nm_per_v = 67", "base_nm = 2000"))]
+    scan = edited(SHORT, "dac.v_min = 0", "dac.v_max = 10", "amplifier.gain = 15", "amplifier.bias_v = 0")
+    scan = edited(scan, *(f"{a}.{key}" for a in "xy" for key in ("size_nm = 2000", "offset_v = 75")))
+    shown = run("simulate", write_pair(tmp_path, scan, edited(SCANNER, *edits)), "--json")
+    assert (shown.status, shown.err) == (0, "")
+    data = json.loads(shown.out)
+    assert data["virtual_scanner"].endswith(", scaled to 0..150 V, 67 nm/V in x and 67 nm/V in y")
+    for stage in ("given", "calibrated"):
+        assert not data[stage]["rejected"]
+        for model in data[stage]["models"].values():
+            assert all(abs(model[axis]["size_error_percent"]) < 5.0 for axis in "xy")
+    harmonic = data["calibrated"]["models"]["harmonic"]["x"]
+    assert abs(harmonic["size_error_percent"]) < 1.0
+    # What a file says is played as it says.
+    given = run(
+        "simulate", tmp_path / "scan.toml", "--no-calibration", "--scanner-truth", truth(tmp_path, "v_max = 150")
+    )
+    assert "virtual'" in given.out.splitlines()[0]
+    assert "scaled" not in given.out
+
+
+@pytest.mark.common
+def test_the_own_operator(tmp_path: Path) -> None:
+    scan = write_operator_scan(tmp_path, operator_file())
+    shown, plain, other = (run("simulate", scan, *extra) for extra in ((), ("--json",), ("--json", "--seed", "5")))
+    assert (shown.status, shown.err, plain.status, plain.err) == (0, "", 0, "")
+    assert "simulation on the scanner file's own operator; 200 nm in x asked for" in shown.out.splitlines()[0]
+    assert shown.out.splitlines()[-1].startswith("A simulation, not a measurement")
+    assert "y     has no operator; --scanner-truth default" in shown.out
+    data = json.loads(plain.out)
+    assert (data["simulation"], data["virtual_scanner"], data["without_operator"]) == (True, "own", ["y"])
+    corrections = data["axes"]["x"]["corrections"]
+    assert list(corrections) == ["uncompensated", "laws", "operator"]
+    rows = [line for line in shown.out.splitlines() if line.startswith("x  ")]
+    for row, (name, found) in zip(rows, corrections.items(), strict=True):
+        assert row.startswith(f"x     {name}")
+        for measure, figures in found["errors_percent"].items():
+            sign = "+" if measure == "size" else ""
+            assert f"{figures['mean']:{sign}.3f} ({figures['worst']:{sign}.3f})" in row
+    rms = [found["errors_percent"]["rms"]["mean"] for found in corrections.values()]
+    assert rms[0] > 3.0 * rms[2]
+    assert rms[1] > 3.0 * rms[2]
+    changed = json.loads(other.out)["axes"]["x"]["corrections"]["operator"]["errors_percent"]
+    assert changed != corrections["operator"]["errors_percent"]
+    asked = run("simulate", scan, "--json", "--scanner-truth", "own")
+    assert asked.out == plain.out
+
+
+@pytest.mark.common
+def test_what_goes_with_the_own_operator(tmp_path: Path) -> None:
+    scan = write_operator_scan(tmp_path, operator_file(), "x.offset_v = 60", branches=False)
+    text = run("simulate", scan).out
+    assert "x     laws              none: the scanner file has no branches for this axis" in text
+    assert "the nearest trace is 10 % of v_max from this offset" in text
+    for extra, name in (
+        (("--csv", tmp_path / "a.csv"), "--csv"),
+        (("--plot", tmp_path / "a.png"), "--plot"),
+        (("--noise", "1"), "--noise"),
+        (("--no-calibration",), "--calibration"),
+    ):
+        outcome = run("simulate", scan, *extra)
+        assert outcome.status == ExitStatus.WRONG_INPUT
+        assert f"{name} does not go with the scanner file's own operator; give --scanner-truth default" in outcome.err
+    built_in = run("simulate", scan, "--scanner-truth", "default", "--no-calibration")
+    assert (built_in.status, built_in.err) == (0, "")
+    assert "its operator is that of the piezo on which it was measured" in built_in.out
+    none = run("simulate", write_pair(tmp_path, SHORT), "--scanner-truth", "own")
+    assert none.status == ExitStatus.WRONG_INPUT
+    assert "scanner.toml has no operator; identify one with tablegen calibrate operator" in none.err
+
+
+@pytest.mark.common
+def test_an_own_operator_that_cannot_be_played(tmp_path: Path) -> None:
+    large = run("simulate", write_operator_scan(tmp_path, operator_file(), "x.size_nm = 5000"))
+    assert large.status == ExitStatus.WRONG_INPUT
+    assert "x.size_nm" in large.err
+    loose = run("simulate", write_operator_scan(tmp_path, operator_file(rms=60.0)))
+    assert loose.status == ExitStatus.WRONG_INPUT
+    assert "with a random departure of its own uncertainty" in loose.err
+
+
+@pytest.mark.common
 def test_an_uncalibrated_scanner_is_a_triangle(tmp_path: Path) -> None:
     scanner = edited(SCANNER, "- [x.hysteresis]", "- [[x.hysteresis.branches]]", "- [y.hysteresis]")
     scanner = edited(scanner, "- [[y.hysteresis.branches]]")
@@ -161,9 +246,10 @@ def test_an_uncalibrated_scanner_is_a_triangle(tmp_path: Path) -> None:
 
 @pytest.mark.common
 def test_a_calibrated_scan_that_cannot_be_played_leaves_the_given_one(tmp_path: Path) -> None:
-    """98 V for k as given; the virtual scanner goes less far a volt than this file says, and takes more than 100 V."""
+    """98 V for k as given; this virtual scanner goes less far a volt than the file says, and takes more than 100 V."""
     scanner = edited(SCANNER, "x.size.k_nm_per_v = 15.0", "x.size.beta = 0.0")
-    outcome = run("simulate", write_pair(tmp_path, edited(SHORT, "x.size_nm = 1450.0"), scanner), "--json")
+    scan = write_pair(tmp_path, edited(SHORT, "x.size_nm = 1450.0"), scanner)
+    outcome = run("simulate", scan, "--json", "--scanner-truth", truth(tmp_path))
     assert outcome.status == 0
     data = json.loads(outcome.out)
     assert data["given"]["models"]

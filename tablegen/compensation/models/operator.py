@@ -33,12 +33,15 @@ class OperatorLine(WholeLine):
     """The line, what the operator expects of it, and how far it is from what was measured.
 
     ``uncertainty`` is what the operator is wrong by where it predicts a trace that it was not made of; ``distance`` is
-    that of stroke or centre to the nearest trace, of v_max.
+    that of stroke or centre to the nearest trace, of v_max. ``operator`` is that of this rate, ``factor`` that of its
+    loops at this offset.
     """
 
     expected: Expected
     uncertainty: Expected
     distance: float
+    operator: Operator
+    factor: float
 
     @property
     def expectation(self) -> Expectation:
@@ -137,6 +140,8 @@ def _line(operator: Operator, wanted: WantedLine) -> OperatorLine:
         expected=found.expected,
         uncertainty=_uncertainty(operator),
         distance=operator.distance(found.stroke, found.centre),
+        operator=operator,
+        factor=factor,
     )
 
 

@@ -1,0 +1,141 @@
+"""A scan on the scanner file's own operator: what its corrections gain, over several departures from the operator."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from tablegen.compensation import models
+from tablegen.compensation.model import Hysteresis
+from tablegen.compensation.models.operator import OperatorModel
+from tablegen.compensation.operator.operator import MeasuredLine
+from tablegen.config.load import Setup
+from tablegen.config.scanner import ScannerAxis
+from tablegen.planning.line_plan import LinePlan, make_plan
+from tablegen.problems import Rejected, Unphysical
+from tablegen.virtual.own_scanner import OwnAxis, departing, operator_line
+from tablegen.virtual.simulation import AxisRun, run_on_each, with_model
+
+SEEDS = 20
+_MOST_TICKS = 1 << 13  # of a period that are looked at
+MEASURES = ("rms", "scaling", "mismatch", "size")
+
+
+@dataclass(frozen=True, slots=True)
+class OwnRow:
+    """One correction on one axis.
+
+    ``errors`` has a row a seed and a column a measure, in percent of the line; mismatch is NaN where one direction
+    images. ``rejected`` says why there are none.
+    """
+
+    correction: str
+    model: str
+    errors: tuple[tuple[float, ...], ...] = ()
+    rejected: str = ""
+
+    def summary(self) -> dict[str, tuple[float, float]]:
+        """Mean and worst of each measure, the worst with its sign; without the mismatch where there is none."""
+        out = {}
+        for name, column in zip(MEASURES, np.array(self.errors).T, strict=True):
+            if not np.isnan(column[0]):
+                out[name] = float(np.mean(column)), float(column[np.argmax(np.abs(column))])
+        return out
+
+
+@dataclass(frozen=True, slots=True)
+class OwnRun:
+    """One axis: what was asked for, the traces that the operator rests on, and the corrections.
+
+    ``distance`` is that of the offset to the nearest one of a trace, of v_max. ``refined``: the scan file has a
+    refinement, which was learnt on the piezo itself and is left out.
+    """
+
+    axis: str
+    nominal_nm: float
+    traces: tuple[MeasuredLine, ...]
+    distance: float
+    refined: bool
+    rows: tuple[OwnRow, ...]
+
+
+def own_axes(setup: Setup) -> tuple[str, ...]:
+    """The axes of which the scanner file has an operator."""
+    return tuple(name for name in ("x", "y") if isinstance(_table(setup, name), OperatorModel))
+
+
+def simulate_own(setup: Setup, seed: int, tell: Callable[[str], None] = lambda _: None) -> list[OwnRun]:
+    """Every axis with an operator, with the models that the scanner file allows; without the scan file's refinement.
+
+    Raises ``Rejected`` where the scan cannot be built with the operator, and ``Unphysical`` where a departure makes a
+    branch run backwards.
+    """
+    scan = setup.scan
+    plain = replace(
+        setup,
+        scan=msgspec.structs.replace(
+            scan, **{name: msgspec.structs.replace(getattr(scan, name), refinement=None) for name in ("x", "y")}
+        ),
+    )
+    tell("finding the waveform on the operator")
+    plan = make_plan(plain)
+    runs = [_axis(plain, name, getattr(plan, name), seed, tell) for name in own_axes(setup)]
+    return [replace(run, refined=getattr(scan, run.axis).refinement is not None) for run in runs]
+
+
+def _axis(setup: Setup, name: str, line: LinePlan, seed: int, tell: Callable[[str], None]) -> OwnRun:
+    table = _table(setup, name)
+    assert isinstance(table, OperatorModel)
+    found = operator_line(line)
+    operator, centre = found.operator, line.drive.v_offset / line.drive.v_max
+    plants = [OwnAxis.of(line, departing(operator, (seed, k))) for k in range(SEEDS)]
+    rows = []
+    for correction, model in (("uncompensated", models.UNCOMPENSATED), ("laws", _laws(table)), (table.model(),) * 2):
+        tell(f"playing {name}, {correction}, on its own operator")
+        if not model:
+            why = "the scanner file has no branches for this axis, which the laws need"
+            rows.append(OwnRow(correction, "", rejected=why))
+            continue
+        try:
+            played = line if model == table.model() else getattr(make_plan(with_model(setup, model)), name)
+        except Rejected as faults:
+            rows.append(OwnRow(correction, model, rejected="; ".join(map(str, faults.problems))))
+            continue
+        rows.append(OwnRow(correction, model, errors_on(played, plants)))
+    nearest = min(abs(one.centre - centre) for one in operator.lines)
+    return OwnRun(name, line.drive.size_nm, operator.lines, nearest, False, tuple(rows))
+
+
+def errors_on(line: LinePlan, plants: Sequence[OwnAxis]) -> tuple[tuple[float, ...], ...]:
+    """Of a line that is played on several scanners: a row each, of ``MEASURES``."""
+    try:
+        return tuple(measured(run) for run in run_on_each(line, plants, _MOST_TICKS))
+    except Unphysical as reason:
+        raise Unphysical(f"{line.axis}: with a random departure of its own uncertainty, {reason}") from None
+
+
+def measured(run: AxisRun) -> tuple[float, float, float, float]:
+    """Rms and scaling error of the worse direction, mismatch (NaN of one direction) and size of the image, percent."""
+    branches = [getattr(run.imaged, side) for side in run.directions]
+    low, high = branches[0].window
+    inside = (branches[0].position >= low) & (branches[0].position <= high)
+    residuals = [branch.residual[inside] for branch in branches]
+    rms = max(float(np.sqrt(np.mean(one * one))) for one in residuals)
+    mismatch = float(np.max(np.abs(residuals[0] - residuals[1]))) if len(residuals) > 1 else float("nan")
+    return rms, max(branch.scaling_peak_to_peak for branch in branches), mismatch, run.size_error_percent
+
+
+def _table(setup: Setup, name: str) -> Hysteresis | None:
+    axis: ScannerAxis = getattr(setup.scanner, name)
+    return axis.hysteresis
+
+
+def _laws(table: OperatorModel) -> str:
+    """The most detailed of the other models that the branches of the table serve; empty without branches."""
+    served = [kind for kind in models.own() if kind.model() != models.UNCOMPENSATED and kind.order < table.order]
+    found: Any = max(
+        (kind for kind in served if kind.like(table) is not None), key=lambda kind: kind.order, default=None
+    )
+    return "" if found is None or not table.branches else str(found.model())

@@ -1,0 +1,111 @@
+"""The operator of the scanner file as the virtual scanner, wrong by as much as it is uncertain.
+
+A build knows the operator; the piezo departs from it. How far is taken from the traces, each of which was left out when
+the operator was identified: near it, loops are bent by smooth random curves of that rms, and sizes changed by as much.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tablegen.compensation.dynamics import Response
+from tablegen.compensation.models.operator import OperatorLine
+from tablegen.compensation.operator.field import Field, Lengths, covariance
+from tablegen.compensation.operator.operator import Operator
+from tablegen.numerics.arrays import Floats
+from tablegen.planning.line_plan import LinePlan
+
+# Departures at two places are alike within this much of stroke and of centre, shares of v_max.
+_ALIKE = Lengths(0.2, 0.2, 1e-9)
+_WAVES = 8  # Chebyshev polynomials of a departure
+_WINDOW = np.linspace(-0.8, 0.8, 161)  # x = 0.1..0.9, where the rms holds
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class DepartingField(Field):
+    """A field, and rows by which it is wrong near each of its points; ``departures`` is of the shape of the rows."""
+
+    places: Floats
+    departures: Floats
+
+    def at(self, stroke: float, centre: float) -> Floats:
+        """As ``Field.at``; a variance that departures have at all points they have in between and beyond as well."""
+        near = covariance(np.array([[stroke, centre]]), self.places, _ALIKE)[0]
+        departure = near @ self.departures / np.sqrt(np.sum(near * near))
+        return np.asarray(super().at(stroke, centre) + departure, dtype=np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class OwnAxis:
+    """An axis that does what an operator says; creep and dynamics up to ``harmonics``; nm from the lower turn on."""
+
+    operator: Operator
+    factor: float
+    v_max: float
+    response: Response | None
+    harmonics: int
+
+    @classmethod
+    def of(cls, line: LinePlan, operator: Operator | None = None) -> "OwnAxis":
+        """At the offset and the rate of a line that was found on an operator; ``operator`` replaces that one."""
+        shape = operator_line(line)
+        drive = line.drive
+        return cls(operator or shape.operator, shape.factor, drive.v_max, drive.response, line.series.harmonics)
+
+    def settled(self, volts: Floats, tick_s: float) -> Floats:
+        """Where the axis is, in the middle of each tick, in a period that has been held tick by tick for ever.
+
+        Raises ``Unphysical`` where a departing branch would run backwards.
+        """
+        u = volts / self.v_max
+        bottom, top, count = int(np.argmin(u)), int(np.argmax(u)), len(u)
+        loop = self.operator.loop(float(u[bottom]), float(u[top]), self.factor)
+        rising = (np.arange(count) - bottom) % count < (top - bottom) % count
+        place = np.where(rising, loop.position(u, True), loop.position(u, False))
+        n = np.arange(1, min(self.harmonics, (count - 1) // 2) + 1)
+        f_hz = n / (count * tick_s)
+        real, imaginary = self.operator.creep.response(f_hz)
+        linear = real + 1j * imaginary
+        if self.response is not None:
+            real, imaginary = self.response.inverse(f_hz)
+            linear = linear / (real + 1j * imaginary)
+        spectrum = np.fft.rfft(place)
+        spectrum[n] *= linear
+        return loop.extent_nm * np.fft.irfft(spectrum, count)
+
+
+def operator_line(line: LinePlan) -> OperatorLine:
+    """What the model made of a line that was found on an operator."""
+    assert isinstance(line.drive.shape, OperatorLine)
+    return line.drive.shape
+
+
+def departing(operator: Operator, seed: tuple[int, ...]) -> Operator:
+    """The operator with branches and sizes that are wrong, near each trace, by what it was missed by when left out.
+
+    By the median of all traces at least: one alone may be met by chance.
+    """
+    random = np.random.default_rng(seed)
+    places = np.array([(line.stroke, line.centre) for line in operator.lines])
+    half = len(operator.residual.weights[0]) // 2
+    missed_by = 0.01 * np.abs([line.left_out for line in operator.lines])
+    rms, _, _, missed = np.maximum(missed_by, np.median(missed_by, axis=0)).T
+    bends = np.array([_bend(random, half) for _ in places]) * rms[:, None]
+    sizes = random.standard_normal((len(places), 1)) * missed[:, None]
+    residual, size = (
+        DepartingField(field.points, field.weights, field.lengths, field.straight, places=places, departures=rows)
+        for field, rows in ((operator.residual, bends), (operator.size, sizes))
+    )
+    return replace(operator, residual=residual, size=size)
+
+
+def _bend(random: np.random.Generator, count: int) -> Floats:
+    """Coefficients of both branches, ``count`` each: 0 where the loop turns, of rms 1 inside the window."""
+    waves = max(min(_WAVES, count - 2), 1)
+    fade = np.arange(1.0, waves + 1.0) ** -0.5
+    turns = np.array([0.5, 0.0, -0.5])  # 1 - x^2
+    drawn = [np.polynomial.chebyshev.chebmul(turns, fade * random.standard_normal(waves)) for _ in range(2)]
+    branches = np.array([np.pad(one, (0, max(count - len(one), 0)))[:count] for one in drawn])
+    seen = np.array([np.polynomial.chebyshev.chebval(_WINDOW, one) for one in branches])
+    about = seen - np.polynomial.chebyshev.chebval(_WINDOW, np.polynomial.chebyshev.chebfit(_WINDOW, seen.mean(0), 1))
+    return np.concatenate(branches) / float(np.sqrt(np.mean(about * about)))

@@ -1,0 +1,52 @@
+"""A built-in virtual scanner in the range and the size of another one: a shape, in its volts and nanometres."""
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from tablegen.config.scanner import Scanner, ScannerAxis
+from tablegen.numerics.arrays import Floats
+from tablegen.virtual.line_error import ideal_triangle
+from tablegen.virtual.scanner import VirtualAxis, VirtualScanner
+
+_SAME = 0.05  # sizes that differ by less are those of the scanner as it is
+_TICKS = 2000
+
+
+@dataclass(frozen=True)
+class ScaledAxis(VirtualAxis):
+    """An axis that goes ``times`` as far. Its response to small signals is that without the factor."""
+
+    times: float = 1.0
+
+    def settled(self, volts: Floats, tick_s: float) -> Floats:
+        """As ``VirtualAxis.settled``."""
+        return self.times * super().settled(volts, tick_s)
+
+    def follow(self, volts: Floats, tick_s: float, mean_v: float | None = None) -> Floats:
+        """As ``VirtualAxis.follow``."""
+        return self.times * super().follow(volts, tick_s, mean_v)
+
+
+def scaled_to(scanner: VirtualScanner, file: Scanner) -> tuple[VirtualScanner, str]:
+    """The scanner in the drive range of a scanner file, and with its nm per V at ``base_nm``; and what was done.
+
+    Frequencies stay. A scanner that goes as far as the file says within 5 % in both axes, over the same range, is
+    returned as it is, with an empty text.
+    """
+    axes = {name: _scaled(getattr(scanner, name), getattr(file, name), file.v_max) for name in ("x", "y")}
+    same_range = all(axis.v_max == file.v_max for axis in (scanner.x, scanner.y))
+    if same_range and all(abs(axis.times - 1.0) <= _SAME for axis in axes.values()):
+        return scanner, ""
+    k = " and ".join(f"{getattr(file, name).size.k_nm_per_v:g} nm/V in {name}" for name in axes)
+    return VirtualScanner(scanner.name, **axes), f"scaled to 0..{file.v_max:g} V, {k}"
+
+
+def _scaled(axis: VirtualAxis, file: ScannerAxis, v_max: float) -> ScaledAxis:
+    """So that a slow triangle about the middle, of the volts that k gives ``base_nm``, moves ``base_nm``."""
+    share = min(file.size.base_nm / (file.size.k_nm_per_v * v_max), 1.0)
+    drive = 0.5 + share * (ideal_triangle(_TICKS, 0.5) - 0.5)
+    moved = float(np.ptp(axis.hysteresis.settled(drive)))
+    kept: dict[str, Any] = {field.name: getattr(axis, field.name) for field in fields(axis)}
+    return ScaledAxis(**{**kept, "v_max": v_max}, times=file.size.k_nm_per_v * share * v_max / moved)
