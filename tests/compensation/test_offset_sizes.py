@@ -11,6 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tablegen.calibration.size import fit_size
+from tablegen.compensation.line import WantedLine
+from tablegen.compensation.models.harmonic import HarmonicModel
 from tablegen.compensation.offset import OffsetLaw
 from tablegen.compensation.offset_sizes import OffsetSurface, law_of_sizes, surface_of
 from tablegen.compensation.size import SizeLaw
@@ -67,6 +69,16 @@ def test_a_build_takes_m_at_its_size(tmp_path: Path) -> None:
     assert drive.position_nm == small.position_nm(60.0, 100.0, k)
     by_nm = drive_of(tmp_path / "nm", *WITHOUT, SIZES, scan=("- x.offset_v", f"x.offset_nm = {drive.position_nm!r}"))
     assert by_nm.v_offset == pytest.approx(60.0, abs=1e-9)
+
+
+def test_models_see_m_of_small_scans(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The operator knows by itself how the sensitivity depends on the size: ``factor_at`` is that of the smallest."""
+    seen: list[WantedLine] = []
+    line = HarmonicModel.line
+    monkeypatch.setattr(HarmonicModel, "line", lambda self, wanted: seen.append(wanted) or line(self, wanted))
+    drive = drive_of(tmp_path, *WITHOUT, SIZES)
+    assert seen[0].factor_at(0.6) == OffsetLaw.from_ends(0.94, 1.2).factor(2.0 * 60.0 / 100.0 - 1.0) != drive.m
+    assert seen[0].v_amplitude == pytest.approx(drive.v_amplitude, rel=1e-12)
 
 
 def test_sizes_that_are_all_the_same_build_the_same_words(tmp_path: Path) -> None:
