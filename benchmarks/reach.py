@@ -106,7 +106,7 @@ def calibrated(plant: ForeignPlant, folder: Path, protocol: Sequence[tuple[float
             for i, (centre, stroke) in enumerate(traces):
                 columns = record(plant, centre, stroke, seed=i, noise=NOISE)
                 files.append(csv(folder / f"{kind}_{i}.csv", "time_s,drive_v,displacement_nm", columns))
-            delay = ("--delay-s", "fit") if kind == "hysteresis" else ()
+            delay = ("--delay-s", "fit", "--force") if kind == "hysteresis" else ()
             run("calibrate", kind, *files, "--axis", "x", *delay, "--scanner", scanner, "--write")
     return load(folder / "annexin_200nm.toml")
 

@@ -12,6 +12,7 @@ from tablegen.calibration.operator.errors import compare
 from tablegen.calibration.operator.fit import OperatorFit, fit_operator
 from tablegen.calibration.operator.nonnegative import nonnegative
 from tablegen.calibration.operator.periodic_line import PeriodicLine, periodic_line
+from tablegen.compensation.operator.plays import envelopes
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 
@@ -81,6 +82,7 @@ def test_the_family_and_the_creep_are_found() -> None:
         (ManyPlays, TEN, 0.7, (0.15, 0.35, 0.55), 1.5, 0.25, 0.5),
         (ManyPlays, TEN, 0.85, (0.05, 0.15, 0.28), 1.5, 0.25, 0.5),
         (BoucWen, SIX, 0.5, (0.15, 0.35, 0.55, 0.75, 0.9), 3.0, 0.4, 0.5),
+        (BoucWen, SIX, 0.85, (0.05, 0.15, 0.28), 3.0, 0.4, 1.0),
         (BoucWen, TEN, 0.7, (0.15, 0.35, 0.55), 3.0, 0.4, 0.5),
     ],
 )
@@ -159,3 +161,38 @@ def test_a_line_is_averaged_from_any_record(periods: int, samples: int, turn: fl
     expected = np.interp(phase, np.arange(4096) / 4096, exact, period=1.0)
     difference = found.displacement_nm - expected
     assert float(np.std(difference)) < 0.004 * float(np.ptp(exact))
+
+
+def test_traces_of_every_kind_together() -> None:
+    """Few periods, noise, early and late turns, few samples and two rates."""
+    plant = ForeignPlant(ManyPlays())
+    kinds: list[dict[str, float]] = [
+        {"periods": 2},
+        {"turn": 0.3},
+        {"rate_hz": 3.0},
+        {"samples": 90},
+        {"noise": 0.005, "turn": 0.7},
+        {"turn": 0.95},
+    ]
+    lines = []
+    for seed, ((centre, stroke), kind) in enumerate(zip(SIX, kinds, strict=True)):
+        trace = Trace(str(seed), *record(plant, centre, stroke, seed=seed, **kind))  # type: ignore[arg-type]
+        lines.append(periodic_line(trace, 100.0))
+    fit = fit_operator(lines, Response(plant), factor_of(plant))
+    assert fit.family == "plays"
+    assert fit.operator.creep.loss_per_decade == pytest.approx(0.026, abs=0.002)
+    for stroke in (0.15, 0.35, 0.55, 0.75, 0.9):
+        noiseless = line(plant, 0.5, stroke, 0, noise=0.0).without(Response(plant), fit.operator.creep)
+        found = compare(noiseless, fit.operator.loop(noiseless.low, noiseless.high))
+        assert found.rms < 0.12
+        assert found.mismatch < 0.25
+
+
+def test_fitted_envelopes_are_those_of_the_plant() -> None:
+    plant, fit = identified(ManyPlays, TEN)
+    assert isinstance(plant.core, ManyPlays)
+    u = np.linspace(0.0, 1.0, 101)
+    bow = u * (1.0 - u)
+    true = np.sort([u + linear * bow + skew * bow * (u - 0.5) for linear, skew in plant.core.bends], axis=0)
+    (bend,) = fit.operator.family.bends
+    assert np.stack(envelopes(u, bend)) == pytest.approx(true, abs=0.01)
