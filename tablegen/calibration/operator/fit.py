@@ -7,6 +7,7 @@ from itertools import product
 import numpy as np
 
 from tablegen.calibration.operator.branches import Left, left_of
+from tablegen.calibration.operator.creep_fit import creep_of_fields, creep_of_plays
 from tablegen.calibration.operator.errors import WORST, LineErrors, compare
 from tablegen.calibration.operator.family import fit_plays, groups_of
 from tablegen.calibration.operator.periodic_line import PeriodicLine
@@ -21,11 +22,9 @@ from tablegen.problems import Unphysical
 STROKE_LENGTHS = (0.4, 0.8, 1.5, 3.0)
 CENTRE_LENGTHS = (0.5, 1.0, 2.0)
 _NOISE = 1e-5  # variance of the noise, of the field's
-_LOSSES = tuple(0.004 * i for i in range(13))  # of creep, per decade
 _MIN_LINES = 3
 _MIN_SPREAD = 2.0  # of the largest stroke over the smallest
 _MAX_NOISE_PERCENT = 1.0
-_DECADES = 1.0  # by which creep is taken to go on beyond the frequencies that were measured
 
 Factor = Callable[[float], float]
 
@@ -55,9 +54,9 @@ def fit_operator(lines: Sequence[PeriodicLine], response: Response | None, facto
     _check(lines)
     still = [line.without(response, None) for line in lines]
     main = _main_centre(still)
-    creep = _fit_creep(still, main)
     found: list[OperatorFit] = []
-    for name, late in (("plays", creep), ("none", NO_CREEP)):
+    creeps = {"plays": creep_of_plays(still, main), "none": creep_of_fields(still, _straight(still), factor)}
+    for name, late in creeps.items():
         settled = [line.without(None, late) for line in still]
         found.append(_fit_family(name, settled, late, main, factor))
     best = min(found, key=lambda one: one.candidates[one.family])
@@ -89,44 +88,6 @@ def _main_centre(lines: Sequence[PeriodicLine]) -> float:
     groups = groups_of([line.centre for line in lines])
     most = max(set(groups), key=groups.count)
     return float(np.mean([line.centre for line, group in zip(lines, groups, strict=True) if group == most]))
-
-
-def _fit_creep(lines: Sequence[PeriodicLine], main: float) -> LogarithmicCreep:
-    """The loss per decade with which plays describe the lines best: a parabola through the best of some."""
-    low = min(line.rate_hz for line in lines)
-    high = max(line.rate_hz for line in lines)
-    reference = float(np.exp(np.mean([np.log(line.rate_hz) for line in lines])))
-    fastest, slowest = 10.0 ** (-2.0 - _DECADES) / high, 10.0**_DECADES / low
-
-    def creep(loss: float) -> LogarithmicCreep:
-        return LogarithmicCreep(loss, fastest, slowest, reference)
-
-    def misfit(loss: float) -> float:
-        settled = [line.without(None, creep(loss)) for line in lines]
-        family = fit_plays(settled, main)
-        return float(np.sqrt(np.mean([_misfit(line, family) ** 2 for line in settled])))
-
-    coarse = [misfit(loss) for loss in _LOSSES[::3]]
-    best = 3 * int(np.argmin(coarse))
-    around = [i for i in range(best - 2, best + 3) if 0 <= i < len(_LOSSES)]
-    fine = {i: misfit(_LOSSES[i]) for i in around}
-    at = min(fine, key=lambda i: fine[i])
-    loss = _LOSSES[at]
-    if at - 1 in fine and at + 1 in fine:
-        left, middle, right = fine[at - 1] ** 2, fine[at] ** 2, fine[at + 1] ** 2
-        bend = left - 2.0 * middle + right
-        if bend > 0.0:
-            loss += 0.5 * (left - right) / bend * (_LOSSES[1] - _LOSSES[0])
-    return creep(round(loss, 6)) if loss > 0.0 else replace(NO_CREEP, reference_hz=reference)
-
-
-def _misfit(line: PeriodicLine, family: Plays) -> float:
-    """What a family leaves of a line, of its stroke in nm, with a gain and an offset of its own."""
-    u = line.drive
-    both = (family.branch(u, line.low, line.high, going) for going in (True, False))
-    modelled = np.where(line.rising, *both)
-    gain, offset = np.polyfit(modelled, line.displacement_nm, 1)
-    return float(np.std(line.displacement_nm - gain * modelled - offset)) / float(np.ptp(line.displacement_nm))
 
 
 def _fit_family(

@@ -89,6 +89,7 @@ class OperatorModel(WithBranches, frozen=True, kw_only=True, tag="operator"):
 def _line(operator: Operator, wanted: WantedLine) -> OperatorLine:
     centre = wanted.v_offset / wanted.v_max
     factor = wanted.factor_at(centre) / wanted.factor_at(operator.centre)
+    operator = replace(operator, creep=operator.creep.down_to(wanted.rate_hz))
     if wanted.rate_gain is not None:  # (23) says what the rate does to the size; creep then only bends the line
         reference = operator.creep.reference_hz
         factor *= wanted.rate_gain(wanted.rate_hz) / wanted.rate_gain(reference)

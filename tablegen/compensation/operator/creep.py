@@ -4,7 +4,7 @@ C(f) = 1 + sum_k a / (1 + i f / f_k), with f_k spaced evenly over the decades; w
 to the next is ``loss_per_decade`` of the displacement.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
 
 import numpy as np
@@ -13,6 +13,7 @@ from tablegen.numerics.arrays import Floats
 from tablegen.numerics.elementary import exp
 
 _TERMS_PER_DECADE = 3
+_PERIODS = 10.0  # of a line: terms that are slower only shift it
 _LN10 = 2.302585092994046
 
 
@@ -24,6 +25,10 @@ class LogarithmicCreep:
     fastest_s: float
     slowest_s: float
     reference_hz: float
+
+    def down_to(self, rate_hz: float) -> "LogarithmicCreep":
+        """The same, with terms as slow as lines of this rate show: creep knows no slowest time."""
+        return replace(self, slowest_s=max(self.slowest_s, _PERIODS / rate_hz))
 
     def response(self, f_hz: Floats) -> tuple[Floats, Floats]:
         """Real and imaginary part of C(f) / |C(reference)|."""
