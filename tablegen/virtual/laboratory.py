@@ -24,6 +24,8 @@ from tablegen.compensation import models
 from tablegen.compensation.size import SizeLaw
 from tablegen.config.load import Setup
 from tablegen.config.scanner import Frequency, Offset, Resonance, ScannerAxis, Size
+from tablegen.numerics.arrays import Floats
+from tablegen.problems import Unphysical
 from tablegen.virtual.experiments import actual_sizes, apparent_sizes, frequency_response, sensor_trace
 from tablegen.virtual.imaging import grating, hexagonal, image_pair
 from tablegen.virtual.scanner import VirtualAxis, VirtualScanner
@@ -97,18 +99,29 @@ class _Day:
     def fits(self, amplitudes: Sequence[float], images: bool) -> dict[str, Fit]:
         """Everything that can be calibrated; a resonance only where the scanner file has one."""
         size = self._size()
-        fits: dict[str, Fit] = {"offset": self._offset(size), "size": size}
-        if images:
-            fits["hysteresis"] = self._imaged_hysteresis(amplitudes)
+        offset = self._offset(size)
+        imaged = self._imaged_hysteresis(amplitudes) if images else None
         traces = [] if images else self._traces(amplitudes)
-        fits["frequency"] = self._frequency()
-        delay_s = 0.0
+        gains = self._gains()
+        resonance, delay_s = None, 0.0
         if self._before.resonance is not None:
-            fits["resonance"] = found = self._resonance(self._before.resonance)
+            try:
+                resonance = self._resonance(self._before.resonance)
+            except Unphysical:
+                if traces:  # of two reasons that of the hysteresis is told: without it there is nothing to correct
+                    fit_hysteresis(traces, self._v_max)
+                raise
             # A build undoes this lag by the resonance; left in the loops, it would be undone by them once more.
-            delay_s = found.delay_s.value + 1.0 / (2.0 * pi * found.frequency_hz.value * found.quality.value)
-        if traces:
-            fits["hysteresis"] = fit_hysteresis(traces, self._v_max, delay_s=delay_s)
+            lag_s = 1.0 / (2.0 * pi * resonance.frequency_hz.value * resonance.quality.value)
+            delay_s = resonance.delay_s.value + lag_s
+        fits: dict[str, Fit] = {
+            "offset": offset,
+            "size": size,
+            "hysteresis": imaged or fit_hysteresis(traces, self._v_max, delay_s=delay_s),
+            "frequency": fit_frequency(gains["frequency_hz"], gains["gain"], self._reference_hz),
+        }
+        if resonance is not None:
+            fits["resonance"] = resonance
         return fits
 
     def scanner_axis(self, fits: dict[str, Fit], points: bool) -> ScannerAxis:
@@ -182,11 +195,10 @@ class _Day:
         """The rate, in Hz, with the scan's tip velocity, and no faster than the scan, as the paper does."""
         return self._rate_hz * min(self._scan_v / volts, 1.0)
 
-    def _frequency(self) -> Fit:
+    def _gains(self) -> dict[str, Floats]:
         """Two decades about the reference, below a tenth of any resonance."""
         f = self._reference_hz * np.geomspace(0.1, 10.0, 15)
-        found = frequency_response(self._axis, f, noise=self._noise, seed=self._next())
-        return fit_frequency(found["frequency_hz"], found["gain"], self._reference_hz)
+        return frequency_response(self._axis, f, noise=self._noise, seed=self._next())
 
     def _resonance(self, before: Resonance) -> ResonanceFit:
         near = before.frequency_hz or 1e4

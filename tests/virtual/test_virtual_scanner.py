@@ -25,17 +25,17 @@ from tablegen.virtual.simulation import models_of, run_line, simulate
 SCANNER = VirtualScanner.of(load_truth())
 X, Y = SCANNER.x, SCANNER.y
 TICKS = 4000
-TIMES = np.arange(TICKS) / TICKS
+TIMES = (np.arange(TICKS) + 0.5) / TICKS  # a tick holds what its middle asks for
 
 
 def measured(
     w: Floats, size_v: float, offset_v: float = 50.0, axis: VirtualAxis = X, rate_hz: float = 100.0
 ) -> LineError:
-    return line_error(axis.settled(offset_v + size_v * (w - 0.5), 1.0 / (rate_hz * TICKS)), 0.5)
+    return line_error(axis.settled(offset_v + size_v * (w - 0.5), 1.0 / (rate_hz * TICKS)), 0.5, first=0.5)
 
 
 def triangle(size_v: float, offset_v: float = 50.0, axis: VirtualAxis = X, rate_hz: float = 100.0) -> LineError:
-    return measured(ideal_triangle(TICKS, 0.5), size_v, offset_v, axis, rate_hz)
+    return measured(ideal_triangle(TICKS, 0.5, 0.5), size_v, offset_v, axis, rate_hz)
 
 
 def test_residual_at_full_scale() -> None:
@@ -111,8 +111,9 @@ def test_one_factor_serves_all_sizes(axis: VirtualAxis, targets: Targets, rate_h
 def test_growth_of_the_hysteresis() -> None:
     """Equation (22) with figure 5k's values, to 0.8 % and 1.5 % of the scan; docs/virtual.md says why not better."""
     for size_v in (13.0, 20.0, 30.0, 50.0, 70.0, 100.0):
-        error, v = triangle(size_v), size_v / 100.0
-        assert -error.forward.peak[0] / 100.0 == pytest.approx(beta_at(v, 0.037, 4.0), abs=0.0085)
+        # As slow as the paper's: at 100 Hz amplifier and resonance are 1 us late, which adds 0.02 % to a loop.
+        error, v = triangle(size_v, rate_hz=20.0), size_v / 100.0
+        assert -error.forward.peak[0] / 100.0 == pytest.approx(beta_at(v, 0.037, 4.0), abs=0.0083)
         assert error.backward.peak[0] / 100.0 == pytest.approx(beta_at(v, 0.08, 1.5), abs=0.0155)
 
 
