@@ -14,6 +14,8 @@ from tablegen.compensation.line import LineShape, WantedLine, WholeLine
 from tablegen.compensation.operator.file import read_operator
 from tablegen.compensation.operator.operator import Operator
 from tablegen.compensation.operator.scan_line import Expected, Found, Wanted, find_waveform
+from tablegen.compensation.operator.transient import after_offset, after_size
+from tablegen.compensation.transient import Transient
 from tablegen.figures import shown_path
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Rejected, Unphysical
@@ -24,6 +26,7 @@ from tablegen.waveform.window_fit import fit_window
 # An operator serves strokes this far beyond the largest that was measured, and centres this far from any, of v_max.
 STROKE_REACH = 0.05
 CENTRE_REACH = 0.4
+_SLOWEST_HZ = 0.01  # of frames over which drift is followed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,12 +34,19 @@ class OperatorLine(WholeLine):
     """The line, what the operator expects of it, and how far it is from what was measured.
 
     ``uncertainty`` is what the operator is wrong by where it predicts a trace that it was not made of; ``distance`` is
-    that of stroke or centre to the nearest trace, of v_max.
+    that of stroke or centre to the nearest trace, of v_max. ``after`` is what follows a change of offset and one
+    of size.
     """
 
     expected: Expected
     uncertainty: Expected
     distance: float
+    after: tuple[Transient, Transient]
+
+    @property
+    def transients(self) -> tuple[Transient, Transient]:
+        """Both."""
+        return self.after
 
 
 class OperatorModel(WithBranches, frozen=True, kw_only=True, tag="operator"):
@@ -117,6 +127,7 @@ def _line(operator: Operator, wanted: WantedLine) -> OperatorLine:
     start = fit_window(straight, wanted.harmonics, wanted.window, wanted.both)
     found = find_waveform(operator, line, start, through, None if response is None else dynamics)
     _check_reach(operator, found, wanted.v_max)
+    late = replace(operator, creep=operator.creep.down_to(_SLOWEST_HZ))  # for all that a few frames may last
     # w = 0 and 1 are the ends of the laws' amplitude everywhere else.
     scale = found.v_amplitude * wanted.v_max / wanted.v_amplitude
     series = FourierSeries(0.5 + scale * (found.series.a0 - 0.5), scale * found.series.a, scale * found.series.b)
@@ -126,6 +137,10 @@ def _line(operator: Operator, wanted: WantedLine) -> OperatorLine:
         expected=found.expected,
         uncertainty=_uncertainty(operator),
         distance=operator.distance(found.stroke, found.centre),
+        after=(
+            after_offset(late, found.stroke, found.centre, factor, wanted.turn),
+            after_size(late, found.stroke, found.centre, factor, wanted.turn),
+        ),
     )
 
 
