@@ -99,6 +99,7 @@ bench: $(VENV)/installed
 figures: $(VENV)/installed-plot
 	$(BIN)/python docs/figures/make_figures.py
 	$(BIN)/python docs/figures/make_virtual.py
+	$(BIN)/python docs/figures/make_operator.py
 
 paper: $(VENV)/installed-plot
 	$(BIN)/python docs/make_paper.py

@@ -22,15 +22,17 @@ from refining import (  # noqa: E402
     rounds,
 )
 
+from tablegen.virtual.parameters import BUILT_IN  # noqa: E402
 
-def reached() -> str:
+
+def reached(plant: str) -> str:
     """A row a round of every scan: true errors of the virtual scanner, not what its sensor saw."""
     rows = [
         "| scan | rounds | residual forward | backward | scaling forward | backward | by extremes forward | backward |",
         "|---|---|---|---|---|---|---|---|",
     ]
     for scan in SCANS:
-        for count, step in enumerate(rounds(calibrated(scan), scan.axis, ROUNDS)):
+        for count, step in enumerate(rounds(calibrated(scan, plant), scan.axis, ROUNDS, plant=plant)):
             rows.append(f"| {scan.name if count == 0 else ''} | {count} | {_figures(step)} |")
     return "\n".join(rows) + "\n"
 
@@ -43,10 +45,10 @@ def _figures(step: Step) -> str:
     return " | ".join(" | ".join(one + ["-"] * (2 - len(one))) for one in (residual, scaling, extremes))
 
 
-def served() -> str:
+def served(plant: str) -> str:
     """A row a change of the scan: what is left with the layer, and without one."""
     rows = ["| scan | with the layer | without |", "|---|---|---|"]
-    for what, kept, without in elsewhere():
+    for what, kept, without in elsewhere(plant):
         rows.append(f"| {what} | {_short(kept)} | {_short(without)} |")
     return "\n".join(rows) + "\n"
 
@@ -55,11 +57,15 @@ def _short(step: Step) -> str:
     return f"{step.true.rms_percent:.3f} rms, {max(step.true.scaling_percent.values()):.1f} % scaling error"
 
 
+TABLES = (("reached", reached), ("elsewhere", served))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--write", action="store_true", help=f"put the tables into {PAGE.name}")
     given = parser.parse_args()
-    for mark, text in (("reached", reached()), ("elsewhere", served())):
+    tables = [(f"{mark} {plant}", make(plant)) for plant in BUILT_IN for mark, make in TABLES]
+    for mark, text in tables:
         print(text)
         if given.write:
             page = PAGE.read_text("utf-8")

@@ -25,7 +25,7 @@ class Kind:
 
 
 # docs/inputs.md has this table.
-CONFIGURATION = Kind("a scan or scanner file", 1 << 20)
+CONFIGURATION = Kind("a scan, scanner or operator file", 1 << 20)
 RESPONSE = Kind("a measured response", 16 << 20)
 MEASUREMENT = Kind("a CSV file of measurements", 512 << 20)
 IMAGE = Kind("an image", 256 << 20)

@@ -6,6 +6,7 @@ from math import log10, sqrt
 
 import numpy as np
 
+from tablegen.certificate.expected import expected_of
 from tablegen.certificate.line_errors import (
     EmittedPeriod,
     Refined,
@@ -14,6 +15,7 @@ from tablegen.certificate.line_errors import (
     refined,
     scaling_error,
 )
+from tablegen.compensation.expectation import Expectation
 from tablegen.compensation.line import Sweep
 from tablegen.planning.line_plan import LinePlan, Plan
 from tablegen.problems import Document, Problem
@@ -24,6 +26,7 @@ class Certificate:
     """The error budget of one axis. Codes and LSB are the converter's; dB are of power, relative to the scan's.
 
     ``refinement`` is what the layer of ``tablegen refine`` moves, where there is one; it is not counted as an error.
+    ``expected`` is what the scanner should do with the line; everything else is of the waveform.
     """
 
     ticks: int
@@ -40,6 +43,7 @@ class Certificate:
     beyond_cutoff_db: float
     at_resonance_db: float | None
     refinement: dict[str, Refined] | None = None
+    expected: Expectation | None = None
 
     @property
     def scaling_error_percent(self) -> float:
@@ -129,6 +133,7 @@ def _certify(line: LinePlan) -> Certificate:
         refinement=None
         if line.layer is None
         else {side: refined(line, side, branch) for side, branch in _directions(line).items()},
+        expected=expected_of(line),
     )
 
 

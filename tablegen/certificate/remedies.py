@@ -4,7 +4,7 @@ A change is searched for along one key at a time, and only along those that act 
 trials, so that the search ends soon where nothing helps.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from math import ceil, copysign, log2
 from typing import Any
@@ -14,6 +14,7 @@ from msgspec import structs
 
 from tablegen.certificate.certificate import scaling_errors
 from tablegen.certificate.excess import Cause, Excess, excess
+from tablegen.certificate.expected import expected_of
 from tablegen.certificate.line_errors import EmittedPeriod
 from tablegen.config.load import Setup
 from tablegen.config.schema import FastAxis
@@ -58,11 +59,29 @@ def tried(setup: Setup, plan: Plan, line: LinePlan, found: Excess, most: float |
     ``found`` is what the axis exceeds, ``most`` as in ``excess``. Where a change of the scan alone is enough, no other
     is looked for; of the hardware, both converter and amplifier are. A change that no plan can be made of is left out.
     """
+    return _tried(_WAYS[found.cause](setup, plan, line, found), lambda change: _trial(setup, plan, line, change, most))
+
+
+def tried_on_operator(setup: Setup, plan: Plan, line: LinePlan, most: float) -> list[Remedy]:
+    """The same for the scaling error that the operator of an axis expects of its waveform: at most ``most`` percent."""
+
+    def trial(change: Change) -> Remedy | None:
+        other = _planned(setup, change)
+        expected = other and expected_of(other.x if line.axis == "x" else other.y)
+        if other is None or not expected:
+            return None
+        left = max(figure.value for figure in expected.scaling.values())
+        return Remedy(_text(change), left, left <= most, _keeps_the_error(plan, other))
+
+    return _tried(_other_bands(setup, plan, line), trial)
+
+
+def _tried(ways: Iterable[Iterable[Change]], trial: Callable[[Change], Remedy | None]) -> list[Remedy]:
     remedies = []
-    for changes in _WAYS[found.cause](setup, plan, line, found):
+    for changes in ways:
         best: Remedy | None = None
         for change in changes:
-            one = _trial(setup, plan, line, change, most)
+            one = trial(change)
             if one is not None and (best is None or one.percent < best.percent):
                 best = one
             if best is not None and best.low:
@@ -89,14 +108,23 @@ def changed(setup: Setup, change: Change) -> Setup:
 
 def _trial(setup: Setup, plan: Plan, line: LinePlan, change: Change, most: float | None) -> Remedy | None:
     """Plan and measure one change; None where it cannot be planned."""
-    try:
-        other = make_plan(changed(setup, change))
-    except Rejected:
+    other = _planned(setup, change)
+    if other is None:
         return None
     scaling = scaling_errors(other.x if line.axis == "x" else other.y)
     left = max(max(one.total, one.band_limit, abs(one.size)) for one in scaling.values())
-    text = " with ".join(f"{key} = {_value(value)}" for key, value in change.items() if value is not None)
-    return Remedy(text, left, excess(scaling, most) is None, _keeps_the_error(plan, other))
+    return Remedy(_text(change), left, excess(scaling, most) is None, _keeps_the_error(plan, other))
+
+
+def _planned(setup: Setup, change: Change) -> Plan | None:
+    try:
+        return make_plan(changed(setup, change))
+    except Rejected:
+        return None
+
+
+def _text(change: Change) -> str:
+    return " with ".join(f"{key} = {_value(value)}" for key, value in change.items() if value is not None)
 
 
 def _keeps_the_error(plan: Plan, other: Plan) -> bool:
@@ -151,11 +179,16 @@ def _amplifiers(setup: Setup, plan: Plan, found: Excess) -> Iterator[Change]:
 
 
 def _against_band_limit(setup: Setup, plan: Plan, line: LinePlan, found: Excess) -> Iterator[Iterator[Change]]:
+    if line.band_limit.method != "window":
+        yield iter([{f"{line.axis}.band_limit.method": "window"}])
+    yield from _other_bands(setup, plan, line)
+
+
+def _other_bands(setup: Setup, plan: Plan, line: LinePlan) -> Iterator[Iterator[Change]]:
+    """More harmonics, or a narrower window; first what helps more."""
     axis = line.axis
     scan: FastAxis = getattr(setup.scan, axis)
     limit, harmonics = scan.band_limit, line.series.harmonics
-    if limit.method != "window":
-        yield iter([{f"{axis}.band_limit.method": "window"}])
     low, high = limit.window
     windows = [(max(low, margin), min(high, round(1.0 - margin, 9))) for margin in _MARGINS]
     narrower = ({f"{axis}.band_limit.window": window} for window in windows if window != (low, high))

@@ -1,30 +1,44 @@
 """Warnings of a scan that is worse than it should be: the error, its cause, and remedies that were tried."""
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 from tablegen.certificate.certificate import Certificate
+from tablegen.certificate.doubts import Doubt, doubts
 from tablegen.certificate.excess import Excess, excess
 from tablegen.certificate.matching import apart_warning
 from tablegen.config.load import Setup
 from tablegen.planning.line_plan import LinePlan, Plan
 from tablegen.problems import Problem
 
+if TYPE_CHECKING:
+    from tablegen.certificate.remedies import Remedy
+
 
 def brief_warnings(plan: Plan, certificates: Mapping[str, Certificate]) -> list[str]:
-    """What exceeds 1 % or the uncompensated line, a sentence an axis, without remedies: it costs nothing."""
-    return [found.text(line.axis) for line, found in _found(plan, certificates)]
+    """What exceeds 1 % or the uncompensated line, and what is to be doubted, without remedies: it costs nothing."""
+    return [
+        *(found.text(line.axis) for line, found in _found(plan, certificates)),
+        *(doubt.text for _, doubt in _doubts(plan, certificates)),
+    ]
 
 
 def scan_warnings(setup: Setup, plan: Plan, certificates: Mapping[str, Certificate]) -> list[Problem]:
     """The same with remedies, each at the key that the cause stands at. Every remedy was planned and measured.
 
-    And what trace and retrace are apart by ticks alone, where that is more than a quarter of a pixel.
+    And what is to be doubted of what is expected on the scanner; and what trace and retrace are apart by ticks alone,
+    where that is more than a quarter of a pixel.
     """
     warnings = []
     for line, found in _found(plan, certificates):
         share = _share(line, found, certificates[line.axis])
         why = f"{found.text(line.axis)}; {share}{_advice(setup, plan, line, found)}"
         warnings.append(setup.scan_file.problem(_key(setup, line, found), why))
+    for line, doubt in _doubts(plan, certificates):
+        key, advice = _size_key(setup, line), ""
+        if doubt.kind == "scaling error":
+            key, advice = _band_key(setup, line), "; " + _advice_on_operator(setup, plan, line, doubt)
+        warnings.append(setup.scan_file.problem(key, doubt.text + advice))
     if apart := apart_warning(plan):
         given = setup.scan.timing.ticks_per_line is not None
         warnings.append(setup.scan_file.problem(f"timing.{'ticks_per_line' if given else 'line_rate_hz'}", apart))
@@ -42,12 +56,21 @@ def limit_advice(setup: Setup, plan: Plan, certificates: Mapping[str, Certificat
 def _advice(setup: Setup, plan: Plan, line: LinePlan, found: Excess, most: float | None = None) -> str:
     from tablegen.certificate.remedies import tried  # only a scan that needs them pays for them
 
-    remedies = tried(setup, plan, line, found, most)
+    return _in_words(tried(setup, plan, line, found, most), abs(found.percent))
+
+
+def _advice_on_operator(setup: Setup, plan: Plan, line: LinePlan, doubt: Doubt) -> str:
+    from tablegen.certificate.remedies import tried_on_operator
+
+    return _in_words(tried_on_operator(setup, plan, line, doubt.limit), doubt.percent)
+
+
+def _in_words(remedies: "list[Remedy]", percent: float) -> str:
     good = [str(one) for one in remedies if one.enough]
     best = min(remedies, key=lambda one: one.percent, default=None)
     if good:
         return f"tried: {'; or '.join(good)}"
-    if best is not None and best.percent < 0.9 * abs(found.percent):
+    if best is not None and best.percent < 0.9 * percent:
         return f"no remedy that was tried is enough; the best: {best}"
     return "no remedy that was tried helps"
 
@@ -55,6 +78,11 @@ def _advice(setup: Setup, plan: Plan, line: LinePlan, found: Excess, most: float
 def _found(plan: Plan, certificates: Mapping[str, Certificate]) -> list[tuple[LinePlan, Excess]]:
     every = [(line, excess(certificates[line.axis].scaling)) for line in plan.lines]
     return [(line, found) for line, found in every if found is not None]
+
+
+def _doubts(plan: Plan, certificates: Mapping[str, Certificate]) -> list[tuple[LinePlan, Doubt]]:
+    most = plan.limits.max_scaling_error_percent
+    return [(line, doubt) for line in plan.lines for doubt in doubts(line, certificates[line.axis], most)]
 
 
 def _share(line: LinePlan, found: Excess, certificate: Certificate) -> str:
@@ -70,10 +98,18 @@ def _share(line: LinePlan, found: Excess, certificate: Certificate) -> str:
 
 
 def _key(setup: Setup, line: LinePlan, found: Excess) -> str:
+    if found.cause == "quantisation":
+        return _size_key(setup, line)
+    if line.band_limit.method != "window" and found.cause == "band limit":
+        return f"{line.axis}.band_limit.method"
+    return _band_key(setup, line)
+
+
+def _size_key(setup: Setup, line: LinePlan) -> str:
+    return f"{line.axis}.{'size_v' if getattr(setup.scan, line.axis).size_v is not None else 'size_nm'}"
+
+
+def _band_key(setup: Setup, line: LinePlan) -> str:
     axis = line.axis
     scan = getattr(setup.scan, axis)
-    if found.cause == "quantisation":
-        return f"{axis}.{'size_v' if scan.size_v is not None else 'size_nm'}"
-    if scan.band_limit.method != "window" and found.cause == "band limit":
-        return f"{axis}.band_limit.method"
     return f"{axis}.band_limit.{'harmonics' if scan.band_limit.cutoff_hz is None else 'cutoff_hz'}"

@@ -8,6 +8,7 @@ import numpy as np
 from tablegen.certificate.certificate import Certificate
 from tablegen.certificate.excess import excess
 from tablegen.certificate.matching import apart_note, apart_percent
+from tablegen.compensation.expectation import Expectation, Figure
 from tablegen.compensation.hold import hold_inverse
 from tablegen.planning.line_plan import LinePlan, Plan
 from tablegen.planning.settling import settling, settling_text
@@ -94,6 +95,7 @@ def certificate_lines(certificate: Certificate) -> list[tuple[str, str]]:
     for side, r in (c.refinement or {}).items():
         moves = f"moves up to {_percent(r.position)} % of the line, takes away {_percent(r.scaling)} % peak to peak"
         rows.append(("refined " + side, moves))
+    rows += _expected(c.expected)
     rows += [
         (
             "codes",
@@ -106,6 +108,35 @@ def certificate_lines(certificate: Certificate) -> list[tuple[str, str]]:
         ("beyond cutoff", f"{c.beyond_cutoff_db:.1f} dB" + _resonance(c)),
     ]
     return rows
+
+
+def _expected(expectation: Expectation | None) -> list[tuple[str, str]]:
+    """What to expect on the scanner; no figure without its uncertainty, or a word that there is none."""
+    if expectation is None:
+        return []
+    if expectation.basis == "laws":
+        assert expectation.mismatch is not None
+        apart = _percent(expectation.mismatch.value)
+        return [
+            ("on the scanner", f"trace and retrace up to {apart} % of the line apart by the laws, since turnarounds"),
+            ("", "are rounded; no measured uncertainty"),
+        ]
+    rows = [
+        (f"{what} {side}", figure)
+        for what, sides in (("rms", expectation.rms), ("scaling", expectation.scaling))
+        for side, figure in sides.items()
+    ]
+    rows += [(what, one) for what, one in (("mismatch", expectation.mismatch), ("size", expectation.size)) if one]
+    texts = [f"{what} {_figure(figure, what == 'size')}" for what, figure in rows]
+    lines = [", ".join(texts[i : i + 2]) for i in range(0, len(texts), 2)]
+    if expectation.distance is not None:
+        lines.append(f"nearest measured line {expectation.distance:.2g} % of v_max away")
+    return [("" if i else "on the scanner", text) for i, text in enumerate(lines)]
+
+
+def _figure(figure: Figure, signed: bool) -> str:
+    value = f"{figure.value:+.2g}" if signed else f"{figure.value:.2g}"
+    return f"{value} %" if figure.uncertainty is None else f"{value} +- {figure.uncertainty:.2g} %"
 
 
 def _resonance(certificate: Certificate) -> str:

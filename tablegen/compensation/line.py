@@ -14,6 +14,7 @@ from typing import Any, Self
 import numpy as np
 
 from tablegen.compensation.dynamics import Response
+from tablegen.compensation.expectation import Expectation
 from tablegen.compensation.transient import Transient
 from tablegen.numerics.arrays import Bools, Floats, FloatsLike
 from tablegen.problems import Document, Problems, Unphysical
@@ -96,6 +97,11 @@ class LineShape:
     @property
     def transients(self) -> tuple[Transient, Transient] | None:
         """What follows a change of offset and one of size, where the model knows."""
+        return None
+
+    @property
+    def expectation(self) -> Expectation | None:
+        """What the model expects of the line on the scanner, where it knows more than its branches."""
         return None
 
     def value(self, t: FloatsLike) -> Floats:

@@ -131,6 +131,24 @@ class ManifestOutput(Struct):
     word_bits: Annotated[int, Meta(ge=8, le=32)]
 
 
+class ManifestFigure(Struct):
+    """A figure in percent, and what it is uncertain by."""
+
+    value: float
+    uncertainty: float | None = None
+
+
+class ManifestExpected(Struct):
+    """What the scanner should do with the line, by an operator or by the laws of the scanner file."""
+
+    basis: Literal["traces", "laws"]
+    rms_percent: dict[str, ManifestFigure] = {}
+    scaling_percent: dict[str, ManifestFigure] = {}
+    mismatch_percent: ManifestFigure | None = None
+    size_percent: ManifestFigure | None = None
+    distance_percent: float | None = None
+
+
 class ManifestCertificate(Struct):
     """What the build promised of an axis."""
 
@@ -148,6 +166,7 @@ class ManifestCertificate(Struct):
     at_resonance_db: float | None = None
     scaling_error_percent: dict[str, dict[str, float]] | None = None
     refinement_percent: dict[str, dict[str, float]] | None = None
+    expected: ManifestExpected | None = None
 
 
 class ManifestAxis(Struct):

@@ -9,6 +9,7 @@ import numpy as np
 from tablegen.certificate.certificate import Certificate
 from tablegen.certificate.line_errors import Refined, ScalingError
 from tablegen.compensation.dynamics import capped_inverse
+from tablegen.compensation.expectation import Expectation, Figure
 from tablegen.device.schedule import Schedule, Window
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, Plan
@@ -29,12 +30,32 @@ def certificate_record(certificate: Certificate) -> dict[str, Any]:
     record: dict[str, Any] = {
         name: _figure(getattr(certificate, name))
         for name in certificate.__dataclass_fields__
-        if name not in ("scaling", "refinement")
+        if name not in ("scaling", "refinement", "expected")
     }
     record["max_error_lsb"] = _bound(certificate.max_error_lsb)
     record["scaling_error_percent"] = _sides(certificate.scaling)
     if certificate.refinement is not None:
         record["refinement_percent"] = _sides(certificate.refinement)
+    if certificate.expected is not None:
+        record["expected"] = _expected(certificate.expected)
+    return record
+
+
+def _expected(expectation: Expectation) -> dict[str, Any]:
+    """What is known of it."""
+
+    def pair(figure: Figure) -> dict[str, Any]:
+        return {"value": _figure(figure.value), "uncertainty": _figure(figure.uncertainty)}
+
+    record: dict[str, Any] = {"basis": expectation.basis}
+    for name, sides in (("rms", expectation.rms), ("scaling", expectation.scaling)):
+        if sides:
+            record[f"{name}_percent"] = {side: pair(figure) for side, figure in sides.items()}
+    for name, figure in (("mismatch", expectation.mismatch), ("size", expectation.size)):
+        if figure is not None:
+            record[f"{name}_percent"] = pair(figure)
+    if expectation.distance is not None:
+        record["distance_percent"] = _figure(expectation.distance)
     return record
 
 

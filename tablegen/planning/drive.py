@@ -1,6 +1,7 @@
 """What is applied to one axis, factor by factor: V(t) = V_offset + m g V_scan (w(t) - 1/2)."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from tablegen.compensation import models
@@ -23,7 +24,8 @@ class Drive:
     """The voltages at the piezo, and every factor that went into them.
 
     ``v_scan`` is from (9)/(12), before ``m`` of (1) and ``g`` of (23). The amplitude played is m g v_scan, peak to
-    peak, for w from 0 to 1. ``position_nm`` is that of the offset, above the one at 0 V.
+    peak, for w from 0 to 1. ``position_nm`` is that of the offset, above the one at 0 V. ``line_at`` is the line that
+    the model makes at another normalised scan voltage, None where it makes none.
     """
 
     v_max: float
@@ -43,6 +45,7 @@ class Drive:
     shape: LineShape
     response: Response | None
     max_boost_db: float
+    line_at: Callable[[float], LineShape | None] = field(compare=False, repr=False)
 
     @property
     def model(self) -> str:
@@ -133,29 +136,34 @@ def compensate(setup: Setup, axis: str, rate_hz: float, harmonics: int, problems
         with problems.at(scanner_file, key):
             response = dynamics_of(scanner.resonance, setup.scanner_folder)
     hysteresis = models.get(models.UNCOMPENSATED)() if scanner.hysteresis is None else scanner.hysteresis
-    shape = hysteresis.line(
-        WantedLine(
-            axis=axis,
-            turn=scan.turn,
-            v=v,
-            v_max=v_max,
-            v_amplitude=m * g * v * v_max,
-            v_offset=v_offset,
-            size_nm=size_nm,
-            rate_hz=rate_hz,
-            harmonics=harmonics,
-            window=(low, high),
-            both=scan.band_limit.directions == "both",
-            response=response,
-            max_boost_db=max_boost_db,
-            factor_at=lambda share: offset_law.factor(normalised_offset(share * v_max, v_max)),
-            rate_gain=None if law is None else lambda hz: frequency_gain(hz, law.alpha, law.reference_hz),
-            folder=setup.scanner_folder,
-            scan_file=scan_file,
-            scanner_file=scanner_file,
-            problems=problems,
-        )
+    wanted = WantedLine(
+        axis=axis,
+        turn=scan.turn,
+        v=v,
+        v_max=v_max,
+        v_amplitude=m * g * v * v_max,
+        v_offset=v_offset,
+        size_nm=size_nm,
+        rate_hz=rate_hz,
+        harmonics=harmonics,
+        window=(low, high),
+        both=scan.band_limit.directions == "both",
+        response=response,
+        max_boost_db=max_boost_db,
+        factor_at=lambda share: offset_law.factor(normalised_offset(share * v_max, v_max)),
+        rate_gain=None if law is None else lambda hz: frequency_gain(hz, law.alpha, law.reference_hz),
+        folder=setup.scanner_folder,
+        scan_file=scan_file,
+        scanner_file=scanner_file,
+        problems=problems,
     )
+
+    def line_at(v: float) -> LineShape | None:
+        apart = Problems()
+        made = hysteresis.line(replace(wanted, v=v, problems=apart))
+        return None if apart.found else made
+
+    shape = hysteresis.line(wanted)
     if len(problems.found) > before or shape is None or size_law is None:
         return None
     return Drive(
@@ -176,6 +184,7 @@ def compensate(setup: Setup, axis: str, rate_hz: float, harmonics: int, problems
         shape=shape,
         response=response,
         max_boost_db=max_boost_db,
+        line_at=line_at,
     )
 
 

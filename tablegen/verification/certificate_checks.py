@@ -9,6 +9,7 @@ from tablegen.manifest.read import StoredBuild
 from tablegen.verification.certified import PlayedPeriod, different_figures
 from tablegen.verification.checks import Check
 from tablegen.verification.directory import some
+from tablegen.verification.expectations import wrong_expectations
 from tablegen.verification.scaling import knows, refinement_figures, scaling_figures
 
 
@@ -57,6 +58,8 @@ def _check(name: str, axis: ManifestAxis, stored: StoredBuild, same_version: boo
             for side, figures in (sides or {}).items():
                 count += len(figures)
                 wrong += different_figures(stated[side], figures, period.is_whole, f"{key}.{side}.")
+    if same_version:
+        wrong += wrong_expectations(axis)
     step = found["largest_step"]
     if isinstance(step, int) and step > axis.output.max_step:
         wrong.append(f"output.max_step is {axis.output.max_step}, the words step by {step}")

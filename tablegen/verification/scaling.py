@@ -1,7 +1,8 @@
 """The scaling errors of a certificate once more, through the shape that the manifest states, by chords of its words.
 
 The shape of a branch is u = lambda s + xi sin(pi s) + xi_gamma (cos(pi s) - 1), equations (15) and (17) to (21), from
-its beta and u_peak; docs/manifest.md says what each figure is.
+its beta and u_peak. An operator's waveform is its own shape: such a line has no other. docs/manifest.md says what each
+figure is.
 """
 
 from collections.abc import Callable
@@ -16,6 +17,7 @@ from tablegen.problems import shortened
 from tablegen.verification.certified import PlayedPeriod, at, played_series
 
 CHORD = 0.05  # share of the line
+OPERATOR = "operator"  # the model whose waveform was found, not worked out of an equation
 _POINTS = 16, 513  # per harmonic, and beside them, over the window
 _GRID = 4097  # points on which a branch is inverted first
 
@@ -52,11 +54,50 @@ class ModelBranch:
 
     def inverse(self, u: Floats) -> Floats:
         """s(u)."""
-        grid = np.linspace(0.0, 1.0, _GRID)
-        s = np.interp(u, self.value(grid), grid)
-        for _ in range(3):
-            s = s - (self.value(s) - u) / self.slope(s)
-        return s
+        return _inverse(self, u)
+
+
+@dataclass(frozen=True)
+class WaveformBranch:
+    """One direction of a line whose shape is a waveform, over its sweep s = 0..1; it has no error of its own."""
+
+    waveform: ManifestSeries
+    turn: float
+    forward: bool
+
+    @classmethod
+    def of(cls, axis: ManifestAxis, side: str) -> "WaveformBranch":
+        """What the piezo is to follow, less a layer: what the operator found."""
+        waveform, layer = followed(axis), axis.fourier.refinement
+        if layer is not None:
+            a, b = (np.subtract(one, other).tolist() for one, other in ((waveform.a, layer.a), (waveform.b, layer.b)))
+            waveform = ManifestSeries(a, b, waveform.a0)
+        return cls(waveform, axis.drive.turn, side == "forward")
+
+    def value(self, s: Floats) -> Floats:
+        """u(s)."""
+        w = at(self.waveform, self._times(s))
+        return w if self.forward else 1.0 - w
+
+    def slope(self, s: Floats) -> Floats:
+        """du/ds."""
+        rise = at(self.waveform, self._times(s), 1)
+        return self.turn * rise if self.forward else (self.turn - 1.0) * rise
+
+    def inverse(self, u: Floats) -> Floats:
+        """s(u)."""
+        return _inverse(self, u)
+
+    def _times(self, s: Floats) -> Floats:
+        return self.turn * s if self.forward else self.turn + (1.0 - self.turn) * s
+
+
+def _inverse(branch: "ModelBranch | WaveformBranch", u: Floats) -> Floats:
+    grid = np.linspace(0.0, 1.0, _GRID)
+    s = np.interp(u, branch.value(grid), grid)
+    for _ in range(3):
+        s = s - (branch.value(s) - u) / branch.slope(s)
+    return s
 
 
 # Written once more, beside the build's own. Of models that are not here scaling errors are not compared.
@@ -72,13 +113,19 @@ def knows(model: str) -> bool:
 
     Raises ``ValueError`` for a model that nobody has: no build states it.
     """
-    if model in _EQUATIONS:
+    if model in _EQUATIONS or model == OPERATOR:
         return True
     from importlib.metadata import entry_points  # seldom needed; nothing of the model itself is loaded
 
     if not entry_points(group="tablegen.models", name=model):
         raise ValueError(f"drive.model is {shortened(repr(model))}, which neither tablegen nor a package here has")
     return False
+
+
+def _branch(axis: ManifestAxis, side: str) -> ModelBranch | WaveformBranch:
+    if axis.drive.model == OPERATOR:
+        return WaveformBranch.of(axis, side)
+    return ModelBranch.of(getattr(axis.drive, side), axis.drive.model)
 
 
 def hold_response(harmonics: int, advances: int, steps: bool) -> tuple[Floats, Floats]:
@@ -137,11 +184,11 @@ def refinement_figures(axis: ManifestAxis) -> dict[str, dict[str, float]] | None
     return found
 
 
-def _sweep(axis: ManifestAxis, side: str) -> tuple[ModelBranch, Floats, Floats, Floats]:
+def _sweep(axis: ManifestAxis, side: str) -> tuple[ModelBranch | WaveformBranch, Floats, Floats, Floats]:
     """The branch of a direction; positions over its window, where its sweep is there, and when."""
     turn, (low, high) = axis.drive.turn, axis.fourier.window
     position = np.linspace(low, high, _POINTS[0] * axis.fourier.harmonics + _POINTS[1])
-    branch = ModelBranch.of(getattr(axis.drive, side), axis.drive.model)
+    branch = _branch(axis, side)
     if side == "forward":
         return branch, position, position, turn * position
     return branch, position, 1.0 - position, turn + (1.0 - turn) * (1.0 - position)

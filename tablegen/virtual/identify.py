@@ -8,8 +8,9 @@ sensitivity's. Needs scipy.
 """
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise, product
 
 import numpy as np
@@ -18,12 +19,13 @@ from scipy.optimize import nnls
 from tablegen.compensation.hysteresis import BranchShape, beta_at
 from tablegen.compensation.offset import OffsetLaw, normalised_offset
 from tablegen.compensation.size import SizeLaw
-from tablegen.numerics.arrays import Floats
+from tablegen.numerics.arrays import Floats, FloatsLike
 from tablegen.virtual.creep import logarithmic_creep
 from tablegen.virtual.preisach import Preisach
 
 DEGREE, REVERSIBLE, SENSITIVITY = 8, 2, 6  # degrees of the polynomials
 TICKS = 2000  # ticks of a triangle
+HALF = TICKS // 2
 SIZES = (0.07, 0.13, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 OFFSETS_V = (7.0, 20.0, 35.0, 50.0, 65.0, 80.0, 93.0)
 V_MAX = 100.0
@@ -73,52 +75,70 @@ X_TARGETS = paper_targets(0.53, (-0.86, 0.0, 0.86), (0.92, 1.0, 1.25), 100.0)
 Y_TARGETS = paper_targets(0.60, (-1.0, 0.0, 1.0), (0.90, 1.0, 1.22), 1.0)
 
 
+# Settled displacement, shape (ticks, unknowns), of a triangle: its size and its middle as shares of v_max.
+Triangles = Callable[[float, float], Floats]
+
+
+class Equations:
+    """Linear equations for the unknowns of an operator: what is printed, at a weight each."""
+
+    def __init__(self, triangles: Triangles, targets: Targets, offset_weight: float) -> None:
+        self._targets = targets
+        self._rows: list[Floats] = []
+        self._wanted: list[Floats] = []
+        tau, sparse = np.arange(HALF) / HALF, slice(0, HALF, 10)
+        for v in SIZES:
+            relative = triangles(v, 0.5) / targets.size.size_nm(v)
+            relative = relative - relative[0]
+            self.add(relative[HALF : HALF + 1], np.ones(1), SIZE_WEIGHT)
+            forward, backward = targets.shapes(v)
+            weight = (LARGEST_WEIGHT if v == 1.0 else SMALLER_WEIGHT) / np.sqrt(HALF / 10)
+            self.add(relative[:HALF][sparse], forward.inverse(tau)[sparse], weight)
+            self.add(relative[HALF:][sparse], 1.0 - backward.inverse(tau)[sparse], weight)
+        self._factors = np.array([targets.offset.factor(normalised_offset(volts, V_MAX)) for volts in OFFSETS_V])
+        ends = [triangles(OFFSET_SIZE, volts / V_MAX)[[0, HALF]] for volts in OFFSETS_V]
+        self._sizes = np.array([b - a for a, b in ends]) / targets.size.size_nm(OFFSET_SIZE)
+        self.add(self._sizes * self._factors[:, None], np.ones(len(self._factors)), offset_weight)
+
+    def add(self, row: Floats, value: Floats, weight: float) -> None:
+        """``row`` times the unknowns shall be ``value``."""
+        self._rows.append(weight * row)
+        self._wanted.append(weight * value)
+
+    def solved(self, least: FloatsLike = 0.0) -> Floats:
+        """The unknowns, none below ``least``, in six digits."""
+        rows, wanted = np.vstack(self._rows), np.concatenate(self._wanted)
+        lowest = np.broadcast_to(np.asarray(least, dtype=np.float64), rows.shape[1])
+        above, _ = nnls(rows, wanted - rows @ lowest, maxiter=20000)
+        return np.array([float(f"{value:.6g}") for value in lowest + above])
+
+    def sensitivity(self, found: Floats) -> tuple[float, ...]:
+        """What the offset does beyond what the operator does with these unknowns."""
+        middle = float(self._sizes[OFFSETS_V.index(50.0)] @ found)
+        p = np.array([normalised_offset(volts, V_MAX) for volts in OFFSETS_V])
+        missing = middle / (self._sizes @ found * self._factors) - 1.0
+        powers = p[:, None] ** np.arange(1, SENSITIVITY + 1)
+        return tuple(float(f"{value:.5g}") for value in np.linalg.lstsq(powers, missing, rcond=None)[0])
+
+
 def identify(targets: Targets, elsewhere: Sequence[tuple[float, float]] = ELSEWHERE) -> Identified:
     """Fit hysteresis and sensitivity to the targets.
 
     ``elsewhere`` are the sizes and middles, shares of v_max, at which one m(p) shall serve: a choice, which nothing in
     the paper asks for. Without it the scanner is another one with the same printed numbers.
     """
-    units = _units()
-    rows: list[Floats] = []
-    wanted: list[Floats] = []
-
-    def add(row: Floats, value: Floats, weight: float) -> None:
-        rows.append(weight * row)
-        wanted.append(weight * value)
-
-    half, sparse = TICKS // 2, slice(0, TICKS // 2, 10)
-    tau = np.arange(half) / half
-    for v in SIZES:
-        relative = _triangles(units, v, 0.5, targets.rate_hz) / targets.size.size_nm(v)
-        relative = relative - relative[0]
-        add(relative[half : half + 1], np.ones(1), SIZE_WEIGHT)
-        forward, backward = targets.shapes(v)
-        weight = (LARGEST_WEIGHT if v == 1.0 else SMALLER_WEIGHT) / np.sqrt(half / 10)
-        add(relative[:half][sparse], forward.inverse(tau)[sparse], weight)
-        add(relative[half:][sparse], 1.0 - backward.inverse(tau)[sparse], weight)
-    factors = np.array([targets.offset.factor(normalised_offset(volts, V_MAX)) for volts in OFFSETS_V])
-    ends = [_triangles(units, OFFSET_SIZE, volts / V_MAX, targets.rate_hz)[[0, half]] for volts in OFFSETS_V]
-    sizes = np.array([b - a for a, b in ends]) / targets.size.size_nm(OFFSET_SIZE)
-    add(sizes * factors[:, None], np.ones(len(factors)), OFFSET_WEIGHT)
-
+    triangles = partial(_triangles, _units(), rate_hz=targets.rate_hz)
+    equations = Equations(triangles, targets, OFFSET_WEIGHT)
     # A build asks for m times the drive, whatever the size: m of the offset's images has to serve the others.
     small = targets.size.size_nm(OFFSET_SIZE)
     for v, middle in elsewhere:
         m = targets.offset.factor(2.0 * middle - 1.0)
         if max(0.5 * m * v, 0.5 * m * OFFSET_SIZE) > min(middle, 1.0 - middle):
             continue
-        at_v = np.diff(_triangles(units, m * v, middle, targets.rate_hz)[[0, half]], axis=0)
-        at_small = np.diff(_triangles(units, m * OFFSET_SIZE, middle, targets.rate_hz)[[0, half]], axis=0)
-        add(at_v / targets.size.size_nm(v) - at_small / small, np.zeros(1), ELSEWHERE_WEIGHT)
-
-    found, _ = nnls(np.vstack(rows), np.concatenate(wanted), maxiter=20000)
-    found = np.array([float(f"{value:.6g}") for value in found])
-    middle = float(sizes[OFFSETS_V.index(50.0)] @ found)
-    p = np.array([normalised_offset(volts, V_MAX) for volts in OFFSETS_V])
-    missing = middle / (sizes @ found * factors) - 1.0
-    powers = p[:, None] ** np.arange(1, SENSITIVITY + 1)
-    sensitivity = np.linalg.lstsq(powers, missing, rcond=None)[0]
+        at_v = np.diff(triangles(m * v, middle)[[0, HALF]], axis=0)
+        at_small = np.diff(triangles(m * OFFSET_SIZE, middle)[[0, HALF]], axis=0)
+        equations.add(at_v / targets.size.size_nm(v) - at_small / small, np.zeros(1), ELSEWHERE_WEIGHT)
+    found = equations.solved()
     density = found[REVERSIBLE + 1 :]
     starts = np.cumsum([0, *range(DEGREE + 1, 0, -1)])
     return Identified(
@@ -126,7 +146,7 @@ def identify(targets: Targets, elsewhere: Sequence[tuple[float, float]] = ELSEWH
             tuple(map(float, found[: REVERSIBLE + 1])),
             tuple(tuple(map(float, density[a:b])) for a, b in pairwise(starts)),
         ),
-        tuple(float(f"{value:.5g}") for value in sensitivity),
+        equations.sensitivity(found),
     )
 
 
@@ -146,7 +166,7 @@ def _units() -> list[Preisach]:
 def _triangles(units: list[Preisach], v: float, middle: float, rate_hz: float) -> Floats:
     """Settled displacement of every operator under a triangle, shape (ticks, operators), in nm."""
     low, high = middle - 0.5 * v, middle + 0.5 * v
-    tau = np.arange(TICKS // 2) / (TICKS // 2)
+    tau = np.arange(HALF) / HALF
     creep = logarithmic_creep(LOSS, rate_hz, FASTEST_S, SLOWEST_S, PER_DECADE)
     out = np.empty((TICKS, len(units)))
     for n, unit in enumerate(units):
@@ -156,19 +176,20 @@ def _triangles(units: list[Preisach], v: float, middle: float, rate_hz: float) -
     return out
 
 
-def _rows(values: Sequence[float]) -> str:
+def row_text(values: Sequence[float]) -> str:
+    """An array of TOML."""
     return "[" + ", ".join(f"{value:g}" for value in values) + "]"
 
 
 def _axis_text(axis: str, found: Identified, rate_hz: float) -> str:
-    density = ",\n".join(f"    {_rows(row)}" for row in found.hysteresis.density)
+    density = ",\n".join(f"    {row_text(row)}" for row in found.hysteresis.density)
     return f"""
 [{axis}]
 # Factor on the displacement, 1 + c1 p + c2 p^2 + ..., with p = 2 V / v_max - 1 of the mean voltage.
-sensitivity = {_rows(found.sensitivity)}
+sensitivity = {row_text(found.sensitivity)}
 
 [{axis}.hysteresis]
-reversible_nm = {_rows(found.hysteresis.reversible)}
+reversible_nm = {row_text(found.hysteresis.reversible)}
 density_nm = [
 {density},
 ]
@@ -191,6 +212,7 @@ def default_text() -> str:
     head = f"""# The default virtual scanner: a simulation, identified from the numbers that the paper prints.
 # docs/virtual.md says where each comes from; tablegen/virtual/identify.py makes this file.
 name = "virtual"
+identified_on = "numbers that the paper prints"
 v_max = {V_MAX:g}
 
 [amplifier]

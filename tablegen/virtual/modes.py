@@ -93,3 +93,21 @@ def second_order(frequency_hz: float, quality: float) -> Modes:
     damped = w * sqrt(1.0 - 0.25 / quality**2)
     pole = complex(-0.5 * w / quality, damped)
     return Modes(0.0, (pole,), (w * w / (2j * damped),))
+
+
+def side_by_side(first: Modes, second: Modes, share: float) -> Modes:
+    """Two modes that follow the same drive; ``share`` of the sum is the second's."""
+    residues = (*((1.0 - share) * r for r in first.residues), *(share * r for r in second.residues))
+    return Modes((1.0 - share) * first.direct + share * second.direct, first.poles + second.poles, residues)
+
+
+def delayed(held: Floats, ticks: float, before: float | None = None) -> Floats:
+    """A held drive that comes late, as its mean over each tick: periodic, or after a long rest at ``before``."""
+    whole = int(ticks)
+    part = ticks - whole
+    if before is None:
+        late, later = np.roll(held, whole), np.roll(held, whole + 1)
+    else:
+        padded = np.concatenate((np.full(min(whole, len(held)) + 1, before), held))
+        late, later = padded[1 : len(held) + 1], padded[: len(held)]
+    return late + part * (later - late)

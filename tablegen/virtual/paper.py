@@ -1,4 +1,4 @@
-"""The numbers that the paper prints of its scanner, beside those of the default virtual scanner.
+"""The numbers that the paper prints of its scanner, beside those of the virtual scanners of the package.
 
 python -m tablegen.virtual.paper     prints the table of docs/virtual.md
 """
@@ -15,7 +15,7 @@ from tablegen.numerics.arrays import Floats
 from tablegen.virtual.experiments import apparent_sizes, triangle_size
 from tablegen.virtual.identify import OFFSETS_V, X_TARGETS
 from tablegen.virtual.line_error import BranchError, LineError, ideal_triangle, line_error
-from tablegen.virtual.parameters import load_truth
+from tablegen.virtual.parameters import BUILT_IN, load_truth
 from tablegen.virtual.scanner import VirtualAxis, VirtualScanner
 
 TICKS, RATE_HZ = 4000, 100.0
@@ -81,9 +81,12 @@ def comparison(axis: VirtualAxis) -> Iterator[tuple[str, str, str]]:
 
 
 def table() -> str:
-    """The comparison in Markdown."""
-    head = ["| | paper | virtual scanner |", "|---|---|---|"]
-    return "\n".join([*head, *(f"| {' | '.join(row)} |" for row in comparison(default_x()))]) + "\n"
+    """The comparison in Markdown: a column for each scanner of the package."""
+    columns = [list(comparison(VirtualScanner.of(load_truth(name)).x)) for name in BUILT_IN]
+    lines = ["| | paper | default | duhem |", "|---|---|---|---|"]
+    for rows in zip(*columns, strict=True):
+        lines.append(f"| {' | '.join((*rows[0][:2], *(row[2] for row in rows)))} |")
+    return "\n".join(lines) + "\n"
 
 
 if __name__ == "__main__":

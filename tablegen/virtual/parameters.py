@@ -1,30 +1,57 @@
 """The file of a virtual scanner: what is true of it, as a laboratory would never know it."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
+import numpy as np
 from msgspec import Meta, Struct
 
 from tablegen.config.decode import decode
+from tablegen.numerics.arrays import Floats, FloatsLike
 from tablegen.problems import Document, Problems
 from tablegen.quantities import Hertz, Name, PositiveVolts
 from tablegen.toml import read_toml
+from tablegen.virtual.duhem import Duhem, Lag
+from tablegen.virtual.preisach import Preisach
 
 Coefficient = Annotated[float, Meta(ge=0.0, le=1e9)]
 
 
-class HysteresisTruth(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The Preisach operator; see ``tablegen.virtual.preisach``."""
+Family = Literal["preisach", "duhem"]
+BUILT_IN = ("default", "duhem")  # scanners that come with the package
 
+
+class LagTruth(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A lag of the Duhem operator; see ``tablegen.virtual.duhem``."""
+
+    rise: Annotated[float, Meta(ge=0.5, le=200.0, description="rate per full drive while the drive rises")]
+    fall: Annotated[float, Meta(ge=0.5, le=200.0, description="the same while it falls")]
+    below_nm: Annotated[list[Coefficient], Meta(min_length=1, max_length=9, description="how far a long rise lags")]
+    above_nm: Annotated[list[Coefficient], Meta(min_length=1, max_length=9, description="how far a long fall lags")]
+
+
+class HysteresisTruth(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """An operator of one family: ``tablegen.virtual.preisach`` or ``tablegen.virtual.duhem``."""
+
+    family: Family = "preisach"
     reversible_nm: Annotated[
         list[Coefficient], Meta(min_length=1, max_length=16, description="slope without hysteresis over the drive")
     ]
     density_nm: Annotated[
-        list[list[Coefficient]], Meta(max_length=13, description="n + 1 rows of n + 1, n, ..., 1 coefficients")
+        list[list[Coefficient]],
+        Meta(max_length=13, description="preisach: n + 1 rows of n + 1, ..., 1 coefficients"),
     ] = []
+    lags: Annotated[list[LagTruth], Meta(max_length=4, description="duhem: lags that add up")] = []
+
+    def operator(self) -> Preisach | Duhem:
+        """The operator. Raises ``ValueError`` where a branch could run backwards."""
+        if self.family == "preisach":
+            return Preisach(tuple(self.reversible_nm), tuple(map(tuple, self.density_nm)))
+        lags = (Lag(one.rise, one.fall, tuple(one.below_nm), tuple(one.above_nm)) for one in self.lags)
+        return Duhem(tuple(self.reversible_nm), tuple(lags))
 
 
 class Creep(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -44,6 +71,12 @@ class ResonanceTruth(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     quality: Annotated[float, Meta(ge=0.6, le=1e4, description="quality factor")]
 
 
+class SecondResonanceTruth(ResonanceTruth, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Another mode beside the first: both follow the drive, and their displacements add up."""
+
+    share: Annotated[float, Meta(gt=0.0, lt=1.0, description="of the displacement at low frequencies")]
+
+
 class AxisTruth(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One axis of the scanner."""
 
@@ -52,8 +85,14 @@ class AxisTruth(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         list[Annotated[float, Meta(ge=-2.0, le=2.0)]],
         Meta(max_length=8, description="s = 1 + c1 p + c2 p^2 + ..., p = 2 V / v_max - 1 of the mean drive"),
     ] = []
+    sensitivity_memory_s: (
+        Annotated[float, Meta(ge=1e-3, le=1e5, description="time constant of that mean; none: all of what is played")]
+        | None
+    ) = None
     creep: Creep | None = None
     resonance: ResonanceTruth | None = None
+    second_resonance: SecondResonanceTruth | None = None
+    dead_time_s: Annotated[float, Meta(ge=0.0, le=1.0, description="between the code and the first movement")] = 0.0
 
 
 class AmplifierTruth(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -66,18 +105,19 @@ class Truth(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A virtual scanner."""
 
     name: Annotated[Name, Meta(description="for reports")]
+    identified_on: Annotated[Name, Meta(description="what the parameters come from")] = "nothing that its file names"
     v_max: Annotated[PositiveVolts, Meta(description="drive 1 of the hysteresis")]
     amplifier: AmplifierTruth = AmplifierTruth()
     x: AxisTruth
     y: AxisTruth
 
 
-def load_truth(path: str | Path | None = None) -> Truth:
-    """Read a virtual scanner, or the default one.
+def load_truth(source: str | Path = "default") -> Truth:
+    """Read a virtual scanner: the name of one of ``BUILT_IN``, or a file.
 
     Raises ``Rejected`` with every fault of the file.
     """
-    path = Path(str(files("tablegen.virtual") / "default.toml")) if path is None else Path(path)
+    path = Path(str(files("tablegen.virtual") / f"{source}.toml")) if source in BUILT_IN else Path(source)
     values, document = read_toml(path, str(path))
     problems = Problems()
     truth = decode(Truth, values, document, problems, partial(_check, document, problems))
@@ -88,19 +128,34 @@ def load_truth(path: str | Path | None = None) -> Truth:
 
 def _check(file: Document, problems: Problems, kind: type, key: str, _: Mapping[str, Any], built: Any) -> None:
     if kind is HysteresisTruth and built is not None:
-        rows = [len(row) for row in built.density_nm]
-        if rows != list(range(len(rows), 0, -1)):
-            problems.add(file, f"{key}.density_nm", f"{len(rows)} rows need {len(rows)}, ..., 2, 1 coefficients")
-        if not any(built.reversible_nm):
-            problems.add(file, f"{key}.reversible_nm", "all 0; a drive that turns would not move at all")
+        _check_hysteresis(file, problems, key, built)
     elif kind is Creep and built is not None and built.slowest_s <= built.fastest_s:
         problems.add(file, f"{key}.slowest_s", f"{built.slowest_s:g} s is not above fastest_s = {built.fastest_s:g} s")
     elif kind is AxisTruth and built is not None:
-        factors = [sensitivity(built.sensitivity, 0.1 * k - 1.0) for k in range(21)]
-        if min(factors) <= 0.05:
-            problems.add(file, f"{key}.sensitivity", f"falls to {min(factors):.3g} between 0 and v_max")
+        if built.second_resonance is not None and built.resonance is None:
+            problems.add(file, f"{key}.second_resonance", f"needs the first one, [{key}.resonance]")
+        least = float(np.min(sensitivity(built.sensitivity, np.linspace(-1.0, 1.0, 21))))
+        if least <= 0.05:
+            problems.add(file, f"{key}.sensitivity", f"falls to {least:.3g} between 0 and v_max")
 
 
-def sensitivity(coefficients: list[float], p: float) -> float:
+def _check_hysteresis(file: Document, problems: Problems, key: str, built: HysteresisTruth) -> None:
+    other = "lags" if built.family == "preisach" else "density_nm"
+    if getattr(built, other):
+        problems.add(file, f"{key}.{other}", f"not of the family {built.family!r}; remove it, or change family")
+        return
+    rows = [len(row) for row in built.density_nm]
+    if rows != list(range(len(rows), 0, -1)):
+        problems.add(file, f"{key}.density_nm", f"{len(rows)} rows need {len(rows)}, ..., 2, 1 coefficients")
+    elif not any(built.reversible_nm):
+        problems.add(file, f"{key}.reversible_nm", "all 0; a drive that turns would not move at all")
+    else:
+        try:
+            built.operator()
+        except ValueError as reason:
+            problems.add(file, f"{key}.reversible_nm", f"{reason}; raise it, or lower the lags")
+
+
+def sensitivity(coefficients: Sequence[float], p: FloatsLike) -> Floats:
     """s(p) = 1 + c1 p + c2 p^2 + ..."""
-    return 1.0 + sum(c * p ** (n + 1) for n, c in enumerate(coefficients))
+    return np.asarray(np.polynomial.polynomial.polyval(p, [1.0, *coefficients]), dtype=np.float64)

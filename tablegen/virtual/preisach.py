@@ -7,15 +7,12 @@ therefore played exactly, one polynomial for each piece of a branch, without a g
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
-from math import comb, factorial
+from math import factorial
 
 import numpy as np
 
 from tablegen.numerics.arrays import Floats, FloatsLike
-
-# Drives this far outside 0..1 are the last bits of a voltage, not a voltage.
-_SATURATION_TOLERANCE = 1e-9
+from tablegen.virtual.pieces import monotonic, normalised, one_minus, powers_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,10 +49,7 @@ class Preisach:
         n, m = len(self.density) - 1, len(self.reversible)
         size = max(n + 3, m + 1)
         out = np.zeros((size, size))
-        slope = np.zeros(m)
-        for i, weight in enumerate(self.reversible):
-            slope[i:] += weight * comb(m - 1, i) * _one_minus(m - 1 - i)
-        integral = slope / np.arange(1, m + 1)
+        integral = powers_of(self.reversible) / np.arange(1, m + 1)
         out[1 : m + 1, 0] += integral
         out[0, 1 : m + 1] -= integral
         for i, row in enumerate(self.density):
@@ -68,16 +62,18 @@ class Preisach:
         """E(high, low): nm between the drives ``low`` and ``high`` along the branch that turned at one of them."""
         return np.asarray(np.polynomial.polynomial.polyval2d(high, low, self.everett), dtype=np.float64)
 
+    def middle(self, drive: FloatsLike) -> Floats:
+        """Between the branches of the largest loop, in nm."""
+        full, none = np.ones_like(drive, dtype=np.float64), np.zeros_like(drive, dtype=np.float64)
+        return 0.5 * (self.branch(drive, none) + self.branch(full, none) - self.branch(full, drive))
+
     def play(self, drive: Floats, memory: TurningPoints | None = None) -> tuple[Floats, TurningPoints]:
         """Displacement in nm at each drive of a sequence, and what is remembered after it."""
-        drive = np.asarray(drive, dtype=np.float64)
-        if drive.size and max(-float(drive.min()), float(drive.max()) - 1.0) > _SATURATION_TOLERANCE:
-            raise ValueError(f"a drive of {drive.min():g}..{drive.max():g} leaves 0..1, for which the operator is made")
-        drive = np.clip(drive, 0.0, 1.0)
+        drive = normalised(drive)
         memory = memory or TurningPoints()
         turning, reached = list(memory.drives), list(memory.displacements)
         out = np.empty_like(drive)
-        for first, stop in _monotonic(np.concatenate(([turning[-1]], drive))):
+        for first, stop in monotonic(np.concatenate(([turning[-1]], drive))):
             self._sweep(drive[first:stop], out[first:stop], turning, reached)
         return out, TurningPoints(tuple(turning), tuple(reached))
 
@@ -121,28 +117,12 @@ class Preisach:
         return value
 
 
-def _monotonic(drive: Floats) -> list[tuple[int, int]]:
-    """Ranges of drive[1:] along which the sequence neither rises and falls; flat parts belong to what is before."""
-    steps = np.sign(np.diff(drive))
-    moving = np.flatnonzero(steps)
-    if not len(moving):
-        return [(0, len(steps))] if len(steps) else []
-    turns = moving[1:][steps[moving[1:]] != steps[moving[:-1]]]
-    ends = [0, *map(int, turns), len(steps)]
-    return list(pairwise(ends))
-
-
-def _one_minus(n: int) -> Floats:
-    """Coefficients of (1 - x)^n."""
-    return np.array([(-1.0) ** k * comb(n, k) for k in range(n + 1)])
-
-
 def _monomials(n: int, i: int, j: int) -> Floats:
     """Bernstein polynomial n!/(i! j! k!) (1 - alpha)^i (alpha - beta)^j beta^k as coefficients of alpha^p beta^q."""
     k = n - i - j
     out = np.zeros((n + 1, n + 1))
-    for s, first in enumerate(_one_minus(i)):
-        for t, second in enumerate(_one_minus(j)):
+    for s, first in enumerate(one_minus(i)):
+        for t, second in enumerate(one_minus(j)):
             out[s + j - t, t + k] += first * second
     return out * (factorial(n) // (factorial(i) * factorial(j) * factorial(k)))
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from tablegen.compensation import models
 from tablegen.virtual.line_error import BranchError, LineError, ideal_triangle
+from tablegen.virtual.parameters import Truth
 from tablegen.virtual.simulation import AxisRun, Run
 
 LABEL = "simulation on a virtual scanner"
@@ -26,11 +27,12 @@ class SimulationStage:
     rejected: tuple[tuple[str, tuple[str, ...]], ...] = ()
 
 
-def text(name: str, truth: str, stages: Sequence[SimulationStage]) -> list[str]:
+def text(name: str, truth: Truth, stages: Sequence[SimulationStage]) -> list[str]:
     """A table for the terminal."""
     first = next(run for stage in stages for run in stage.runs)
     lines = [
-        f"{name}: {LABEL} ({truth!r}); {first.x.nominal_nm:g} nm in x and {first.y.nominal_nm:g} nm in y asked for",
+        f"{name}: {LABEL} ({truth.name!r}); "
+        f"{first.x.nominal_nm:g} nm in x and {first.y.nominal_nm:g} nm in y asked for",
         "",
         "                  size    residual in the window [% of the line]               in the image       "
         "scaling error",
@@ -47,7 +49,7 @@ def text(name: str, truth: str, stages: Sequence[SimulationStage]) -> list[str]:
     lines.append("* the model of the scanner file")
     if any(getattr(run, axis).refined for stage in stages for run in stage.runs for axis in ("x", "y")):
         lines.append("+ with the refinement of the scan file")
-    lines.append("A simulation, not a measurement: the virtual scanner was identified from figures in a paper.")
+    lines.append(f"A simulation, not a measurement: the virtual scanner was identified on {truth.identified_on}.")
     return lines
 
 
@@ -72,7 +74,7 @@ def _range(branch: BranchError) -> str:
     return f"{low:+6.3f} .. {high:+6.3f}"
 
 
-def data(name: str, truth: str, stages: Sequence[SimulationStage]) -> dict[str, Any]:
+def data(name: str, truth: Truth, stages: Sequence[SimulationStage]) -> dict[str, Any]:
     """The same as plain data, for JSON, by stage and model."""
 
     def branch(one: BranchError, imaged: BranchError) -> dict[str, Any]:
@@ -99,7 +101,8 @@ def data(name: str, truth: str, stages: Sequence[SimulationStage]) -> dict[str, 
         "simulation": True,
         "label": LABEL,
         "scan": name,
-        "virtual_scanner": truth,
+        "virtual_scanner": truth.name,
+        "identified_on": truth.identified_on,
         **{
             stage.name: {
                 "models": {

@@ -1,9 +1,12 @@
 """The virtual scanner: volts at the amplifier's output stage in, nanometres out.
 
-amplifier bandwidth -> hysteresis -> sensitivity at the mean drive -> creep -> resonance, each axis by itself.
+dead time -> amplifier bandwidth -> hysteresis -> sensitivity at the mean drive -> creep -> resonances, each axis by
+itself. The mean drive is that of all that is played, or, with a memory, of the last tens of seconds.
 """
 
 from dataclasses import dataclass
+from math import pi
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -11,12 +14,24 @@ import numpy.typing as npt
 from tablegen.numerics.arrays import Floats, FloatsLike
 from tablegen.virtual import parameters
 from tablegen.virtual.creep import logarithmic_creep
-from tablegen.virtual.modes import Modes, low_pass, second_order
+from tablegen.virtual.modes import Modes, delayed, low_pass, second_order, side_by_side
 from tablegen.virtual.parameters import Truth, sensitivity
-from tablegen.virtual.preisach import Preisach
 
 _STRAIGHT = Modes(1.0)
 _DRIVE_LEVELS = 2.0**36  # levels of the drive
+
+
+class HysteresisOperator(Protocol):
+    """Hysteresis: a drive of 0..1 to nm above rest at drive 0, whatever the family."""
+
+    def play(self, drive: Floats, memory: Any = None) -> tuple[Floats, Any]:
+        """Displacement at each drive of a sequence, and what is remembered after it."""
+
+    def settled(self, drive: Floats) -> Floats:
+        """Displacement over one period of a drive that has been repeated for ever."""
+
+    def middle(self, drive: FloatsLike) -> Floats:
+        """Displacement between the branches, at drives of 0..1."""
 
 
 @dataclass(frozen=True)
@@ -25,52 +40,80 @@ class VirtualAxis:
 
     v_max: float
     amplifier: Modes
-    hysteresis: Preisach
+    hysteresis: HysteresisOperator
     sensitivity: tuple[float, ...]
     creep: Modes
     resonance: Modes
+    memory: Modes | None = None
+    dead_time_s: float = 0.0
 
     @classmethod
     def of(cls, axis: parameters.AxisTruth, v_max: float, amplifier: parameters.AmplifierTruth) -> "VirtualAxis":
         """From the parameters of a file."""
-        h, c, r = axis.hysteresis, axis.creep, axis.resonance
+        c, r, other = axis.creep, axis.resonance, axis.second_resonance
         creep = _STRAIGHT
         if c is not None:
             creep = logarithmic_creep(c.loss_per_decade, c.reference_hz, c.fastest_s, c.slowest_s, c.terms_per_decade)
+        resonance = _STRAIGHT if r is None else second_order(r.frequency_hz, r.quality)
+        if other is not None:
+            resonance = side_by_side(resonance, second_order(other.frequency_hz, other.quality), other.share)
+        remembered = axis.sensitivity_memory_s
         return cls(
             v_max=v_max,
             amplifier=_STRAIGHT if amplifier.bandwidth_hz is None else low_pass(amplifier.bandwidth_hz),
-            hysteresis=Preisach(tuple(h.reversible_nm), tuple(map(tuple, h.density_nm))),
+            hysteresis=axis.hysteresis.operator(),
             sensitivity=tuple(axis.sensitivity),
             creep=creep,
-            resonance=_STRAIGHT if r is None else second_order(r.frequency_hz, r.quality),
+            resonance=resonance,
+            memory=None if remembered is None else low_pass(0.5 / (pi * remembered)),
+            dead_time_s=axis.dead_time_s,
         )
 
     def settled(self, volts: Floats, tick_s: float) -> Floats:
         """Where the axis is, as a mean over each tick, in a period that has been held tick by tick for ever."""
-        drive = self._normalised(self.amplifier.settled(volts, tick_s))
-        moved = self._sensitivity(float(np.mean(volts))) * self.hysteresis.settled(drive)
+        late = delayed(volts, self.dead_time_s / tick_s)
+        drive = self._normalised(self.amplifier.settled(late, tick_s))
+        mean_v: FloatsLike = float(np.mean(volts)) if self.memory is None else self.memory.settled(late, tick_s)
+        moved = self._moved(self.hysteresis.settled(drive), mean_v)
         return self.resonance.settled(self.creep.settled(moved, tick_s), tick_s)
 
     def follow(self, volts: Floats, tick_s: float, mean_v: float | None = None) -> Floats:
         """The same of a drive that begins after a long rest at its first voltage.
 
-        The sensitivity is that at ``mean_v``, by default the mean of this drive; it does not change meanwhile.
+        Without a memory the sensitivity is that at ``mean_v``, by default the mean of this drive, and does not change
+        meanwhile. A memory begins with ``mean_v``, by default the first voltage.
         """
-        drive = self._normalised(self.amplifier.follow(volts, tick_s))
+        first = float(volts[0])
+        late = delayed(volts, self.dead_time_s / tick_s, first)
+        drive = self._normalised(self.amplifier.follow(late, tick_s))
         rest, memory = self.hysteresis.play(self._normalised(volts[:1]))
-        factor = self._sensitivity(float(np.mean(volts)) if mean_v is None else mean_v)
-        moved = factor * self.hysteresis.play(drive, memory)[0]
-        at_rest = factor * float(rest[0])
+        bias: FloatsLike
+        if self.memory is None:
+            start = bias = float(np.mean(volts)) if mean_v is None else mean_v
+        else:
+            start = first if mean_v is None else mean_v
+            bias = self.memory.follow(late, tick_s, start)
+        moved = self._moved(self.hysteresis.play(drive, memory)[0], bias)
+        at_rest = float(self._moved(rest, start)[0])
         crept = self.creep.follow(moved, tick_s, at_rest)
         return self.resonance.follow(crept, tick_s, at_rest * float(self.creep.response(0.0).real))
 
     def response(self, f_hz: FloatsLike) -> npt.NDArray[np.complex128]:
         """The linear part of the response to small signals, hysteresis aside: amplifier, creep, resonance."""
-        return self.amplifier.response(f_hz) * self.creep.response(f_hz) * self.resonance.response(f_hz)
+        late = np.exp(-2j * pi * self.dead_time_s * np.asarray(f_hz, dtype=np.float64))
+        linear = self.amplifier.response(f_hz) * self.creep.response(f_hz) * self.resonance.response(f_hz)
+        return np.asarray(late * linear, dtype=np.complex128)
 
-    def _sensitivity(self, mean_v: float) -> float:
-        return sensitivity(list(self.sensitivity), 2.0 * mean_v / self.v_max - 1.0)
+    def _moved(self, displacement: Floats, mean_v: FloatsLike) -> Floats:
+        """With the sensitivity; one that changes with a memory scales about where the remembered drive would be."""
+        factor = self._sensitivity(mean_v)
+        if self.memory is None:
+            return np.asarray(factor * displacement, dtype=np.float64)
+        about = self.hysteresis.middle(np.clip(np.asarray(mean_v, dtype=np.float64) / self.v_max, 0.0, 1.0))
+        return np.asarray(about + factor * (displacement - about), dtype=np.float64)
+
+    def _sensitivity(self, mean_v: FloatsLike) -> Floats:
+        return sensitivity(self.sensitivity, 2.0 * np.asarray(mean_v, dtype=np.float64) / self.v_max - 1.0)
 
     def _normalised(self, volts: Floats) -> Floats:
         """The drive, 0..1; the operator is made for no other.

@@ -69,6 +69,8 @@ def test_the_family_and_the_creep_are_found() -> None:
     _, other = identified(BoucWen, SIX)
     assert other.family == "none"
     assert other.candidates["none"] < 0.3 * other.candidates["plays"]
+    # Sizes hold at the rate of the traces, with creep or without it: (23) counts from there.
+    assert [fit.operator.creep.reference_hz for fit in (plays, other)] == pytest.approx([100.0, 100.0], rel=1e-3)
 
 
 @pytest.mark.parametrize(

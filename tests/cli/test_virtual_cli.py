@@ -15,7 +15,9 @@ from tablegen.cli.exit_status import ExitStatus
 from tablegen.problems import Rejected
 from tablegen.virtual.parameters import load_truth
 
-TRUTH = (files("tablegen.virtual") / "default.toml").read_text(encoding="utf-8")
+TRUTH, DUHEM = (
+    (files("tablegen.virtual") / f"{name}.toml").read_text(encoding="utf-8") for name in ("default", "duhem")
+)
 SHORT = edited(SCAN, "timing.lines = 20", "y.band_limit.harmonics = 16")
 
 
@@ -185,6 +187,44 @@ def test_another_truth(tmp_path: Path) -> None:
     plain, shaped = (data["given"]["models"][model]["x"]["forward"] for model in ("triangle", "harmonic"))
     assert abs(plain["residual_peak_percent"]) < 0.05
     assert shaped["residual_peak_percent"] == pytest.approx(2.08, abs=0.1)  # (22) at 0.2 of full scale
+
+
+@pytest.mark.common
+def test_the_scanner_of_another_family(tmp_path: Path) -> None:
+    """By name; it says what it was identified on, and a calibration on it makes the scan straighter."""
+    scan = write_pair(tmp_path, SHORT)
+    outcome = run("simulate", scan, "--scanner-truth", "duhem", "--json")
+    assert (outcome.status, outcome.err) == (0, "")
+    data = json.loads(outcome.out)
+    assert data["virtual_scanner"] == "virtual, Duhem"
+    assert data["identified_on"] == "numbers that the paper prints"
+    given, calibrated = (data[stage]["models"]["harmonic"]["x"] for stage in ("given", "calibrated"))
+    for side in ("forward", "backward"):
+        before, after = (one[side]["scaling_error_peak_to_peak_percent"] for one in (given, calibrated))
+        assert after < 0.6 * before
+    (tmp_path / "own.toml").write_text(edited(DUHEM, "- identified_on"), encoding="utf-8")
+    shown = run("simulate", scan, "--scanner-truth", tmp_path / "own.toml", "--no-calibration")
+    assert shown.out.splitlines()[-1].endswith("identified on nothing that its file names.")
+
+
+@pytest.mark.common
+@pytest.mark.parametrize(
+    ("text", "edit", "key", "why"),
+    [
+        (DUHEM, "x.hysteresis.family = 'preisach'", "x.hysteresis.lags", "not of the family 'preisach'"),
+        (DUHEM, "x.hysteresis.family = 'bouc-wen'", "x.hysteresis.family", "is not one of"),
+        (DUHEM, "y.hysteresis.reversible_nm = [100]", "y.hysteresis.reversible_nm", "could run backwards"),
+        (DUHEM, "x.second_resonance.share = 1", "x.second_resonance.share", "is not below 1"),
+        (DUHEM, "- [x.resonance]", "x.second_resonance", "needs the first one"),
+        (TRUTH, "x.hysteresis.family = 'duhem'", "x.hysteresis.density_nm", "not of the family 'duhem'"),
+    ],
+)
+def test_faults_of_a_family(tmp_path: Path, text: str, edit: str, key: str, why: str) -> None:
+    path = tmp_path / "truth.toml"
+    path.write_text(edited(text, edit), encoding="utf-8")
+    with pytest.raises(Rejected) as caught:
+        load_truth(path)
+    assert [(problem.key, why in problem.why) for problem in caught.value.problems] == [(key, True)]
 
 
 @pytest.mark.common

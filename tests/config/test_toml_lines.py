@@ -422,7 +422,7 @@ def test_a_huge_decimal_number_is_reported_on_its_line(folder: Path, text: str, 
 
 def test_an_oversized_file_is_not_even_parsed(folder: Path) -> None:
     assert refused(folder, b"#" * ((1 << 20) + 1)) == (
-        "scan.toml: cannot be read: above 1 MiB, which is the most that a scan or scanner file may have"
+        "scan.toml: cannot be read: above 1 MiB, which is the most that a scan, scanner or operator file may have"
     )
     assert located(folder, b"#" * (1 << 20)) == {}
 

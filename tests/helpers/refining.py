@@ -51,9 +51,9 @@ SCANS = (
 
 
 @cache
-def scanner() -> VirtualScanner:
-    """The default one."""
-    return VirtualScanner.of(load_truth())
+def scanner(plant: str = "default") -> VirtualScanner:
+    """One of those of the package."""
+    return VirtualScanner.of(load_truth(plant))
 
 
 def scan_text(*edits: str) -> str:
@@ -68,14 +68,14 @@ def setup_of(*edits: str) -> Setup:
 
 
 @cache
-def _calibrated() -> Scanner:
+def _calibrated(plant: str) -> Scanner:
     """The virtual scanner from its own simulated data: x at 100 Hz, y at 0.5 Hz."""
-    return calibrate(setup_of("timing.lines = 200"), scanner()).setup.scanner
+    return calibrate(setup_of("timing.lines = 200"), scanner(plant)).setup.scanner
 
 
-def calibrated(scan: Scan) -> Setup:
+def calibrated(scan: Scan, plant: str = "default") -> Setup:
     """A scan on the virtual scanner as it was calibrated."""
-    return replace(setup_of(*scan.edits), scanner=_calibrated())
+    return replace(setup_of(*scan.edits), scanner=_calibrated(plant))
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,9 +120,11 @@ def learnt(step: Step, axis: VirtualAxis, seed: int, options: Options | None = N
     return refine(step.setup, step.line.axis, *columns, options or Options())
 
 
-def rounds(setup: Setup, name: Literal["x", "y"], count: int, options: Options | None = None) -> Iterator[Step]:
+def rounds(
+    setup: Setup, name: Literal["x", "y"], count: int, options: Options | None = None, plant: str = "default"
+) -> Iterator[Step]:
     """The scan before the first round and after each of ``count``."""
-    axis: VirtualAxis = getattr(scanner(), name)
+    axis: VirtualAxis = getattr(scanner(plant), name)
     for seed in range(count + 1):
         step = play(setup, name, axis)
         if seed == count:
@@ -133,9 +135,9 @@ def rounds(setup: Setup, name: Literal["x", "y"], count: int, options: Options |
         setup = found.setup
 
 
-def elsewhere() -> Iterator[tuple[str, Step, Step]]:
+def elsewhere(plant: str = "default") -> Iterator[tuple[str, Step, Step]]:
     """A layer at 60 V as learnt, and at the edges of what it serves; beside it the same scan without."""
-    *_, last = rounds(calibrated(SCANS[1]), "x", 3)
+    *_, last = rounds(calibrated(SCANS[1], plant), "x", 3, plant=plant)
     layer = last.setup.scan.x.refinement
     edges: tuple[tuple[str, dict[str, Any], dict[str, Any]], ...] = (
         ("as learnt, 60 V", {}, {}),
@@ -153,5 +155,5 @@ def elsewhere() -> Iterator[tuple[str, Step, Step]]:
             scan = last.setup.scan
             x = msgspec.structs.replace(scan.x, refinement=kept, **axis)
             changed = msgspec.structs.replace(scan, x=x, timing=msgspec.structs.replace(scan.timing, **timing))
-            both.append(play(replace(last.setup, scan=changed), "x", scanner().x))
+            both.append(play(replace(last.setup, scan=changed), "x", scanner(plant).x))
         yield what, both[0], both[1]

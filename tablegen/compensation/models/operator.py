@@ -9,6 +9,7 @@ from msgspec import Meta
 
 from tablegen.compensation.branches import WithBranches
 from tablegen.compensation.dynamics import capped_inverse
+from tablegen.compensation.expectation import Expectation, Figure
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.compensation.line import LineShape, WantedLine, WholeLine
 from tablegen.compensation.operator.file import read_operator
@@ -27,6 +28,7 @@ from tablegen.waveform.window_fit import fit_window
 STROKE_REACH = 0.05
 CENTRE_REACH = 0.4
 _SLOWEST_HZ = 0.01  # of frames over which drift is followed
+SIDES = ("forward", "backward")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,6 +49,19 @@ class OperatorLine(WholeLine):
     def transients(self) -> tuple[Transient, Transient]:
         """Both."""
         return self.after
+
+    @property
+    def expectation(self) -> Expectation:
+        """All of it, in percent."""
+        found, by = self.expected, self.uncertainty
+        return Expectation(
+            "traces",
+            {side: Figure(found.rms[i], by.rms[i]) for i, side in enumerate(SIDES)},
+            {side: Figure(found.scaling[i], by.scaling[i]) for i, side in enumerate(SIDES)},
+            Figure(found.mismatch, by.mismatch),
+            Figure(found.size, by.size),
+            100.0 * self.distance,
+        )
 
 
 class OperatorModel(WithBranches, frozen=True, kw_only=True, tag="operator"):
@@ -89,11 +104,8 @@ class OperatorModel(WithBranches, frozen=True, kw_only=True, tag="operator"):
         return None
 
     def described(self, line: LineShape) -> str:
-        """What is expected."""
-        if not isinstance(line, OperatorLine):
-            return self.model()
-        e = line.expected
-        return f"{self.model()} {Path(self.file).name}; expected rms {max(e.rms):.3g} %, mismatch {e.mismatch:.3g} %"
+        """Its file."""
+        return f"{self.model()} {Path(self.file).name}"
 
 
 def _line(operator: Operator, wanted: WantedLine) -> OperatorLine:

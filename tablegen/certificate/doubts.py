@@ -1,0 +1,59 @@
+"""Where what is expected on the scanner should be doubted, or is worse than the waveform's own errors say."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from tablegen.certificate.certificate import Certificate
+from tablegen.certificate.excess import LARGEST_PERCENT
+from tablegen.planning.line_plan import LinePlan
+
+FAR_PERCENT = 10.0  # of v_max, from the nearest measured line; the traces of `calibrate operator` are closer than twice
+_GRID = 32  # points per period of the highest harmonic
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """A sentence about one axis: a figure in percent, above ``limit``; ``kind`` says which figure it is."""
+
+    kind: Literal["scaling error", "distance"]
+    text: str
+    percent: float
+    limit: float
+
+
+def largest_expected(certificate: Certificate) -> tuple[str, float] | None:
+    """The direction with the largest scaling error that is expected, and that in percent; None where none is."""
+    expected = certificate.expected
+    if expected is None or not expected.scaling:
+        return None
+    return max(((side, figure.value) for side, figure in expected.scaling.items()), key=lambda one: one[1])
+
+
+def doubts(line: LinePlan, certificate: Certificate, most: float | None) -> list[Doubt]:
+    """What should be said of the expectation of an axis; ``most`` is ``limits.max_scaling_error_percent``.
+
+    The uncertainty is not counted: it stands beside the figure, and no change of the scan makes it smaller.
+    """
+    found, axis = [], line.axis
+    worst = largest_expected(certificate)
+    limit = LARGEST_PERCENT if most is None else min(LARGEST_PERCENT, most)
+    if worst is not None and worst[1] > limit:
+        text = (
+            f"on the scanner the {axis} axis is expected to have a scaling error of {worst[1]:.3g} % {worst[0]}, above "
+            f"{limit:g} %, since these harmonics do not make the waveform that its operator needs over the window"
+        )
+        found.append(Doubt("scaling error", text, worst[1], limit))
+    expected = certificate.expected
+    if expected is not None and expected.distance is not None and expected.distance > FAR_PERCENT:
+        w = line.drive_series.on_grid(_GRID * line.drive_series.harmonics)
+        stroke = line.drive.v_amplitude * float(np.max(w) - np.min(w))
+        here = f"{stroke:.3g} V about {line.drive.v_offset:.3g} V"
+        text = (
+            f"the {axis} axis moves by {here}, {expected.distance:.2g} % of v_max from the nearest trace of its "
+            f"operator, so that less is known than its uncertainty says; record a trace of {here}, and give it to "
+            "`tablegen calibrate operator` with the others"
+        )
+        found.append(Doubt("distance", text, expected.distance, FAR_PERCENT))
+    return found

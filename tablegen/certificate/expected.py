@@ -1,0 +1,56 @@
+"""What is expected on the scanner: by the operator of an axis, or of trace and retrace by the laws of its file.
+
+A branch of (17) runs from turn to turn of a line of V_scan. Turnarounds are rounded, so that the drive of a build turns
+earlier: at a stroke of V_scan (w_max - w_min). The piezo's loop is that of this stroke, with the smaller residual of
+(22), and its branches meet where the drive really turns. So trace and retrace are apart, although each is straight by
+the branches that were applied.
+"""
+
+import numpy as np
+
+from tablegen.compensation.expectation import Expectation, Figure
+from tablegen.numerics.arrays import Floats
+from tablegen.planning.line_plan import LinePlan
+
+_POINTS = 401  # over the window
+_GRID = 32  # points per period of the highest harmonic
+
+
+def expected_of(line: LinePlan) -> Expectation | None:
+    """What a line should do on the scanner; None where nothing is known.
+
+    A layer of ``tablegen refine`` was learnt on the scanner, and knows more than the model.
+    """
+    if line.layer is not None:
+        return None
+    both = line.band_limit.directions == "both"
+    known = line.drive.shape.expectation
+    if known is not None:
+        return known if both else known.forward_only
+    mismatch = rounding_mismatch(line) if both else None
+    return None if mismatch is None else Expectation("laws", mismatch=Figure(mismatch))
+
+
+def rounding_mismatch(line: LinePlan) -> float | None:
+    """The largest distance of trace and retrace inside the window, in percent of the line, by the laws.
+
+    None where a model has no branches for the stroke that is played.
+    """
+    drive = line.drive
+    if drive.shape.waveform is not None or not drive.hysteresis.compensates:
+        return None
+    w = line.target.on_grid(_GRID * line.target.harmonics)
+    low, high = float(np.min(w)), float(np.max(w))
+    played = drive.line_at(drive.v_scan_normalised * (high - low))
+    if played is None:
+        return None
+    x = np.linspace(*line.band_limit.window, _POINTS)
+    there, back = (_share(line, side, x, low, high) for side in ("forward", "backward"))
+    apart = played.forward.inverse(there) - (1.0 - played.backward.inverse(1.0 - back))
+    extent = drive.size_law.size_nm(drive.v_scan_normalised * (high - low)) / drive.size_nm
+    return 100.0 * extent * float(np.max(np.abs(apart)))
+
+
+def _share(line: LinePlan, side: str, x: Floats, low: float, high: float) -> Floats:
+    """The drive where the line is at ``x``, from 0 to 1 between its turns."""
+    return (line.target.value(line.drive.shape.times(side, x)) - low) / (high - low)

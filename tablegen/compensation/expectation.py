@@ -1,0 +1,38 @@
+"""What is expected of a line on the scanner, by what a model knows of the piezo, each figure with its uncertainty."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """A figure in percent of the line, and what it is uncertain by, in the same unit; None where nobody knows."""
+
+    value: float
+    uncertainty: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Expectation:
+    """What the scanner should do with the line; a waveform's own errors are the certificate's.
+
+    ``rms`` is the residual about the best straight line, ``scaling`` the scaling error, peak to peak, each by
+    direction; ``mismatch`` the largest distance of trace and retrace; ``size`` the error of the size, with its sign.
+    ``basis`` says where they are from: "traces" of the piezo, or the "laws" of the scanner file, by which the
+    mismatch alone is known. ``distance`` is how far stroke or centre are from the nearest measured line, in percent of
+    v_max.
+    """
+
+    basis: Literal["traces", "laws"]
+    rms: Mapping[str, Figure] = field(default_factory=dict)
+    scaling: Mapping[str, Figure] = field(default_factory=dict)
+    mismatch: Figure | None = None
+    size: Figure | None = None
+    distance: float | None = None
+
+    @property
+    def forward_only(self) -> "Expectation":
+        """The same where the retrace is not imaged."""
+        rms, scaling = ({"forward": one["forward"]} if "forward" in one else {} for one in (self.rms, self.scaling))
+        return replace(self, rms=rms, scaling=scaling, mismatch=None)

@@ -1,0 +1,170 @@
+"""Hysteresis of another family: a Duhem operator, after Coleman and Hodgdon, in which a branch relaxes.
+
+The displacement is a reversible part R(u) plus lags. While the drive u rises, a lag z relaxes towards -b(u), and while
+it falls towards +c(u), each over its own share of the full drive:
+
+    rising   dz/du = rise (-b(u) - z)         falling   dz/du = -fall (c(u) - z)
+
+Nothing is wiped out: what a lag remembers decays with the way that the drive has gone, and a drive that goes to and fro
+about one value brings it to its balance there. R', b and c are Bernstein polynomials with coefficients >= 0. The
+equation is linear: a branch is a polynomial and an exponential, exact whatever the number of ticks, and one period maps
+a lag to a linear function of itself, whose fixed point is the steady state.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from math import exp, expm1
+
+import numpy as np
+
+from tablegen.numerics.arrays import Floats, FloatsLike
+from tablegen.virtual.pieces import monotonic, normalised, powers_of
+
+LEAST_RATE = 0.5  # below it a branch would be the difference of large numbers
+POINTS = np.linspace(0.0, 1.0, 201)  # drives at which the slope is checked
+
+
+@dataclass(frozen=True)
+class Lag:
+    """Rates per full drive; ``below`` and ``above`` are the Bernstein coefficients of b and c in nm."""
+
+    rise: float
+    fall: float
+    below: tuple[float, ...]
+    above: tuple[float, ...]
+
+    @cached_property
+    def towards(self) -> tuple[Floats, Floats]:
+        """Polynomials that solve the equation of a rise and of a fall; every other solution approaches them."""
+        return -_relaxed(self.below, -self.rise), _relaxed(self.above, self.fall)
+
+    def balance(self, drive: FloatsLike) -> Floats:
+        """Where a small drive to and fro about ``drive`` ends, in nm."""
+        polyval = np.polynomial.polynomial.polyval
+        pulled = self.fall * polyval(drive, powers_of(self.above)) - self.rise * polyval(drive, powers_of(self.below))
+        return np.asarray(pulled / (self.rise + self.fall), dtype=np.float64)
+
+    @cached_property
+    def reach(self) -> tuple[Floats, Floats]:
+        """The lowest and the highest lag at each of ``POINTS`` that a history which began in balance can lead to."""
+        low, high = self.balance(POINTS), self.balance(POINTS)
+        solutions = [np.polynomial.polynomial.polyval(POINTS, solution) for solution in self.towards]
+        count = len(POINTS)
+        ways = [(0, range(count - 1), 1), (1, range(count - 1, 0, -1), -1)]
+        for direction, places, step in ways + ways:
+            at, kept = solutions[direction], exp(-(self.fall if direction else self.rise) / (count - 1))
+            for n in places:
+                low[n + step] = min(low[n + step], at[n + step] + (low[n] - at[n]) * kept)
+                high[n + step] = max(high[n + step], at[n + step] + (high[n] - at[n]) * kept)
+        return low, high
+
+    def after(self, z: float, turned: float, drive: FloatsLike, up: bool) -> Floats:
+        """The lag in nm at drives of a branch that left the drive ``turned`` with a lag of ``z``."""
+        rate, solution = (self.rise, self.towards[0]) if up else (self.fall, self.towards[1])
+        away = z - float(np.polynomial.polynomial.polyval(turned, solution))
+        drive = np.asarray(drive, dtype=np.float64)
+        found: Floats = np.polynomial.polynomial.polyval(drive, solution) + away * np.exp(
+            -rate * np.abs(drive - turned)
+        )
+        return found
+
+
+@dataclass(frozen=True, slots=True)
+class Lags:
+    """Where the drive is, 0..1, and each lag there in nm."""
+
+    drive: float
+    nm: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Duhem:
+    """The operator; drive normalised to 0..1, displacement in nm above that at drive 0 in balance.
+
+    ``reversible``: Bernstein coefficients of the slope R' over 0..1, in nm per full drive. Raises ``ValueError`` where
+    a branch could run backwards, whatever was played before.
+    """
+
+    reversible: tuple[float, ...]
+    lags: tuple[Lag, ...]
+
+    def __post_init__(self) -> None:
+        coefficients = [*self.reversible, *(c for lag in self.lags for c in (*lag.below, *lag.above))]
+        if not self.reversible or not all(lag.below and lag.above for lag in self.lags) or min(coefficients) < 0.0:
+            raise ValueError("reversible slope, below and above need coefficients, none of which is below 0")
+        if min((rate for lag in self.lags for rate in (lag.rise, lag.fall)), default=LEAST_RATE) < LEAST_RATE:
+            raise ValueError(f"a lag that relaxes at less than {LEAST_RATE:g} per full drive is no lag")
+        slope = self.least_slope()
+        if slope < 0.0:
+            raise ValueError(f"a branch could run backwards, at {-slope:.3g} nm per full drive")
+
+    @cached_property
+    def _integral(self) -> Floats:
+        slope = powers_of(self.reversible)
+        return np.append(0.0, slope / np.arange(1, len(slope) + 1))
+
+    @cached_property
+    def rest(self) -> Lags:
+        """At drive 0, in balance."""
+        return Lags(0.0, tuple(float(lag.balance(0.0)) for lag in self.lags))
+
+    def least_slope(self) -> float:
+        """The least slope of a branch after any history, in nm per full drive, or less."""
+        polyval = np.polynomial.polynomial.polyval
+        rising = falling = polyval(POINTS, powers_of(self.reversible))
+        for lag in self.lags:
+            low, high = lag.reach
+            rising = rising - lag.rise * (polyval(POINTS, powers_of(lag.below)) + high)
+            falling = falling - lag.fall * (polyval(POINTS, powers_of(lag.above)) - low)
+        return float(min(np.min(rising), np.min(falling)))
+
+    def middle(self, drive: FloatsLike) -> Floats:
+        """In balance at a drive, in nm: between the branches of every small loop there."""
+        lags = sum(lag.balance(drive) for lag in self.lags) - sum(self.rest.nm)
+        return np.asarray(np.polynomial.polynomial.polyval(drive, self._integral) + lags, dtype=np.float64)
+
+    def play(self, drive: Floats, memory: Lags | None = None) -> tuple[Floats, Lags]:
+        """Displacement in nm at each drive of a sequence, and what is remembered after it."""
+        drive = normalised(drive)
+        memory = memory or self.rest
+        at, z = memory.drive, [*memory.nm]
+        out = np.asarray(np.polynomial.polynomial.polyval(drive, self._integral) - sum(self.rest.nm), dtype=np.float64)
+        for first, stop, turned, up in _branches(drive, at):
+            for n, lag in enumerate(self.lags):
+                lagging = lag.after(z[n], turned, drive[first:stop], up)
+                out[first:stop] += lagging
+                z[n] = float(lagging[-1])
+            at = float(drive[stop - 1])
+        return out, Lags(at, tuple(z))
+
+    def settled(self, drive: Floats) -> Floats:
+        """Displacement in nm over one period of a drive that has been repeated for ever."""
+        drive = normalised(drive)
+        at = float(drive[-1])
+        _, memory = self.play(np.array([at]))
+        way = np.diff(np.append(at, drive))
+        up, down = float(np.sum(way[way > 0.0])), -float(np.sum(way[way < 0.0]))
+        if up == 0.0:
+            return self.play(drive, memory)[0]
+        # A period maps z to kept z + gained, so that gained / (1 - kept) comes back.
+        gained = self.play(drive, Lags(at, (0.0,) * len(self.lags)))[1].nm
+        lost = [-expm1(-lag.rise * up - lag.fall * down) for lag in self.lags]
+        return self.play(drive, Lags(at, tuple(g / one for g, one in zip(gained, lost, strict=True))))[0]
+
+
+def _branches(drive: Floats, at: float) -> Iterator[tuple[int, int, float, bool]]:
+    """First and last tick of every monotonic piece, the drive that it left, and whether it rises."""
+    for first, stop in monotonic(np.append(at, drive)):
+        turned = at if first == 0 else float(drive[first - 1])
+        yield first, stop, turned, bool(drive[stop - 1] > turned)
+
+
+def _relaxed(bernstein: tuple[float, ...], rate: float) -> Floats:
+    """s + s'/rate + s''/rate^2 + ..., which solves p' = rate (p - s)."""
+    term = powers_of(bernstein)
+    out = term.copy()
+    for count in range(len(term) - 1, 0, -1):
+        term = np.arange(1, count + 1) * term[1:] / rate
+        out[:count] += term
+    return out

@@ -1,0 +1,45 @@
+"""What the operators of hysteresis share: monotonic pieces of a drive, and Bernstein polynomials as powers."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+from math import comb
+
+import numpy as np
+
+from tablegen.numerics.arrays import Floats
+
+# Drives this far outside 0..1 are the last bits of a voltage, not a voltage.
+_SATURATION_TOLERANCE = 1e-9
+
+
+def normalised(drive: Floats) -> Floats:
+    """A drive of 0..1, without the last bits of a voltage. Raises ``ValueError`` for any other."""
+    drive = np.asarray(drive, dtype=np.float64)
+    if drive.size and max(-float(drive.min()), float(drive.max()) - 1.0) > _SATURATION_TOLERANCE:
+        raise ValueError(f"a drive of {drive.min():g}..{drive.max():g} leaves 0..1, for which the operator is made")
+    return np.clip(drive, 0.0, 1.0)
+
+
+def monotonic(drive: Floats) -> list[tuple[int, int]]:
+    """Ranges of drive[1:] along which the sequence never both rises and falls; flat parts belong to what is before."""
+    steps = np.sign(np.diff(drive))
+    moving = np.flatnonzero(steps)
+    if not len(moving):
+        return [(0, len(steps))] if len(steps) else []
+    turns = moving[1:][steps[moving[1:]] != steps[moving[:-1]]]
+    ends = [0, *map(int, turns), len(steps)]
+    return list(pairwise(ends))
+
+
+def one_minus(n: int) -> Floats:
+    """Coefficients of (1 - x)^n."""
+    return np.array([(-1.0) ** k * comb(n, k) for k in range(n + 1)])
+
+
+def powers_of(bernstein: Sequence[float]) -> Floats:
+    """The polynomial with these Bernstein coefficients over 0..1, as coefficients of 1, x, x^2, ..."""
+    n = len(bernstein) - 1
+    out = np.zeros(n + 1)
+    for i, weight in enumerate(bernstein):
+        out[i:] += weight * comb(n, i) * one_minus(n - i)
+    return out

@@ -1,0 +1,119 @@
+"""docs/operator.md says what the operator is: its keys, its columns, its limits, and what its example prints."""
+
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+import msgspec.inspect as types
+import pytest
+from building import EXAMPLE, REPOSITORY
+from click.testing import CliRunner
+
+from tablegen.calibration.operator import branches, family, fit, periodic_line
+from tablegen.cli import cli
+from tablegen.compensation.models.operator import CENTRE_REACH, STROKE_REACH
+from tablegen.compensation.operator import operator as operators
+from tablegen.compensation.operator.file import OperatorFile, read_operator
+from tablegen.reading import CONFIGURATION
+
+PAGE = (REPOSITORY / "docs" / "operator.md").read_text("utf-8")
+WORDS = " ".join(PAGE.split())
+NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]\d+)?")
+CELL = re.compile(r"([\d.]+) / ([\d.]+)")
+
+
+def section(title: str) -> str:
+    """The text under a heading."""
+    return PAGE.partition(f"\n## {title}\n")[2].partition("\n## ")[0]
+
+
+def first_cells(title: str) -> list[str]:
+    """The code words in the first column of a section's table."""
+    rows = re.findall(r"^\| (`.*?) \|", section(title), re.MULTILINE)
+    return [word for row in rows for word in re.findall(r"`([^`]+)`", row)]
+
+
+def keys(described: Any, before: str = "") -> list[str]:
+    """Dotted names of all values of a table."""
+    if isinstance(described, types.ListType) and isinstance(described.item_type, types.StructType):
+        described = described.item_type
+    if not isinstance(described, types.StructType):
+        return [before[:-1]]
+    return [key for field in described.fields for key in keys(field.type, f"{before}{field.encode_name}.")]
+
+
+def test_every_key_of_the_file_is_told() -> None:
+    assert first_cells("What the file holds") == keys(types.type_info(OperatorFile))
+
+
+def test_the_limits_are_those_of_the_code() -> None:
+    assert f"more than {STROKE_REACH:g} v_max above the largest trace" in WORDS
+    assert f"{CENTRE_REACH:g} v_max away from every trace" in WORDS
+    assert f"at most {CONFIGURATION.most_bytes >> 20} MiB" in WORDS
+    assert f"{family.THRESHOLDS} thresholds from {family._LOWEST} to {family._HIGHEST}" in WORDS
+    assert f"Chebyshev series of degree {branches.DEGREE}" in WORDS
+    assert f"These {2 * branches.DEGREE + 2} numbers" in WORDS
+    assert f"s0 is {operators.SMALL_STROKE}" in WORDS
+    assert f"more than {fit._MAX_NOISE_PERCENT:g} % of the line differs" in WORDS
+    assert f"up to {periodic_line._RESONANCE_SHARE:g} of the resonance" in WORDS
+    assert f"more than {100 * periodic_line._BACKWARDS:g} % in the middle of a sweep" in WORDS
+
+
+def test_the_readme_has_the_numbers_of_the_page() -> None:
+    readme = " ".join((REPOSITORY / "README.md").read_text("utf-8").split())
+    for plant in ("many plays", "Bouc-Wen"):
+        for line in ("laws", "operator, six traces"):
+            (row,) = re.findall(rf"^\| {plant} \| 50 V \| {line} \| (.*) \|$", PAGE, re.MULTILINE)
+            _, (mean, worst), (mean_apart, worst_apart), _ = CELL.findall(row)
+            told = f"{float(mean):.1f} ({float(worst):.1f})", f"{float(mean_apart):.2f} ({float(worst_apart):.2f})"
+            assert f"{told[0]} | {told[1]}" in readme, (plant, line, told)
+
+
+@pytest.mark.common
+def test_the_example_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its traces, its command, what that prints; then what the scan leaves on the same scanner."""
+    for name in (EXAMPLE.name, "scanner.toml"):
+        (tmp_path / name).write_text((EXAMPLE.parent / name).read_text("utf-8"), "utf-8")
+    monkeypatch.chdir(tmp_path)
+    part = section("An example to run")
+    (code,) = re.findall(r"```python\n(.*?)```", part, re.DOTALL)
+    exec(compile(code, "docs/operator.md", "exec"), {})
+    ((command, shown),) = re.findall(r"```text\n\$ tablegen (.*?)\n(.*?)```", part, re.DOTALL)
+    result = CliRunner().invoke(cli, command.split(), catch_exceptions=False)
+    assert result.exit_code == 0, result.output
+    assert NUMBER.sub("#", " ".join(result.stdout.split())) == NUMBER.sub("#", " ".join(shown.split()))
+    for one, other in zip(NUMBER.findall(result.stdout), NUMBER.findall(shown), strict=True):
+        assert float(one) == pytest.approx(float(other), rel=0.2, abs=0.06)  # LAPACK differs between machines
+
+    (header,) = [line for line in shown.splitlines() if line.startswith("size [V]")]
+    columns = re.findall(r"[a-z]+(?: \[\S+\])?", header)
+    assert list(dict.fromkeys(columns)) == first_cells("What it prints")
+
+    _, file = read_operator(tmp_path / "scanner_x_operator.toml", "")
+    assert [line.name for line in file.lines] == [f"{volts}v.csv" for volts in (10, 25, 45, 65, 82, 97)]
+    simulated = CliRunner().invoke(cli, ["simulate", EXAMPLE.name, "--no-calibration", "--json"])
+    assert '"operator"' in simulated.stdout
+
+
+@pytest.mark.rest
+def test_a_row_of_the_measured_table(tmp_path: Path) -> None:
+    """The first one with an operator: five sizes at two rates, from traces through commands to integers."""
+    sys.path.insert(0, str(REPOSITORY / "docs" / "figures"))
+    try:
+        import make_operator
+        from calibrated_plant import calibrated, scanned
+        from foreign_plants import SIX, ForeignPlant, ManyPlays
+    finally:
+        sys.path.pop(0)
+    plant = ForeignPlant(ManyPlays())
+    calibrated(plant, tmp_path, SIX)
+    lines = [
+        scanned(plant, tmp_path, "operator.toml", size_nm, offset_v, rate_hz)
+        for offset_v, size_nm in make_operator.SCANS["50 V"]
+        for rate_hz in make_operator.RATES_HZ
+    ]
+    made = make_operator.row("many plays", "50 V", "operator, six traces", lines)
+    (shown,) = [row for row in PAGE.splitlines() if row.startswith(made[: made.index("traces |")])]
+    for one, other in zip(CELL.findall(made), CELL.findall(shown), strict=True):
+        assert [float(v) for v in one] == pytest.approx([float(v) for v in other], rel=0.1, abs=0.02)
