@@ -3,21 +3,26 @@
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import msgspec
 import numpy as np
 
 from tablegen.calibration.hysteresis import HysteresisFit, Trace, fit_hysteresis
+from tablegen.calibration.operator.fit import fit_operator
+from tablegen.calibration.operator.periodic_line import periodic_line
+from tablegen.calibration.operator.record import operator_file
 from tablegen.compensation.branch import Branch
 from tablegen.compensation.branches import Branches
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.compensation.line import LineShape
+from tablegen.compensation.models.operator import OperatorModel
 from tablegen.compensation.models.sinusoidal import SinusoidalModel
 from tablegen.config.load import load
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import make_plan
 from tablegen.virtual.experiments import triangle_size
-from tablegen.virtual.line_error import LineError, ideal_triangle, line_error
+from tablegen.virtual.line_error import LineError, about_window_line, ideal_triangle, line_error
 from tablegen.virtual.paper import SECTION_8, default_x, played_line
 from tablegen.virtual.played import PlayedDrive, played
 from tablegen.virtual.scanner import VirtualAxis
@@ -28,6 +33,7 @@ V_MAX, MIDDLE_V = 100.0, 50.0
 RATE_HZ = 100.0  # where the virtual scanner's gain is 1
 VELOCITY_NM_PER_S = 100e3  # section 9
 TICKS = 8000
+OPERATOR_V = (10.0, 25.0, 45.0, 65.0, 82.0, 100.0)  # traces of the operator
 GROWTH_V = tuple(float(v) for v in range(10, 101, 10))  # sizes of figure 5k, peak to peak
 
 
@@ -71,6 +77,27 @@ def optimised() -> tuple[float, float]:
         found.append([abs(branch.peak[0]) for branch in (error.forward, error.backward)])
     best = np.argmin(np.array(found), axis=0)
     return float(round(0.02 + tried[best[0]], 6)), float(round(0.065 + tried[best[1]], 6))
+
+
+@cache
+def by_operator() -> LineError:
+    """The same line by ``tablegen calibrate operator`` on settled triangles, without noise.
+
+    Its turnarounds are rounded; so the errors are about the best line through both windows.
+    """
+    time = np.arange(2 * TICKS) / (TICKS * RATE_HZ)
+    lines = []
+    for v in OPERATOR_V:
+        volts = MIDDLE_V + v * (ideal_triangle(TICKS, 0.5) - 0.5)
+        moved = axis().settled(volts, 1.0 / (RATE_HZ * TICKS))
+        lines.append(periodic_line(Trace(f"{v:g} V", time, np.tile(volts, 2), np.tile(moved, 2)), V_MAX))
+    setup = load(SCAN)
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "operator.toml"
+        path.write_bytes(operator_file(fit_operator(lines, None, lambda _: 1.0), "x", V_MAX))
+        x = msgspec.structs.replace(setup.scanner.x, hysteresis=OperatorModel(file=str(path)))
+        drive = played(make_plan(replace(setup, scanner=msgspec.structs.replace(setup.scanner, x=x))).x)
+    return about_window_line(line_error(axis().settled(drive.volts, drive.tick_s), 0.5, first=0.5))
 
 
 def modelled(shape: LineShape) -> LineError:

@@ -109,14 +109,18 @@ def _evidence(every: list[Row]) -> list[str]:
 
 
 def _table(rows: list[Row]) -> str:
-    head = (
-        "| in the paper | what | paper | same if | ours | from | same, or the reason |\n|---|---|---|---|---|---|---|\n"
-    )
-    cells = (
-        (row.figure, row.what, row.printed.text, row.printed.within, row.ours_text, row.source, row.verdict)
+    """With a column for the operator where a row has its number."""
+    titles = ["in the paper", "what", "paper", "same if", "ours", "from", "same, or the reason"]
+    lines = [
+        [row.figure, row.what, row.printed.text, row.printed.within, row.ours_text, row.source, row.verdict]
         for row in rows
-    )
-    return head + "".join(f"| {' | '.join(line)} |\n" for line in cells)
+    ]
+    if any(row.operator is not None for row in rows):
+        titles.insert(5, "operator")
+        for line, row in zip(lines, rows, strict=True):
+            line.insert(5, row.operator_text)
+    head = f"| {' | '.join(titles)} |\n|{'---|' * len(titles)}\n"
+    return head + "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 
 def _summary(rows: list[Row]) -> str:

@@ -52,7 +52,8 @@ class Printed:
 class Row:
     """The number that a figure or section prints, our number, its source, and ``why`` they differ, if they do.
 
-    ``decimals`` of our number; by default one more than the paper's, so that it can be seen by how much it agrees.
+    ``operator`` is the same of an identified operator, in place of the paper's model. ``decimals`` of our numbers; by
+    default one more than the paper's, so that it can be seen by how much they agree.
     """
 
     figure: str
@@ -62,6 +63,7 @@ class Row:
     source: Source
     why: str = ""
     decimals: int | None = None
+    operator: float | None = None
 
     @property
     def same(self) -> bool:
@@ -83,9 +85,17 @@ class Row:
     @property
     def ours_text(self) -> str:
         """Our number, with the sign where the paper has one."""
+        return self._text(self.ours)
+
+    @property
+    def operator_text(self) -> str:
+        """The operator's number in the same way; empty where it has none."""
+        return "" if self.operator is None else self._text(self.operator)
+
+    def _text(self, value: float) -> str:
         sign = "+" if "+" in self.printed.text else ""
         plus_minus = "±" if "±" in self.printed.text else ""
-        return f"{plus_minus}{self.ours:{sign}.{self._decimals}f} {self.printed.unit}".strip()
+        return f"{plus_minus}{value:{sign}.{self._decimals}f} {self.printed.unit}".strip()
 
     @property
     def _decimals(self) -> int:

@@ -24,14 +24,16 @@ class MeasuredBranch:
 class AmplitudeFit:
     """What one amplitude says.
 
-    ``v_scan`` is peak to peak in V. ``residual_percent`` is the position error that the model leaves, in percent of
-    the scan, averaged in bins of a twentieth of the line, forward then backward; ``scaling_percent`` the local scaling
-    error that it leaves, peak to peak over x = 0.1..0.9, of each direction. ``noise_percent`` is that of the scan for
-    a sensor, of the contrast for an image; ``drift_percent`` of the scan.
+    ``v_scan`` is peak to peak in V, ``v_offset`` its middle, None where it is not known. ``residual_percent`` is the
+    position error that the model leaves, in percent of the scan, averaged in bins of a twentieth of the line, forward
+    then backward; ``scaling_percent`` the local scaling error that it leaves, peak to peak over x = 0.1..0.9, of each
+    direction. ``noise_percent`` is that of the scan for a sensor, of the contrast for an image; ``drift_percent`` of
+    the scan.
     """
 
     turn: Estimate
     v_scan: float
+    v_offset: float | None = None
     samples: int
     forward: MeasuredBranch
     backward: MeasuredBranch

@@ -44,6 +44,7 @@ class Column:
 
 
 OFFSET = Column("offset", _VOLTS, -1e6, 1e6)
+SIZE = Column("size", _VOLTS, _SMALLEST, 1e6)
 APPARENT = Column("apparent", _NANOMETRES, _SMALLEST, 1e12)
 TRUE = Column("true", _NANOMETRES, _SMALLEST, 1e12)
 NOMINAL = Column("nominal", _NANOMETRES, _SMALLEST, 1e12)

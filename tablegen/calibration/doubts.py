@@ -12,6 +12,7 @@ from tablegen.calibration.frequency import FrequencyFit
 from tablegen.calibration.growth import Growth
 from tablegen.calibration.hysteresis import HysteresisFit
 from tablegen.calibration.offset import OffsetFit
+from tablegen.calibration.offset_sizes import OffsetSizesFit
 from tablegen.calibration.resonance import ResonanceFit
 from tablegen.calibration.size import SizeFit
 
@@ -35,6 +36,8 @@ def doubts(fit: Fit, points: bool = False) -> tuple[str, ...]:
             found = _hysteresis(fit, points)
         case OffsetFit():
             found = _offset(fit)
+        case OffsetSizesFit():
+            found = (f"images of {one.size_v:g} V: {doubt}" for one in fit.sizes for doubt in _offset(one))
         case SizeFit():
             found = _size(fit)
         case FrequencyFit():

@@ -14,6 +14,7 @@ from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 
 TYPICAL_RHO = 1.5  # the paper's backward scan, and the default of the scanner file
+OFFSET_TOLERANCE = 0.02  # of v_max: offsets that differ by less are one
 TURN_TOLERANCE = 0.02  # turns that differ by less are one calibration
 _POOR_FIT_PERCENT = 1.0
 _MAX_DRIVE_DEPARTURE = 0.01  # rms departure of the drive from a triangle
@@ -31,12 +32,16 @@ class Trace:
 
 @dataclass(frozen=True)
 class TurnFit:
-    """Both directions at one turning point, and the traces or image pairs that they rest on, by ascending amplitude."""
+    """Both directions at one turning point, and the traces or image pairs that they rest on, by ascending amplitude.
+
+    ``offsets_v`` are the offsets of these traces; empty where all have one, or where they are not known.
+    """
 
     turn: Estimate
     forward: Growth
     backward: Growth
     traces: tuple[AmplitudeFit, ...]
+    offsets_v: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,7 +104,13 @@ def combined(fits: Sequence[AmplitudeFit], v_max: float, rho: float, remarks: Se
             except Unphysical as reason:
                 raise Unphysical(f"turn {turn:.4g}, {name}: {reason}") from None
             remarks += [f"turn {turn:.4g}, {name}: {text}" for text in sides[-1].remarks]
-        branches.append(TurnFit(Estimate(turn, spread), sides[0], sides[1], tuple(group)))
+        offsets = _offsets(group, v_max)
+        if offsets:
+            listed = ", ".join(f"{volts:g}" for volts in sorted(set(offsets)))
+            remarks.append(
+                f"turn {turn:.4g}: (22) is one for the offsets of {listed} V; --points writes them by offset"
+            )
+        branches.append(TurnFit(Estimate(turn, spread), sides[0], sides[1], tuple(group), offsets))
     return HysteresisFit(
         points=sum(fit.samples for fit in fits),
         residual_percent=np.concatenate([fit.residual_percent for fit in fits]),
@@ -109,6 +120,25 @@ def combined(fits: Sequence[AmplitudeFit], v_max: float, rho: float, remarks: Se
         curves=tuple(_curves(branches, v_max)),
         branches=tuple(branches),
     )
+
+
+def _offsets(group: Sequence[AmplitudeFit], v_max: float) -> tuple[float, ...]:
+    """The offset of each, those that are near each other as one.
+
+    Empty where there is but one, and where no offset has two sizes: traces that all begin at 0 V say nothing of it.
+    """
+    known = sorted(fit.v_offset for fit in group if fit.v_offset is not None)
+    if len(known) < len(group):
+        return ()
+    clusters = [[known[0]]]
+    for volts in known[1:]:
+        if volts - clusters[-1][0] > OFFSET_TOLERANCE * v_max:
+            clusters.append([])
+        clusters[-1].append(volts)
+    means = {volts: float(f"{np.mean(cluster):.4g}") for cluster in clusters for volts in cluster}
+    if len(clusters) < 2 or max(map(len, clusters)) < 2:
+        return ()
+    return tuple(means[fit.v_offset] for fit in group if fit.v_offset is not None)
 
 
 def _check_shape(growth: Growth, v: float) -> None:

@@ -12,13 +12,15 @@ _MAX_PEAK_ERROR = 0.1  # standard error of a u_peak that was not determined
 
 
 def measured_points(branch: TurnFit, direction: str) -> list[dict[str, Any]]:
-    """Entries of ``points`` of one direction: size_v, beta, u_peak, by ascending amplitude.
+    """Entries of ``points`` of one direction: size_v, beta, u_peak, by ascending amplitude; of several offsets, by
+    ascending offset_v.
 
     Where noise hides the peak, u_peak is that of the mean; an amplitude at which noise hides all is left out. Raises
     ``Unphysical`` where a residual has the wrong sign, or makes no branch.
     """
     points: list[dict[str, Any]] = []
-    for trace in branch.traces:
+    offsets = branch.offsets_v or (None,) * len(branch.traces)
+    for trace, offset_v in sorted(zip(branch.traces, offsets, strict=True), key=lambda one: one[1] or 0.0):
         side: MeasuredBranch = getattr(trace, direction)
         beta, peak = side.beta, side.u_peak
         size_v = float(f"{trace.v_scan:.5g}")
@@ -28,11 +30,12 @@ def measured_points(branch: TurnFit, direction: str) -> list[dict[str, Any]]:
             continue
         if beta.value < _MIN_BETA_ERRORS * beta.standard_error or peak.standard_error > _MAX_PEAK_ERROR:
             peak = getattr(branch, direction).u_peak
-        if any(point["size_v"] == size_v for point in points):
+        place = {} if offset_v is None else {"offset_v": offset_v}
+        if any((point["size_v"], point.get("offset_v")) == (size_v, offset_v) for point in points):
             raise Unphysical(f"{size_v:g} V was measured twice; give one of the two")
         try:
             BranchShape.harmonic(beta.value, peak.value)
         except Unphysical as reason:
             raise Unphysical(f"{size_v:g} V, {direction}: {reason}") from None
-        points.append({"size_v": size_v, "beta": beta.rounded, "u_peak": peak.rounded})
+        points.append({**place, "size_v": size_v, "beta": beta.rounded, "u_peak": peak.rounded})
     return points

@@ -86,7 +86,7 @@ def _put(document: tomlkit.TOMLDocument, before: Mapping[str, Any], axis: str, c
     for key in change.removed:
         table.pop(key, None)
     for key, value in change.values.items():
-        _set(table, key, value)
+        _set(table, key, _rows_of_tables(value) if isinstance(value, list) else value)
     if change.branches:
         _put_branches(table, change.branches)
 
@@ -117,10 +117,10 @@ def _put_branches(table: Any, branches: Sequence[Mapping[str, Any]]) -> None:
             for other in old:
                 entry[key].pop(other, None)
             for inner_key, inner in value.items():
-                _set(entry[key], inner_key, _points(inner) if inner_key in MEASURED else inner)
+                _set(entry[key], inner_key, _rows_of_tables(inner) if inner_key in MEASURED else inner)
 
 
-def _points(rows: Sequence[Mapping[str, Any]]) -> Any:
+def _rows_of_tables(rows: Sequence[Mapping[str, Any]]) -> Any:
     """A row a line."""
     array = tomlkit.array()
     for row in rows:

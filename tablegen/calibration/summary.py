@@ -11,6 +11,7 @@ from tablegen.calibration.frequency import FrequencyFit
 from tablegen.calibration.hysteresis import HysteresisFit, TurnFit
 from tablegen.calibration.image_fit import ImageFit
 from tablegen.calibration.offset import OffsetFit
+from tablegen.calibration.offset_sizes import OffsetSizesFit
 from tablegen.calibration.points import measured_points
 from tablegen.calibration.resonance import ResonanceFit
 from tablegen.calibration.scanner_file import Change
@@ -20,6 +21,7 @@ from tablegen.calibration.trace import TraceFit
 from tablegen.compensation.branch import LAW, MEASURED
 from tablegen.compensation.models.harmonic import HarmonicModel
 
+_FACTORS = ("m_minus", "m_plus")
 _DIRECTIONS = ("forward", "backward")
 
 
@@ -31,6 +33,15 @@ def parameters(fit: Fit) -> list[tuple[str, Estimate, str]]:
                 ("m_minus", fit.m_minus, "amplitude factor at an offset of 0 V"),
                 ("m_plus", fit.m_plus, "amplitude factor at an offset of v_max"),
                 ("(centre_nm)", fit.centre_nm, "apparent size at the centre"),
+            ]
+        case OffsetSizesFit():
+            return [
+                row
+                for one in fit.sizes
+                for row in (
+                    ("size_v", Estimate(one.size_v or 0.0), f"scan voltage of {one.points} images"),
+                    *parameters(one),
+                )
             ]
         case SizeFit():
             return [
@@ -97,11 +108,17 @@ def change(
                 [f"{len(branch.traces)} {of}, {count} {what}, residual {fit.rms_percent:.2g} % rms{by_force}", *files]
             )
         return Change("hysteresis", {"model": HarmonicModel.model()}, (), branches, comments)
+    if isinstance(fit, OffsetSizesFit):
+        rows = [{key: value.rounded for key, value, _ in parameters(one) if key in _FACTORS} for one in fit.sizes]
+        entries = [{"size_v": one.size_v, **row} for one, row in zip(fit.sizes, rows, strict=True)]
+        law = ", drive factors by the size law"
+        gone = (*_FACTORS, "alpha", "beta", "points")
+        return Change("offset", {"sizes": entries}, gone, (), [[residual + law, *files]])
     values = {key: estimate.rounded for key, estimate, _ in parameters(fit) if not key.startswith("(")}
     match fit:
         case OffsetFit():
             law = "" if fit.size_v is None else f", drive factors of {fit.size_v:g} V by the size law"
-            return Change("offset", values, ("alpha", "beta", "points"), (), [[residual + law, *files]])
+            return Change("offset", values, ("alpha", "beta", "points", "sizes"), (), [[residual + law, *files]])
         case SizeFit():
             return Change("size", {**values, "base_nm": fit.base_nm}, (), (), [[residual, *files]])
         case FrequencyFit():
@@ -136,6 +153,11 @@ def record(fit: Fit, axis: str, sources: Sequence[Source]) -> dict[str, Any]:
         data["size_v"] = fit.size_v
     if isinstance(fit, HysteresisFit):
         data["branches"] = [_branch_record(branch) for branch in fit.branches]
+    elif isinstance(fit, OffsetSizesFit):
+        data["sizes"] = [
+            {"size_v": one.size_v, **{key.strip("()"): _plain(value) for key, value, _ in parameters(one)}}
+            for one in fit.sizes
+        ]
     else:
         data["parameters"] = {key.strip("()"): _plain(estimate) for key, estimate, _ in parameters(fit)}
     return data
@@ -155,6 +177,7 @@ def _amplitude_record(trace: AmplitudeFit) -> dict[str, Any]:
     match trace:
         case TraceFit():
             data |= {
+                "v_offset": trace.v_offset,
                 "rate_hz": 1.0 / trace.triangle.period_s,
                 "periods": trace.periods,
                 "delay_s": _plain(trace.delay_s),

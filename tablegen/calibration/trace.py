@@ -201,6 +201,7 @@ def _result(model: _TraceModel, solution: Solution, triangle: Triangle, periods:
         triangle=triangle,
         turn=Estimate(triangle.turn, float(triangle.timing_covariance[2, 2]) ** 0.5),
         v_scan=triangle.v_high - triangle.v_low,
+        v_offset=0.5 * (triangle.v_low + triangle.v_high),
         periods=periods,
         samples=len(left),
         left_out=left_out,

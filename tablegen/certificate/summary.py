@@ -95,7 +95,8 @@ def certificate_lines(certificate: Certificate) -> list[tuple[str, str]]:
     for side, r in (c.refinement or {}).items():
         moves = f"moves up to {_percent(r.position)} % of the line, takes away {_percent(r.scaling)} % peak to peak"
         rows.append(("refined " + side, moves))
-    rows += _expected(c.expected)
+    expected = [] if c.expected is None else expected_lines(c.expected)
+    rows += [("" if i else "on the scanner", text) for i, text in enumerate(expected)]
     rows += [
         (
             "codes",
@@ -110,16 +111,14 @@ def certificate_lines(certificate: Certificate) -> list[tuple[str, str]]:
     return rows
 
 
-def _expected(expectation: Expectation | None) -> list[tuple[str, str]]:
+def expected_lines(expectation: Expectation) -> list[str]:
     """What to expect on the scanner; no figure without its uncertainty, or a word that there is none."""
-    if expectation is None:
-        return []
     if expectation.basis == "laws":
         assert expectation.mismatch is not None
         apart = _percent(expectation.mismatch.value)
         return [
-            ("on the scanner", f"trace and retrace up to {apart} % of the line apart by the laws, since turnarounds"),
-            ("", "are rounded; no measured uncertainty"),
+            f"trace and retrace up to {apart} % of the line apart by the laws, since turnarounds",
+            "are rounded; no measured uncertainty",
         ]
     rows = [
         (f"{what} {side}", figure)
@@ -131,7 +130,7 @@ def _expected(expectation: Expectation | None) -> list[tuple[str, str]]:
     lines = [", ".join(texts[i : i + 2]) for i in range(0, len(texts), 2)]
     if expectation.distance is not None:
         lines.append(f"nearest measured line {expectation.distance:.2g} % of v_max away")
-    return [("" if i else "on the scanner", text) for i, text in enumerate(lines)]
+    return lines
 
 
 def _figure(figure: Figure, signed: bool) -> str:

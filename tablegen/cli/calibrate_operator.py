@@ -87,7 +87,7 @@ def _text(
     out = [
         f"operator of {axis} from {len(lines)} traces",
         "",
-        f"family   {fit.family}  (median rms of a trace left out: {tried})",
+        f"family   {fit.family}  (mean rms of a trace left out: {tried})",
         f"creep    {100.0 * creep.loss_per_decade:.2g} % a decade",
         "",
         f"{'':41}  {'in the fit':<23}   left out",

@@ -174,55 +174,53 @@ def in_file(common: Common, kind: str, key: str) -> float | None:
     return float(values) if isinstance(values, int | float) and values > 0.0 else None
 
 
-def size_law(common: Common, v_max: float, size_v: float) -> "SizeLaw":
-    """The size law of the scanner file, for images of ``size_v`` volts; the rest of the file may be incomplete."""
-    from tablegen.compensation.size import SizeLaw
-    from tablegen.config.decode import decode
-    from tablegen.config.scanner import Scanner
-    from tablegen.problems import Problems, Unphysical
-    from tablegen.toml import read_toml
+def size_law(common: Common, v_max: float, source: str) -> "SizeLaw":
+    """The size law of the scanner file, for ``source`` of scan voltages; the rest of the file may be incomplete."""
+    from tablegen.planning.drive import size_law_of
+    from tablegen.problems import Unphysical
 
     path = f"{common.axis}.size"
     if in_file(common, "size", "k_nm_per_v") is None:
-        fail([f"--size-v takes {path} of --scanner FILE; calibrate the size first"], ExitStatus.WRONG_INPUT)
-    if not size_v <= v_max:
-        fail([f"--size-v {size_v:g} is above v_max = {v_max:g} V"], ExitStatus.WRONG_INPUT)
-    values, document = read_toml(common.scanner, str(common.scanner))  # type: ignore[arg-type]
-    tables: dict[str, Any] = {}
-    problems = Problems()
-    decode(Scanner, values, document, problems, lambda _kind, key, _values, built: tables.update({key: built}))
-    size = tables.get(path)
-    if size is None:
-        fail([problem for problem in problems.found if problem.key.startswith(path)], ExitStatus.WRONG_INPUT)
+        fail([f"{source} takes {path} of --scanner FILE; calibrate the size first"], ExitStatus.WRONG_INPUT)
     try:
-        return SizeLaw.calibrated(size.k_nm_per_v, v_max, size.beta, size.base_nm, size.v_threshold)
+        return size_law_of(_tables(common, "size")[path], v_max)
     except Unphysical as reason:
         fail([f"{common.scanner}: {path}: {reason}"], ExitStatus.WRONG_INPUT)
 
 
-def scanner_axis(common: Common, v_max: float) -> "tuple[Response | None, OffsetLaw]":
-    """The dynamics and the offset law of the scanner file; without them, none and a constant."""
-    from tablegen.compensation.offset import OffsetLaw
+def _tables(common: Common, *names: str) -> dict[str, Any]:
+    """These tables of the axis as the scanner file has them, by path; a fault in one of them ends the command."""
     from tablegen.config.decode import decode
     from tablegen.config.scanner import Scanner
-    from tablegen.planning.drive import dynamics_of, offset_law_of
-    from tablegen.problems import Problems, Unphysical
+    from tablegen.problems import Problems
     from tablegen.toml import read_toml
 
-    if common.scanner is None or not common.scanner.exists():
-        return None, OffsetLaw()
-    values, document = read_toml(common.scanner, str(common.scanner))
+    values, document = read_toml(common.scanner, str(common.scanner))  # type: ignore[arg-type]
     tables: dict[str, Any] = {}
     problems = Problems()
     decode(Scanner, values, document, problems, lambda _kind, key, _values, built: tables.update({key: built}))
     found = [problem for problem in problems.found if problem.key.startswith(f"{common.axis}.")]
-    used = [problem for problem in found if problem.key.split(".")[1] in ("offset", "resonance")]
+    used = [problem for problem in found if problem.key.split(".")[1] in names]
     if used:
         fail(used, ExitStatus.WRONG_INPUT)
-    resonance, offset = (tables.get(f"{common.axis}.{name}") for name in ("resonance", "offset"))
+    return tables
+
+
+def scanner_axis(common: Common, v_max: float) -> "tuple[Response | None, OffsetLaw]":
+    """The dynamics of the scanner file, and its offset law for small scans; without them, none and a constant."""
+    from tablegen.compensation.offset import OffsetLaw
+    from tablegen.compensation.size import SizeLaw
+    from tablegen.planning.drive import dynamics_of, offset_surface, size_law_of
+    from tablegen.problems import Unphysical
+
+    if common.scanner is None or not common.scanner.exists():
+        return None, OffsetLaw()
+    tables = _tables(common, "offset", "resonance")
+    resonance, offset, size = (tables.get(f"{common.axis}.{name}") for name in ("resonance", "offset", "size"))
     try:
         response = None if resonance is None else dynamics_of(resonance, common.scanner.parent)
-        return response, OffsetLaw() if offset is None else offset_law_of(offset, v_max)
+        law = SizeLaw(1.0, 0.0, 1.0) if size is None else size_law_of(size, v_max)
+        return response, OffsetLaw() if offset is None else offset_surface(offset, v_max, law).small
     except Unphysical as reason:
         fail([f"{common.scanner}: {common.axis}: {reason}"], ExitStatus.WRONG_INPUT)
 

@@ -55,11 +55,13 @@ def calibration_text(
 def _traces(fit: HysteresisFit) -> list[str]:
     """What each trace says by itself, and how good it is."""
     images = isinstance(fit.branches[0].traces[0], ImageFit)
-    head = (*(_IMAGE_HEAD if images else _TRACE_HEAD), "direction", "beta", "u_peak", "left [% p-p]")
+    offsets = any(branch.offsets_v for branch in fit.branches)
+    at = ("offset [V]",) if offsets else ()
+    head = (*at, *(_IMAGE_HEAD if images else _TRACE_HEAD), "direction", "beta", "u_peak", "left [% p-p]")
     rows: list[tuple[str, ...]] = [head]
     for branch in fit.branches:
         for trace in branch.traces:
-            record = _record(trace)
+            record = (f"{trace.v_offset or 0.0:.4g}",) * offsets + _record(trace)
             for side, left in zip(("forward", "backward"), trace.scaling_percent, strict=True):
                 measured: MeasuredBranch = getattr(trace, side)
                 start = record if side == "forward" else ("",) * len(record)

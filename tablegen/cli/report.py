@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from tablegen.certificate.certificate import Certificate
-from tablegen.certificate.summary import rate
+from tablegen.certificate.summary import expected_lines, rate
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, Plan
 
@@ -41,6 +41,9 @@ def certificate_table(plan: Plan, certificates: dict[str, Certificate]) -> list[
                 f"{line.axis:<4}  refinement, {side}: moves up to {moved.position:.3g} % of the line and takes away "
                 f"{moved.scaling:.3g} % of scaling error, peak to peak"
             )
+        expected = certificates[line.axis].expected
+        if expected is not None and expected.basis == "traces":
+            lines.append(f"{line.axis:<4}  on the scanner: {'; '.join(expected_lines(expected))}")
     return lines
 
 

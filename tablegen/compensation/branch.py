@@ -8,7 +8,7 @@ from msgspec import Meta
 
 from tablegen.compensation.hysteresis import beta_at
 from tablegen.compensation.model import Parameters
-from tablegen.compensation.points import HysteresisPoint, Residual, Rows, between_points, rows_of
+from tablegen.compensation.points import HysteresisPoint, OffsetRows, Residual, Rows, between_points, rows_of
 from tablegen.quantities import Normalised
 
 Decay = Annotated[float, Meta(ge=1e-6, le=100.0)]
@@ -60,43 +60,53 @@ class Branch(Parameters, frozen=True):
 class ResidualLaw:
     """beta and u_peak against the normalised scan voltage v.
 
-    With ``points``, (v, beta, u_peak) ascending in v, they lie between these. Without, beta is (22) of beta_max and
-    rho, u_peak one number.
+    With ``points``, (v, beta, u_peak) ascending in v, they lie between these; with ``offsets``, between those of two
+    offsets. Without, beta is (22) of beta_max and rho, u_peak one number.
     """
 
     beta_max: float = 0.0
     rho: float = 1.5
     u_peak: float = 0.5
     points: Rows = ()
+    offsets: OffsetRows | None = None
 
     @classmethod
     def of(cls, branch: Branch, v_max: float) -> "ResidualLaw":
         """As the scanner file has it."""
+        if branch.points is not None and branch.points[0].offset_v is not None:
+            return cls(offsets=OffsetRows.of(branch.points, v_max))
         if branch.points is not None:
             return cls(points=rows_of(branch.points, v_max))
         peak = 0.5 if branch.u_peak is None else branch.u_peak
         return cls(0.0 if branch.beta_max is None else branch.beta_max, branch.rho, peak)
 
-    def at(self, v: float, v_max: float) -> tuple[float, float]:
-        """beta and u_peak at a normalised scan voltage.
+    @property
+    def measured(self) -> bool:
+        """Whether it is that of points."""
+        return bool(self.points) or self.offsets is not None
 
-        Raises ``Unphysical`` for a scan that is larger than what was measured.
+    def at(self, v: float, v_max: float, v_offset: float | None = None) -> tuple[float, float]:
+        """beta and u_peak at a normalised scan voltage, and at an offset in V (default: half of v_max).
+
+        Raises ``Unphysical`` for a scan that is larger than what was measured, or far from its offsets.
         """
+        if self.offsets is not None:
+            return self.offsets.at(v, 0.5 if v_offset is None else v_offset / v_max, v_max)
         if self.points:
             return between_points(self.points, v, v_max)
         return beta_at(v, self.beta_max, self.rho), self.u_peak
 
 
 def residual_between(
-    one: Branch, other: Branch, share: float, v: float, v_max: float
+    one: Branch, other: Branch, share: float, v: float, v_max: float, v_offset: float
 ) -> tuple[float, float, float | None]:
     """beta and u_peak between two turns, and the beta_max that they come from where (22) gives both."""
     left, right = ResidualLaw.of(one, v_max), ResidualLaw.of(other, v_max)
-    if not left.points and not right.points:
+    if not left.measured and not right.measured:
         beta_max, rho = _between(left.beta_max, right.beta_max, share), _between(left.rho, right.rho, share)
         law = ResidualLaw(beta_max, rho, _between(left.u_peak, right.u_peak, share))
         return *law.at(v, v_max), beta_max
-    (beta_left, peak_left), (beta_right, peak_right) = left.at(v, v_max), right.at(v, v_max)
+    (beta_left, peak_left), (beta_right, peak_right) = left.at(v, v_max, v_offset), right.at(v, v_max, v_offset)
     return _between(beta_left, beta_right, share), _between(peak_left, peak_right, share), None
 
 

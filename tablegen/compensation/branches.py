@@ -106,7 +106,7 @@ class ByBranches(WithBranches, frozen=True):
             key = f"branches[{entries[left if share < 0.5 else right][0]}].{side}"
             found = None
             with wanted.at(f"{key}.points"):
-                found = residual_between(one, other, share, wanted.v, wanted.v_max)
+                found = residual_between(one, other, share, wanted.v, wanted.v_max, wanted.v_offset)
             if found is None:
                 continue
             beta, u_peak, beta_max = found

@@ -195,7 +195,8 @@ class WantedLine:
     ``v`` is the normalised scan voltage V_scan / V_max, in [0, 1]; ``v_amplitude`` = m g V_scan, volts peak to peak at
     the piezo for w from 0 to 1; ``harmonics`` the highest that is played; ``both`` whether both directions image.
     ``response`` are the dynamics, whose inverse gives no harmonic more than ``max_boost_db``; ``factor_at`` is m of (1)
-    at an offset as a share of v_max, ``rate_gain`` g of (23) at a rate in Hz, None where it is not calibrated.
+    at an offset as a share of v_max, for small scans, ``rate_gain`` g of (23) at a rate in Hz, None where it is
+    not calibrated.
     """
 
     axis: str

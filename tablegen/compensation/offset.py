@@ -38,6 +38,11 @@ class OffsetLaw:
         The p of each point is taken as it is, since the paper advises points away from the edges. The apparent
         size is proportional to m; the size at the centre comes out of the fit.
         """
+        return cls.fitted(p, apparent)[0]
+
+    @classmethod
+    def fitted(cls, p: list[float], apparent: list[float]) -> "tuple[OffsetLaw, float]":
+        """The law of ``fit``, and the apparent size at the centre."""
         if len(set(p)) < 3:
             raise Unphysical(f"{len(set(p))} different offsets do not determine a parabola; at least 3 are needed")
         if max(p) - min(p) < _MIN_SPAN:
@@ -62,7 +67,7 @@ class OffsetLaw:
         centre = float(c[0] - c[1] * middle + c[2] * middle * middle)
         if centre <= 0.0:
             raise Unphysical(f"the fit gives an apparent size of {centre:.4g} at the centre; it has to be above 0")
-        return cls(linear / centre, quadratic / centre)
+        return cls(linear / centre, quadratic / centre), centre
 
     def factor(self, p: float) -> float:
         """m(p), equation (1)."""

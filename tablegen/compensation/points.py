@@ -1,17 +1,21 @@
-"""Hysteresis as it was measured at each amplitude: ``points`` of a branch, in place of the growth law (22)."""
+"""Hysteresis as it was measured at each amplitude, and offset: ``points`` of a branch, in place of the law (22)."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
 from typing import Annotated
 
 from msgspec import Meta
 
 from tablegen.compensation.model import Parameters
-from tablegen.figures import at_most
+from tablegen.figures import at_least, at_most
 from tablegen.problems import Unphysical
-from tablegen.quantities import Normalised, PositiveVolts
+from tablegen.quantities import Normalised, PositiveVolts, Volts
 
 # Measured points serve scans this much larger than the largest of them, of v_max.
 SIZE_REACH = 0.1
+# And scans this far beyond the outermost offsets at which they were measured, of v_max.
+OFFSET_REACH = 0.1
 FULL_SCALE_TOLERANCE = 0.02  # relative difference allowed between a measured full scale and v_max
 
 Residual = Annotated[float, Meta(ge=0.0, lt=0.5)]
@@ -19,11 +23,17 @@ Rows = tuple[tuple[float, float, float], ...]  # normalised scan voltage, beta, 
 
 
 class HysteresisPoint(Parameters, frozen=True):
-    """Hysteresis of one direction as measured at one scan voltage."""
+    """Hysteresis of one direction as measured at one scan voltage, and at one offset where it depends on that."""
 
     size_v: Annotated[PositiveVolts, Meta(description="scan voltage V_scan of the measurement, at the piezo")]
     beta: Annotated[Residual, Meta(description="peak residual at this voltage, as a fraction of the scan")]
     u_peak: Annotated[Normalised, Meta(description="position of the peak; harmonic model only")] | None = None
+    offset_v: (
+        Annotated[
+            Volts, Meta(description="offset voltage of the measurement; without it, of any; of all points or none")
+        ]
+        | None
+    ) = None
 
 
 def rows_of(points: Sequence[HysteresisPoint], v_max: float) -> Rows:
@@ -32,19 +42,83 @@ def rows_of(points: Sequence[HysteresisPoint], v_max: float) -> Rows:
     return tuple(sorted(found))
 
 
+@dataclass(frozen=True, slots=True)
+class OffsetRows:
+    """Points of several offsets: the rows of each, by ascending offset as a share of v_max."""
+
+    offsets: tuple[tuple[float, Rows], ...]
+
+    @classmethod
+    def of(cls, points: Sequence[HysteresisPoint], v_max: float) -> "OffsetRows":
+        """Points that all have an offset."""
+        groups: dict[float, list[HysteresisPoint]] = {}
+        for point in points:
+            groups.setdefault((point.offset_v or 0.0) / v_max, []).append(point)
+        return cls(tuple((at, rows_of(groups[at], v_max)) for at in sorted(groups)))
+
+    def at(self, v: float, offset: float, v_max: float) -> tuple[float, float]:
+        """beta and u_peak at a normalised scan voltage and an offset, both shares of v_max.
+
+        Linear in the offset between two offsets that were measured, constant beyond the outermost. Raises
+        ``Unphysical`` where the scan is too large, or too far off.
+        """
+        first, last = self.offsets[0][0], self.offsets[-1][0]
+        if not first - OFFSET_REACH - 1e-9 <= offset <= last + OFFSET_REACH + 1e-9:
+            low = at_least(max(first - OFFSET_REACH, 0.0) * v_max, 6)
+            high = at_most(min(last + OFFSET_REACH, 1.0) * v_max, 6)
+            raise Unphysical(
+                f"measured at offsets of {first * v_max:g} to {last * v_max:g} V, which serves {low} to {high} V; this "
+                f"scan is at {offset * v_max:.6g} V; measure there, or leave offset_v away from all points"
+            )
+        if offset <= first or len(self.offsets) == 1:
+            return between_points(self.offsets[0][1], v, v_max)
+        for (low_at, left), (high_at, right) in pairwise(self.offsets):
+            if offset <= high_at:
+                share = (offset - low_at) / (high_at - low_at)
+                return _between_offsets(left, right, share, v, v_max)
+        return between_points(self.offsets[-1][1], v, v_max)
+
+
+def _between_offsets(left: Rows, right: Rows, share: float, v: float, v_max: float) -> tuple[float, float]:
+    """Between two offsets, of which the outer one has the smaller scans: beyond its largest it grows as the other."""
+    check_size(left[-1][0] + share * (right[-1][0] - left[-1][0]), v, v_max)
+    common = min(left[-1][0], right[-1][0])
+    sides = []
+    for rows, other in ((left, right), (right, left)):
+        beta, peak = interpolated(rows, v)
+        if rows[-1][0] == common < v:
+            there, peak_there = interpolated(other, common)
+            beyond, peak_beyond = interpolated(other, v)
+            beta *= beyond / there if there > 0.0 else 1.0
+            peak += peak_beyond - peak_there
+        sides.append((beta, peak))
+    (beta_left, peak_left), (beta_right, peak_right) = sides
+    return beta_left + share * (beta_right - beta_left), peak_left + share * (peak_right - peak_left)
+
+
 def between_points(rows: Rows, v: float, v_max: float) -> tuple[float, float]:
-    """beta and u_peak at a normalised scan voltage: linear between points; below the first beta falls to 0 at v = 0
-    and u_peak stays, beyond the last both stay.
+    """beta and u_peak at a normalised scan voltage, as ``interpolated``.
 
     Raises ``Unphysical`` for a scan that is larger than what was measured.
     """
-    largest = rows[-1][0]
+    check_size(rows[-1][0], v, v_max)
+    return interpolated(rows, v)
+
+
+def check_size(largest: float, v: float, v_max: float) -> None:
+    """Refuse a scan that is larger than the largest that was measured, both of v_max, by more than ``SIZE_REACH``."""
     if v > largest + SIZE_REACH + 1e-9:
         served = at_most((largest + SIZE_REACH) * v_max, 6)
         raise Unphysical(
             f"measured up to {largest * v_max:g} V, which serves scans up to {served} V; this one takes "
             f"{v * v_max:.6g} V; measure a larger one"
         )
+
+
+def interpolated(rows: Rows, v: float) -> tuple[float, float]:
+    """beta and u_peak: linear between points; below the first beta falls to 0 at v = 0 and u_peak stays, beyond the
+    last both stay.
+    """
     before = (0.0, 0.0, rows[0][2])
     for point in rows:
         if v <= point[0]:
@@ -55,18 +129,27 @@ def between_points(rows: Rows, v: float, v_max: float) -> tuple[float, float]:
 
 
 def twice(points: Sequence[HysteresisPoint]) -> list[tuple[str, str]]:
-    """Points at one voltage, and what is wrong with them."""
-    return [
+    """Points at one voltage and offset, and those without an offset among others; and what is wrong with them."""
+    found = [
         (f"points[{j}].size_v", f"{point.size_v:g} V is measured twice")
         for j, point in enumerate(points)
-        if any(point.size_v == earlier.size_v for earlier in points[:j])
+        if any((point.size_v, point.offset_v) == (earlier.size_v, earlier.offset_v) for earlier in points[:j])
     ]
+    if any(point.offset_v is not None for point in points):
+        lacking = [j for j, point in enumerate(points) if point.offset_v is None]
+        found += [(f"points[{j}].offset_v", "missing beside those of other points") for j in lacking]
+    return found
 
 
 def beyond_driver(points: Sequence[HysteresisPoint], v_max: float) -> list[tuple[str, str]]:
     """No hysteresis can have been measured at more than the driver's range, but for the error of a voltage."""
-    return [
+    found = [
         (f"points[{j}].size_v", f"{point.size_v:g} V is above v_max = {v_max:g} V")
         for j, point in enumerate(points)
         if point.size_v > (1.0 + FULL_SCALE_TOLERANCE) * v_max
+    ]
+    return found + [
+        (f"points[{j}].offset_v", f"{point.offset_v:g} V is outside the driver's 0..{v_max:g} V")
+        for j, point in enumerate(points)
+        if point.offset_v is not None and not 0.0 <= point.offset_v <= v_max
     ]

@@ -149,10 +149,10 @@ def _at_most_one(
 
 
 def _check_ways(key: str, written: Mapping[str, Any], file: Document, problems: Problems) -> None:
-    ways = [("m_minus", "m_plus"), ("alpha", "beta"), ("points",)]
+    ways = [("m_minus", "m_plus"), ("alpha", "beta"), ("points",), ("sizes",)]
     used = [way for way in ways if any(name in written for name in way)]
     if not used:
-        problems.add(file, key, "missing; give m_minus and m_plus, or alpha and beta, or points")
+        problems.add(file, key, "missing; give m_minus and m_plus, or alpha and beta, or points, or sizes")
     elif len(used) > 1:
         first, second = (next(name for name in way if name in written) for way in used[:2])
         problems.add(file, f"{key}.{second}", f"{first} is given as well; keep one of the ways")
@@ -195,11 +195,22 @@ def _faults(built: Struct) -> list[tuple[str, str]]:
                 return [("length", f"{built.length} is not a power of two; the nearest are {lower} and {2 * lower}")]
         case Refinement() if len(built.a) != len(built.b):
             return [("b", f"{len(built.b)} harmonics, and {len(built.a)} in a")]
+        case Offset():
+            return _offset_faults(built)
         case Parameters():
             return built.faults()
         case _:
             pass
     return []
+
+
+def _offset_faults(offset: Offset) -> list[tuple[str, str]]:
+    points, sizes = offset.points or [], [entry.size_v for entry in offset.sizes or []]
+    found = [(f"sizes[{i}].size_v", f"{v:g} V is given twice") for i, v in enumerate(sizes) if v in sizes[:i]]
+    if any(point.size_v is not None for point in points):
+        lacking = [i for i, point in enumerate(points) if point.size_v is None]
+        found += [(f"points[{i}].size_v", "missing beside those of other points") for i in lacking]
+    return found
 
 
 def _dac_faults(dac: Dac) -> list[tuple[str, str]]:

@@ -18,10 +18,25 @@ class OffsetPoint(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
 
     offset_v: Annotated[Volts, Meta(description="offset voltage at which the image was taken")]
     apparent_nm: Annotated[Nanometres, Meta(description="apparent size of the object, or apparent lattice constant")]
+    size_v: (
+        Annotated[PositiveVolts, Meta(description="scan voltage of the image, at the piezo; of all points or of none")]
+        | None
+    ) = None
+
+
+class OffsetSize(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Amplitude factors of (1) at one scan voltage; `alpha` and `beta` are linear in the voltage between two."""
+
+    size_v: Annotated[PositiveVolts, Meta(description="scan voltage V_scan of the images, at the piezo")]
+    m_minus: Annotated[Factor, Meta(description="amplitude factor at an offset of 0 V, of this size")]
+    m_plus: Annotated[Factor, Meta(description="amplitude factor at an offset of v_max, of this size")]
 
 
 class Offset(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Amplitude factor against offset voltage, (1)-(4): `m_minus` and `m_plus`, `alpha` and `beta`, or `points`."""
+    """Amplitude factor against offset voltage, (1)-(4): `m_minus` and `m_plus`, `alpha` and `beta`, or `points`.
+
+    Or `sizes`, where it depends on the scan size too; as with points of several `size_v`.
+    """
 
     m_minus: Annotated[Factor, Meta(description="amplitude factor at an offset of 0 V")] | None = None
     m_plus: Annotated[Factor, Meta(description="amplitude factor at an offset of v_max")] | None = None
@@ -31,6 +46,13 @@ class Offset(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         Annotated[
             list[OffsetPoint],
             Meta(min_length=3, max_length=1000, description="apparent sizes at three or more offsets"),
+        ]
+        | None
+    ) = None
+    sizes: (
+        Annotated[
+            list[OffsetSize],
+            Meta(min_length=1, max_length=64, description="factors as measured at several scan sizes"),
         ]
         | None
     ) = None

@@ -10,10 +10,11 @@ from tablegen.compensation.frequency import frequency_gain
 from tablegen.compensation.line import AppliedBranch, LineShape, WantedLine
 from tablegen.compensation.model import Hysteresis
 from tablegen.compensation.offset import OffsetLaw, normalised_offset
+from tablegen.compensation.offset_sizes import OffsetSurface, surface_of
 from tablegen.compensation.response_file import read_response
 from tablegen.compensation.size import SizeLaw
 from tablegen.config.load import Setup
-from tablegen.config.scanner import Offset, Resonance, ScannerAxis
+from tablegen.config.scanner import Offset, Resonance, ScannerAxis, Size
 from tablegen.config.schema import FastAxis
 from tablegen.figures import at_most
 from tablegen.problems import Problems, Unphysical
@@ -83,15 +84,14 @@ def compensate(setup: Setup, axis: str, rate_hz: float, harmonics: int, problems
     scan_file, scanner_file = setup.scan_file, setup.scanner_file
     before = len(problems.found)
 
-    offset_law = OffsetLaw()
-    if scanner.offset is not None:
-        _check_points(setup, axis, problems)
-        with problems.at(scanner_file, f"{axis}.offset{'.points' if scanner.offset.points is not None else ''}"):
-            offset_law = offset_law_of(scanner.offset, v_max)
     size_law = None
     with problems.at(scanner_file, f"{axis}.size.base_nm"):
-        s = scanner.size
-        size_law = SizeLaw.calibrated(s.k_nm_per_v, v_max, s.beta, s.base_nm, s.v_threshold)
+        size_law = size_law_of(scanner.size, v_max)
+    surface = OffsetSurface.everywhere(OffsetLaw())
+    if scanner.offset is not None and size_law is not None:
+        _check_points(setup, axis, problems)
+        with problems.at(scanner_file, f"{axis}.offset{'.points' if scanner.offset.points is not None else ''}"):
+            surface = offset_surface(scanner.offset, v_max, size_law)
 
     v_offset = 0.5 * v_max
     if scan.offset_v is not None:
@@ -101,7 +101,7 @@ def compensate(setup: Setup, axis: str, rate_hz: float, harmonics: int, problems
                 raise Unphysical(outside_driver(v_offset, v_max))
     elif scan.offset_nm is not None:
         with problems.at(scan_file, f"{axis}.offset_nm"):
-            v_offset = offset_law.voltage_at(scan.offset_nm, v_max, scanner.size.k_nm_per_v)
+            v_offset = surface.small.voltage_at(scan.offset_nm, v_max, scanner.size.k_nm_per_v)
 
     low, high = scan.band_limit.window
     v, size_nm = 0.0, 0.0
@@ -128,6 +128,7 @@ def compensate(setup: Setup, axis: str, rate_hz: float, harmonics: int, problems
             g = frequency_gain(rate_hz, scanner.frequency.alpha, scanner.frequency.reference_hz)
 
     p = normalised_offset(v_offset, v_max)
+    offset_law = surface.at(v)
     m = offset_law.factor(p)
     response, max_boost_db, law = None, 0.0, scanner.frequency
     if scanner.resonance is not None:
@@ -150,7 +151,7 @@ def compensate(setup: Setup, axis: str, rate_hz: float, harmonics: int, problems
         both=scan.band_limit.directions == "both",
         response=response,
         max_boost_db=max_boost_db,
-        factor_at=lambda share: offset_law.factor(normalised_offset(share * v_max, v_max)),
+        factor_at=lambda share: surface.small.factor(normalised_offset(share * v_max, v_max)),
         rate_gain=None if law is None else lambda hz: frequency_gain(hz, law.alpha, law.reference_hz),
         folder=setup.scanner_folder,
         scan_file=scan_file,
@@ -169,7 +170,7 @@ def compensate(setup: Setup, axis: str, rate_hz: float, harmonics: int, problems
     return Drive(
         v_max=v_max,
         v_offset=v_offset,
-        position_nm=offset_law.position_nm(v_offset, v_max, scanner.size.k_nm_per_v),
+        position_nm=surface.small.position_nm(v_offset, v_max, scanner.size.k_nm_per_v),
         size_nm=size_nm,
         window_nm=size_nm * (high - low),
         v_scan=v * v_max,
@@ -202,16 +203,34 @@ def _check_points(setup: Setup, axis: str, problems: Problems) -> None:
         if not 0.0 <= point.offset_v <= v_max:
             key = f"{axis}.offset.points[{i}].offset_v"
             problems.add(setup.scanner_file, key, outside_driver(point.offset_v, v_max))
+    sizes = [("points", i, point.size_v) for i, point in enumerate(offset.points or [])]
+    sizes += [("sizes", i, entry.size_v) for i, entry in enumerate(offset.sizes or [])]
+    for name, i, size_v in sizes:
+        if size_v is not None and size_v > v_max:
+            why = f"{size_v:g} V is above v_max = {v_max:g} V"
+            problems.add(setup.scanner_file, f"{axis}.offset.{name}[{i}].size_v", why)
 
 
-def offset_law_of(offset: Offset, v_max: float) -> OffsetLaw:
+def size_law_of(size: Size, v_max: float) -> SizeLaw:
     """The law of a scanner file. Raises ``Unphysical``."""
+    return SizeLaw.calibrated(size.k_nm_per_v, v_max, size.beta, size.base_nm, size.v_threshold)
+
+
+def offset_surface(offset: Offset, v_max: float, size: SizeLaw) -> OffsetSurface:
+    """m of a scanner file over offset and size; ``size`` serves points with ``size_v`` alone. Raises ``Unphysical``."""
+    if offset.sizes is not None:
+        entries = sorted(offset.sizes, key=lambda entry: entry.size_v)
+        laws = [(entry.size_v / v_max, OffsetLaw.from_ends(entry.m_minus, entry.m_plus)) for entry in entries]
+        return OffsetSurface(tuple(laws))
     if offset.points is not None:
-        p = [normalised_offset(point.offset_v, v_max) for point in offset.points]
-        return OffsetLaw.fit(p, [point.apparent_nm for point in offset.points])
+        points = [(point.offset_v, point.apparent_nm, point.size_v or 0.0) for point in offset.points]
+        if offset.points[0].size_v is not None:
+            return surface_of(points, size, v_max)
+        p = [normalised_offset(volts, v_max) for volts, _, _ in points]
+        return OffsetSurface.everywhere(OffsetLaw.fit(p, [apparent for _, apparent, _ in points]))
     if offset.m_minus is not None and offset.m_plus is not None:
-        return OffsetLaw.from_ends(offset.m_minus, offset.m_plus)
-    return OffsetLaw(offset.alpha or 0.0, offset.beta or 0.0)
+        return OffsetSurface.everywhere(OffsetLaw.from_ends(offset.m_minus, offset.m_plus))
+    return OffsetSurface.everywhere(OffsetLaw(offset.alpha or 0.0, offset.beta or 0.0))
 
 
 def dynamics_of(resonance: Resonance, folder: Path) -> Response:

@@ -16,7 +16,7 @@ from tablegen.calibration.estimate import Fit
 from tablegen.calibration.frequency import fit_frequency
 from tablegen.calibration.hysteresis import HysteresisFit, Trace, fit_hysteresis
 from tablegen.calibration.images import Pair, fit_images
-from tablegen.calibration.offset import fit_offset
+from tablegen.calibration.offset_sizes import fit_offset_sizes
 from tablegen.calibration.resonance import ResonanceFit, fit_resonance
 from tablegen.calibration.size import SizeFit, fit_size
 from tablegen.calibration.summary import change
@@ -37,6 +37,8 @@ NOISE = 0.002  # rms noise of every reading, relative to the scan or to the valu
 # Shares of v_max. Offsets stay away from the ends, as the paper advises.
 OFFSETS = (0.07, 0.285, 0.5, 0.715, 0.93)
 OFFSET_SIZE = 0.13
+OFFSET_SIZES = (0.06, 0.13, 0.25, 0.4, 0.55)  # where m is measured over the size too
+OFFSET_ROOM = 0.97  # of the offsets at which a scan of such a size fits, those that are used
 SIZES = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 AMPLITUDES = (0.2, 0.4, 0.6, 0.8, 1.0)
 SMALL_IMAGE, LATTICE_NM, GRATING_NM = 0.2, 17.7, 50.0
@@ -59,19 +61,21 @@ def calibrate(
     amplitudes: Sequence[float] = AMPLITUDES,
     points: bool = True,
     images: bool = False,
+    offset_sizes: Sequence[float] = (),
 ) -> Calibration:
     """Measure both axes with a sensor and fit what a scanner file holds; its base size, references and boost are kept.
 
     ``noise`` is relative, rms, of every reading; ``amplitudes`` of the traces are shares of v_max. Hysteresis is taken
     as measured at each amplitude, or by (22) with one u_peak where ``points`` is false; with ``images`` not from a
-    sensor, but from trace and retrace of a lattice and a grating, 256 x 256 with 5 % noise. Raises ``Unphysical``.
+    sensor, but from trace and retrace of a lattice and a grating, 256 x 256 with 5 % noise. ``offset_sizes`` are the
+    scan voltages, shares of v_max, of the images that give m; none stands for ``OFFSET_SIZE``. Raises ``Unphysical``.
     """
     axes: dict[str, ScannerAxis] = {}
     fits: dict[str, dict[str, Fit]] = {}
     for number, name in enumerate(_AXES):
         axis: VirtualAxis = getattr(scanner, name)
         day = _Day(setup, name, axis, noise, 1000 * (2 * seed + number))
-        fits[name] = day.fits(amplitudes, images)
+        fits[name] = day.fits(amplitudes, images, offset_sizes)
         axes[name] = day.scanner_axis(fits[name], points)
     scan = msgspec.structs.replace(  # what was learnt over another model does not fit to this one
         setup.scan,
@@ -96,10 +100,10 @@ class _Day:
         scan = getattr(setup.scan, name)
         self._scan_v: float = scan.size_v or scan.size_nm / self._before.size.k_nm_per_v
 
-    def fits(self, amplitudes: Sequence[float], images: bool) -> dict[str, Fit]:
+    def fits(self, amplitudes: Sequence[float], images: bool, offset_sizes: Sequence[float]) -> dict[str, Fit]:
         """Everything that can be calibrated; a resonance only where the scanner file has one."""
         size = self._size()
-        offset = self._offset(size)
+        offset = self._offset(size, offset_sizes or (OFFSET_SIZE,))
         imaged = self._imaged_hysteresis(amplitudes) if images else None
         traces = [] if images else self._traces(amplitudes)
         gains = self._gains()
@@ -140,15 +144,21 @@ class _Day:
             resonance=resonance,
         )
 
-    def _offset(self, size: SizeFit) -> Fit:
-        volts = [share * self._v_max for share in OFFSETS]
-        size_v = OFFSET_SIZE * self._v_max
-        found = apparent_sizes(
-            self._axis, volts, size_v, self._reference_hz, noise=self._noise, seed=self._next(), turn=self._turn
-        )
+    def _offset(self, size: SizeFit, sizes: Sequence[float]) -> Fit:
+        """From images of one object, at five offsets each; of a large scan closer to the middle, so that it fits."""
+        found = []
+        for share in sizes:
+            room = min(1.0, OFFSET_ROOM * (1.0 - share) / (OFFSETS[-1] - OFFSETS[0])) if len(sizes) > 1 else 1.0
+            volts = [self._v_max * (0.5 + room * (offset - 0.5)) for offset in OFFSETS]
+            size_v = share * self._v_max
+            seen = apparent_sizes(
+                self._axis, volts, size_v, self._reference_hz, noise=self._noise, seed=self._next(), turn=self._turn
+            )
+            found.append((seen["offset_v"], seen["apparent_nm"], np.full(len(volts), size_v)))
         k, beta, threshold = size.k_nm_per_v.value, size.beta.value, size.v_threshold.value
         law = SizeLaw.calibrated(k, self._v_max, beta, size.base_nm, threshold)
-        return fit_offset(found["offset_v"], found["apparent_nm"], self._v_max, law, size_v)
+        offset_v, apparent_nm, size_v_each = (np.concatenate(column) for column in zip(*found, strict=True))
+        return fit_offset_sizes(offset_v, apparent_nm, size_v_each, self._v_max, law)
 
     def _size(self) -> SizeFit:
         size = self._before.size

@@ -12,7 +12,7 @@ from foreign_plants import BoucWen, ForeignPlant, ManyPlays, record
 
 from tablegen.calibration.hysteresis import Trace
 from tablegen.calibration.operator.creep_fit import creep_of_fields
-from tablegen.calibration.operator.fit import OperatorFit, fit_operator
+from tablegen.calibration.operator.fit import OperatorFit, _creep_of, fit_operator
 from tablegen.calibration.operator.periodic_line import PeriodicLine, periodic_line
 from tablegen.calibration.operator.record import operator_file
 from tablegen.compensation.operator.creep import NO_CREEP, LogarithmicCreep
@@ -60,6 +60,10 @@ def loss_between(creep: LogarithmicCreep, slow_hz: float, quick_hz: float) -> fl
     real, imaginary = creep.response(np.array([slow_hz, quick_hz]))
     slow, quick = np.hypot(real, imaginary).tolist()
     return float(1.0 - quick / slow)
+
+
+def found_creep(lines: list[PeriodicLine]) -> LogarithmicCreep:
+    return creep_of_fields(lines, NO_PLAYS, lambda _: 1.0, _creep_of(lines))
 
 
 @cache
@@ -138,14 +142,14 @@ def test_creep_is_what_misses(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("protocol", [FRAMES, TURNED, QUICK], ids=["frames", "turned", "quick"])
 def test_creep_is_found_without_plays(protocol: tuple[tuple[float, float, float], ...]) -> None:
-    creep = creep_of_fields(traces("Bouc-Wen", protocol), NO_PLAYS, lambda _: 1.0)
+    creep = found_creep(traces("Bouc-Wen", protocol))
     slow, quick = np.abs(ForeignPlant(BoucWen()).crept(np.array([1.0, 10.0])))
     assert loss_between(creep.down_to(1.0), 1.0, 10.0) == pytest.approx(float(1.0 - quick / slow), rel=0.15)
 
 
 def test_turns_that_differ_at_one_rate_leave_creep_open() -> None:
     lines = [*traces("Bouc-Wen", TURNED)[:3], *(line for line in traces("Bouc-Wen", SLOW_TRIANGLES))]
-    assert creep_of_fields(lines, NO_PLAYS, lambda _: 1.0).loss_per_decade == 0.0
+    assert found_creep(lines).loss_per_decade == 0.0
 
 
 def test_creep_goes_on_below_the_rates_that_were_measured() -> None:

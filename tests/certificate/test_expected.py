@@ -149,7 +149,11 @@ def test_plays_that_are_stepped_do_with_the_codes_what_is_expected(tmp_path: Pat
 
 def test_it_stands_in_the_summary_and_in_the_manifest_and_old_manifests_are_read(tmp_path: Path) -> None:
     path, out = with_operator(tmp_path), tmp_path / "out"
-    assert run("build", path, "-o", out).status == 0
+    built = run("build", path, "-o", out)
+    assert built.status == 0
+    assert re.search(
+        r"\nx +on the scanner: rms forward .*; scaling forward .*; mismatch .*; nearest ", built.out + built.err
+    )
     assert run("verify", out, "--target", "files").status == 0
     text = run("show", path, "--no-plot").out
     assert re.search(r"on the scanner +rms forward [\d.e-]+ \+- 0\.05 %, rms backward ", text)
@@ -304,12 +308,14 @@ def test_the_virtual_scanner_has_the_mismatch_that_the_laws_expect() -> None:
     base = load(REPOSITORY / "examples" / "annexin_200nm.toml")
     limit = base.scan.x.band_limit
     setup = calibrate(with_scan(base, size_v=50.0, rate_hz=100.0, band_limit=limit), scanner).setup
-    for size_v in (20.0, 60.0, 100.0):
+    for size_v in (20.0, 80.0, 100.0):
         scan = with_scan(setup, size_v=size_v)
         error = play_x(scan, scanner).imaged
         inside = (error.forward.position >= 0.1) & (error.forward.position <= 0.9)
         apart = float(np.max(np.abs(error.forward.residual - error.backward.residual)[inside]))
-        assert rounding_mismatch(make_plan(scan).x) == pytest.approx(apart, rel=0.25)
+        estimate = rounding_mismatch(make_plan(scan).x)
+        assert estimate is not None
+        assert 0.75 < estimate / apart < 0.92, "docs/manifest.md says 9 to 24 % less"
         sharp = rounding_mismatch(make_plan(with_scan(setup, size_v=size_v, rate_hz=20.0, band_limit=SHARP)).x)
         assert sharp is not None
         assert sharp < 0.1 * apart

@@ -16,6 +16,8 @@ from editing import SCANNER, Outcome, run, write_pair
 
 from tablegen.calibration.estimate import Estimate
 from tablegen.cli.calibration_text import figures
+from tablegen.compensation.offset import OffsetLaw
+from tablegen.compensation.size import SizeLaw
 
 NOISE = 1.0 + 0.002 * np.random.default_rng(11).standard_normal(100)
 
@@ -400,3 +402,84 @@ def test_the_measured_table_is_whole_and_within_chance() -> None:
     assert [(kind, name) for kind, name, _ in rows] == expected
     assert all(93.4 <= float(share) <= 97.5 for _, _, share in rows)
     assert np.mean([float(share) for _, _, share in rows]) >= 95.0
+
+
+def images_of_sizes(path: Path) -> None:
+    """m_minus and m_plus of 10 V and of 40 V, seen through the size law of the scanner file."""
+    size = SizeLaw.calibrated(10.0, 100.0, 0.53, 200.0, 0.5)
+    rows: list[tuple[float, float, float]] = []
+    for volts, ends in ((40.0, (0.9, 1.3)), (10.0, (0.94, 1.2))):
+        law, v = OffsetLaw.from_ends(*ends), volts / 100.0
+        at = 50.0 + 0.9 * (50.0 - 0.6 * volts) * np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
+        looks = [size.size_nm(v) / size.size_nm(v / law.factor(one / 50.0 - 1.0)) for one in at.tolist()]
+        rows += zip(at.tolist(), 17.7 * np.array(looks) * (1.0 + 0.1 * (NOISE[:5] - 1.0)), [volts] * 5, strict=True)
+    write_csv(path, **dict(zip(("offset_v", "apparent_nm", "size_v"), zip(*rows, strict=True), strict=True)))
+
+
+def test_images_of_several_sizes_give_m_of_each(lab: Path) -> None:
+    images_of_sizes(lab / "sizes.csv")
+    command = ("calibrate", "offset", "--axis", "x", "sizes.csv", "--scanner", "scanner.toml")
+    fit = json.loads(run(*command, "--json").out)
+    assert [one["size_v"] for one in fit["sizes"]] == [10.0, 40.0]
+    for one, (m_minus, m_plus) in zip(fit["sizes"], ((0.94, 1.2), (0.9, 1.3)), strict=True):
+        for key, truth in (("m_minus", m_minus), ("m_plus", m_plus)):
+            assert abs(one[key]["value"] - truth) < 4.0 * one[key]["standard_error"] < 0.04
+    shown = run(*command, "--write")
+    assert (shown.status, shown.err) == (0, "")
+    assert shown.out.count("scan voltage of 5 images") == 2
+    assert "± " in next(line for line in shown.out.splitlines() if line.startswith("m_plus"))
+    text = (lab / "scanner.toml").read_text("utf-8")
+    written = tomllib.loads(text)["x"]["offset"]
+    assert list(written) == ["sizes"]
+    assert written["sizes"][1] == pytest.approx({"size_v": 40.0, "m_minus": 0.9, "m_plus": 1.3}, abs=0.02)
+    assert "# calibrate offset: 10 points, residual" in text
+    assert run("check", "scan.toml").status == 0
+    assert run(*command, "--write").out.endswith("x.offset up to date\n")
+    assert calibrate("offset", "--write").status == 0  # and back
+    assert list(tomllib.loads((lab / "scanner.toml").read_text("utf-8"))["x"]["offset"]) == ["m_minus", "m_plus"]
+
+
+def test_a_column_of_sizes_takes_the_size_law_and_no_option(lab: Path) -> None:
+    images_of_sizes(lab / "sizes.csv")
+    command = ("calibrate", "offset", "--axis", "x", "sizes.csv")
+    missing = run(*command, "--v-max", "100")
+    assert (missing.status, "the column size_v of sizes.csv takes x.size of" in missing.err) == (2, True)
+    both = run(*command, "--scanner", "scanner.toml", "--size-v", "13")
+    assert (both.status, "--size-v is for files without the column size_v" in both.err) == (2, True)
+    rows = (lab / "sizes.csv").read_text("utf-8").splitlines()
+    (lab / "sizes.csv").write_text("\n".join(rows[:4] + rows[6:]), "utf-8")
+    few = run(*command, "--scanner", "scanner.toml")
+    assert few.status == 0
+    assert "images of 40 V: three points fit exactly" in few.out
+    (lab / "sizes.csv").write_text("\n".join(rows[:3] + rows[6:]), "utf-8")
+    fewer = run(*command, "--scanner", "scanner.toml")
+    assert (fewer.status, "images of 40 V: 2 different offsets do not" in fewer.err) == (2, True)
+
+
+def test_traces_at_several_offsets_make_points_of_each(lab: Path) -> None:
+    """40 and 80 V at 50 V, 40 V once more at 72 V with another branch: the scan between has what lies between."""
+    noise = 0.002 * np.random.default_rng(13).standard_normal((2, 800))
+    there = Scanner(forward=(0.06, 3.0, 0.45), backward=(0.09, 1.2, 0.42)).trace(40.0, 3.3, 800, noise)
+    write_csv(
+        lab / "there.csv", time_s=there.time_s, drive_v=there.drive_v + 22.0, displacement_nm=there.displacement_nm
+    )
+    command = ("calibrate", "hysteresis", "--axis", "x", *TRACES, "there.csv", "--scanner", "scanner.toml")
+    outcome = run(*command, "--points", "--write")
+    assert (outcome.status, outcome.err) == (0, "")
+    assert "offset [V]" in outcome.out
+    assert "(22) is one for the offsets of 50, 72 V; --points writes them by offset" in outcome.out
+    (branch,) = tomllib.loads((lab / "scanner.toml").read_text("utf-8"))["x"]["hysteresis"]["branches"]
+    points = branch["forward"]["points"]
+    assert [point["offset_v"] for point in points] == pytest.approx([50.0] * len(TRACES) + [72.0], abs=0.1)
+    assert points[-1]["size_v"] == pytest.approx(40.0, rel=0.01)
+    assert points[-1]["u_peak"] == pytest.approx(0.45, abs=0.01)
+    assert run("check", "scan.toml").status == 0
+    # Traces that all begin at 0 V have a size an offset each, and do not tell one from the other.
+    for v in (40.0, 80.0):
+        trace = Scanner().trace(v, 3.3, 800, noise)
+        drive = trace.drive_v - 50.0 + 0.5 * v
+        write_csv(lab / f"low{v:g}.csv", time_s=trace.time_s, drive_v=drive, displacement_nm=trace.displacement_nm)
+    lows = ("calibrate", "hysteresis", "--axis", "x", "low40.csv", "low80.csv", "--scanner", "scanner.toml")
+    assert run(*lows, "--points", "--write").status == 0
+    (branch,) = tomllib.loads((lab / "scanner.toml").read_text("utf-8"))["x"]["hysteresis"]["branches"]
+    assert not any("offset_v" in point for point in branch["forward"]["points"])

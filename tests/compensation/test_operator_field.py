@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tablegen.compensation.operator.creep import NO_CREEP, LogarithmicCreep
-from tablegen.compensation.operator.field import Lengths, covariance, distinct, shape_field, through
+from tablegen.compensation.operator.field import Lengths, covariance, distinct, through
 
 POINTS = np.array([(0.1, 0.5), (0.4, 0.5), (0.9, 0.5), (0.3, 0.7)])
 LENGTHS = Lengths(0.8, 1.0, 1e-8)
@@ -19,10 +19,21 @@ def test_a_field_goes_through_what_was_measured() -> None:
         assert field.at(*point) == pytest.approx(row, abs=1e-4)
 
 
-def test_the_smallest_lines_are_straight() -> None:
-    field = shape_field(POINTS, np.ones((4, 2)), LENGTHS)
-    assert field.at(0.0, 0.5) == pytest.approx([0.0, 0.0], abs=1e-4)
-    assert field.at(0.0, 0.7) == pytest.approx([0.0, 0.0], abs=1e-4)
+def test_smaller_lines_are_straighter_but_for_what_all_strokes_share() -> None:
+    rows = np.stack([POINTS[:, 0], np.ones(4)], axis=1)
+    field = through(POINTS, rows, LENGTHS, straight=True)
+    for point, row in zip(POINTS.tolist(), rows, strict=True):
+        assert field.at(*point) == pytest.approx(row, abs=1e-4)
+    for centre in (0.3, 0.5, 0.7):
+        assert field.at(0.0, centre) == pytest.approx([0.0, 1.0], abs=0.15)
+
+
+def test_a_shape_is_that_of_the_same_stroke_at_another_centre() -> None:
+    one = POINTS[:3]
+    field = through(one, np.array([[0.1], [0.5], [0.7]]), Lengths(3.0, 2.0, 1e-9), straight=True)
+    for stroke in (0.05, 0.3, 0.6):
+        here, there = field.at(stroke, 0.5)[0], field.at(stroke, 0.85)[0]
+        assert there == pytest.approx(here, rel=0.03)
 
 
 def test_far_from_all_points_a_field_is_nothing() -> None:

@@ -7,18 +7,22 @@ from hypothesis import strategies as st
 
 from tablegen.compensation.operator.loop import POINTS, Loop
 from tablegen.compensation.operator.operator import chebyshev
-from tablegen.compensation.operator.plays import Plays, plays, transformed
+from tablegen.compensation.operator.plays import Plays, envelopes, plays
 from tablegen.numerics.arrays import Floats
 
 THRESHOLDS = np.array([0.01, 0.07, 0.2, 0.45])
 
 
-def stepped(u: Floats, transform: int, threshold: float) -> Floats:
-    """A play by its definition, sample by sample, over the second of two periods."""
+BENDS = np.array([[0.0, 0.0, 0.0, 0.0], [-1.0, 0.0, -1.0, 0.0], [-0.2, 0.3, 0.25, -0.1]])
+
+
+def stepped(u: Floats, bend: Floats, threshold: float) -> Floats:
+    """A play by its definition, sample by sample, over the third of three periods."""
+    lower, upper = envelopes(u, bend)
     state, out = 0.0, np.empty(len(u))
     for _ in range(3):
-        for k, g in enumerate(transformed(u)[transform]):
-            state = min(max(state, g - threshold), g + threshold)
+        for k in range(len(u)):
+            state = min(max(state, lower[k] - threshold), upper[k] + threshold)
             out[k] = state
     return out
 
@@ -27,15 +31,24 @@ def stepped(u: Floats, transform: int, threshold: float) -> Floats:
 def test_settled_plays_are_those_that_are_stepped(low: float, stroke: float) -> None:
     up = np.linspace(low, low + stroke, 60)
     u = np.concatenate([up, up[-2:0:-1]])
-    rising, falling = (plays(u, low, low + stroke, going, THRESHOLDS) for going in (True, False))
-    for transform in range(3):
-        g = transformed(np.array([low, low + stroke]))[transform]
+    rising, falling = (plays(u, low, low + stroke, going, THRESHOLDS, BENDS) for going in (True, False))
+    for number, bend in enumerate(BENDS):
+        least, most = envelopes(low, bend)[1], envelopes(low + stroke, bend)[0]
         for i, threshold in enumerate(THRESHOLDS.tolist()):
-            expected = stepped(u, transform, threshold)
-            moving = 2.0 * threshold < g[1] - g[0]
-            found = np.where(np.arange(len(u)) < len(up), rising[transform, i], falling[transform, i])
+            expected = stepped(u, bend, threshold)
+            moving = 2.0 * threshold < most - least
+            found = np.where(np.arange(len(u)) < len(up), rising[number, i], falling[number, i])
             # One that stands still may stand anywhere that its history left it.
             assert np.ptp(expected) < 1e-12 if not moving else np.allclose(found, expected, atol=1e-12)
+
+
+def test_envelopes_rise_and_do_not_cross() -> None:
+    u = np.linspace(0.0, 1.0, 201)
+    for bend in np.random.default_rng(2).uniform(-0.6, 0.6, (50, 4)):
+        lower, upper = envelopes(u, bend)
+        assert np.all(lower <= upper)
+        assert min(np.diff(lower).min(), np.diff(upper).min()) > 0.0
+        assert [lower[0], upper[0], lower[-1], upper[-1]] == [0.0, 0.0, 1.0, 1.0]
 
 
 def test_branches_meet_where_the_drive_turns() -> None:

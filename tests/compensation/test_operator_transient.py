@@ -17,7 +17,7 @@ from tablegen.calibration.operator.periodic_line import periodic_line
 from tablegen.calibration.operator.record import operator_file
 from tablegen.compensation.operator.creep import LogarithmicCreep
 from tablegen.compensation.operator.operator import Operator
-from tablegen.compensation.operator.plays import transformed
+from tablegen.compensation.operator.plays import FIXED_BENDS, envelopes
 from tablegen.compensation.operator.transient import after_offset, after_size
 from tablegen.compensation.transient import Transient
 from tablegen.config.load import load
@@ -37,7 +37,7 @@ def stepped_periods(*lines: tuple[float, float]) -> list[Floats]:
     for stroke, centre in lines:
         along = np.concatenate([np.linspace(0.0, 1.0, 300), np.linspace(1.0, 0.0, 300)])
         u = centre + stroke * (along - 0.5)
-        transforms, moved = transformed(u), np.empty(len(u))
+        transforms, moved = [envelopes(u, bend)[0] for bend in FIXED_BENDS], np.empty(len(u))
         for k in range(len(u)):
             g = np.array([[transform[k]] for transform in transforms])
             state = np.minimum(np.maximum(state, g - THRESHOLDS), g + THRESHOLDS)

@@ -11,7 +11,7 @@ from tablegen.compensation.line import LineShape
 from tablegen.compensation.operator.creep import NO_CREEP, LogarithmicCreep
 from tablegen.compensation.operator.field import Field, Lengths
 from tablegen.compensation.operator.operator import Operator
-from tablegen.compensation.operator.plays import Plays, transformed
+from tablegen.compensation.operator.plays import FIXED_BENDS, Plays, envelopes
 from tablegen.compensation.operator.scan_line import Wanted, find_waveform
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
@@ -44,7 +44,7 @@ def same(series: FourierSeries) -> FourierSeries:
 
 def stepped(u: Floats) -> Floats:
     """The plays of the operator by their definition, and the line that they lie over, in nm; settled."""
-    transforms = transformed(u)
+    transforms = [envelopes(u, bend)[0] for bend in FIXED_BENDS]
     state = np.zeros((3, len(THRESHOLDS)))
     out = np.empty(len(u))
     for _ in range(2):

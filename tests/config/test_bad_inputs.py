@@ -456,7 +456,7 @@ ALTERNATIVES = [
     ),
     case(
         scanner=("- x.offset.m_minus", "- x.offset.m_plus"),
-        says="scanner.toml:5: x.offset: missing; give m_minus and m_plus, or alpha and beta, or points",
+        says="scanner.toml:5: x.offset: missing; give m_minus and m_plus, or alpha and beta, or points, or sizes",
     ),
     case(
         scanner="x.offset.alpha = 0.1",

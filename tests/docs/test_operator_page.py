@@ -15,11 +15,16 @@ from tablegen.cli import cli
 from tablegen.compensation.models.operator import CENTRE_REACH, STROKE_REACH
 from tablegen.compensation.operator import operator as operators
 from tablegen.compensation.operator.file import OperatorFile, read_operator
+from tablegen.config.load import load
+from tablegen.planning.line_plan import make_plan
 from tablegen.reading import CONFIGURATION
+from tablegen.virtual.paper import default_x
+from tablegen.virtual.simulation import run_line
 
 PAGE = (REPOSITORY / "docs" / "operator.md").read_text("utf-8")
 WORDS = " ".join(PAGE.split())
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]\d+)?")
+DIRECTIONS = ("forward", "backward")
 CELL = re.compile(r"([\d.]+) / ([\d.]+)")
 
 
@@ -51,7 +56,8 @@ def test_the_limits_are_those_of_the_code() -> None:
     assert f"more than {STROKE_REACH:g} v_max above the largest trace" in WORDS
     assert f"{CENTRE_REACH:g} v_max away from every trace" in WORDS
     assert f"at most {CONFIGURATION.most_bytes >> 20} MiB" in WORDS
-    assert f"{family.THRESHOLDS} thresholds from {family._LOWEST} to {family._HIGHEST}" in WORDS
+    assert f"{family.THRESHOLDS} thresholds up to {family._HIGHEST}" in WORDS
+    assert f"linear between {family.NODES} nodes" in WORDS
     assert f"Chebyshev series of degree {branches.DEGREE}" in WORDS
     assert f"These {2 * branches.DEGREE + 2} numbers" in WORDS
     assert f"s0 is {operators.SMALL_STROKE}" in WORDS
@@ -92,8 +98,22 @@ def test_the_example_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
     _, file = read_operator(tmp_path / "scanner_x_operator.toml", "")
     assert [line.name for line in file.lines] == [f"{volts}v.csv" for volts in (10, 25, 45, 65, 82, 97)]
-    simulated = CliRunner().invoke(cli, ["simulate", EXAMPLE.name, "--no-calibration", "--json"])
-    assert '"operator"' in simulated.stdout
+    expected = CliRunner().invoke(cli, ["show", EXAMPLE.name]).stdout
+    (told,) = re.findall(r"```text\n(  on the scanner.*?)```", part, re.DOTALL)
+    (found,) = re.findall(r"^  on the scanner.*?nearest measured line.*?\n", expected, re.DOTALL | re.MULTILINE)
+    assert NUMBER.sub("#", found) == NUMBER.sub("#", told)
+    for one, other in zip(NUMBER.findall(found), NUMBER.findall(told), strict=True):
+        assert float(one) == pytest.approx(float(other), rel=0.2, abs=0.01)
+
+    setup = load(EXAMPLE.name)
+    played = run_line(make_plan(setup).x, default_x())
+    residual = max(abs(end) for side in DIRECTIONS for end in getattr(played.imaged, side).residual_range)
+    scaling = [getattr(played.imaged, side).scaling_peak_to_peak for side in DIRECTIONS]
+    (numbers,) = re.findall(
+        r"straight within (\S+) % .*? of (\S+) % forward and (\S+) % backward.*? is (\S+) % off", WORDS
+    )
+    measured = [residual, *scaling, abs(played.size_error_percent)]
+    assert [float(number) for number in numbers] == pytest.approx(measured, rel=0.1, abs=0.06)
 
 
 @pytest.mark.rest

@@ -71,6 +71,17 @@ def test_the_page_is_what_comes_out(written: Path) -> None:
         assert abs(float(one) - float(other)) <= 1.001 * unit, (one, other)
 
 
+def test_the_operator_has_a_column(rows: dict[str, list[Row]]) -> None:
+    """Beside the harmonic model's residuals and scaling errors, which it makes smaller; no verdict counts it."""
+    found = [row for section in rows.values() for row in section if row.operator is not None]
+    assert [row.figure for row in found] == ["5i", "5i", "5j", "5j"]
+    for row in found:
+        assert row.operator is not None
+        assert row.operator < 0.6 * row.ours
+        assert f"| {row.ours_text} | {row.operator_text} | {row.source} |" in PAGE.read_text(encoding="utf-8")
+        assert replace(row, operator=None).verdict == row.verdict
+
+
 def test_every_picture_is_drawn_and_linked(written: Path) -> None:
     linked = re.findall(r"!\[[^\]]+\]\(([^)]+)\)", PAGE.read_text(encoding="utf-8"))
     assert linked == [f"{name}.png" for name in page.PICTURES]

@@ -5,18 +5,22 @@ The limits are the paper's results (figures 5i and 5j), at the paper's condition
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 from building import EXAMPLE, REPOSITORY
 
 from tablegen.calibration.hysteresis import HysteresisFit
+from tablegen.calibration.offset_sizes import OffsetSizesFit
 from tablegen.config.load import Setup, load
+from tablegen.config.scanner import Offset
 from tablegen.virtual import laboratory
 from tablegen.virtual.closed_loop import SHARP, SHARP_RATE_HZ, play_x, size_map, uncorrected, with_scan
 from tablegen.virtual.experiments import sensor_trace
-from tablegen.virtual.laboratory import OFFSETS, Calibration, calibrate
+from tablegen.virtual.laboratory import OFFSET_SIZES, OFFSETS, Calibration, calibrate
 from tablegen.virtual.line_error import about_window_line, line_error
 from tablegen.virtual.other_plants import same_numbers, uniform_density
 from tablegen.virtual.parameters import Truth, load_truth
@@ -142,6 +146,26 @@ def test_the_map_of_another_plant_is_not(example: Setup, monkeypatch: pytest.Mon
     assert 3.0 < worst(same_numbers, 0.06) < 3.6
     monkeypatch.setattr(laboratory, "OFFSET_SIZE", 0.06)  # offsets from images of the size that is scanned
     assert worst(same_numbers, 0.06) < 1.2
+
+
+def test_images_of_several_sizes_serve_scans_of_all(example: Setup) -> None:
+    """m over the size too, on the plant that one m does not serve; and by m of 13 V alone."""
+    plant = VirtualScanner.of(same_numbers(load_truth()))
+    scan = with_scan(example, size_v=20.0, rate_hz=100.0)
+    found = calibrate(scan, plant, amplitudes=(0.2, 0.6), offset_sizes=OFFSET_SIZES)
+    fit = found.fits["x"]["offset"]
+    assert isinstance(fit, OffsetSizesFit)
+    at_13_v = Offset(m_minus=fit.sizes[1].m_minus.value, m_plus=fit.sizes[1].m_plus.value)
+    x = msgspec.structs.replace(found.setup.scanner.x, offset=at_13_v)
+    alone = replace(found.setup, scanner=msgspec.structs.replace(found.setup.scanner, x=x))
+    worst = [
+        max(
+            abs(play_x(with_scan(setup, size_v=size_v, offset_v=offset_v), plant).size_error_percent)
+            for offset_v, size_v in ((70.0, 30.0), (70.0, 55.0), (85.0, 25.0))
+        )
+        for setup in (alone, found.setup)
+    ]
+    assert worst[1] < 1.4 < 3.0 < worst[0]
 
 
 def test_the_fits_say_what_they_rest_on(calibration: Calibration) -> None:

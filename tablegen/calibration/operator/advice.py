@@ -11,6 +11,7 @@ from tablegen.compensation.operator.field import covariance
 
 _STROKES = np.arange(0.1, 1.0, 0.05)
 _CENTRES = np.arange(0.1, 0.91, 0.05)
+_JITTER = 1e-5  # what every trace leaves open, of all that there is to know
 _DECADE = 8.0  # ratio of rates that tells creep from hysteresis
 
 
@@ -28,7 +29,7 @@ def next_trace(fit: OperatorFit, lines: Sequence[PeriodicLine], v_max: float) ->
     """The trace that helps most; ``rate_hz`` is another rate than that of all traces, where they have but one."""
     lengths = fit.operator.residual.lengths
     points = fit.operator.residual.points
-    known = np.linalg.inv(covariance(points, points, lengths) + lengths.noise * np.eye(len(points)))
+    known = np.linalg.inv(covariance(points, points, lengths) + _JITTER * np.eye(len(points)))
     reach = [(s, c) for s in _STROKES for c in _CENTRES if 0.5 * s <= min(c, 1.0 - c) + 1e-9]
     near = covariance(np.array(reach), points, lengths)
     unknown = 1.0 - np.einsum("ij,jk,ik->i", near, known, near)

@@ -10,14 +10,19 @@ from tablegen.numerics.arrays import Floats
 
 DEGREE = 20  # of each branch
 _CLOSURE = 1e3  # weight of the two places at which the branches meet
+_LAGS = 4  # phases
 
 
 @dataclass(frozen=True, eq=False)
 class Left:
-    """``coefficients`` of both branches, 2 ``DEGREE`` + 2 of them; ``extent_nm`` between the turns."""
+    """``coefficients`` of both branches, 2 ``DEGREE`` + 2 of them; ``extent_nm`` between the turns.
+
+    ``variance`` is what the noise of the trace gives each coefficient.
+    """
 
     coefficients: Floats
     extent_nm: float
+    variance: Floats
 
 
 def left_of(line: PeriodicLine, family: Plays) -> Left:
@@ -40,5 +45,15 @@ def left_of(line: PeriodicLine, family: Plays) -> Left:
     matrix[len(u) :] = _CLOSURE * np.hstack([edges, -edges])
     right = np.append((measured - offset) / scale - modelled, [0.0, 0.0])
     found = np.linalg.lstsq(matrix, right, rcond=None)[0]
+    remain = right[: len(u)] - matrix[: len(u)] @ found
+    spread = np.diag(np.linalg.inv(matrix.T @ matrix)) * float(np.mean(remain * remain)) * _together(remain)
     begin, end = (float(edge @ (found[:count] + found[count:])) / 2.0 for edge in edges)
-    return Left(found, float(scale) * (1.0 + end - begin))
+    return Left(found, float(scale) * (1.0 + end - begin), spread)
+
+
+def _together(noise: Floats) -> float:
+    """By how much neighbouring phases, which may come of the same sample, vary together: 1 where they do not."""
+    power = float(noise @ noise)
+    if power <= 0.0:
+        return 1.0
+    return max(1.0 + 2.0 * sum(float(noise[lag:] @ noise[:-lag]) / power for lag in range(1, _LAGS + 1)), 1.0)

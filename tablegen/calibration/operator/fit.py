@@ -7,13 +7,14 @@ from itertools import product
 import numpy as np
 
 from tablegen.calibration.operator.branches import Left, left_of
-from tablegen.calibration.operator.creep_fit import creep_of_fields, creep_of_plays
+from tablegen.calibration.operator.creep_fit import creep_of_fields
 from tablegen.calibration.operator.errors import WORST, LineErrors, compare
-from tablegen.calibration.operator.family import fit_plays, groups_of
+from tablegen.calibration.operator.family import STARTS, CreepOf, fit_family, groups_of
 from tablegen.calibration.operator.periodic_line import PeriodicLine
+from tablegen.calibration.operator.shrinkage import shrunk
 from tablegen.compensation.dynamics import Response
 from tablegen.compensation.operator.creep import NO_CREEP, LogarithmicCreep
-from tablegen.compensation.operator.field import Field, Lengths, shape_field, through
+from tablegen.compensation.operator.field import Field, Lengths, through
 from tablegen.compensation.operator.operator import MeasuredLine, Operator
 from tablegen.compensation.operator.plays import NO_PLAYS, Plays
 from tablegen.numerics.arrays import Floats
@@ -21,10 +22,13 @@ from tablegen.problems import Unphysical
 
 STROKE_LENGTHS = (0.4, 0.8, 1.5, 3.0)
 CENTRE_LENGTHS = (0.5, 1.0, 2.0)
-_NOISE = 1e-5  # variance of the noise, of the field's
+_NOISE = 1e-9  # variance of what passes for noise in the fields, whose rows have none
+_ROUNDS = 8  # steps of the family's numbers at most, and where a line is left out
+_ROUNDS_WITHOUT = 2
 _MIN_LINES = 3
 _MIN_SPREAD = 2.0  # of the largest stroke over the smallest
 _MAX_NOISE_PERCENT = 1.0
+_DECADES = 1.0  # by which creep is taken to go on beyond the frequencies that were measured
 
 Factor = Callable[[float], float]
 
@@ -34,7 +38,7 @@ class OperatorFit:
     """The operator, and what it leaves of each line: in the fit, and when the line is left out; in percent.
 
     ``rows`` and ``sizes`` are what its fields go through, a row a line; ``candidates`` has the families that were
-    tried, and the median rms of a line left out, in percent.
+    tried, and the geometric mean of the rms of the lines left out, in percent.
     """
 
     operator: Operator
@@ -54,11 +58,7 @@ def fit_operator(lines: Sequence[PeriodicLine], response: Response | None, facto
     _check(lines)
     still = [line.without(response, None) for line in lines]
     main = _main_centre(still)
-    found: list[OperatorFit] = []
-    creeps = {"plays": creep_of_plays(still, main), "none": creep_of_fields(still, _straight(still), factor)}
-    for name, late in creeps.items():
-        settled = [line.without(None, late) for line in still]
-        found.append(_fit_family(name, settled, late, main, factor))
+    found = [_fit_family(name, still, main, factor) for name in ("plays", "none")]
     best = min(found, key=lambda one: one.candidates[one.family])
     candidates = {name: value for one in found for name, value in one.candidates.items()}
     return replace(best, candidates=candidates)
@@ -90,36 +90,71 @@ def _main_centre(lines: Sequence[PeriodicLine]) -> float:
     return float(np.mean([line.centre for line, group in zip(lines, groups, strict=True) if group == most]))
 
 
-def _fit_family(
-    name: str, lines: Sequence[PeriodicLine], creep: LogarithmicCreep, main: float, factor: Factor
-) -> OperatorFit:
+def _creep_of(lines: Sequence[PeriodicLine]) -> CreepOf:
+    """Creep over the decades that the lines show, for its loss per decade."""
+    low = min(line.rate_hz for line in lines)
+    high = max(line.rate_hz for line in lines)
+    reference = float(np.exp(np.mean([np.log(line.rate_hz) for line in lines])))
+    fastest, slowest = 10.0 ** (-2.0 - _DECADES) / high, 10.0**_DECADES / low
+
+    def creep(loss: float) -> LogarithmicCreep:
+        if loss <= 0.0:
+            return replace(NO_CREEP, reference_hz=reference)
+        return LogarithmicCreep(round(loss, 6), fastest, slowest, reference)
+
+    return creep
+
+
+class _Family:
+    """A family, its creep, the lines before that creep and what it leaves of them."""
+
+    def __init__(
+        self, name: str, lines: Sequence[PeriodicLine], main: float, factor: Factor, near: "_Family | None" = None
+    ) -> None:
+        """Of lines that still have their creep; ``near`` is one of almost the same lines."""
+        creep: CreepOf = _creep_of(lines) if near is None else near.creep_of
+        self.creep_of: CreepOf = creep
+        self.main = main
+        self.creep: LogarithmicCreep
+        self.numbers: Floats | None = None
+        if name == "none":
+            self.plays = _straight(lines)
+            self.creep = creep_of_fields(lines, self.plays, factor, creep) if near is None else near.creep
+        else:
+            start, rounds = (STARTS, _ROUNDS) if near is None else ([near.numbers], _ROUNDS_WITHOUT)
+            found = fit_family(lines, main, creep, [one for one in start if one is not None], rounds)
+            self.plays, self.creep, self.numbers = found.plays, creep(found.loss_per_decade), found.numbers
+        self.settled = [line.without(None, self.creep) for line in lines]
+        self.left = [left_of(line, self.plays) for line in self.settled]
+
+    def operator(self, lengths: Lengths, factor: Factor) -> tuple[Operator, Floats, Floats]:
+        """Both fields through what is left, and the rows and sizes that they go through."""
+        points = np.array([(line.stroke, line.centre) for line in self.settled])
+        rows = shrunk(points, self.left, lengths)
+        sizes = _sizes(self.plays, self.settled, self.left, self.main, factor)
+        residual = through(points, rows, lengths, straight=True)
+        size = through(points, sizes[:, None], lengths)
+        return Operator(self.plays, residual, size, self.creep, self.main, ()), rows, sizes
+
+
+def _fit_family(name: str, lines: Sequence[PeriodicLine], main: float, factor: Factor) -> OperatorFit:
     """The best lengths for one family, and the operator with them."""
-
-    def family_of(some: Sequence[PeriodicLine]) -> Plays:
-        return fit_plays(some, main) if name == "plays" else _straight(some)
-
-    everything = range(len(lines))
-    whole = family_of(lines)
-    left = [left_of(line, whole) for line in lines]
-    others = [[j for j in everything if j != i] for i in everything]
-    without = [family_of([lines[j] for j in other]) for other in others]
-    left_without = [[left_of(lines[j], family) for j in other] for other, family in zip(others, without, strict=True)]
+    whole = _Family(name, lines, main, factor)
+    without = [
+        _Family(name, [other for j, other in enumerate(lines) if j != i], main, factor, whole)
+        for i in range(len(lines))
+    ]
+    alone = [line.without(None, one.creep) for line, one in zip(lines, without, strict=True)]
     several = max(groups_of([line.centre for line in lines])) > 0
-    results = []
+    tried = []
     for stroke, centre in product(STROKE_LENGTHS, CENTRE_LENGTHS if several else CENTRE_LENGTHS[-1:]):
         lengths = Lengths(stroke, centre, _NOISE)
-        out = tuple(
-            _left_out(
-                lines[i],
-                _operator(without[i], [lines[j] for j in others[i]], left_without[i], lengths, creep, main, factor),
-                factor,
-                main,
-            )
-            for i in everything
-        )
-        results.append((float(np.median([errors.rms for errors in out])), lengths, out))
-    score, lengths, out = min(results, key=lambda result: result[0])
-    operator = _operator(whole, lines, left, lengths, creep, main, factor)
+        out = [
+            _errors(line, one.operator(lengths, factor)[0], factor) for line, one in zip(alone, without, strict=True)
+        ]
+        tried.append((float(np.exp(np.mean([np.log(errors.rms) for errors in out]))), lengths, out))
+    score, lengths, out = min(tried, key=lambda one: one[0])
+    operator, rows, sizes = whole.operator(lengths, factor)
     measured = tuple(
         MeasuredLine(
             line.name,
@@ -131,32 +166,14 @@ def _fit_family(
         for line, errors in zip(lines, out, strict=True)
     )
     operator = replace(operator, lines=measured)
-    inside = tuple(_left_out(line, operator, factor, main) for line in lines)
-    rows = np.stack([one.coefficients for one in left])
-    sizes = _sizes(whole, lines, left, main, factor)
-    return OperatorFit(operator, name, rows, sizes, inside, out, {name: score})
+    inside = tuple(_errors(line, operator, factor) for line in whole.settled)
+    return OperatorFit(operator, name, rows, sizes, inside, tuple(out), {name: score})
 
 
 def _straight(lines: Sequence[PeriodicLine]) -> Plays:
     """No family: a straight line with the mean gain."""
     gain = float(np.mean([np.ptp(line.displacement_nm) / line.stroke for line in lines]))
     return replace(NO_PLAYS, reversible=np.array([gain]))
-
-
-def _operator(
-    family: Plays,
-    lines: Sequence[PeriodicLine],
-    left: Sequence[Left],
-    lengths: Lengths,
-    creep: LogarithmicCreep,
-    main: float,
-    factor: Factor,
-) -> Operator:
-    """Both fields through what the family leaves of the lines."""
-    points = np.array([(line.stroke, line.centre) for line in lines])
-    residual = shape_field(points, np.stack([one.coefficients for one in left]), lengths)
-    size = through(points, _sizes(family, lines, left, main, factor)[:, None], lengths)
-    return Operator(family, residual, size, creep, main, ())
 
 
 def _sizes(family: Plays, lines: Sequence[PeriodicLine], left: Sequence[Left], main: float, factor: Factor) -> Floats:
@@ -167,8 +184,8 @@ def _sizes(family: Plays, lines: Sequence[PeriodicLine], left: Sequence[Left], m
     return np.array([one.extent_nm / extent - 1.0 for one, extent in zip(left, extents, strict=True)])
 
 
-def _left_out(line: PeriodicLine, operator: Operator, factor: Factor, main: float) -> LineErrors:
+def _errors(line: PeriodicLine, operator: Operator, factor: Factor) -> LineErrors:
     try:
-        return compare(line, operator.loop(line.low, line.high, factor(line.centre) / factor(main)))
+        return compare(line, operator.loop(line.low, line.high, factor(line.centre) / factor(operator.centre)))
     except Unphysical:
         return WORST

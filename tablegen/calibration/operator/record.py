@@ -56,6 +56,7 @@ def operator_file(fit: OperatorFit, axis: str, v_max: float, sources: Sequence[s
         plays=PlaysTable(
             thresholds=operator.family.thresholds.tolist(),
             weights=operator.family.weights.tolist(),
+            bends=operator.family.bends.tolist(),
             reversible=operator.family.reversible.tolist(),
         ),
         lengths=LengthsTable(stroke=lengths.stroke, centre=lengths.centre, noise=lengths.noise),

@@ -1,8 +1,8 @@
 """What was measured at some strokes and centres, interpolated over both without a formula: a Gaussian process.
 
-The covariance of two points is Matern's of order 5/2 in the distance of their strokes and centres, each over its own
-length; at the points themselves the field is what was measured, but for the noise. Far from all of them it goes back to
-0, that is to the hysteresis family over which it lies.
+The covariance of two points is Matern's of order 5/2 in the distance of their strokes, times the same in that of their
+centres, each over its own length; at the points themselves the field is what was measured, but for the noise. Far from
+all of them it goes back to 0, that is to the hysteresis family over which it lies.
 """
 
 from collections.abc import Sequence
@@ -15,6 +15,7 @@ from tablegen.numerics.arrays import Floats
 from tablegen.numerics.elementary import exp
 from tablegen.numerics.linear import Cholesky
 
+_STRAIGHT = 0.9  # share of the covariance that vanishes at a stroke of 0; creep bends even the smallest lines
 SAME_CENTRE = 0.02  # of v_max: lines whose centres differ by less have one centre
 
 
@@ -30,45 +31,52 @@ class Lengths:
     noise: float
 
 
-def covariance(points: Floats, others: Floats, lengths: Lengths) -> Floats:
-    """Of shape (n, m) for points (stroke, centre) of shapes (n, 2) and (m, 2); 1 where they coincide."""
+def covariance(points: Floats, others: Floats, lengths: Lengths, straight: bool = False) -> Floats:
+    """Of shape (n, m) for points (stroke, centre) of shapes (n, 2) and (m, 2).
+
+    Without ``straight`` it is 1 where they coincide; with it a stroke of 0 is nearly known, to be 0.
+    """
     out = np.empty((len(points), len(others)))
     for i, (stroke, centre) in enumerate(points.tolist()):
         for j, (other_stroke, other_centre) in enumerate(others.tolist()):
-            along, across = (stroke - other_stroke) / lengths.stroke, (centre - other_centre) / lengths.centre
-            d = sqrt(5.0 * (along * along + across * across))
-            out[i, j] = (1.0 + d + d * d / 3.0) * exp(-d)
+            along = _matern((stroke - other_stroke) / lengths.stroke)
+            if straight:
+                along -= _STRAIGHT * _matern(stroke / lengths.stroke) * _matern(other_stroke / lengths.stroke)
+            out[i, j] = along * _matern((centre - other_centre) / lengths.centre)
     return out
+
+
+def _matern(distance: float) -> float:
+    d = sqrt(5.0) * abs(distance)
+    return (1.0 + d + d * d / 3.0) * exp(-d)
 
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """Rows of numbers known at ``points``, shape (n, 2) of (stroke, centre); ``weights`` has shape (n, columns)."""
+    """Rows of numbers known at ``points``, shape (n, 2) of (stroke, centre); ``weights`` has shape (n, columns).
+
+    A ``straight`` one goes towards 0 with the stroke, but for what all strokes have in common.
+    """
 
     points: Floats
     weights: Floats
     lengths: Lengths
+    straight: bool = False
 
     def at(self, stroke: float, centre: float) -> Floats:
         """The interpolated row, shape (columns,)."""
-        near = covariance(np.array([[stroke, centre]]), self.points, self.lengths)[0]
+        near = covariance(np.array([[stroke, centre]]), self.points, self.lengths, self.straight)[0]
         total = np.zeros(self.weights.shape[1])
         for weight, row in zip(near.tolist(), self.weights, strict=True):
             total = total + weight * row
         return total
 
 
-def through(points: Floats, rows: Floats, lengths: Lengths) -> Field:
+def through(points: Floats, rows: Floats, lengths: Lengths, straight: bool = False) -> Field:
     """The field that has these rows at these points, but for the noise."""
-    factor = Cholesky(covariance(points, points, lengths) + lengths.noise * np.eye(len(points)))
-    return Field(points, np.stack([factor.solve(column) for column in rows.T], axis=1), lengths)
-
-
-def shape_field(points: Floats, rows: Floats, lengths: Lengths) -> Field:
-    """The same of shapes: at each centre a stroke of 0 leaves nothing, since the smallest lines are straight."""
-    still = np.array([(0.0, centre) for centre in distinct(points[:, 1].tolist())])
-    nothing = np.zeros((len(still), rows.shape[1]))
-    return through(np.concatenate([points, still]), np.concatenate([rows, nothing]), lengths)
+    known = covariance(points, points, lengths, straight)
+    factor = Cholesky(known + lengths.noise * np.diag(np.diag(known)))
+    return Field(points, np.stack([factor.solve(column) for column in rows.T], axis=1), lengths, straight)
 
 
 def distinct(centres: Sequence[float]) -> list[float]:

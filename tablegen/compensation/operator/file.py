@@ -10,15 +10,16 @@ import numpy as np
 from msgspec import Meta, Struct, ValidationError, convert
 
 from tablegen.compensation.operator.creep import LogarithmicCreep
-from tablegen.compensation.operator.field import Lengths, shape_field, through
+from tablegen.compensation.operator.field import Lengths, through
 from tablegen.compensation.operator.operator import MeasuredLine, Operator
-from tablegen.compensation.operator.plays import TRANSFORMS, Plays
+from tablegen.compensation.operator.plays import BENDS, Plays
 from tablegen.problems import Problem, Problems, Rejected
 from tablegen.toml import read_toml
 
 VERSION = 1
 _Number = Annotated[float, Meta(ge=-1e9, le=1e9)]
 _Share = Annotated[float, Meta(ge=0.0, le=1.0)]
+_Bend = Annotated[float, Meta(ge=-1.0, le=1.0)]
 _Length = Annotated[float, Meta(ge=0.01, le=100.0)]
 _Time = Annotated[float, Meta(ge=1e-9, le=1e9)]
 _Row = Annotated[list[_Number], Meta(min_length=2, max_length=128)]
@@ -38,10 +39,11 @@ class CreepTable(_Table, frozen=True, kw_only=True):
 
 
 class PlaysTable(_Table, frozen=True, kw_only=True):
-    """The hysteresis family; see ``Plays``. Weights in nm."""
+    """The hysteresis family; see ``Plays``. Weights in nm; ``bends`` are l and s of both envelopes, a row of each."""
 
     thresholds: Annotated[list[Annotated[float, Meta(gt=0.0, lt=1.0)]], Meta(max_length=256)]
-    weights: Annotated[list[list[_Number]], Meta(min_length=len(TRANSFORMS), max_length=len(TRANSFORMS))]
+    weights: Annotated[list[list[_Number]], Meta(min_length=1, max_length=8)]
+    bends: Annotated[list[list[_Bend]], Meta(min_length=1, max_length=8)]
     reversible: Annotated[list[_Number], Meta(min_length=1, max_length=16)]
 
 
@@ -50,7 +52,7 @@ class LengthsTable(_Table, frozen=True, kw_only=True):
 
     stroke: _Length
     centre: _Length
-    noise: Annotated[float, Meta(ge=1e-9, le=1.0)]
+    noise: Annotated[float, Meta(ge=1e-12, le=1.0)]
 
 
 class LineTable(_Table, frozen=True, kw_only=True):
@@ -111,6 +113,10 @@ def _contradictions(file: OperatorFile) -> list[tuple[str, str]]:
         found.append(("plays.thresholds", "do not ascend"))
     if any(len(row) != len(plays.thresholds) for row in plays.weights):
         found.append(("plays.weights", f"need {len(plays.thresholds)} numbers a row, one for each threshold"))
+    if len(plays.bends) != len(plays.weights) or any(len(row) != BENDS for row in plays.bends):
+        found.append(("plays.bends", f"need {BENDS} numbers a row, and a row for each of weights"))
+    elif any(abs(row[i]) + 0.5 * abs(row[i + 1]) > 1.0 for row in plays.bends for i in (0, 2)):
+        found.append(("plays.bends", "|l| + |s| / 2 above 1 would let an envelope run backwards"))
     if any(weight < 0.0 for row in plays.weights for weight in row):
         found.append(("plays.weights", "a weight below 0 would let a branch run backwards"))
     if file.creep.slowest_s < file.creep.fastest_s:
@@ -122,13 +128,14 @@ def _contradictions(file: OperatorFile) -> list[tuple[str, str]]:
 
 def _operator(file: OperatorFile) -> Operator:
     lengths = Lengths(file.lengths.stroke, file.lengths.centre, file.lengths.noise)
-    family = Plays(np.array(file.plays.thresholds), np.array(file.plays.weights), np.array(file.plays.reversible))
+    plays = file.plays
+    family = Plays(*(np.array(one) for one in (plays.thresholds, plays.weights, plays.reversible, plays.bends)))
     creep = LogarithmicCreep(
         file.creep.loss_per_decade, file.creep.fastest_s, file.creep.slowest_s, file.creep.reference_hz
     )
     points = np.array([(line.stroke, line.centre) for line in file.lines])
     rows = np.array([[*line.rising, *line.falling] for line in file.lines])
-    residual = shape_field(points, rows, lengths)
+    residual = through(points, rows, lengths, straight=True)
     size = through(points, np.array([[line.size] for line in file.lines]), lengths)
     lines = tuple(
         MeasuredLine(
@@ -154,11 +161,12 @@ def operator_text(file: OperatorFile, comments: Sequence[str]) -> str:
     out += [f"{name} = {_float(getattr(file.creep, name))}" for name in file.creep.__struct_fields__]
     out += [
         "",
-        "[plays]  # of u, u^2 and 1 - (1 - u)^2",
+        "[plays]",
         f"thresholds = {numbers(file.plays.thresholds)}",
         "weights = [",
     ]
     out += [f"    {numbers(row)}," for row in file.plays.weights]
+    out += ["]", "bends = [", *(f"    {numbers(row)}," for row in file.plays.bends)]
     out += ["]", f"reversible = {numbers(file.plays.reversible)}", "", "[lengths]"]
     out += [f"{name} = {_float(getattr(file.lengths, name))}" for name in file.lengths.__struct_fields__]
     for line in file.lines:

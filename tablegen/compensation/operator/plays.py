@@ -1,32 +1,39 @@
-"""Generalised Prandtl-Ishlinskii hysteresis: plays on three transforms of the drive, and a reversible polynomial.
+"""Generalised Prandtl-Ishlinskii hysteresis: plays on bent drives, whose envelopes may differ, and a polynomial.
 
-With one rise and one fall a period a settled play has a closed form. Of the transform g and the threshold r, between
-drives a and b, it is max(g(u) - r, g(a) + r) where the drive u rises, and min(g(u) + r, g(b) - r) where it falls; it
-stands still where g(b) - g(a) is below 2 r. Plays on transforms that bend either way have envelopes that differ.
+An envelope is a bent drive: u + l u (1 - u) + s u (1 - u) (u - 1/2). With one rise and one fall a period a settled play
+has a closed form. Of the envelopes g <= h and the threshold r, between drives a and b, it is max(g(u) - r, h(a) + r)
+where the drive u rises, and min(h(u) + r, g(b) - r) where it falls; it stands still where g(b) - h(a) is below 2 r.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from tablegen.numerics.arrays import Floats, FloatsLike
 
-TRANSFORMS = ("u", "u^2", "1 - (1 - u)^2")
+BENDS = 4  # numbers that bend both envelopes of a play
+# l and s of two envelopes, of which the lower one pushes where the drive rises: u, u^2 and 1 - (1 - u)^2, both alike.
+FIXED_BENDS = np.array([[0.0, 0.0, 0.0, 0.0], [-1.0, 0.0, -1.0, 0.0], [1.0, 0.0, 1.0, 0.0]])
 
 
-def transformed(u: FloatsLike) -> tuple[Floats, ...]:
-    """The three transforms of a normalised drive, each of its shape."""
+def envelopes(u: FloatsLike, bend: Floats) -> tuple[Floats, Floats]:
+    """The lower and the upper envelope of a row of four bends, at normalised drives, each of their shape."""
     u = np.asarray(u, dtype=np.float64)
-    rest = 1.0 - u
-    return u, u * u, 1.0 - rest * rest
+    bow = u * (1.0 - u)
+    skew = bow * (u - 0.5)
+    linear, cubic, other_linear, other_cubic = bend.tolist()
+    one, two = u + linear * bow + cubic * skew, u + other_linear * bow + other_cubic * skew
+    return np.minimum(one, two), np.maximum(one, two)
 
 
-def plays(u: Floats, low: float, high: float, rising: bool, thresholds: Floats) -> Floats:
-    """Settled plays between the drives ``low`` and ``high``, of shape (transforms, thresholds, drives)."""
+def plays(u: Floats, low: float, high: float, rising: bool, thresholds: Floats, bends: Floats) -> Floats:
+    """Settled plays between the drives ``low`` and ``high``, of shape (bends, thresholds, drives)."""
     r = thresholds[:, None]
     found = []
-    for g, least, most in zip(transformed(u), transformed(low), transformed(high), strict=True):
-        moving = np.maximum(g - r, least + r) if rising else np.minimum(g + r, most - r)
+    for bend in bends:
+        lower, upper = envelopes(u, bend)
+        least, most = float(envelopes(low, bend)[1]), float(envelopes(high, bend)[0])
+        moving = np.maximum(lower - r, least + r) if rising else np.minimum(upper + r, most - r)
         found.append(np.where(2.0 * r < most - least, moving, 0.5 * (least + most)))
     return np.stack(found)
 
@@ -35,13 +42,14 @@ def plays(u: Floats, low: float, high: float, rising: bool, thresholds: Floats) 
 class Plays:
     """Weights in units of the displacement, at normalised drives u of 0..1.
 
-    ``thresholds`` has shape (k,) and ascends from above 0, ``weights`` (3, k) in the order of ``TRANSFORMS``;
-    ``reversible`` are the coefficients of u, u^2, ...
+    ``thresholds`` has shape (k,) and ascends from above 0, ``weights`` (n, k), ``bends`` (n, 4): of each row of weights
+    the envelopes; ``reversible`` are the coefficients of u, u^2, ...
     """
 
     thresholds: Floats
     weights: Floats
     reversible: Floats
+    bends: Floats = field(default_factory=lambda: FIXED_BENDS)
 
     def branch(self, u: Floats, low: float, high: float, rising: bool) -> Floats:
         """The displacement at drives ``u`` of a settled line between two drives; up to a constant of the line."""
@@ -50,7 +58,7 @@ class Plays:
         for coefficient in self.reversible:
             power = power * u
             total = total + float(coefficient) * power
-        moved = plays(u, low, high, rising, self.thresholds)
+        moved = plays(u, low, high, rising, self.thresholds, self.bends)
         for transform, weights in zip(moved, self.weights, strict=True):
             for row, weight in zip(transform, weights, strict=True):
                 if weight:
@@ -58,4 +66,4 @@ class Plays:
         return total
 
 
-NO_PLAYS = Plays(np.zeros(0), np.zeros((len(TRANSFORMS), 0)), np.ones(1))
+NO_PLAYS = Plays(np.zeros(0), np.zeros((1, 0)), np.ones(1), FIXED_BENDS[:1])

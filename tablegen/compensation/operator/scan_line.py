@@ -26,6 +26,7 @@ _GRID_PER_HARMONIC = 16
 _MIN_GRID = 1024
 _SMOOTHNESS = 1e-8  # of the penalty on n^4, against the mean square of the error
 _SLOPE_STEPS = 4  # points of the loop over which its slope is taken
+_FIRST_ROUNDS = 4
 _BEYOND = 0.01  # of v_max: what a round may leave the driver's range by
 _ROUNDING = 2.0**40  # coefficients are multiples of its inverse: the last bits of a round do not matter then
 
@@ -84,9 +85,11 @@ def find_waveform(
     or the operator reach.
     """
     learner = _Learner(operator, wanted, start.harmonics, inverse, dynamics)
-    series, amplitude = start, wanted.size_nm / operator.nm_per_drive
+    series, amplitude = start, learner.first_amplitude()
     before: Floats | None = None
     for turn in range(1, _ROUNDS + 1):
+        if turn <= _FIRST_ROUNDS:  # the amplitude is not known yet, and what cannot be played teaches nothing
+            amplitude = min(amplitude, learner.most_amplitude(series))
         played = learner.play(series, amplitude)
         line = learner.line_of(played.position)
         inside = played.position[learner.imaged] - line[1]
@@ -147,6 +150,24 @@ class _Learner:
         penalty = _SMOOTHNESS * np.concatenate([[0.0], square * square, square * square])
         self._basis = basis
         self._factor = Cholesky(normal + np.diag(penalty + 1e-14))
+
+    def first_amplitude(self) -> float:
+        """About the one that makes a line of this size: larger lines are more than proportionally larger."""
+        wanted, operator = self._wanted, self._operator
+        amplitude = wanted.size_nm / operator.nm_per_drive
+        for _ in range(_FIRST_ROUNDS):
+            stroke = min(amplitude, 1.0)
+            extent = operator.expected_extent(stroke, wanted.centre, wanted.factor)
+            if not extent > 0.0:
+                break
+            amplitude = wanted.size_nm * stroke / extent
+        return amplitude
+
+    def most_amplitude(self, series: FourierSeries) -> float:
+        """The one with which the drive just stays inside the driver's range."""
+        wave = self._inverse(series).on_grid(self._count) - 0.5
+        centre = self._wanted.centre
+        return min((centre + _BEYOND) / -float(np.min(wave)), (1.0 - centre + _BEYOND) / float(np.max(wave)))
 
     def play(self, series: FourierSeries, amplitude: float) -> _Played:
         """A waveform on the operator."""

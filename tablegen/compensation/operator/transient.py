@@ -7,7 +7,7 @@ step, of which creep brings its share late: s a exp(-t / tau) / |C| is still to 
 import numpy as np
 
 from tablegen.compensation.operator.operator import Operator, extent_of
-from tablegen.compensation.operator.plays import Plays, transformed
+from tablegen.compensation.operator.plays import Plays, envelopes
 from tablegen.compensation.transient import OFFSET_CHANGE, SIZE_CHANGE, Transient
 from tablegen.numerics.arrays import Floats, tree_sum
 
@@ -30,7 +30,7 @@ def _after(
 ) -> Transient:
     """From one settled line to another, (stroke, centre) each of v_max; sizes are those of the other."""
     family = operator.family
-    memory = np.zeros((3, len(family.thresholds)))
+    memory = np.zeros(family.weights.shape)
     for _ in range(2):
         rising, falling, memory = _period(family, memory, *before)
     earlier = _mean(rising, falling, turn)
@@ -51,10 +51,12 @@ def _period(family: Plays, memory: Floats, stroke: float, centre: float) -> tupl
     """A line from its lower turn on: positions rising and falling, at even drives from its low; and the plays then."""
     low, high = centre - 0.5 * stroke, centre + 0.5 * stroke
     u = low + (high - low) * (np.arange(_POINTS) / (_POINTS - 1))
-    g, r = np.stack(transformed(u))[:, None, :], family.thresholds[None, :, None]
-    begin = np.minimum(np.maximum(memory[:, :, None], g[:, :, :1] - r), g[:, :, :1] + r)
-    rising = np.maximum(begin, g - r)
-    falling = np.minimum(rising[:, :, -1:], g + r)
+    r = family.thresholds[None, :, None]
+    both = np.stack([envelopes(u, bend) for bend in family.bends])
+    below, above = both[:, :1, :] - r, both[:, 1:, :] + r
+    begin = np.minimum(np.maximum(memory[:, :, None], below[:, :, :1]), above[:, :, :1])
+    rising = np.maximum(begin, below)
+    falling = np.minimum(rising[:, :, -1:], above)
     along, power = np.zeros_like(u), np.ones_like(u)
     for coefficient in family.reversible:
         power = power * u

@@ -1,0 +1,38 @@
+"""What lines leave of a family, freed of noise: each Chebyshev order is as strong as the lines together show it to be.
+
+Of a Gaussian process with a variance for each order, and the noise that each coefficient is known to have, the mean at
+the measured points. The variances are those of the largest likelihood.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tablegen.calibration.operator.branches import DEGREE, Left
+from tablegen.compensation.operator.field import Lengths, covariance
+from tablegen.numerics.arrays import Floats
+
+_POWERS = np.geomspace(1e-4, 1e12, 65)  # variance of an order over that of its noise
+_FLOOR = 1e-14  # variance below which no coefficient is known
+
+
+def shrunk(points: Floats, left: Sequence[Left], lengths: Lengths) -> Floats:
+    """Rows without noise, shape (lines, 2 ``DEGREE`` + 2), for lines at points (stroke, centre)."""
+    known = covariance(points, points, lengths, straight=True)
+    rows = np.stack([one.coefficients for one in left])
+    noise = np.maximum(np.stack([one.variance for one in left]), _FLOOR)
+    # The noise of a line times that of an order: nearly all lines have their samples at the same places.
+    of_line = np.sqrt(np.mean(noise, axis=1) / np.mean(noise))
+    of_order = np.sqrt(np.mean(noise, axis=0))
+    values, vectors = np.linalg.eigh(known / of_line[:, None] / of_line)
+    values = np.maximum(values, 0.0)
+    along = vectors.T @ (rows / of_line[:, None] / of_order)
+    # The likelihood of every order, of both branches together, at every power.
+    spread = 1.0 + _POWERS[:, None] * values
+    each = -0.5 * (1.0 / spread) @ (along * along) - 0.5 * np.sum(np.log(spread), axis=1)[:, None]
+    count = DEGREE + 1
+    best = np.argmax(each[:, :count] + each[:, count:], axis=0)
+    power = _POWERS[np.concatenate([best, best])]
+    kept = power * values[:, None] / (1.0 + power * values[:, None])
+    out: Floats = (vectors @ (kept * along)) * of_line[:, None] * of_order
+    return out

@@ -1,0 +1,72 @@
+"""m of (1) where it depends on the scan size too: (1)-(4) as measured at several scan voltages."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from tablegen.compensation.offset import OffsetLaw, normalised_offset
+from tablegen.compensation.size import SizeLaw
+from tablegen.problems import Unphysical
+
+_ROUNDS = 40  # of a contraction that leaves a third of an error
+
+
+@dataclass(frozen=True, slots=True)
+class OffsetSurface:
+    """m(p, v) = 1 + alpha(v) p + beta(v) p^2 with v = V_scan / V_max in [0, 1].
+
+    ``laws`` are (1) as measured at scan voltages, shares of v_max, ascending. Between two of them alpha and beta are
+    linear in v; below the first and above the last they stay. With one law m does not depend on the size.
+    """
+
+    laws: tuple[tuple[float, OffsetLaw], ...]
+
+    @classmethod
+    def everywhere(cls, law: OffsetLaw) -> "OffsetSurface":
+        """One law for all sizes."""
+        return cls(((0.0, law),))
+
+    @property
+    def small(self) -> OffsetLaw:
+        """At small scans: the law of the smallest size."""
+        return self.laws[0][1]
+
+    def at(self, v: float) -> OffsetLaw:
+        """(1) at a normalised scan voltage."""
+        if v <= self.laws[0][0]:
+            return self.laws[0][1]
+        for (low, left), (high, right) in pairwise(self.laws):
+            if v <= high:
+                share = (v - low) / (high - low)
+                alpha = left.alpha + share * (right.alpha - left.alpha)
+                return OffsetLaw(alpha, left.beta + share * (right.beta - left.beta))
+        return self.laws[-1][1]
+
+
+def law_of_sizes(p: list[float], apparent: list[float], size: SizeLaw, v: float) -> OffsetLaw:
+    """(1) from apparent sizes (any unit) of one object in images of a scan voltage ``v`` (of v_max) at three or more p.
+
+    Of a scan that was not changed they are in proportion to R(V) / R(V / m), R of (6) and (10). Raises ``Unphysical``.
+    """
+    centre, scan_nm = 1.0, size.size_nm(v)
+    law, middle = OffsetLaw.fitted(p, apparent)
+    for _ in range(_ROUNDS):
+        centre *= middle
+        law, middle = OffsetLaw.fitted(p, [v / size.voltage(scan_nm * centre / seen) for seen in apparent])
+    return law
+
+
+def surface_of(points: Sequence[tuple[float, float, float]], size: SizeLaw, v_max: float) -> OffsetSurface:
+    """The surface of (offset in V, apparent size in any unit, scan voltage of the image in V).
+
+    The images of one scan voltage have to show one object. Raises ``Unphysical``.
+    """
+    laws = []
+    for volts in sorted({size_v for _, _, size_v in points}):
+        p = [normalised_offset(at, v_max) for at, _, size_v in points if size_v == volts]
+        apparent = [seen for _, seen, size_v in points if size_v == volts]
+        try:
+            laws.append((volts / v_max, law_of_sizes(p, apparent, size, volts / v_max)))
+        except Unphysical as reason:
+            raise Unphysical(f"at a size_v of {volts:g} V: {reason}") from None
+    return OffsetSurface(tuple(laws))
