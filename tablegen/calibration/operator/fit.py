@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import combinations, product
 
 import numpy as np
 
@@ -23,6 +23,8 @@ from tablegen.problems import Unphysical
 STROKE_LENGTHS = (0.4, 0.8, 1.5, 3.0)
 CENTRE_LENGTHS = (0.5, 1.0, 2.0)
 _NOISE = 1e-9  # variance of what passes for noise in the fields, whose rows have none
+_NOISE_OF_TWINS = 1e-4  # where two lines are as good as one point, whose rates or turns differ: they contradict a bit
+_TWINS = 0.03  # of v_max: how near strokes and centres of such lines are
 _ROUNDS = 8  # steps of the family's numbers at most, and where a line is left out
 _ROUNDS_WITHOUT = 2
 _MIN_LINES = 3
@@ -105,6 +107,14 @@ def _creep_of(lines: Sequence[PeriodicLine]) -> CreepOf:
     return creep
 
 
+def _any_twins(lines: Sequence[PeriodicLine]) -> bool:
+    """Whether two lines have the same stroke and centre, or nearly."""
+    return any(
+        abs(one.stroke - other.stroke) < _TWINS and abs(one.centre - other.centre) < _TWINS
+        for one, other in combinations(lines, 2)
+    )
+
+
 class _Family:
     """A family, its creep, the lines before that creep and what it leaves of them."""
 
@@ -146,9 +156,10 @@ def _fit_family(name: str, lines: Sequence[PeriodicLine], main: float, factor: F
     ]
     alone = [line.without(None, one.creep) for line, one in zip(lines, without, strict=True)]
     several = max(groups_of([line.centre for line in lines])) > 0
+    noise = _NOISE_OF_TWINS if _any_twins(lines) else _NOISE
     tried = []
     for stroke, centre in product(STROKE_LENGTHS, CENTRE_LENGTHS if several else CENTRE_LENGTHS[-1:]):
-        lengths = Lengths(stroke, centre, _NOISE)
+        lengths = Lengths(stroke, centre, noise)
         out = [
             _errors(line, one.operator(lengths, factor)[0], factor) for line, one in zip(alone, without, strict=True)
         ]
