@@ -83,7 +83,10 @@ def _plain(kind: types.Type) -> tuple[types.Type, str]:
             description = (kind.extra_json_schema or {}).get("description", description)
             kind = kind.type
         else:
-            kind = next(t for t in kind.types if not isinstance(t, types.NoneType))
+            some = [t for t in kind.types if not isinstance(t, types.NoneType)]
+            if len(some) > 1:
+                break
+            kind = some[0]
     return kind, description.replace("|", "\\|")
 
 
@@ -104,6 +107,8 @@ def _accepts(kind: types.Type) -> str:
             return " ".join(filter(None, [word, low, high]))
         case types.LiteralType():
             return ", ".join(f'`"{value}"`' for value in kind.values)
+        case types.UnionType():
+            return ", ".join(_accepts(_plain(t)[0]) for t in kind.types)
         case types.StrType():
             return "text"
         case types.BoolType():

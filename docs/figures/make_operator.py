@@ -29,7 +29,8 @@ LINES = (  # name, protocol, scanner file, model
     ("operator, ten traces", TEN, "operator.toml", ""),
 )
 HEAD = (
-    "| piezo | offset | line | rms [% of the line] | scaling error [% p-p] | trace-retrace [%] | size [%] |",
+    "| piezo | offset | line | rms [% of the line] | scaling error [% p-p] "
+    "| trace-retrace [% of the line] | size [%] |",
     "|---|---|---|---|---|---|---|",
 )
 WORSE = (

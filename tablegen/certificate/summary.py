@@ -11,6 +11,7 @@ from tablegen.certificate.matching import apart_note, apart_percent
 from tablegen.compensation.expectation import Expectation, Figure
 from tablegen.compensation.hold import hold_inverse
 from tablegen.planning.line_plan import LinePlan, Plan
+from tablegen.planning.settling import settling, settling_text
 
 _GRID = 32  # points per period of the highest harmonic
 
@@ -177,6 +178,12 @@ def notes(plan: Plan) -> list[str]:
         + f" pixels: the lines inside the window of y, of {schedule.lines} a frame"
     )
     for line in plan.lines:
+        settles = settling(line.axis, line.drive, schedule)
+        if settles is not None and settles.lines > schedule.settle_lines:
+            found.append(
+                f"{line.axis} drifts by more than {settles.bound_nm:.3g} nm a frame after the {schedule.settle_lines} "
+                f"settle_lines that follow a change of offset of {settles.offset_v:.4g} V or a smaller scan"
+            )
         if not line.drive.hysteresis.compensates:
             found.append(f"hysteresis of {line.axis} is not compensated: the scanner file has no model for it")
     return found
@@ -193,6 +200,9 @@ def summary(plan: Plan, certificates: dict[str, Certificate]) -> list[str]:
     for line in plan.lines:
         lines += ["", f"{line.axis} drive"]
         lines += [f"  {label:<18}{value}" for label, value in drive_lines(line)]
+        settles = settling(line.axis, line.drive, schedule)
+        for i, text in enumerate([] if settles is None else settling_text(settles)):
+            lines.append(f"  {'' if i else 'settles':<18}{text}")
         lines += [f"{line.axis} certificate"]
         lines += [f"  {label:<18}{value}" for label, value in certificate_lines(certificates[line.axis])]
         found = excess(certificates[line.axis].scaling)

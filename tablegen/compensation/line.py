@@ -15,6 +15,7 @@ import numpy as np
 
 from tablegen.compensation.dynamics import Response
 from tablegen.compensation.expectation import Expectation
+from tablegen.compensation.transient import Transient
 from tablegen.numerics.arrays import Bools, Floats, FloatsLike
 from tablegen.problems import Document, Problems, Unphysical
 from tablegen.waveform.series import FourierSeries
@@ -91,6 +92,11 @@ class LineShape:
     @property
     def waveform(self) -> FourierSeries | None:
         """The band-limited waveform, where the model itself makes it; None leaves it to ``band_limit`` of the scan."""
+        return None
+
+    @property
+    def transients(self) -> tuple[Transient, Transient] | None:
+        """What follows a change of offset and one of size, where the model knows."""
         return None
 
     @property

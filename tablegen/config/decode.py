@@ -45,8 +45,15 @@ class _Decoder:
         match kind:
             case types.Metadata():
                 return self._any(kind.type, value, key)
-            case types.UnionType():  # in the schema always "something or None", and TOML has no null
-                return self._any(next(t for t in kind.types if not isinstance(t, types.NoneType)), value, key)
+            case types.UnionType():  # in the schema "something or None", and TOML has no null; or a number or a word
+                some = [t for t in kind.types if not isinstance(t, types.NoneType)]
+                words = [word for t in some if isinstance(t, types.LiteralType) for word in t.values]
+                if len(some) > 1 and isinstance(value, str):
+                    wrong = f"{_shown(value)} is not a number, nor {' or '.join(map(repr, words))}"
+                    return value if value in words else self._wrong(key, wrong)
+                return self._any(
+                    next(t for t in some if len(some) == 1 or not isinstance(t, types.LiteralType)), value, key
+                )
             case types.StructType():
                 return self.struct(kind, value, key)
             case types.ListType():

@@ -161,7 +161,10 @@ class Timing(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         Annotated[int, Meta(ge=1, le=1 << 20, description="ticks of a pixel; the length of the line follows from it")]
         | None
     ) = None
-    settle_lines: Annotated[int, Meta(ge=0, le=255, description="lines after a change during which valid is low")] = 2
+    settle_lines: Annotated[
+        Annotated[int, Meta(ge=0, le=255)] | Literal["auto"],
+        Meta(description="lines after a change during which valid is low; auto: by the operators of x and y"),
+    ] = 2
 
 
 class Limits(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

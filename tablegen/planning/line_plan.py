@@ -1,6 +1,6 @@
 """From a checked configuration to integers: the immutable plan that everything downstream reads."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import ceil
 from typing import Literal
@@ -22,6 +22,7 @@ from tablegen.planning.band_limit import band_limited
 from tablegen.planning.drive import Drive, compensate
 from tablegen.planning.feasibility import DEFAULT_HARMONICS, Feasibility
 from tablegen.planning.refinement_layer import learnt_layer
+from tablegen.planning.settling import settle_lines
 from tablegen.planning.timing import make_schedule
 from tablegen.problems import Problems
 from tablegen.waveform.series import FourierSeries
@@ -128,6 +129,8 @@ def make_plan(setup: Setup) -> Plan:
     problems.stop_if_any()
     assert x is not None
     assert y is not None
+    schedule = replace(schedule, settle_lines=settle_lines(setup, {"x": x.drive, "y": y.drive}, schedule, problems))
+    problems.stop_if_any()
     scan = setup.scan
     return Plan(
         scan.name,

@@ -43,7 +43,7 @@ def make_schedule(setup: Setup, problems: Problems) -> Schedule | None:
         update_rate_hz=rate,
         requested_hz=timing.line_rate_hz,
         pixels=timing.pixels,
-        settle_lines=timing.settle_lines,
+        settle_lines=0 if timing.settle_lines == "auto" else timing.settle_lines,  # until the axes are known
         turn_tick=ceil(exact(scan.x.turn) * ticks),
         forward=forward,
         backward=backward,

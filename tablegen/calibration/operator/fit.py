@@ -2,11 +2,12 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import combinations, product
 
 import numpy as np
 
 from tablegen.calibration.operator.branches import Left, left_of
+from tablegen.calibration.operator.creep_fit import creep_of_fields
 from tablegen.calibration.operator.errors import WORST, LineErrors, compare
 from tablegen.calibration.operator.family import STARTS, CreepOf, fit_family, groups_of
 from tablegen.calibration.operator.periodic_line import PeriodicLine
@@ -22,6 +23,8 @@ from tablegen.problems import Unphysical
 STROKE_LENGTHS = (0.4, 0.8, 1.5, 3.0)
 CENTRE_LENGTHS = (0.5, 1.0, 2.0)
 _NOISE = 1e-9  # variance of what passes for noise in the fields, whose rows have none
+_NOISE_OF_TWINS = 1e-4  # where two lines are as good as one point, whose rates or turns differ: they contradict a bit
+_TWINS = 0.03  # of v_max: how near strokes and centres of such lines are
 _ROUNDS = 8  # steps of the family's numbers at most, and where a line is left out
 _ROUNDS_WITHOUT = 2
 _MIN_LINES = 3
@@ -104,17 +107,29 @@ def _creep_of(lines: Sequence[PeriodicLine]) -> CreepOf:
     return creep
 
 
+def _any_twins(lines: Sequence[PeriodicLine]) -> bool:
+    """Whether two lines have the same stroke and centre, or nearly."""
+    return any(
+        abs(one.stroke - other.stroke) < _TWINS and abs(one.centre - other.centre) < _TWINS
+        for one, other in combinations(lines, 2)
+    )
+
+
 class _Family:
     """A family, its creep, the lines before that creep and what it leaves of them."""
 
-    def __init__(self, name: str, lines: Sequence[PeriodicLine], main: float, near: "_Family | None" = None) -> None:
+    def __init__(
+        self, name: str, lines: Sequence[PeriodicLine], main: float, factor: Factor, near: "_Family | None" = None
+    ) -> None:
         """Of lines that still have their creep; ``near`` is one of almost the same lines."""
         creep: CreepOf = _creep_of(lines) if near is None else near.creep_of
         self.creep_of: CreepOf = creep
         self.main = main
+        self.creep: LogarithmicCreep
         self.numbers: Floats | None = None
         if name == "none":
-            self.plays, self.creep = _straight(lines), creep(0.0)
+            self.plays = _straight(lines)
+            self.creep = creep_of_fields(lines, self.plays, factor, creep) if near is None else near.creep
         else:
             start, rounds = (STARTS, _ROUNDS) if near is None else ([near.numbers], _ROUNDS_WITHOUT)
             found = fit_family(lines, main, creep, [one for one in start if one is not None], rounds)
@@ -134,15 +149,17 @@ class _Family:
 
 def _fit_family(name: str, lines: Sequence[PeriodicLine], main: float, factor: Factor) -> OperatorFit:
     """The best lengths for one family, and the operator with them."""
-    whole = _Family(name, lines, main)
+    whole = _Family(name, lines, main, factor)
     without = [
-        _Family(name, [other for j, other in enumerate(lines) if j != i], main, whole) for i in range(len(lines))
+        _Family(name, [other for j, other in enumerate(lines) if j != i], main, factor, whole)
+        for i in range(len(lines))
     ]
     alone = [line.without(None, one.creep) for line, one in zip(lines, without, strict=True)]
     several = max(groups_of([line.centre for line in lines])) > 0
+    noise = _NOISE_OF_TWINS if _any_twins(lines) else _NOISE
     tried = []
     for stroke, centre in product(STROKE_LENGTHS, CENTRE_LENGTHS if several else CENTRE_LENGTHS[-1:]):
-        lengths = Lengths(stroke, centre, _NOISE)
+        lengths = Lengths(stroke, centre, noise)
         out = [
             _errors(line, one.operator(lengths, factor)[0], factor) for line, one in zip(alone, without, strict=True)
         ]

@@ -15,6 +15,8 @@ from tablegen.compensation.line import LineShape, WantedLine, WholeLine
 from tablegen.compensation.operator.file import read_operator
 from tablegen.compensation.operator.operator import Operator
 from tablegen.compensation.operator.scan_line import Expected, Found, Wanted, find_waveform
+from tablegen.compensation.operator.transient import after_offset, after_size
+from tablegen.compensation.transient import Transient
 from tablegen.figures import shown_path
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Rejected, Unphysical
@@ -25,6 +27,7 @@ from tablegen.waveform.window_fit import fit_window
 # An operator serves strokes this far beyond the largest that was measured, and centres this far from any, of v_max.
 STROKE_REACH = 0.05
 CENTRE_REACH = 0.4
+_SLOWEST_HZ = 0.01  # of frames over which drift is followed
 SIDES = ("forward", "backward")
 
 
@@ -34,7 +37,7 @@ class OperatorLine(WholeLine):
 
     ``uncertainty`` is what the operator is wrong by where it predicts a trace that it was not made of; ``distance`` is
     that of stroke or centre to the nearest trace, of v_max. ``operator`` is that of this rate, ``factor`` that of its
-    loops at this offset.
+    loops at this offset; ``after`` is what follows a change of offset and one of size.
     """
 
     expected: Expected
@@ -42,6 +45,12 @@ class OperatorLine(WholeLine):
     distance: float
     operator: Operator
     factor: float
+    after: tuple[Transient, Transient]
+
+    @property
+    def transients(self) -> tuple[Transient, Transient]:
+        """Both."""
+        return self.after
 
     @property
     def expectation(self) -> Expectation:
@@ -104,6 +113,7 @@ class OperatorModel(WithBranches, frozen=True, kw_only=True, tag="operator"):
 def _line(operator: Operator, wanted: WantedLine) -> OperatorLine:
     centre = wanted.v_offset / wanted.v_max
     factor = wanted.factor_at(centre) / wanted.factor_at(operator.centre)
+    operator = replace(operator, creep=operator.creep.down_to(wanted.rate_hz))
     if wanted.rate_gain is not None:  # (23) says what the rate does to the size; creep then only bends the line
         reference = operator.creep.reference_hz
         factor *= wanted.rate_gain(wanted.rate_hz) / wanted.rate_gain(reference)
@@ -131,6 +141,7 @@ def _line(operator: Operator, wanted: WantedLine) -> OperatorLine:
     start = fit_window(straight, wanted.harmonics, wanted.window, wanted.both)
     found = find_waveform(operator, line, start, through, None if response is None else dynamics)
     _check_reach(operator, found, wanted.v_max)
+    late = replace(operator, creep=operator.creep.down_to(_SLOWEST_HZ))  # for all that a few frames may last
     # w = 0 and 1 are the ends of the laws' amplitude everywhere else.
     scale = found.v_amplitude * wanted.v_max / wanted.v_amplitude
     series = FourierSeries(0.5 + scale * (found.series.a0 - 0.5), scale * found.series.a, scale * found.series.b)
@@ -142,6 +153,10 @@ def _line(operator: Operator, wanted: WantedLine) -> OperatorLine:
         distance=operator.distance(found.stroke, found.centre),
         operator=operator,
         factor=factor,
+        after=(
+            after_offset(late, found.stroke, found.centre, factor, wanted.turn),
+            after_size(late, found.stroke, found.centre, factor, wanted.turn),
+        ),
     )
 
 

@@ -4,7 +4,8 @@ C(f) = 1 + sum_k a / (1 + i f / f_k), with f_k spaced evenly over the decades; w
 to the next is ``loss_per_decade`` of the displacement.
 """
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from math import pi
 
 import numpy as np
@@ -13,6 +14,7 @@ from tablegen.numerics.arrays import Floats
 from tablegen.numerics.elementary import exp
 
 _TERMS_PER_DECADE = 3
+_PERIODS = 10.0  # of a line: terms that are slower only shift it
 _LN10 = 2.302585092994046
 
 
@@ -25,6 +27,10 @@ class LogarithmicCreep:
     slowest_s: float
     reference_hz: float
 
+    def down_to(self, rate_hz: float) -> "LogarithmicCreep":
+        """The same, with terms as slow as lines of this rate show: creep knows no slowest time."""
+        return replace(self, slowest_s=max(self.slowest_s, _PERIODS / rate_hz))
+
     def response(self, f_hz: Floats) -> tuple[Floats, Floats]:
         """Real and imaginary part of C(f) / |C(reference)|."""
         real, imaginary = self._response(f_hz)
@@ -32,19 +38,25 @@ class LogarithmicCreep:
         size = float(np.sqrt(at_real * at_real + at_imaginary * at_imaginary)[0])
         return real / size, imaginary / size
 
+    def terms(self) -> tuple[tuple[float, float], ...]:
+        """Share and time constant in s of every term, where |C| is 1 at the reference."""
+        real, imaginary = self._response(np.array([self.reference_hz]))
+        size = float(np.sqrt(real * real + imaginary * imaginary)[0])
+        return tuple((share / size, tau_s) for share, tau_s in self._terms())
+
     def _response(self, f_hz: Floats) -> tuple[Floats, Floats]:
         real, imaginary = np.ones_like(f_hz), np.zeros_like(f_hz)
-        if not self.loss_per_decade:
-            return real, imaginary
-        share = self.loss_per_decade / _TERMS_PER_DECADE
-        step = exp(_LN10 / _TERMS_PER_DECADE)
-        tau_s = self.fastest_s
-        while tau_s <= 1.0001 * self.slowest_s:
+        for share, tau_s in self._terms():
             x = f_hz * (2.0 * pi * tau_s)
             size = share / (1.0 + x * x)
             real, imaginary = real + size, imaginary - x * size
-            tau_s *= step
         return real, imaginary
+
+    def _terms(self) -> Iterator[tuple[float, float]]:
+        step, tau_s = exp(_LN10 / _TERMS_PER_DECADE), self.fastest_s
+        while self.loss_per_decade and tau_s <= 1.0001 * self.slowest_s:
+            yield self.loss_per_decade / _TERMS_PER_DECADE, tau_s
+            tau_s *= step
 
 
 NO_CREEP = LogarithmicCreep(0.0, 1.0, 1.0, 1.0)
