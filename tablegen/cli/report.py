@@ -43,7 +43,11 @@ def certificate_table(plan: Plan, certificates: dict[str, Certificate]) -> list[
             )
         expected = certificates[line.axis].expected
         if expected is not None and expected.basis == "traces":
-            lines.append(f"{line.axis:<4}  on the scanner: {'; '.join(expected_lines(expected))}")
+            told = expected_lines(expected)
+            lines += [
+                f"{line.axis if i == 0 else '':<4}  {'' if i else 'on the scanner':<14}  {text}"
+                for i, text in enumerate(told)
+            ]
     return lines
 
 

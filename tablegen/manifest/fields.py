@@ -60,6 +60,7 @@ class ManifestDrive(Struct):
     forward: ManifestBranch
     backward: ManifestBranch
     resonance: ManifestResonance | None = None
+    model_files: dict[FileName, Digest] | None = None
 
 
 class ManifestLine(Struct):

@@ -144,6 +144,7 @@ def _axis(line: LinePlan) -> dict[str, Any]:
             "backward": {"beta": drive.backward.beta, "u_peak": drive.backward.u_peak},
             "turn": drive.turn,
             "model": drive.model,
+            **({"model_files": dict(drive.model_files)} if drive.model_files else {}),
             **_resonance(line),
         },
         "line": {

@@ -26,7 +26,8 @@ class Drive:
 
     ``v_scan`` is from (9)/(12), before ``m`` of (1) and ``g`` of (23). The amplitude played is m g v_scan, peak to
     peak, for w from 0 to 1. ``position_nm`` is that of the offset, above the one at 0 V. ``line_at`` is the line that
-    the model makes at another normalised scan voltage, None where it makes none.
+    the model makes at another normalised scan voltage, None where it makes none; ``model_files`` has the files that the
+    model names, and their SHA-256.
     """
 
     v_max: float
@@ -47,6 +48,7 @@ class Drive:
     response: Response | None
     max_boost_db: float
     line_at: Callable[[float], LineShape | None] = field(compare=False, repr=False)
+    model_files: tuple[tuple[str, str], ...] = ()
 
     @property
     def model(self) -> str:
@@ -186,6 +188,10 @@ def compensate(setup: Setup, axis: str, rate_hz: float, harmonics: int, problems
         response=response,
         max_boost_db=max_boost_db,
         line_at=line_at,
+        model_files=tuple(
+            (Path(name).name, digest)
+            for name, digest in zip(hysteresis.files(), hysteresis.contents(setup.scanner_folder), strict=True)
+        ),
     )
 
 
