@@ -12,9 +12,13 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 from building import EXAMPLE, REMOVED, REPOSITORY, VARIANTS, Variant, write_variant
+from operator_files import operator_file
+
+from tablegen.compensation.operator.file import operator_text
 
 pytestmark = pytest.mark.common
 
@@ -82,7 +86,26 @@ SCANS: dict[str, Variant] = {
         {**NO_LIMITS, "timing.line_rate_hz": 1990.0, "timing.pixels": 40, "x.size_of": "window", "x.size_nm": 61.0},
         {"x.resonance.max_boost_db": 1.0, "x.resonance.delay_s": 3.3e-6, "x.size.beta": 0.0},
     ),
+    "operator": Variant(
+        {**NO_LIMITS, "x.size_nm": 413.7, "x.offset_v": 46.3},
+        {"x.hysteresis": {"model": "operator", "file": "x_operator.toml"}},
+    ),
 }
+
+
+def operator() -> str:
+    """Plays, a residual over them that differs from trace to trace, and creep."""
+    file = operator_file(creep=0.027)
+    lines = [
+        msgspec.structs.replace(
+            line,
+            size=0.001 * (i - 1.3),
+            rising=[0.002 / (k + 1 + i) for k in range(12)],
+            falling=[-0.003 / (k + 2 + i) for k in range(12)],
+        )
+        for i, line in enumerate(file.lines)
+    ]
+    return operator_text(msgspec.structs.replace(file, lines=lines), [])
 
 
 def write_scans(folder: Path) -> list[Path]:
@@ -91,6 +114,7 @@ def write_scans(folder: Path) -> list[Path]:
     for name, variant in SCANS.items():
         paths.append(write_variant(folder / name, variant))
         (folder / name / "response.csv").write_text(RESPONSE, "ascii")
+        (folder / name / "x_operator.toml").write_text(operator(), "ascii")
     return paths
 
 
