@@ -10,6 +10,7 @@ from tablegen.numerics.arrays import Floats, FloatsLike, freeze, multiples
 from tablegen.numerics.turns import sine_and_cosine
 
 _BLOCK = 1 << 12  # times that are worked out together
+_TURNED = 16  # harmonics from one whose sine is worked out to the next
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +82,8 @@ class FourierSeries:
 def values(t: FloatsLike, *asked: tuple[FourierSeries, int]) -> tuple[Floats, ...]:
     """Values of several series or of their derivatives at the same times, each of the shape of ``t``.
 
-    The sines are worked out once for all of them.
+    The sines are worked out once for all of them: each sixteenth harmonic by itself, and those that follow by turning
+    it on, which leaves some 16 units in the last place.
     """
     t = np.asarray(t, dtype=np.float64)
     totals = tuple(np.full(t.shape, series.a0 if derivative == 0 else 0.0) for series, derivative in asked)
@@ -89,8 +91,13 @@ def values(t: FloatsLike, *asked: tuple[FourierSeries, int]) -> tuple[Floats, ..
     for first in range(0, t.size, _BLOCK):  # a block stays in the cache through all harmonics
         block = t.reshape(-1)[first : first + _BLOCK]
         parts = [total.reshape(-1)[first : first + _BLOCK] for total in totals]
+        first_s, first_c = sine_and_cosine(block)
+        s, c = first_s, first_c
         for n in range(1, harmonics + 1):
-            s, c = sine_and_cosine(n * block)
+            if n % _TURNED == 0:
+                s, c = sine_and_cosine(n * block)
+            elif n > 1:
+                s, c = s * first_c + c * first_s, c * first_c - s * first_s
             for part, (series, derivative) in zip(parts, asked, strict=True):
                 if n <= series.harmonics:
                     part += series.term(n, derivative, s, c)
