@@ -59,7 +59,8 @@ def test_a_piezo_is_no_worse_than_the_worst_of_the_table(tmp_path: Path, kind: t
         assert real[2] < mismatch
         # Of eight scans one scaling error and one size are above the worst, which docs/virtual.md says.
         assert real[1] < 1.25 * scaling
-        assert abs(real[3]) < 2.0 * abs(size)
+        # The middle of a large stroke is up to 1 V below the offset at which (1) is taken: docs/operator.md.
+        assert abs(real[3]) < (2.0 * abs(size) if size_nm < 500.0 else 0.4)
         # Nor does it frighten: of the largest scans less than ten times as much.
         if size_nm > 500.0:
             assert rms < 10.0 * real[0]
