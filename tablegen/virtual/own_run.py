@@ -15,7 +15,7 @@ from tablegen.config.load import Setup
 from tablegen.config.scanner import ScannerAxis
 from tablegen.planning.line_plan import LinePlan, make_plan
 from tablegen.problems import Rejected, Unphysical
-from tablegen.virtual.own_scanner import OwnAxis, departing, operator_line
+from tablegen.virtual.own_scanner import OwnAxis, operator_line
 from tablegen.virtual.simulation import AxisRun, run_on_each, with_model
 
 SEEDS = 20
@@ -90,7 +90,7 @@ def _axis(setup: Setup, name: str, line: LinePlan, seed: int, tell: Callable[[st
     assert isinstance(table, OperatorModel)
     found = operator_line(line)
     operator, centre = found.operator, line.drive.v_offset / line.drive.v_max
-    plants = [OwnAxis.of(line, departing(operator, (seed, k))) for k in range(SEEDS)]
+    plants = [OwnAxis.departing(line, (seed, k)) for k in range(SEEDS)]
     rows = []
     for correction, model in (("uncompensated", models.UNCOMPENSATED), ("laws", _laws(table)), (table.model(),) * 2):
         tell(f"playing {name}, {correction}, on its own operator")

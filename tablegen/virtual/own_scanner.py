@@ -52,6 +52,14 @@ class OwnAxis:
         drive = line.drive
         return cls(operator or shape.operator, shape.factor, drive.v_max, drive.response, line.series.harmonics)
 
+    @classmethod
+    def departing(cls, line: LinePlan, seed: tuple[int, ...]) -> "OwnAxis":
+        """An axis that departs from the operator of a line, and whose sensitivity does from the law of offsets."""
+        shape = operator_line(line)
+        axis = cls.of(line, departing(shape.operator, seed))
+        share = shape.between * float(np.random.default_rng((*seed, 1)).standard_normal())
+        return replace(axis, factor=axis.factor * (1.0 + share))
+
     def settled(self, volts: Floats, tick_s: float) -> Floats:
         """Where the axis is, in the middle of each tick, in a period that has been held tick by tick for ever.
 

@@ -1,6 +1,7 @@
 """An identified operator: the waveform that it follows straight, found when a scan is built."""
 
 from dataclasses import dataclass, replace
+from math import sqrt
 from pathlib import Path
 from typing import Annotated, ClassVar
 
@@ -37,7 +38,8 @@ class OperatorLine(WholeLine):
 
     ``uncertainty`` is what the operator is wrong by where it predicts a trace that it was not made of; ``distance`` is
     that of stroke or centre to the nearest trace, of v_max. ``operator`` is that of this rate, ``factor`` that of its
-    loops at this offset; ``after`` is what follows a change of offset and one of size.
+    loops at this offset, and ``between`` by how much of it (1) differs at the middle between the turns; ``after`` is
+    what follows a change of offset and one of size.
     """
 
     expected: Expected
@@ -45,6 +47,7 @@ class OperatorLine(WholeLine):
     distance: float
     operator: Operator
     factor: float
+    between: float
     after: tuple[Transient, Transient]
 
     @property
@@ -140,6 +143,7 @@ def _line(operator: Operator, wanted: WantedLine) -> OperatorLine:
     straight = LineShape(wanted.turn, BranchShape(), BranchShape())
     start = fit_window(straight, wanted.harmonics, wanted.window, wanted.both)
     found = find_waveform(operator, line, start, through, None if response is None else dynamics)
+    between = wanted.factor_at(found.centre) / wanted.factor_at(centre) - 1.0
     _check_reach(operator, found, wanted.v_max)
     late = replace(operator, creep=operator.creep.down_to(_SLOWEST_HZ))  # for all that a few frames may last
     # w = 0 and 1 are the ends of the laws' amplitude everywhere else.
@@ -149,10 +153,11 @@ def _line(operator: Operator, wanted: WantedLine) -> OperatorLine:
         series,
         wanted.turn,
         expected=found.expected,
-        uncertainty=_uncertainty(operator),
+        uncertainty=_uncertainty(operator, between),
         distance=operator.distance(found.stroke, found.centre),
         operator=operator,
         factor=factor,
+        between=between,
         after=(
             after_offset(late, found.stroke, found.centre, factor, wanted.turn),
             after_size(late, found.stroke, found.centre, factor, wanted.turn),
@@ -177,12 +182,16 @@ def _check_reach(operator: Operator, found: Found, v_max: float) -> None:
         )
 
 
-def _uncertainty(operator: Operator) -> Expected:
-    """Of the traces that were left out the median: the outermost are predicted from one side alone."""
+def _uncertainty(operator: Operator, between: float) -> Expected:
+    """Of the traces that were left out the median: the outermost are predicted from one side alone.
+
+    The size has that of (1) too: whether the sensitivity goes with the offset or with the middle between the turns, no
+    trace tells.
+    """
     rms, scaling, mismatch, size = (
         float(np.median([abs(line.left_out[i]) for line in operator.lines])) for i in range(4)
     )
-    return Expected((rms, rms), (scaling, scaling), mismatch, size)
+    return Expected((rms, rms), (scaling, scaling), mismatch, sqrt(size * size + (100.0 * between) ** 2))
 
 
 MODEL = OperatorModel
