@@ -60,6 +60,7 @@ class Picture:
     address: str
     alternative: str
     sites: tuple[tuple[float, float], ...]
+    height: float = 1.0  # of the width
 
 
 @dataclass(frozen=True)

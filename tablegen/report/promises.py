@@ -9,7 +9,7 @@ from tablegen.report.blocks import Cell, Grid, Paragraph, Section, row
 from tablegen.report.subject import Subject
 from tablegen.report.words import figure
 
-_HEAD = ("", "figure", "limit", "", "parts")
+_HEAD = ("", "figure", "limit", "")
 
 
 def certificate(subject: Subject) -> Section:
@@ -21,6 +21,7 @@ def certificate(subject: Subject) -> Section:
         Grid(f"{axis} axis, measured over all {entry.line.ticks} ticks", _HEAD, tuple(_rows(entry, limits, slew)))
         for axis, entry in subject.axes
     ]
+    tables.append(_parts(subject))
     tables += [
         Grid(f"{axis} axis, to expect on the scanner", ("", "figure", "uncertain by", ""), rows)
         for axis, entry in subject.axes
@@ -45,9 +46,7 @@ def _rows(entry: ManifestAxis, limits: Limits, slew: float | None) -> list[tuple
     for side, error in (found.scaling_error_percent or {}).items():
         most = limits.max_scaling_error_percent
         worst = max(error.get("total", 0.0), error.get("band_limit", 0.0))
-        parts = ", ".join(f"{name.replace('_', ' ')} {figure(error[name], 3)}" for name in _PARTS if name in error)
-        scaling = _bounded(f"scaling error {side}, peak to peak", worst, most, "%", LARGEST_PERCENT)
-        rows.append((*scaling, Cell(parts and f"{parts} %", "quiet")))
+        rows.append(_bounded(f"scaling error {side}, peak to peak", worst, most, "%", LARGEST_PERCENT))
         rows.append(_bounded(f"size error {side}", error.get("size", 0.0), most, "%", LARGEST_PERCENT, signed=True))
     for side, moved in (found.refinement_percent or {}).items():
         text = f"moves {moved.get('position', 0.0):.3g} % of the line, removes {moved.get('scaling', 0.0):.3g} %"
@@ -64,10 +63,20 @@ def _rows(entry: ManifestAxis, limits: Limits, slew: float | None) -> list[tuple
         rows.append(row("power beyond the cutoff", f"{found.beyond_cutoff_db:.1f} dB", "", ""))
     if found.at_resonance_db is not None:
         rows.append(row("power at the resonance", f"{found.at_resonance_db:.1f} dB", "", ""))
-    return [(*one, *[Cell("")] * (len(_HEAD) - len(one))) for one in rows]
+    return rows
 
 
-_PARTS = ("uncompensated", "band_limit", "quantisation", "model")
+_PARTS = ("uncompensated", "total", "band_limit", "quantisation", "model")
+
+
+def _parts(subject: Subject) -> Grid:
+    """What the scaling errors are made of; peaks of the parts are at different places, and do not add up."""
+    rows = []
+    for axis, entry in subject.axes:
+        for side, error in (entry.certificate.scaling_error_percent or {}).items():
+            rows.append(row(f"{axis} {side}", *(figure(error.get(name, 0.0), 3) for name in _PARTS)))
+    head = ("", *(name.replace("_", " ") for name in _PARTS))
+    return Grid("Scaling errors and their parts taken alone [%, peak to peak]", head, tuple(rows))
 
 
 def _bounded(

@@ -11,8 +11,8 @@ from markupsafe import Markup, escape
 from tablegen.numerics.arrays import Floats
 from tablegen.report.chart import Chart, DrawnCurve, runs, ticks
 
-WIDTH, HEIGHT = 520, 290
-_LEFT, _RIGHT, _TOP, _BOTTOM = 62, 12, 16, 44
+WIDTH, HEIGHT = 536, 290
+_LEFT, _RIGHT, _TOP, _BOTTOM = 70, 20, 16, 44
 PLOT_WIDTH, PLOT_HEIGHT = WIDTH - _LEFT - _RIGHT, HEIGHT - _TOP - _BOTTOM
 _FINE = 100  # positions to a pixel
 _FAR = 1_000_000  # nothing is drawn farther out than that
