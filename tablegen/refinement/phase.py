@@ -181,15 +181,20 @@ def _at(table: Floats, turns: Floats) -> Floats:
 
 
 def _averaged(turns: Floats, left: Floats) -> float:
-    """Rms of what is left, averaged over the periods in pieces of one: without the noise of a reading."""
+    """Rms of what is left, averaged over the periods in pieces of one, less what noise has in it.
+
+    Noise is what neighbouring readings differ by: a short trace has few readings in a piece, which average little.
+    """
     count, total = np.zeros(_BINS_PER_PERIOD), np.zeros(_BINS_PER_PERIOD)
     for rows in _parts(len(turns)):
         place = ((turns[rows] - np.floor(turns[rows])) * _BINS_PER_PERIOD).astype(np.int64)
         place = np.minimum(place, _BINS_PER_PERIOD - 1)
         count += np.bincount(place, minlength=_BINS_PER_PERIOD)
         total += np.bincount(place, left[rows], minlength=_BINS_PER_PERIOD)
-    mean = total[count > 0] / count[count > 0]
-    return float(np.sqrt(np.mean(mean**2)))
+    readings = count[count > 0]
+    mean = total[count > 0] / readings
+    noise = 0.5 * sum(float(np.sum(np.diff(left[rows]) ** 2)) for rows in _parts(len(left))) / len(left)
+    return float(np.sqrt(max(float(np.mean(mean**2)) - noise * float(np.mean(1.0 / readings)), 0.0)))
 
 
 def _check_layer(line: LinePlan, turns: Floats, left: Floats) -> None:
