@@ -65,7 +65,7 @@ def _codes(subject: Subject, axis: str) -> str:
 def _settles(line: LinePlan, subject: Subject) -> list[tuple[Cell, ...]]:
     planned = subject.planned
     settles = None if planned is None else settling(line.axis, line.drive, planned.plan.schedule)
-    return [] if settles is None else [row(f"{line.axis} settles", "", " ".join(settling_text(settles)))]
+    return [] if settles is None else [row(f"{line.axis} settles", "", "; ".join(settling_text(settles)))]
 
 
 def verification(subject: Subject) -> Section:

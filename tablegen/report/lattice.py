@@ -27,9 +27,9 @@ def lattice(planned: PlannedScan, axes: tuple[PlayedAxis, PlayedAxis]) -> Sectio
     if not pairs:
         return None
     pictures, worst = [], []
-    ratio = round(min(max(_size(planned.plan.y) / _size(planned.plan.x), 0.25), 4.0), 4)
+    ratio = round(min(max(_size(planned.plan.y) / _size(planned.plan.x), 0.5), 2.0), 4)
     for name, one, other in pairs:
-        images, apart = _images(planned, one, other)
+        images, apart = _images(planned, one, other, ratio)
         for side, image in images:
             alternative = f"{side} image of a lattice, {name} the correction of hysteresis"
             pictures.append(
@@ -61,8 +61,11 @@ def _remark(axes: tuple[PlayedAxis, PlayedAxis]) -> str:
 Image = tuple[bytes, tuple[tuple[float, float], ...]]
 
 
-def _images(planned: PlannedScan, x: AxisRun, y: AxisRun) -> tuple[list[tuple[str, Image]], float]:
-    """Each direction with its picture, and by how much the worst pixel is away from its place, in percent."""
+def _images(planned: PlannedScan, x: AxisRun, y: AxisRun, ratio: float) -> tuple[list[tuple[str, Image]], float]:
+    """Each direction with its picture, and by how much the worst pixel is away from its place, in percent.
+
+    The lattice is regular in the picture, whose height is ``ratio`` of its width whatever the window's is.
+    """
     schedule = planned.plan.schedule
     line: LinePlan = planned.plan.x
     nominal = _size(planned.plan.x), _size(planned.plan.y)
@@ -88,9 +91,9 @@ def _images(planned: PlannedScan, x: AxisRun, y: AxisRun) -> tuple[list[tuple[st
             100.0 * float(np.max(np.abs(at_x - asked_x))) / nominal[0],
             100.0 * float(np.max(np.abs(at_y - asked_y))) / nominal[1],
         )
-        constant = nominal[0] / _ROWS
-        heights = _heights(np.broadcast_to(at_x, at_y.shape), at_y, constant)
-        sites = _sites(nominal, constant)
+        shown_x, shown_y = at_x / nominal[0], at_y / nominal[1] * ratio
+        heights = _heights(np.broadcast_to(shown_x, shown_y.shape), shown_y, 1.0 / _ROWS)
+        sites = _sites((1.0, ratio), 1.0 / _ROWS)
         images.append((name, (grey_png(heights[::-1], -_CONTRAST, 3.0), sites)))
     return images, apart
 

@@ -10,6 +10,7 @@ from tablegen.certificate.doubts import doubts
 from tablegen.certificate.excess import excess
 from tablegen.certificate.matching import apart_percent
 from tablegen.certificate.summary import notes
+from tablegen.manifest.fields import ManifestCertificate
 from tablegen.planning.line_plan import Plan
 from tablegen.problems import Problem
 from tablegen.report.blocks import Tone
@@ -26,6 +27,7 @@ _SIGNS: dict[Weight, str] = {
     "note": "note",
 }
 _UNCOMPENSATED = "is not compensated"
+_CHORD = 0.05  # of the line: a scaling error over it is a place that is wrong by so much of it
 _TYPICAL_PERCENT = 10.0  # of a piezo whose hysteresis is not compensated: 10 to 20 % of the line
 
 
@@ -59,26 +61,45 @@ def _found(subject: Subject) -> Iterator[Finding]:
         if state.wrong:
             yield Finding("limit", 1000.0, f"{state.name} {state.wrong}; build it again")
     yield from _verified(subject.verified, subject)
+    told = []
     if planned is not None:
+        told = [*planned.broken, *(text for _, text in planned.warnings)]
         yield from (Finding("limit", 100.0, text) for text in planned.broken)
-        yield from (Finding("spoils", percent, text) for percent, text in planned.warnings)
+        for percent, text in planned.warnings:
+            if not any(_same(text, broken) for broken in planned.broken):
+                yield Finding("spoils", percent, text)
         for text in notes(planned.plan):
             spoils = _UNCOMPENSATED in text
             yield Finding("spoils" if spoils else "note", _TYPICAL_PERCENT if spoils else 0.0, text)
     for axis, entry in subject.axes:
-        expected = entry.certificate.expected
-        if expected is not None and expected.mismatch_percent is not None:
-            figure = expected.mismatch_percent
-            basis = "the operator expects" if expected.basis == "traces" else "the laws expect"
-            by = "" if figure.uncertainty is None else f" \u00b1 {figure.uncertainty:.2g}"
-            why = ", since turnarounds are rounded" if expected.basis == "laws" else ""
-            text = f"trace and retrace of {axis} up to {figure.value:.3g}{by} % of the line apart, {basis}{why}"
-            yield Finding("expect", figure.value, text)
-        for side, error in (entry.certificate.scaling_error_percent or {}).items():
-            text = f"{axis} {side}: the waveform itself has {error.get('total', 0.0):.3g} % of scaling error"
-            if error.get("uncompensated", 0.0) > 0.0005:
-                text += f"; without correction it would be {error['uncompensated']:.3g} %"
-            yield Finding("expect", 0.05 * error.get("total", 0.0), text)
+        yield from _expected(axis, entry.certificate, any(_scaling(axis) in text for text in told))
+
+
+def _scaling(axis: str) -> str:
+    """How a sentence on the scaling error of an axis begins."""
+    return f"the {axis} axis has a scaling error"
+
+
+def _same(one: str, other: str) -> bool:
+    """Whether both are on the scaling error of the same axis, which is said once."""
+    return any(_scaling(axis) in one and _scaling(axis) in other for axis in ("x", "y"))
+
+
+def _expected(axis: str, certificate: ManifestCertificate, told: bool) -> Iterator[Finding]:
+    """What to expect of an axis; its scaling error unless that was ``told``."""
+    expected = certificate.expected
+    if expected is not None and expected.mismatch_percent is not None:
+        figure = expected.mismatch_percent
+        basis = "the operator expects" if expected.basis == "traces" else "the laws expect"
+        by = "" if figure.uncertainty is None else f" \u00b1 {figure.uncertainty:.2g}"
+        why = ", since turnarounds are rounded" if expected.basis == "laws" else ""
+        text = f"trace and retrace of {axis} up to {figure.value:.3g}{by} % of the line apart, {basis}{why}"
+        yield Finding("expect", figure.value, text)
+    for side, error in ({} if told else certificate.scaling_error_percent or {}).items():
+        text = f"{axis} {side}: the waveform itself has {error.get('total', 0.0):.3g} % of scaling error"
+        if error.get("uncompensated", 0.0) > 0.0005:
+            text += f"; without correction it would be {error['uncompensated']:.3g} %"
+        yield Finding("expect", _CHORD * error.get("total", 0.0), text)
 
 
 def _verified(record: VerifyRecord | None, subject: Subject) -> Iterator[Finding]:

@@ -2,13 +2,13 @@
 
 import json
 import re
-import shutil
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import urlsplit
 
 import numpy as np
+from building import tool
 from limits import PATIENCE_S
 from PIL import Image
 
@@ -37,11 +37,16 @@ class Seen:
     requests: list[str]
 
 
-def _run(folder: Path, address: str, *options: str) -> subprocess.CompletedProcess[str]:
-    program = shutil.which("chromium")
-    assert program, "chromium is missing; on Debian: apt-get install chromium"
+def loaded(folder: Path, address: str, *options: str) -> subprocess.CompletedProcess[str]:
+    """Run Chromium on an address; it has no network."""
     quiet = "--host-resolver-rules=MAP * ~NOTFOUND"
-    command = [program, *_OPTIONS, quiet, f"--user-data-dir={folder / 'profile'}", "--virtual-time-budget=2000"]
+    command = [
+        tool("chromium"),
+        *_OPTIONS,
+        quiet,
+        f"--user-data-dir={folder / 'profile'}",
+        "--virtual-time-budget=2000",
+    ]
     done = subprocess.run(
         [*command, *options, address], capture_output=True, text=True, timeout=PATIENCE_S, check=False
     )
@@ -52,7 +57,7 @@ def _run(folder: Path, address: str, *options: str) -> subprocess.CompletedProce
 def seen(page: Path, folder: Path) -> Seen:
     """Load a page; ``folder`` is for the browser's own files."""
     log = folder / "net.json"
-    done = _run(folder, page.as_uri(), "--enable-logging=stderr", f"--log-net-log={log}", "--dump-dom")
+    done = loaded(folder, page.as_uri(), "--enable-logging=stderr", f"--log-net-log={log}", "--dump-dom")
     asked = {
         event["params"]["url"]
         for event in json.loads(log.read_text("utf-8"))["events"]
@@ -66,6 +71,6 @@ def seen(page: Path, folder: Path) -> Seen:
 def picture(page: Path, folder: Path, *options: str, width: int = 1200, height: int = 1600) -> np.ndarray:
     """The upper left of a page as rows x columns x red, green, blue."""
     target = folder / "picture.png"
-    _run(folder, page.as_uri(), f"--window-size={width},{height}", f"--screenshot={target}", *options)
+    loaded(folder, page.as_uri(), f"--window-size={width},{height}", f"--screenshot={target}", *options)
     with Image.open(target) as image:
         return np.asarray(image.convert("RGB")).astype(int)

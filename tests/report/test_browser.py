@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from browser import picture, seen
+from browser import loaded, picture, seen
 from editing import run, write_pair
 
 pytestmark = pytest.mark.common
@@ -87,9 +87,7 @@ def test_a_narrow_page_does_not_scroll_sideways(page: Path, tmp_path: Path) -> N
         "{ document.title = document.getElementById('f').contentDocument.title }</script>",
         "utf-8",
     )
-    from browser import _run
-
-    done = _run(tmp_path, frame.as_uri(), "--allow-file-access-from-files", "--dump-dom")
+    done = loaded(tmp_path, frame.as_uri(), "--allow-file-access-from-files", "--dump-dom")
     title = re.search(r"<title>(.*?)</title>", done.stdout)
     assert title
     inner, scrolled = json.loads(title[1])

@@ -1,79 +1,25 @@
 """`tablegen report`: the page against an HTML parser, hostile names, the certificate, and other ways to its figures."""
 
-import base64
-import hashlib
 import json
 import re
 import subprocess
 import sys
 import zlib
-from html.parser import HTMLParser
 from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from building import FEW, VARIANTS, write_variant
 from editing import SCAN, SCANNER, edited, run, write_pair
+from html_page import Page, well_formed
 from operator_files import operator_file, write_operator_scan
+from sets import quick
 
 from tablegen.report.page import charts_of, page, sections
 from tablegen.report.planned import planned_scan
 from tablegen.report.png import grey_png
 from tablegen.report.subject import Subject
-
-VOID = {"meta", "link", "br", "img", "hr", "input"}
-MOST_BYTES = 1_500_000
-
-
-class Page(HTMLParser):
-    """What a page has, by a parser that believes nothing: elements that do not close are faults."""
-
-    def __init__(self, text: str) -> None:
-        super().__init__(convert_charrefs=True)
-        self.open: list[str] = []
-        self.faults: list[str] = []
-        self.ids: list[str] = []
-        self.addresses: list[str] = []
-        self.handlers: list[str] = []
-        self.texts: list[str] = []
-        self.scripts: list[str] = []
-        self.tags: set[str] = set()
-        self.verdicts: list[str] = []
-        self.policy = ""
-        self.feed(text)
-        self.close()
-        self.faults += [f"<{tag}> stays open" for tag in self.open]
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags.add(tag)
-        self._look(tag, dict(attrs))
-        if tag not in VOID:
-            self.open.append(tag)
-
-    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags.add(tag)
-        self._look(tag, dict(attrs))
-
-    def handle_endtag(self, tag: str) -> None:
-        if not self.open or self.open.pop() != tag:
-            self.faults.append(f"</{tag}> at {self.getpos()}")
-
-    def handle_data(self, data: str) -> None:
-        (self.scripts if self.open and self.open[-1] == "script" else self.texts).append(data)
-
-    def _look(self, tag: str, attributes: dict[str, str | None]) -> None:
-        if "id" in attributes:
-            self.ids.append(str(attributes["id"]))
-        self.addresses += [str(attributes[name]) for name in ("href", "src", "action", "data") if name in attributes]
-        self.handlers += [name for name in attributes if name.startswith("on") or name == "style"]
-        if tag == "meta" and attributes.get("http-equiv") == "Content-Security-Policy":
-            self.policy = str(attributes["content"])
-        if tag == "p" and str(attributes.get("class", "")).startswith("verdict"):
-            self.verdicts.append(str(attributes["class"]).split()[1])
-
-    @property
-    def said(self) -> str:
-        return " ".join(" ".join(self.texts).split())
 
 
 def report(path: Path, *options: str | Path, status: int = 0) -> tuple[bytes, Page]:
@@ -98,23 +44,6 @@ def found(example: Path) -> tuple[bytes, Page]:
 @pytest.fixture(scope="module")
 def subject(example: Path) -> Subject:
     return planned_scan(example)
-
-
-def well_formed(content: bytes, read: Page) -> None:
-    assert read.faults == []
-    assert len(read.ids) == len(set(read.ids))
-    inside = [address for address in read.addresses if address.startswith("#")]
-    assert {address[1:] for address in inside} <= set(read.ids)
-    assert [a[:40] for a in read.addresses if a not in inside and not a.startswith("data:")] == []
-    text = content.decode("utf-8")
-    assert set(re.findall(r"[a-z]+://[^\s\"'<]+", text)) <= {"http://www.w3.org/2000/svg"}  # a name, no address
-    assert not re.search(r"@import|url\(", text)
-    assert read.handlers == []
-    assert len(read.scripts) == 1
-    digest = base64.b64encode(hashlib.sha256(read.scripts[0].encode()).digest()).decode()
-    assert read.policy.startswith("default-src 'none';")
-    assert f"script-src 'sha256-{digest}'" in read.policy
-    assert len(content) < MOST_BYTES
 
 
 def test_the_page_is_well_formed_and_needs_no_network(found: tuple[bytes, Page]) -> None:
@@ -144,6 +73,18 @@ def test_the_same_scan_gives_the_same_bytes(found: tuple[bytes, Page], tmp_path:
     assert str(tmp_path.parent) not in text
     assert "/tmp" not in text
     assert not re.search(r"\b20[2-9]\d-\d\d-\d\d|\b\d\d:\d\d:\d\d", re.sub(r"base64,[A-Za-z0-9+/=]+", "", text))
+
+
+@pytest.mark.parametrize("name", quick(FEW[:3], [*VARIANTS]))
+def test_every_kind_of_scan_has_a_page(name: str, tmp_path: Path) -> None:
+    """Converters of all widths, steps, turns, a table a tick; with a limit of the example exceeded or not."""
+    path = write_variant(tmp_path, VARIANTS[name])
+    accepted = run("check", path).status
+    content, read = report(path, status=accepted)
+    well_formed(content, read)
+    assert ("bad" in read.verdicts) == (accepted == 3)
+    numbers = re.sub(r"<script>.*?</script>|<style>.*?</style>", "", content.decode("utf-8"), flags=re.DOTALL)
+    assert not re.search(r"\b(nan|inf|None)\b", numbers)
 
 
 EVIL = "<script>alert(1)</script>\"'&<img src=x onerror=f()>`\u202e{{7*7}}"
@@ -200,6 +141,7 @@ def test_a_broken_limit_is_shown_and_is_status_3(tmp_path: Path) -> None:
     well_formed(content, read)
     assert read.verdicts == ["bad"]
     assert "✗ exceeded" in read.said
+    assert read.said.count("the x axis has a scaling error") == 1
     assert "scan.toml:" in read.said
     assert str(tmp_path) not in content.decode("utf-8")
 
