@@ -4,6 +4,7 @@ Needs the extra ``images`` for .tif, .png and .jpk. What each format says is in 
 """
 
 import hashlib
+import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from tablegen.calibration.gwyddion import gwy_channels
+from tablegen.calibration.image_formats.asd import asd_channels
 from tablegen.calibration.image_formats.channel import (
     MAX_PIXELS,
     Channel,
@@ -22,7 +24,11 @@ from tablegen.calibration.image_formats.channel import (
     partner,
     quoted,
 )
+from tablegen.calibration.image_formats.igor import ibw_channels
+from tablegen.calibration.image_formats.jpk import jpk_channels
 from tablegen.calibration.image_formats.matrix import npy_channels, text_channels
+from tablegen.calibration.image_formats.nanonis import sxm_channels
+from tablegen.calibration.image_formats.nanoscope import spm_channels
 from tablegen.calibration.image_formats.picture import png_channels
 from tablegen.calibration.table import Source, file_content
 from tablegen.calibration.tiff import tiff_channels
@@ -33,7 +39,8 @@ from tablegen.reading import IMAGE
 
 _MIN_PIXELS = 32  # rows and columns
 _MAX_HEIGHT = 1e30  # in any unit; squares of heights have to be numbers
-MODULES = {".png": "PIL", ".tif": "tifffile", ".tiff": "tifffile"}  # what reads them, beside numpy
+_NUMBERED = re.compile(r"\.\d{3}")  # Nanoscope's images of one name, .000 to .999
+MODULES = {".png": "PIL", **dict.fromkeys((".tif", ".tiff", ".jpk", ".jpk-qi-image"), "tifffile")}  # beside numpy
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +148,8 @@ def _opened(path: Path) -> _ImageFile:
     """The channels of a file. Raises ``Rejected``."""
     name = shown_path(path)
     file = _ImageFile(name, Source(path.name, ""), [])
-    reader = _READERS.get(path.suffix.lower())
+    ending = path.suffix.lower()
+    reader = spm_channels if _NUMBERED.fullmatch(ending) else _READERS.get(ending)
     with file.named():
         if reader is None:
             what = path.suffix or "no ending"
@@ -203,5 +211,11 @@ _READERS: dict[str, Callable[[bytes, str], list[Channel]]] = {
     ".tiff": tiff_channels,
     ".png": png_channels,
     ".gwy": gwy_channels,
+    ".asd": asd_channels,
+    ".ibw": ibw_channels,
+    ".spm": spm_channels,
+    ".jpk": jpk_channels,
+    ".jpk-qi-image": jpk_channels,
+    ".sxm": sxm_channels,
     **dict.fromkeys((".txt", ".asc", ".csv", ".dat"), text_channels),
 }
