@@ -172,14 +172,19 @@ def _read(file: _ImageFile, channel: Channel, frame: int | None) -> ScanImage:
         least = f"{_MIN_PIXELS} x {_MIN_PIXELS}"
         raise ValueError(f"{what}has {size} pixels; at least {least} and at most 2^25 are read")
     if frame is None and channel.frames > 1:
-        raise ValueError(f"{what}is a movie of {channel.frames} frames; choose one, 0 to {channel.frames - 1}")
+        raise ValueError(
+            f"{what}is a movie of {channel.frames} frames; choose one with --frame, 0 to {channel.frames - 1}"
+        )
     chosen = frame or 0
     if not 0 <= chosen < channel.frames:
         raise ValueError(f"{what}has no frame {chosen}; the last one is {channel.frames - 1}")
-    matrix = channel.load(chosen)
-    if matrix.dtype.kind not in "iufb":
-        raise ValueError(f"{what}has values of the type {matrix.dtype}; heights are real numbers")
-    heights = matrix.astype(np.float64)
+    with np.errstate(all="ignore"):  # of factors in a damaged file; what is not finite is counted below
+        matrix = channel.load(chosen)
+        if matrix.dtype.kind not in "iufb":
+            raise ValueError(f"{what}has values of the type {matrix.dtype}; heights are real numbers")
+        if matrix.shape != channel.shape:
+            raise ValueError(f"{what}has {matrix.size} pixels, not {size}; copy it again")
+        heights = matrix.astype(np.float64)
     bad = int(np.sum(~np.isfinite(heights)))
     if bad:
         raise ValueError(f"{what}{bad} pixels are not finite; crop or interpolate them")
@@ -211,11 +216,11 @@ _READERS: dict[str, Callable[[bytes, str], list[Channel]]] = {
     ".tiff": tiff_channels,
     ".png": png_channels,
     ".gwy": gwy_channels,
+    **dict.fromkeys((".txt", ".asc", ".csv", ".dat"), text_channels),
     ".asd": asd_channels,
     ".ibw": ibw_channels,
     ".spm": spm_channels,
     ".jpk": jpk_channels,
     ".jpk-qi-image": jpk_channels,
     ".sxm": sxm_channels,
-    **dict.fromkeys((".txt", ".asc", ".csv", ".dat"), text_channels),
 }

@@ -20,7 +20,8 @@ import numpy as np
 from tablegen.calibration.image_formats.channel import Channel, Matrix, first_line
 
 _MAX_PAGES = 1000
-_MAX_TEXT = 1 << 12  # characters of a tag
+_MAX_TAGS = 100_000  # of all pages
+_MAX_TEXT = 256  # characters of a tag
 _TEXT = 2
 _KINDS = {1: "B", 3: "H", 4: "I", 6: "b", 8: "h", 9: "i", 11: "f", 12: "d"}  # of a number in a tag
 TiffTags = dict[int, int | float | str]
@@ -82,7 +83,7 @@ def _unreadable(error: Exception) -> ValueError:
 def tiff_tags(content: bytes) -> list[TiffTags]:
     """Tags of each page that hold one number or a short text, by code; other ones are left out.
 
-    Raises ``ValueError`` where the directories do not end inside the file.
+    Raises ``ValueError`` where the directories, or what these tags point at, do not end inside the file.
     """
     found: list[TiffTags] = []
     for order, big, at, count in _directories(content):
@@ -96,9 +97,10 @@ def tiff_tags(content: bytes) -> list[TiffTags]:
             place = entry + (12 if big else 8)
             if struct.calcsize(layout) > (8 if big else 4):
                 place = _number(content, place, order + ("Q" if big else "I"))
-            if place + struct.calcsize(layout) <= len(content):
-                (value,) = struct.unpack_from(order + layout, content, place)
-                tags[code] = value.split(b"\0")[0].decode("latin-1") if isinstance(value, bytes) else value
+            if place + struct.calcsize(layout) > len(content):
+                raise ValueError(f"ends before byte {place}, where a tag should be; copy it again")
+            (value,) = struct.unpack_from(order + layout, content, place)
+            tags[code] = value.split(b"\0")[0].decode("latin-1") if isinstance(value, bytes) else value
         found.append(tags)
     return found
 
@@ -116,6 +118,7 @@ def _directories(content: bytes) -> Iterator[tuple[str, bool, int, int]]:
     at, count, tag_bytes, place = (4, "H", 12, "I") if version == 42 else (8, "Q", 20, "Q")
     count, place = order + count, order + place
     seen: set[int] = set()
+    total = 0
     while True:
         directory = _number(content, at, place)
         if directory == 0:
@@ -126,6 +129,9 @@ def _directories(content: bytes) -> Iterator[tuple[str, bool, int, int]]:
             raise ValueError(f"more than {_MAX_PAGES} pages")
         seen.add(directory)
         first, tags = directory + struct.calcsize(count), _number(content, directory, count)
+        total += tags
+        if total > _MAX_TAGS:
+            raise ValueError(f"more than {_MAX_TAGS} tags")
         at = first + tag_bytes * tags
         _number(content, at, place)
         yield order, version == 43, first, tags

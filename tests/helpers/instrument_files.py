@@ -37,7 +37,7 @@ def ibw(channels: Mapping[str, Floats], note: Mapping[str, str], order: str = "<
     rows, columns = next(iter(channels.values())).shape
     stored = [heights[::-1] if turned else heights for heights in channels.values()]
     values = b"".join(heights.astype(f"{order}f4").tobytes() for heights in stored)
-    text = "".join(f"{key}: {value}\r" for key, value in note.items()).encode()
+    text = "".join(f"{key}: {value}\r" for key, value in {"ImageNote": "", **note}.items()).encode()
     labels = b"".join(label.encode().ljust(32, b"\0") for label in ("", *channels))
     sizes = struct.pack(f"{order}15i", 320 + len(values), 0, len(text), *[0] * 5, 0, 0, len(labels), *[0] * 4)
     wave = bytearray(320)
@@ -54,7 +54,7 @@ def spm(
     signals: Both, nm: tuple[float, float] = (500.0, 500.0), frame: str = "Up", stored: int = 2, aspect: str = "1:1"
 ) -> bytes:
     """Nanoscope: the bottom row first, integers of 100 nm full scale."""
-    start, lists, blocks = 1 << 14, "", b""
+    start, lists, blocks = 1 << 12, "", b""
     for signal, both in signals.items():
         for name, heights in zip(("Trace", "Retrace"), both, strict=True):
             rows, columns = heights.shape
@@ -81,7 +81,9 @@ def spm(
 def jpk(signals: Both, nm: tuple[float, float] = (500.0, 250.0), big: bool = False) -> bytes:
     """JPK: a page with a picture and the grid, then pages of 16 bits, 0.01 nm a step from -100 nm."""
     order = ">" if big else "<"
-    grid = {0x8042: nm[0] * 1e-9, 0x8043: nm[1] * 1e-9, 0x8044: 0.0, 0x8045: 0, 0x8049: 4.0, 0x8050: "settings"}
+    rows, columns = next(iter(signals.values()))[0].shape
+    grid = {0x8042: nm[0] * 1e-9, 0x8043: nm[1] * 1e-9, 0x8044: 0.0, 0x8045: 0, 0x8046: columns, 0x8047: rows}
+    grid |= {0x8049: 4.0, 0x8050: "settings"}
     pages = [({**grid, 262: 2}, np.zeros((8, 8, 3), np.uint8))]
     for signal, both in signals.items():
         for flag, heights in enumerate(both):
@@ -128,10 +130,13 @@ def _page(out: bytearray, order: str, tags: Mapping[int, int | float | str], mat
     return first + len(entries)
 
 
-def asd(channels: Mapping[str, Floats], version: int = 1, nm: tuple[int, int] = (400, 200), code: int = 0x40000) -> bytes:
+def asd(
+    channels: Mapping[str, Floats], version: int = 1, nm: tuple[int, int] = (400, 200), code: int = 0x40000
+) -> bytes:
     """High-speed AFM: frames x rows x columns of nm by signal, TP or ER; 12 bits over -5..5 V, 0.05 nm a level."""
     frames, rows, columns = next(iter(channels.values())).shape
     extension, gain, sensor = 10.24, 2.0, 20.48  # nm/V, 1, nm/V: 20.48 nm/V x 10 V / 4096
+    bipolar_5_v = 0x40000
     body = b""
     for name, movie in channels.items():
         sign = 1.0 if name == "TP" else -1.0
@@ -141,7 +146,9 @@ def asd(channels: Mapping[str, Floats], version: int = 1, nm: tuple[int, int] = 
     names = [*channels, ""][:2]
     user, comment = b"user", b"comment"
     if version == 0:
-        head = struct.pack("<5i4h3fIi", 0, 0, len(user), 0, len(comment), columns, rows, *nm, 500.0, extension, gain, code, 12)
+        head = struct.pack(
+            "<5i4h3fIi", 0, 0, len(user), 0, len(comment), columns, rows, *nm, 500.0, extension, gain, code, 12
+        )
         head += bytes(1 + 4 + 2 + 2 + 6 + 8 + 12 + 4) + struct.pack("<iih", frames, 7, 1) + user
         head += struct.pack("<2fi", sensor, 1.0, 0) + comment
         head = "".join(name.ljust(2, "\0") for name in names).encode() + head
@@ -150,7 +157,7 @@ def asd(channels: Mapping[str, Floats], version: int = 1, nm: tuple[int, int] = 
         head = struct.pack("<5i", 0, 0, 65001, len(user), len(comment))
         head += b"".join(name.encode("utf-16-le").ljust(4, b"\0") for name in names)
         head += struct.pack("<8i", frames, frames, 0, 1, columns, rows, *nm) + bytes(1 + 4 + 24 + 8)
-        head += struct.pack("<3fi", 500.0, sensor, 1.0, 0) + bytes(12) + struct.pack("<iIi", 7, code, 12)
+        head += struct.pack("<3fi", 500.0, sensor, 1.0, 0) + bytes(12) + struct.pack("<iIi", 7, bipolar_5_v, 12)
         head += struct.pack("<6f", 5000.0, 5000.0, 1.0, 1.0, extension, gain) + user + comment
         if version == 2:
             head += struct.pack("<iid5i", frames, 0, 0.0, 0, 0, 0, 0, 0)
