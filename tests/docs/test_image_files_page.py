@@ -13,7 +13,7 @@ from instrument_files import asd, ibw
 
 from tablegen.calibration.image_files import _READERS, MODULES
 from tablegen.calibration.image_formats import channel, igor, nanonis, nanoscope
-from tablegen.calibration.tiff import _MAX_TAGS
+from tablegen.calibration.image_formats.tiff import _MAX_TAGS
 
 PAGE = (REPOSITORY / "docs" / "image_files.md").read_text("utf-8")
 WORDS = " ".join(PAGE.split())
