@@ -8,9 +8,9 @@ from scipy.special import chdtrc
 
 from tablegen.calibration.branch import BINS, WINDOW, AmplitudeFit, measured_branch
 from tablegen.calibration.estimate import Curve, Estimate
+from tablegen.calibration.image_checks import MIN_PERIODS
 from tablegen.calibration.image_model import begin, check_signs, grown, prepared
 from tablegen.calibration.periodic import FitState, PeriodicModel
-from tablegen.calibration.spots import MIN_PERIODS
 from tablegen.calibration.trace import correlation_length
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.numerics.arrays import Bools, Floats

@@ -5,67 +5,42 @@ from math import sqrt
 import numpy as np
 from scipy.optimize import least_squares
 
+from tablegen.calibration.image_checks import ALIASING_HINT, check_lines, check_pair
 from tablegen.calibration.periodic import BASES, LAG, Columns, FitState, Geometry, PeriodicModel, settle
 from tablegen.calibration.spots import Bend, Spot, bend_of, column_phase, row_polynomial, second_base, strongest
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.numerics.arrays import Bools, Floats, Ints
 from tablegen.problems import Unphysical
 
-_MIN_PIXELS = 32  # along and across
 _ROW_POLYNOMIAL_ORDER = 3  # order of the polynomial over rows: drift, and hysteresis of the slow axis
 _MAX_SPOTS = 14
 _MAX_SPOT_INDEX = {1: 12, 2: 3}  # largest index of a spot, by number of bases
 _MIN_SPOT_ERRORS = 6.0  # standard errors of an amplitude
 _MIN_SPOT_AMPLITUDE = 0.003  # share of the strongest amplitude
-_MAX_LINE_POWER = 100.0  # times the usual power of a line
-_FLAT, _MANY_FLAT = 1e-9, 0.02  # share of the largest power of a line; share of all lines
 _MAX_DELAY = 0.1  # share of the line
 _MIN_TRACKED_PERIODS = 8.0  # periods
 _PHASE_TOLERANCE = 0.01  # periods, rms
 _MIN_MISFIT_RATIO = 1.5  # how much worse another count of periods has to be
-_ALIASING_HINT = " (periods finer than two pixels look like that too)"
 
 
 def prepared(
     trace: Floats, retrace: Floats, turn: float, window: tuple[float, float], delay: float
 ) -> tuple[Geometry, list[Floats]]:
     """Levelled heights of unit variance."""
-    if trace.shape != retrace.shape:
-        sizes = " and ".join(f"{image.shape[0]} x {image.shape[1]}" for image in (trace, retrace))
-        raise Unphysical(f"trace and retrace have {sizes} pixels; both must be from one scan")
-    if trace.ndim != 2 or min(trace.shape) < _MIN_PIXELS:
-        raise Unphysical(f"{' x '.join(map(str, trace.shape))} pixels are too few; {_MIN_PIXELS} rows and columns do")
+    check_pair(trace, retrace)
     if not 0.0 < turn < 1.0:
         raise Unphysical(f"a turn of {turn:g} is outside 0..1")
     if not (window[0] >= 0.0 and window[1] <= 1.0 and window[1] - window[0] >= 0.3):
         raise Unphysical(f"a window of {window[0]:g}..{window[1]:g} is not a large part of the sweep, 0..1")
     if not abs(delay) <= _MAX_DELAY * trace.shape[1]:
         raise Unphysical(f"a delay of {delay:g} pixels is too large for a line of {trace.shape[1]}")
-    if np.array_equal(trace, retrace) or np.array_equal(trace, retrace[:, ::-1]):
-        raise Unphysical(
-            "trace and retrace are the same image; both directions are needed, since the scanner file has a branch for "
-            "each"
-        )
     geometry = Geometry(trace.shape[0], trace.shape[1], turn, window, delay)
     images = []
     for name, image in (("trace", trace), ("retrace", retrace)):
-        if not np.all(np.isfinite(image)):
-            raise Unphysical(f"the {name} has {int(np.sum(~np.isfinite(image)))} pixels that are not numbers; crop it")
         image = image - np.mean(image)
         largest = float(np.max(np.abs(image)))
         level = np.asarray(geometry.levelled(image), dtype=np.float64)
-        if not np.max(np.abs(level)) > 1e-12 * largest:
-            raise Unphysical(f"the {name} has no contrast along its lines")
-        power = np.sum(level**2, axis=1)
-        flat = np.flatnonzero(power <= _FLAT * np.max(power))
-        if len(flat) > _MANY_FLAT * len(power):
-            raise Unphysical(
-                f"{len(flat)} rows of the {name}, from {flat[0] + 1} to {flat[-1] + 1}, have no contrast, as of a scan "
-                f"that was stopped; crop both images"
-            )
-        loud = np.flatnonzero(power > _MAX_LINE_POWER * np.median(power))
-        if np.sum(power[loud]) > 0.5 * np.sum(power):
-            raise Unphysical(f"rows {loud[0] + 1} to {loud[-1] + 1} have most of the {name}'s contrast; crop them")
+        check_lines(name, level, largest)
         images.append(level)
     spread = sqrt(0.5 * sum(float(np.var(image)) for image in images))
     return geometry, [image / spread for image in images]
@@ -79,7 +54,7 @@ def begin(geometry: Geometry, heights: list[Floats], mirrored: bool) -> tuple[Sp
     turned = bend_of(geometry, heights[1][:, ::-1], False, spot)
     advice = "leave --retrace-mirrored out" if mirrored else "it needs --retrace-mirrored"
     if turned.match > 1.5 * max(backward.match, 0.2 * forward.match):
-        raise Unphysical(f"the retrace shows the trace's pattern only when it is mirrored; {advice}{_ALIASING_HINT}")
+        raise Unphysical(f"the retrace shows the trace's pattern only when it is mirrored; {advice}{ALIASING_HINT}")
     if backward.match < 0.3 * forward.match:
         raise Unphysical("the retrace does not show the trace's pattern; are they from one scan?")
     # A grating square to the lines looks the same mirrored; then the bend tells.
@@ -92,10 +67,10 @@ def check_signs(forward: float, backward: float, least: float, advice: str) -> N
     """Each sweep has to lag."""
     if forward < -least and backward < -least:
         raise Unphysical(
-            f"both sweeps lead the drive; trace and retrace are exchanged, or both mirrored{_ALIASING_HINT}"
+            f"both sweeps lead the drive; trace and retrace are exchanged, or both mirrored{ALIASING_HINT}"
         )
     if forward > 0.0 and backward < -least:
-        raise Unphysical(f"the retrace bends the wrong way, as one that is mirrored; {advice}{_ALIASING_HINT}")
+        raise Unphysical(f"the retrace bends the wrong way, as one that is mirrored; {advice}{ALIASING_HINT}")
     if forward < -least and backward > 0.0:
         raise Unphysical("the trace bends the wrong way; is it mirrored? The left end must be where the trace begins")
 
