@@ -154,7 +154,7 @@ def _of_lattice(waves: Floats, covariance: Floats, cell: Cell, aspect: float) ->
         strain = hypot(log(abs(height) / size / aspect) / _ASPECT_SPREAD, drift / size / _SHEAR_SPREAD)
         gradient = inverse.T @ (direct @ along)
         error = sqrt(float(gradient @ covariance[::2, ::2] @ gradient))
-        angle = -float(np.degrees(np.arctan2(along[1], along[0])))
+        angle = _turned(-float(np.degrees(np.arctan2(along[1], along[0]))), cell)
         readings.append((strain, LineSize(Estimate(size, error), 0.0, angle, abs(height) / size, drift / size)))
     strain, best = min(readings, key=lambda one: one[0])
     if strain > _MAX_STRAIN:
@@ -171,6 +171,12 @@ def _of_lattice(waves: Floats, covariance: Floats, cell: Cell, aspect: float) ->
             f"{apart.nm.value:.4g} nm in one {apart.aspect:.3g} times as high; say how high it is with --aspect"
         )
     return best
+
+
+def _turned(angle_deg: float, cell: Cell) -> float:
+    """The least angle that looks the same."""
+    same = {"hexagonal": 60.0, "square": 90.0}.get(cell.name, 180.0)
+    return (angle_deg + 0.5 * same) % same - 0.5 * same
 
 
 def _check_whole_period(line: ImageLine) -> None:

@@ -37,8 +37,8 @@ class Solution:
 
     @property
     def freedom(self) -> int:
-        """Points less parameters."""
-        return len(self.residuals) - len(self.values)
+        """Points less parameters that were fitted."""
+        return len(self.residuals) - len(self.names)
 
     @property
     def variance(self) -> float:

@@ -17,16 +17,17 @@ if TYPE_CHECKING:
 
 F = TypeVar("F", bound=Callable[..., Any])
 IMAGE_NAMES = ("--image", "--images")
+PAIR_NAME = "--pair"
 _NO_RETRACE = Path()  # where RETRACE was left out
 _POSITIVE = click.FloatRange(min=0.0, min_open=True)
 
 
-def image_option(metavar: str, volts: int, text: str) -> Callable[[F], F]:
-    """``--image`` with so many voltages before the files."""
+def image_option(metavar: str, volts: int, text: str, names: tuple[str, ...] = IMAGE_NAMES) -> Callable[[F], F]:
+    """``--image`` with so many numbers before the files."""
     kinds: tuple[Any, ...] = (_POSITIVE, float, _POSITIVE)[:volts]
     files = click.Path(path_type=Path), click.Path(path_type=Path)
     return click.option(
-        *IMAGE_NAMES, "images", type=(*kinds, *files), metavar=f"{metavar} TRACE [RETRACE]", multiple=True, help=text
+        *names, "images", type=(*kinds, *files), metavar=f"{metavar} TRACE [RETRACE]", multiple=True, help=text
     )
 
 
@@ -44,6 +45,12 @@ class CommandOfImages(click.Command):
             if ends and any(at > volts and args[at - volts - 1] == name for name, volts in self.images):
                 words.append(str(_NO_RETRACE))
         return super().parse_args(ctx, words)
+
+
+class CommandOfOperatorPairs(CommandOfImages):
+    """``--pair`` with a scan voltage, an offset and a rate before the files."""
+
+    images = ((PAIR_NAME, 3),)
 
 
 class CommandOfOffsetImages(CommandOfImages):
