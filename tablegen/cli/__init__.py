@@ -21,6 +21,7 @@ _COMMANDS = {
     "show": ("show", "show"),
     "report": ("report", "report"),
     "calibrate": ("calibrate", "calibrate"),
+    "channels": ("channels", "channels"),
     "simulate": ("simulate", "simulate"),
     "refine": ("refine", "refine"),
     "verify": ("verify", "verify"),

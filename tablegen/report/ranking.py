@@ -114,12 +114,18 @@ def _verified(record: VerifyRecord | None, subject: Subject) -> Iterator[Finding
 
 def weighed(plan: Plan, certificates: Mapping[str, Certificate], warnings: list[Problem]) -> list[tuple[float, str]]:
     """The warnings of a scan, each with the percentage of the error that it tells of, and without folders."""
-    every = [excess(certificates[line.axis].scaling) for line in plan.lines]
-    percents = [abs(one.percent) for one in every if one is not None]
-    most = plan.limits.max_scaling_error_percent
-    percents += [one.percent for line in plan.lines for one in doubts(line, certificates[line.axis], most)]
-    percents += [apart_percent(plan)] * (len(warnings) - len(percents))
-    return [(percent, placed(problem)) for percent, problem in zip(percents, warnings, strict=True)]
+    known = []
+    for line in plan.lines:
+        found = excess(certificates[line.axis].scaling)
+        known += [] if found is None else [(found.text(line.axis), abs(found.percent))]
+        known += [(doubt.text, doubt.percent) for doubt in doubts(line, certificates[line.axis])]
+    return [
+        (
+            next((percent for text, percent in known if problem.why.startswith(text)), apart_percent(plan)),
+            placed(problem),
+        )
+        for problem in warnings
+    ]
 
 
 def placed(problem: Problem) -> str:
