@@ -43,7 +43,7 @@ def basis(planned: PlannedScan) -> Section:
     blocks.append(
         Paragraph(
             "The scanner file keeps how many points a fit had, what they leave, and which files they were. Standard "
-            "errors and outliers are what `tablegen calibrate` prints, and `--json` keeps.",
+            "errors and outliers are what `tablegen calibrate` prints, and `--report` shows.",
             "quiet",
         )
     )

@@ -33,11 +33,15 @@ _TYPICAL_PERCENT = 10.0  # of a piezo whose hysteresis is not compensated: 10 to
 
 @dataclass(frozen=True)
 class Finding:
-    """A sentence, how much it weighs, and by what percentage of the line within that."""
+    """A sentence, how much it weighs, and by what percentage of the line within that.
+
+    ``called`` replaces the words for its weight.
+    """
 
     weight: Weight
     percent: float
     text: str
+    called: str = ""
 
     @property
     def tone(self) -> Tone:
@@ -47,7 +51,7 @@ class Finding:
     @property
     def sign(self) -> str:
         """Its weight in words, for eyes that see no colour."""
-        return _SIGNS[self.weight]
+        return self.called or _SIGNS[self.weight]
 
 
 def ranked(subject: Subject) -> list[Finding]:
