@@ -19,6 +19,8 @@ from tablegen.report.ranking import Finding
 from tablegen.version import __version__
 
 _LOG_SPAN = 30.0  # of frequencies: above it they are drawn over their logarithm
+_BESIDE = 0.08  # of the distance of two traces
+_FEW = 60  # points that are drawn large
 _FOOT = f"Made by tablegen {__version__} from measurements whose SHA-256 are above."
 
 
@@ -90,8 +92,14 @@ def _charts(curves: Sequence[Curve]) -> tuple[Chart, ...]:
             curve.x_label,
             curve.y_label,
             (
-                DrawnCurve("measured", "before", curve.measured[0], curve.measured[1], "points"),
                 DrawnCurve("fit", "forward", *in_parts(*curve.fitted)),
+                DrawnCurve(
+                    "measured",
+                    "other" if len(curve.measured[0]) <= _FEW else "before",
+                    curve.measured[0],
+                    curve.measured[1],
+                    "points",
+                ),
             ),
             log_x=_over_decades(curve),
         )
@@ -143,8 +151,8 @@ def operator_page(
         "trace",
         "rms residual [% of the line]",
         (
-            DrawnCurve("in the fit", "forward", numbers, inside, "points"),
-            DrawnCurve("left out", "backward", numbers, left_out, "points"),
+            DrawnCurve("in the fit", "forward", numbers - _BESIDE, inside, "points"),
+            DrawnCurve("left out", "backward", numbers + _BESIDE, left_out, "points"),
         ),
         marks=(Mark(0.0, "", "y"),),
         x_range=(0.0, len(traces) + 1.0),
