@@ -64,7 +64,7 @@ def _errors(found: Round) -> Section:
 def _layer(found: Round) -> Section:
     lesson, bound = found.lesson, found.bound
     curves = (
-        DrawnCurve("this round", "other", _TURNS, 100.0 * lesson.change.value(_TURNS)),
+        DrawnCurve("this round", "before", _TURNS, 100.0 * lesson.change.value(_TURNS)),
         DrawnCurve("the layer now", "forward", _TURNS, 100.0 * lesson.layer.value(_TURNS)),
     )
     text = (
