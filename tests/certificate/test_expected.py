@@ -20,6 +20,7 @@ from tablegen.certificate.scan_warnings import brief_warnings, scan_warnings
 from tablegen.certificate.summary import certificate_lines, summary
 from tablegen.compensation.operator.file import (
     VERSION,
+    BoucWenTable,
     CreepTable,
     LengthsTable,
     LineTable,
@@ -82,6 +83,7 @@ def operator_bytes() -> bytes:
             reversible=list(REVERSIBLE),
             bends=FIXED_BENDS.tolist(),
         ),
+        bouc_wen=BoucWenTable(depth_nm=0.0, n=1.0, beta=0.0, gamma=0.0, asymmetry=0.0, bend=[0.0, 0.0]),
         lengths=LengthsTable(stroke=0.3, centre=0.5, noise=1e-6),
         lines=lines,
     )
