@@ -24,6 +24,7 @@ from tablegen.compensation.expectation import Figure
 from tablegen.compensation.models.operator import OperatorLine
 from tablegen.compensation.operator.file import (
     VERSION,
+    BoucWenTable,
     CreepTable,
     LengthsTable,
     LineTable,
@@ -87,6 +88,7 @@ def operator_bytes() -> bytes:
             reversible=list(REVERSIBLE),
             bends=FIXED_BENDS.tolist(),
         ),
+        bouc_wen=BoucWenTable(depth_nm=0.0, n=1.0, beta=0.0, gamma=0.0, asymmetry=0.0, bend=[0.0, 0.0]),
         lengths=LengthsTable(stroke=0.3, centre=0.5, noise=1e-6),
         lines=lines,
     )

@@ -5,6 +5,7 @@ before creep, two modes and dead time, and their sensitivity depends on the mean
 """
 
 from dataclasses import dataclass, field
+from math import copysign
 from typing import Protocol
 
 import numpy as np
@@ -16,6 +17,8 @@ CREEP_PER_DECADE = 0.026
 BIAS = (0.12, 0.05)  # of the sensitivity: linear and quadratic in the mean drive from -1 to 1
 MODES = ((60e3, 14.0, 0.96), (31e3, 20.0, 0.04))  # Hz, quality, share
 DEAD_TIME_S = 2e-6
+_CLOSED = 1e-10  # of what h may differ by from period to period
+_MOST_PERIODS = 50
 
 
 class Core(Protocol):
@@ -65,30 +68,42 @@ class BoucWen:
     depth: float = 0.6
     asymmetry: float = 0.5
     bend: float = 0.15
-    periods: int = 12
 
     def settled(self, u: Floats) -> Floats:
-        """Periods until the loop has closed."""
-        h, before = 0.0, float(u[0])
-        out = np.empty(len(u))
-        for _ in range(self.periods):
-            start = h
-            for k, drive in enumerate(u.tolist()):
-                h = self._moved(h, drive - before)
-                before = drive
-                out[k] = drive * (1.0 + self.bend * drive) - self.depth * h
-            if abs(h - start) < 1e-9:
+        """The period that ends where it began: a small loop takes hundreds to get there by itself."""
+        drives = u.tolist()
+        start, (h, after) = 0.0, self._period(drives, 0.0)
+        for _ in range(_MOST_PERIODS):
+            if abs(after - start) < _CLOSED:
                 break
-        return 1250.0 * out
+            # Secant of what a period moves the start by: exact where that is linear, and it hardly bends.
+            ahead = self._period(drives, after)[1]
+            moves, next_moves = after - start, ahead - after
+            start = after + next_moves * moves / (moves - next_moves)
+            h, after = self._period(drives, start)
+        else:
+            raise ValueError(f"the loop of {self} did not close")
+        return 1250.0 * (u * (1.0 + self.bend * u) - self.depth * np.array(h))
+
+    def _period(self, drives: list[float], h: float) -> tuple[list[float], float]:
+        """h at every drive of a period that begins with it, and at its end."""
+        before, out = drives[0], []
+        for drive in [*drives, drives[0]]:
+            h = self._moved(h, drive - before)
+            before = drive
+            out.append(h)
+        return out[:-1], out[-1]
 
     def _moved(self, h: float, by: float) -> float:
         steps = int(abs(by) / 2e-3) + 1
         du = by / steps
         for _ in range(steps):
-            size = abs(h) ** self.n
-            against = self.beta * (1.0 + 0.5 * self.asymmetry * np.sign(h)) * np.sign(h * du) + self.gamma
-            h += du * (self.a - size * against)
+            h += du * self._slope(h + 0.5 * du * self._slope(h, du), du)
         return h
+
+    def _slope(self, h: float, du: float) -> float:
+        lag = self.beta * (1.0 + copysign(0.5, h) * self.asymmetry)
+        return float(self.a - abs(h) ** self.n * (copysign(lag, h * du) + self.gamma))
 
 
 @dataclass

@@ -6,9 +6,9 @@ from functools import cached_property
 import numpy as np
 
 from tablegen.compensation.operator.creep import LogarithmicCreep
+from tablegen.compensation.operator.family import Family
 from tablegen.compensation.operator.field import Field
 from tablegen.compensation.operator.loop import POINTS, Loop
-from tablegen.compensation.operator.plays import Plays
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 
@@ -43,7 +43,7 @@ class Operator:
     the one at which most lines were measured, of v_max.
     """
 
-    family: Plays
+    family: Family
     residual: Field
     size: Field
     creep: LogarithmicCreep
@@ -80,8 +80,8 @@ class Operator:
 
         What the factor has beyond the family, at a small stroke, is taken for a sensitivity that depends on the offset.
         """
-        here = extent_of(self.family, stroke, centre)
-        small = extent_of(self.family, SMALL_STROKE, self.centre) / extent_of(self.family, SMALL_STROKE, centre)
+        here = self.family.extent(stroke, centre)
+        small = self.family.extent(SMALL_STROKE, self.centre) / self.family.extent(SMALL_STROKE, centre)
         return here * small / factor
 
     def distance(self, stroke: float, centre: float) -> float:
@@ -91,7 +91,7 @@ class Operator:
     @property
     def nm_per_drive(self) -> float:
         """About how far the axis moves for the whole of v_max: a first guess of amplitudes."""
-        return extent_of(self.family, SMALL_STROKE, self.centre) / SMALL_STROKE
+        return self.family.extent(SMALL_STROKE, self.centre) / SMALL_STROKE
 
     @cached_property
     def _grid(self) -> Floats:
@@ -103,13 +103,6 @@ class Operator:
         rising, falling = (self.family.branch(u, low, high, going) for going in (True, False))
         extent = float(rising[-1] - rising[0])
         return (rising - rising[0]) / extent, (falling - rising[0]) / extent, extent
-
-
-def extent_of(family: Plays, stroke: float, centre: float) -> float:
-    """nm between the turns of a settled line."""
-    low, high = centre - 0.5 * stroke, centre + 0.5 * stroke
-    ends = family.branch(np.array([low, high]), low, high, True)
-    return float(ends[1] - ends[0])
 
 
 def _closed(rising: Floats, falling: Floats) -> tuple[Floats, Floats]:

@@ -6,7 +6,7 @@ step, of which creep brings its share late: s a exp(-t / tau) / |C| is still to 
 
 import numpy as np
 
-from tablegen.compensation.operator.operator import Operator, extent_of
+from tablegen.compensation.operator.operator import Operator
 from tablegen.compensation.operator.plays import Plays, envelopes
 from tablegen.compensation.transient import OFFSET_CHANGE, SIZE_CHANGE, Transient
 from tablegen.numerics.arrays import Floats, tree_sum
@@ -29,17 +29,24 @@ def _after(
     operator: Operator, before: tuple[float, float], now: tuple[float, float], factor: float, turn: float
 ) -> Transient:
     """From one settled line to another, (stroke, centre) each of v_max; sizes are those of the other."""
-    family = operator.family
-    memory = np.zeros(family.weights.shape)
+    plays, loop = operator.family.plays, operator.family.bouc_wen
+    memory = np.zeros(plays.weights.shape)
     for _ in range(2):
-        rising, falling, memory = _period(family, memory, *before)
+        rising, falling, memory = _period(plays, memory, *before)
+    if loop is not None:
+        u, low, high = _sweep(*before)
+        rising, falling = (rising + loop.branch(u, low, high, True), falling + loop.branch(u, low, high, False))
     earlier = _mean(rising, falling, turn)
-    first, _, memory = _period(family, memory, *now)
-    rising, falling, memory = _period(family, memory, *now)
+    first, _, memory = _period(plays, memory, *now)
+    rising, falling, memory = _period(plays, memory, *now)
+    if loop is not None:
+        ends, (u, low, high) = (_sweep(*before)[1:]), _sweep(*now)
+        first = first + loop.first_branch(u, low, ends)
+        rising, falling = (rising + loop.branch(u, low, high, True), falling + loop.branch(u, low, high, False))
     # An offset moves the piezo as far as the largest line does, which is more than a small one where plays are missing.
     largest = max(((line.stroke, line.centre) for line in operator.lines), default=now)
     extent = operator.expected_extent(*largest, factor) * (1.0 + float(operator.size.at(*largest)[0]))
-    scale = extent / extent_of(family, *largest)
+    scale = extent / operator.family.extent(*largest)
     step = scale * (_mean(rising, falling, turn) - earlier)
     return Transient(
         tuple((step * share, tau_s) for share, tau_s in operator.creep.terms()),
@@ -47,10 +54,15 @@ def _after(
     )
 
 
+def _sweep(stroke: float, centre: float) -> tuple[Floats, float, float]:
+    """Even drives of a line, its lowest and its highest."""
+    low, high = centre - 0.5 * stroke, centre + 0.5 * stroke
+    return low + (high - low) * (np.arange(_POINTS) / (_POINTS - 1)), low, high
+
+
 def _period(family: Plays, memory: Floats, stroke: float, centre: float) -> tuple[Floats, Floats, Floats]:
     """A line from its lower turn on: positions rising and falling, at even drives from its low; and the plays then."""
-    low, high = centre - 0.5 * stroke, centre + 0.5 * stroke
-    u = low + (high - low) * (np.arange(_POINTS) / (_POINTS - 1))
+    u, _, _ = _sweep(stroke, centre)
     r = family.thresholds[None, :, None]
     both = np.stack([envelopes(u, bend) for bend in family.bends])
     below, above = both[:, :1, :] - r, both[:, 1:, :] + r
