@@ -24,8 +24,10 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "tests" / "helpers"))
 
 from foreign_plants import SIX, TEN, V_MAX, BoucWen, Floats, ForeignPlant, ManyPlays, record, triangle
 
+from tablegen.certificate.expected import certified_expectation
+from tablegen.certificate.line_errors import EmittedPeriod
 from tablegen.cli import cli as tablegen
-from tablegen.compensation.operator.scan_line import Expected
+from tablegen.compensation.expectation import Expectation, Figure
 from tablegen.config.load import Setup, load
 from tablegen.numerics.arrays import Bools
 from tablegen.planning.line_plan import make_plan
@@ -68,7 +70,7 @@ PLANTS = {
 
 @dataclass(frozen=True)
 class Judged:
-    """A scan on its plant, percent of the line: what it left, and what the operator expected with what uncertainty.
+    """A scan on its plant, percent of the line: what it left, and what its certificate expected.
 
     ``left`` is that of the emitted integers, ``unrounded`` of the same drive without their steps, and ``converter`` of
     a straight line with what these steps move the plant by: what a perfect model would leave.
@@ -80,8 +82,7 @@ class Judged:
     left: dict[str, float]
     unrounded: dict[str, float]
     converter: dict[str, float]
-    expected: Expected | None = None
-    uncertainty: Expected | None = None
+    expected: Expectation | None = None
 
 
 def calibrated(plant: ForeignPlant, folder: Path, protocol: Sequence[tuple[float, float]] | None) -> Setup:
@@ -163,14 +164,13 @@ def judge(setup: Setup, plant: ForeignPlant, offset: float, share: float, rate_h
     x = np.where(t <= turn, t / turn, (1.0 - t) / (1.0 - turn))
     exact = line.converter.v_zero + line.converter.v_per_code * line.float_codes(line.series.on_grid(len(t)))
     moved, smooth = (settled(plant, volts, drive.period_s) for volts in (drive.volts, exact))
-    shape, ideal = line.drive.shape, size_nm * x
+    ideal = size_nm * x
     return Judged(
         offset,
         share,
         rate_hz,
         *(measures(x, t <= turn, position, size_nm) for position in (moved, smooth, ideal + moved - smooth)),
-        expected=getattr(shape, "expected", None),
-        uncertainty=getattr(shape, "uncertainty", None),
+        certified_expectation(line, EmittedPeriod(line)),
     )
 
 
@@ -242,6 +242,13 @@ def table(kinds: dict[str, dict[str, list[Judged]]]) -> list[str]:
     return out
 
 
+def figures_of(expected: Expectation, measure: str) -> list[Figure]:
+    """Those of a measure that have an uncertainty."""
+    found = getattr(expected, measure)
+    figures = found.values() if measure in ("rms", "scaling") else [found]
+    return [one for one in figures if one is not None and one.uncertainty is not None]
+
+
 def coverage(kinds: dict[str, dict[str, list[Judged]]]) -> list[str]:
     """How often what is left lies below what was expected and its uncertainty together."""
     out = []
@@ -251,9 +258,10 @@ def coverage(kinds: dict[str, dict[str, list[Judged]]]) -> list[str]:
             for measure in MEASURES:
                 inside = []
                 for one in judged:
-                    if one.expected is not None and one.uncertainty is not None:
-                        most = (np.max(np.abs(getattr(part, measure))) for part in (one.expected, one.uncertainty))
-                        inside.append(abs(one.left[measure]) <= sum(most))
+                    figures = [] if one.expected is None else figures_of(one.expected, measure)
+                    if figures:
+                        most = max(abs(figure.value) + (figure.uncertainty or 0.0) for figure in figures)
+                        inside.append(abs(one.left[measure]) <= most)
                 if inside:
                     shares.append(f"{measure} {100.0 * np.mean(inside):.0f} %")
             if shares:

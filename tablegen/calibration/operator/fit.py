@@ -1,7 +1,7 @@
 """Settled lines -> the operator: family, creep, residual and size, by what each predicts of a line left out."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from itertools import combinations, product
 
 import numpy as np
@@ -149,8 +149,8 @@ class _Fitted:
         """Both fields through what is left, and the rows and sizes that they go through."""
         points = np.array([(line.stroke, line.centre) for line in self.settled])
         rows = shrunk(points, self.left, lengths)
-        sizes = _sizes(self.family, self.settled, self.left, self.main, factor)
         residual = through(points, rows, lengths, straight=True)
+        sizes = _sizes(self.family, residual, self.settled, self.left, self.main, factor)
         size = through(points, sizes[:, None], lengths)
         return Operator(self.family, residual, size, self.creep, self.main, ()), rows, sizes
 
@@ -207,18 +207,12 @@ def _judged(candidate: _Candidate, lines: Sequence[PeriodicLine], factor: Factor
         tried.append((float(np.exp(np.mean([np.log(errors.rms) for errors in out]))), lengths, out))
     score, lengths, out = min(tried, key=lambda one: one[0])
     operator, rows, sizes = whole.operator(lengths, factor)
+    inside = tuple(_errors(line, operator, factor) for line in whole.settled)
     measured = tuple(
-        MeasuredLine(
-            line.name,
-            line.stroke,
-            line.centre,
-            line.rate_hz,
-            (errors.rms, errors.scaling, errors.mismatch, errors.size),
-        )
-        for line, errors in zip(lines, out, strict=True)
+        MeasuredLine(line.name, line.stroke, line.centre, line.rate_hz, astuple(errors), astuple(left))
+        for line, errors, left in zip(lines, out, inside, strict=True)
     )
     operator = replace(operator, lines=measured)
-    inside = tuple(_errors(line, operator, factor) for line in whole.settled)
     return OperatorFit(operator, candidate.name, rows, sizes, inside, tuple(out), {candidate.name: score})
 
 
@@ -228,16 +222,25 @@ def _straight(lines: Sequence[PeriodicLine]) -> Family:
     return Family(NO_PLAYS).over(np.array([gain]))
 
 
-def _sizes(family: Family, lines: Sequence[PeriodicLine], left: Sequence[Left], main: float, factor: Factor) -> Floats:
+def _sizes(
+    family: Family, residual: Field, lines: Sequence[PeriodicLine], left: Sequence[Left], main: float, factor: Factor
+) -> Floats:
     """Measured extents over expected ones, less 1."""
     nothing = Field(np.zeros((0, 2)), np.zeros((0, 1)), Lengths(1.0, 1.0, 1.0))
-    bare = Operator(family, nothing, nothing, NO_CREEP, main, ())
-    extents = [bare.expected_extent(line.stroke, line.centre, factor(line.centre) / factor(main)) for line in lines]
-    return np.array([one.extent_nm / extent - 1.0 for one, extent in zip(left, extents, strict=True)])
+    bare = Operator(family, residual, nothing, NO_CREEP, main, ())
+
+    def extent(line: PeriodicLine) -> float:
+        here = factor(line.mean) / factor(main)
+        try:
+            return bare.loop(line.low, line.high, here, line.mean).extent_nm
+        except Unphysical:  # where a line is left out; its errors are the worst then
+            return bare.expected_extent(line.stroke, line.mean, here)
+
+    return np.array([one.extent_nm / extent(line) - 1.0 for one, line in zip(left, lines, strict=True)])
 
 
 def _errors(line: PeriodicLine, operator: Operator, factor: Factor) -> LineErrors:
     try:
-        return compare(line, operator.loop(line.low, line.high, factor(line.centre) / factor(operator.centre)))
+        return compare(line, operator.loop(line.low, line.high, factor(line.mean) / factor(operator.centre), line.mean))
     except Unphysical:
         return WORST
