@@ -72,10 +72,10 @@ def test_the_first_way_up_continues_from_the_line_before() -> None:
         u = np.linspace(low, low + 0.3, 400)
         plant = stepped(MODEL)
         settled = -(plant.settled(period(before[0], before[1] - before[0])) - 1250.0 * before[0])[0] / MODEL.depth
-        h = plant._moved(float(settled), low - before[0])
+        h = plant.moved(float(settled), 0.0, low - before[0])
         expected = [h]
         for by in np.diff(u).tolist():
-            h = plant._moved(h, by)
+            h = plant.moved(h, 0.0, by)
             expected.append(h)
         found = MODEL.first_branch(u, low, before)
         assert found == pytest.approx(-MODEL.depth * np.array(expected), abs=0.05)

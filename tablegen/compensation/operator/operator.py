@@ -1,7 +1,7 @@
 """The operator: a hysteresis family, the measured residual over it, the size at every offset, and creep."""
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import lru_cache
 
 import numpy as np
 
@@ -58,10 +58,10 @@ class Operator:
         bend says. Raises ``Unphysical`` where a branch would stand still or run backwards.
         """
         stroke, centre = high - low, 0.5 * (low + high)
-        rising, falling, _ = self._family(low, high)
+        rising, falling = _branches(self.family, low, high)
         row = self.residual.at(stroke, centre)
         half = len(row) // 2
-        x = 2.0 * self._grid - 1.0
+        x = 2.0 * _GRID - 1.0
         rising, falling = rising + chebyshev(row[:half], x), falling + chebyshev(row[half:], x)
         rising, falling = _closed(rising, falling)
         mean = centre if mean is None else mean
@@ -93,16 +93,17 @@ class Operator:
         """About how far the axis moves for the whole of v_max: a first guess of amplitudes."""
         return self.family.extent(SMALL_STROKE, self.centre) / SMALL_STROKE
 
-    @cached_property
-    def _grid(self) -> Floats:
-        return np.arange(POINTS) / (POINTS - 1)
 
-    def _family(self, low: float, high: float) -> tuple[Floats, Floats, float]:
-        """Both branches of the family from 0 to 1, and the extent in nm."""
-        u = low + (high - low) * self._grid
-        rising, falling = (self.family.branch(u, low, high, going) for going in (True, False))
-        extent = float(rising[-1] - rising[0])
-        return (rising - rising[0]) / extent, (falling - rising[0]) / extent, extent
+_GRID = np.arange(POINTS) / (POINTS - 1)
+
+
+@lru_cache(maxsize=512)  # while lengths are chosen, the same loops come again and again
+def _branches(family: Family, low: float, high: float) -> tuple[Floats, Floats]:
+    """Both branches of the family from 0 to 1."""
+    u = low + (high - low) * _GRID
+    rising, falling = (family.branch(u, low, high, going) for going in (True, False))
+    extent = float(rising[-1] - rising[0])
+    return (rising - rising[0]) / extent, (falling - rising[0]) / extent
 
 
 def _closed(rising: Floats, falling: Floats) -> tuple[Floats, Floats]:
