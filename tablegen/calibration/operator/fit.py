@@ -14,6 +14,7 @@ from tablegen.calibration.operator.family import CreepOf, FamilyProblem, groups_
 from tablegen.calibration.operator.periodic_line import PeriodicLine
 from tablegen.calibration.operator.plays_fit import PlaysProblem
 from tablegen.calibration.operator.shrinkage import shrunk
+from tablegen.calibration.operator.units import check_units
 from tablegen.compensation.dynamics import Response
 from tablegen.compensation.operator.creep import NO_CREEP, LogarithmicCreep
 from tablegen.compensation.operator.family import Family
@@ -82,6 +83,7 @@ def fit_operator(lines: Sequence[PeriodicLine], response: Response | None, facto
 def _check(lines: Sequence[PeriodicLine]) -> None:
     if len(lines) < _MIN_LINES:
         raise Unphysical(f"{len(lines)} traces are not enough for an operator; at least {_MIN_LINES} are needed")
+    check_units(lines)
     strokes = [line.stroke for line in lines]
     if max(strokes) < _MIN_SPREAD * min(strokes):
         low, high = (100.0 * share for share in (min(strokes), max(strokes)))
