@@ -27,6 +27,11 @@ class LineErrors:
     size: float
     sides: Floats | None = field(default=None, compare=False, repr=False)
 
+    @property
+    def figures(self) -> tuple[float, float, float, float]:
+        """All four."""
+        return self.rms, self.scaling, self.mismatch, self.size
+
 
 WORST = LineErrors(100.0, 100.0, 100.0, 100.0)  # of a loop that cannot be
 
