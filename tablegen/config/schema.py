@@ -163,7 +163,9 @@ class Timing(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     ) = None
     settle_lines: Annotated[
         Annotated[int, Meta(ge=0, le=255)] | Literal["auto"],
-        Meta(description="lines after a change during which valid is low; auto: by the operators of x and y"),
+        Meta(
+            description="lines after a change during which valid is low; auto: by the operators of x, of y or of both"
+        ),
     ] = 2
 
 

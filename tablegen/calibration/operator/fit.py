@@ -1,7 +1,7 @@
 """Settled lines -> the operator: family, creep, residual and size, by what each predicts of a line left out."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import astuple, dataclass, replace
+from dataclasses import dataclass, replace
 from itertools import combinations, product
 
 import numpy as np
@@ -14,6 +14,7 @@ from tablegen.calibration.operator.family import CreepOf, FamilyProblem, groups_
 from tablegen.calibration.operator.periodic_line import PeriodicLine
 from tablegen.calibration.operator.plays_fit import PlaysProblem
 from tablegen.calibration.operator.shrinkage import shrunk
+from tablegen.calibration.operator.units import check_units
 from tablegen.compensation.dynamics import Response
 from tablegen.compensation.operator.creep import NO_CREEP, LogarithmicCreep
 from tablegen.compensation.operator.family import Family
@@ -82,6 +83,7 @@ def fit_operator(lines: Sequence[PeriodicLine], response: Response | None, facto
 def _check(lines: Sequence[PeriodicLine]) -> None:
     if len(lines) < _MIN_LINES:
         raise Unphysical(f"{len(lines)} traces are not enough for an operator; at least {_MIN_LINES} are needed")
+    check_units(lines)
     strokes = [line.stroke for line in lines]
     if max(strokes) < _MIN_SPREAD * min(strokes):
         low, high = (100.0 * share for share in (min(strokes), max(strokes)))
@@ -209,7 +211,7 @@ def _judged(candidate: _Candidate, lines: Sequence[PeriodicLine], factor: Factor
     operator, rows, sizes = whole.operator(lengths, factor)
     inside = tuple(_errors(line, operator, factor) for line in whole.settled)
     measured = tuple(
-        MeasuredLine(line.name, line.stroke, line.centre, line.rate_hz, astuple(errors), astuple(left))
+        MeasuredLine(line.name, line.stroke, line.centre, line.rate_hz, errors.figures, left.figures)
         for line, errors, left in zip(lines, out, inside, strict=True)
     )
     operator = replace(operator, lines=measured)

@@ -167,8 +167,8 @@ def _line(operator: Operator, wanted: WantedLine) -> OperatorLine:
         factor=factor,
         between=between,
         after=(
-            after_offset(late, found.stroke, found.centre, factor, wanted.turn),
-            after_size(late, found.stroke, found.centre, factor, wanted.turn),
+            after_offset(late, found.stroke, found.centre, factor, wanted.turn, 1.0 / wanted.rate_hz),
+            after_size(late, found.stroke, found.centre, factor, wanted.turn, 1.0 / wanted.rate_hz),
         ),
     )
 
