@@ -323,6 +323,31 @@ def test_scales_that_overflow_are_no_heights(tmp_path: Path) -> None:
     assert "pixels are not finite" in why(put(tmp_path, "b.spm", content), "Height trace")
 
 
+def test_what_stands_in_other_lists_of_a_nanoscope_file_is_not_of_the_scan() -> None:
+    """The list of force curves has a scan rate of its own; of sensitivities, the first is the scanner's."""
+    content = spm({"Height": (SMALL, SMALL)})
+    force = b"\\*Ciao force list\r\n\\Scan rate: 9.9\r\n\\@Sens. Zsens: V 7.0 m/V\r\n\\*Ciao image list"
+    longer = content.replace(b"\\*Ciao image list", force, 1).replace(bytes(len(force) - 17), b"", 1)
+    channel, _ = spm_channels(longer, "a")
+    assert (channel.line_rate_hz, channel.unit) == (2.5, "nm")
+    (channel, _) = spm_channels(content.replace(b"Scan Rate: 2.5", b"Scan Moth: 2.5"), "a")
+    assert channel.line_rate_hz is None
+
+
+def test_units_of_an_igor_file() -> None:
+    labels = ("HeightTrace", "PhaseTrace", "FrequencyRetrace", "UserIn0Trace")
+    channels = ibw_channels(ibw(dict.fromkeys(labels, SMALL), NOTE), "a")
+    assert [channel.unit for channel in channels] == ["m", "deg", "Hz", ""]
+    assert ibw_channels(ibw({"UserIn0Trace": SMALL}, NOTE), "a")[0].unit == "m"  # the wave's own
+
+
+def test_another_scaling_of_jpk_is_not_taken_for_a_line() -> None:
+    content = jpk({"height": (SMALL, SMALL)}).replace(b"LinearScaling", b"SquareScaling")
+    channel = jpk_channels(content, "a")[0]
+    assert channel.unit == "LSB"
+    assert channel.load(0) == pytest.approx(np.round((SMALL + 100.0) / 0.01))
+
+
 def test_an_image_says_what_it_has() -> None:
     """What a file does not say is None or empty, never a guess."""
     content = ibw({"HeightTrace": SMALL}, {})
