@@ -243,7 +243,10 @@ def test_damage_is_refused_or_read_and_never_worse(kind: str) -> None:
     content, reader = READERS[kind]
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        read = [read_or_refused(reader, damaged(content, random.Random(seed))) for seed in range(300)]
+        changed = [damaged(content, random.Random(seed)) for seed in range(300)]
+        if kind == "ibw":  # a checksum that is right, so that more is looked at
+            changed = [summed(one, "<i", 4, 320 + 96) if len(one) > 400 else one for one in changed]
+        read = [read_or_refused(reader, one) for one in changed]
     assert 0 < sum(read) < len(read)
 
 
@@ -352,7 +355,9 @@ def test_an_image_says_what_it_has() -> None:
     """What a file does not say is None or empty, never a guess."""
     content = ibw({"HeightTrace": SMALL}, {})
     (channel,) = ibw_channels(content, "a")
-    assert (channel.width_nm, channel.height_nm, channel.line_rate_hz, channel.first_row) == (None, None, None, None)
+    assert (channel.width_nm, channel.height_nm, channel.line_rate_hz) == (None, None, None)
+    assert channel.first_row == "bottom"  # as the format stores it, whatever came first in time
+    assert sxm_channels(sxm({"Z": (SMALL, SMALL)}, scan_dir="?"), "a")[0].first_row is None
     (trace, _) = spm_channels(spm({"Height": (SMALL, SMALL)}), "a")
     assert (trace.width_nm, trace.height_nm) == (500.0, None)  # pixels that are not square: readers differ
     content = spm({"Height": (SMALL, SMALL)}).replace(b"@Sens. Zsens", b"@Sens. Other")

@@ -70,7 +70,7 @@ def ibw_channels(content: bytes, _: str) -> list[Channel]:
                 positive(note.get("FastScanSize"), 1e9),
                 positive(note.get("SlowScanSize"), 1e9),
                 positive(note.get("ScanRate"), 1.0),
-                first if down in ("0", "1") else None,
+                first,
             )
         )
     return channels

@@ -85,7 +85,7 @@ def _channel(content: bytes, number: int, image: _List, others: _List, line_rate
         width,
         height,
         line_rate,
-        first if down in ("up", "down") else None,
+        first,
     )
 
 
