@@ -147,6 +147,20 @@ def test_a_nanonis_file_of_one_direction_and_the_other_byte_order(tmp_path: Path
     assert np.array_equal(read_image(put(tmp_path, "b.sxm", turned)).heights, image.heights)
 
 
+def test_a_nanonis_scan_that_was_stopped_ends_with_its_last_whole_line(tmp_path: Path) -> None:
+    trace, retrace = T.copy(), R.copy()
+    trace[36:], retrace[35, :20], retrace[36:] = np.nan, np.nan, np.nan  # backward, the right end comes first
+    other = np.where(np.isnan(trace), np.nan, P)
+    images = read_pair(put(tmp_path, "a.sxm", sxm({"Z": (trace, retrace), "Current": (other, other)})), channel="Z")
+    for image, heights in zip(images, (T, R), strict=True):
+        assert np.max(np.abs(image.heights - heights[:35])) < 1e-5
+        assert image.height_nm == pytest.approx(250.0 * 35 / 40)
+    trace[10, 10] = np.nan
+    assert "pixels are not finite" in why(put(tmp_path, "b.sxm", sxm({"Z": (trace, retrace)})), "Z forward")
+    empty = put(tmp_path, "c.sxm", sxm({"Z": (T * np.nan, R * np.nan)}))
+    assert "1920 pixels are not finite" in why(empty, "Z forward")
+
+
 @pytest.mark.parametrize(
     ("title", "signal", "direction"),
     [
@@ -254,6 +268,7 @@ WORLD = 2_000_000_000
 HUGE: dict[str, tuple[str, Callable[[bytes], bytes], str]] = {
     "sxm": ("sxm", lambda c: c.replace(b"       4       3\n", b" 999999 999999\n"), "ends in the middle of its images"),
     "sxm, digits": ("sxm", lambda c: c.replace(b"       4       3\n", b" 9" * 4000), "no two numbers as SCAN_PIXELS"),
+    "sxm, nothing": ("sxm", lambda c: c.replace(b"       4       3\n", b"  0  3\n"), "has an image of 0 x 3 pixels"),
     "sxm, rows": ("sxm", lambda c: re.sub(rb"(\t14.*\n)", rb"\1" * 2000, c), "has 4000 images; at most 1000 are read"),
     "sxm, no end": ("sxm", lambda c: c.replace(b":SCANIT_END:", b":COMMENT2:"), "has no end of its header"),
     "sxm, no mark": ("sxm", lambda c: c.replace(b"\x1a\x04", b"\x1a\x1a"), "no data after it"),
