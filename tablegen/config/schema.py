@@ -178,7 +178,10 @@ class Limits(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     max_scaling_error_percent: (
         Annotated[
             Percent,
-            Meta(description="largest scaling error, peak to peak, and largest size error, both of the imaging window"),
+            Meta(
+                description="largest scaling error, peak to peak, and largest size error, both of the imaging window, "
+                "with what an operator expects on the scanner"
+            ),
         ]
         | None
     ) = None

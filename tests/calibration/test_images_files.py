@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from image_writers import ascii_of, gwy, npy, png
 from PIL import Image as Pillow
 
-from tablegen.calibration.gwyddion import data_fields
 from tablegen.calibration.image_files import read_image
+from tablegen.calibration.image_formats.gwyddion import data_fields
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Rejected
 
@@ -182,4 +182,4 @@ def test_a_damaged_gwyddion_file_is_refused_or_read_and_never_worse(data: st.Dat
             fields = data_fields(damaged)
         except ValueError:
             continue
-        assert all(matrix.ndim == 2 for _, _, matrix in fields)
+        assert all(matrix.ndim == 2 for matrix in (field.values for field in fields))

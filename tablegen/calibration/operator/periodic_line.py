@@ -56,6 +56,11 @@ class PeriodicLine:
         return 0.5 * (self.low + self.high)
 
     @property
+    def mean(self) -> float:
+        """The mean of the drive over the period, of v_max, with which the sensitivity goes."""
+        return float(np.mean(self.drive))
+
+    @property
     def rising(self) -> Bools:
         """Where the drive is on its way from its minimum to its maximum."""
         return np.arange(PHASES) < int(np.argmax(self.drive))
