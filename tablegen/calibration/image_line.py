@@ -27,7 +27,8 @@ _WHOLE = 0.02  # of the sweep: how much of it a window may leave out and still s
 _HOPELESS, _AS_GOOD = 300.0, 60.0  # by how much Akaike's criterion may be worse
 _NEIGHBOURS = 3  # degrees: which other fits say how much their number matters
 _UNSEEN_GAP = 5e-4  # of the line: what is open at the turns where no retrace shows it
-_RIPPLES_OF_A_WINDOW = 3  # where the turns are not in the image: more than that would say nothing of them
+_RIPPLES_OF_A_WINDOW = 8  # where the turns are not in the image, and higher degrees would go anywhere
+_UNSEEN_TURNS = 0.02  # of what a window leaves out of the sweep: how far its ends are told by what is seen
 _MIN_EXPLAINED = 0.03  # share of an image's variance
 _MISFIT_SIGNIFICANCE = 1e-3  # probability that noise alone is taken for misfit
 _MIN_OPENING = 0.004  # of the line: what is a loop, and has a sign
@@ -309,6 +310,9 @@ def _of_the_form(best: _Degree, fits: list[_Degree], gap: Floats) -> Floats:
     if moved:
         whole[:end, :end] = np.mean([np.outer(one, one) for one in moved], axis=0)
     open_by = 0.5 * float(np.nanmean(np.abs(gap))) if np.isfinite(gap).any() else _UNSEEN_GAP
+    if not shows_turns(best.model.geometry):
+        low, high = best.model.geometry.window
+        open_by = _UNSEEN_TURNS * (low + 1.0 - high)
     step = best.model.order + 1
     longer = np.zeros(len(best.free))
     longer[BASES:end:step] = open_by * best.state.parameters[BASES:end:step]

@@ -1,5 +1,6 @@
 """Sizes and lines from images of plants that obey no law of ours, held against where the plant was."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -90,18 +91,24 @@ def test_sizes_are_right_on_piezos_of_any_kind(name: str) -> None:
 
 @pytest.mark.parametrize("name", AXES)
 def test_a_line_from_images_is_where_the_axis_was(name: str) -> None:
-    """Both directions, from turn to turn, within 0.1 % of the line, 0.03 % rms; bars give the scale to 0.3 %."""
+    """Both directions, from turn to turn, within 0.1 % of the line, 0.03 % rms; bars give the scale to 0.3 %.
+
+    Where a twentieth of the sweep is missing at each end, within 0.5 %, there.
+    """
     axis = AXES[name]
-    for v in (15.0, 70.0):
-        line, _ = imaged_line(taken(axis, v, 50.0, 9), RATE, 100.0, KNOWN, Taking())
+    for v, cut in ((15.0, 0), (70.0, 0), (70.0, 12)):  # columns at each end that were not kept
+        image, kept = taken(axis, v, 50.0, 9), slice(cut, 256 - cut)
+        assert image.retrace is not None
+        image = replace(image, trace=image.trace[:, kept], retrace=image.retrace[:, kept])
+        line, _ = imaged_line(image, RATE, 100.0, KNOWN, Taking(window=(cut / 256.0, 1.0 - cut / 256.0)))
         truth = true_line(axis, v, 50.0)
         assert np.ptp(line.drive) == pytest.approx(v / 100.0, abs=2e-3)
         moved, expected = line.displacement_nm - line.displacement_nm.mean(), truth - truth.mean()
         scale = float(moved @ expected / (expected @ expected))
         off = (moved / scale - expected) / np.ptp(expected)
         assert scale == pytest.approx(1.0, abs=3e-3)
-        assert np.sqrt(np.mean(off**2)) < 3e-4
-        assert np.max(np.abs(off)) < 1e-3
+        assert np.sqrt(np.mean(off**2)) < (1e-3 if cut else 3e-4)
+        assert np.max(np.abs(off)) < (5e-3 if cut else 1e-3)
 
 
 def test_an_operator_needs_both_directions_and_the_turns() -> None:
@@ -111,7 +118,7 @@ def test_an_operator_needs_both_directions_and_the_turns() -> None:
     with pytest.raises(Unphysical, match="the retrace is missing"):
         imaged_line(alone, RATE, 100.0, KNOWN, Taking())
     inner = SampleImage("inner", 60.0, 50.0, image.trace[:, 25:231], image.retrace[:, 25:231])
-    with pytest.raises(Unphysical, match="the turns are not in the images"):
+    with pytest.raises(Unphysical, match="the turns are too far outside the images"):
         imaged_line(inner, RATE, 100.0, KNOWN, Taking(window=(25.0 / 256.0, 231.0 / 256.0)))
 
 
