@@ -1,0 +1,153 @@
+"""Where each pixel of a scan really was, and the same scan on a straight grid, resampled once.
+
+x depends on the column alone, since a line is settled, but for a drift that depends on the row; y on the time in the
+frame, which goes on within a row. So what belongs to a place of the straight grid is found by two inversions in one
+dimension each.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.ndimage import map_coordinates
+
+from tablegen.numerics.arrays import Bools, Floats
+from tablegen.problems import Unphysical
+
+_ORDER = 3  # of the splines
+_HALF = 0.5  # of a pixel: a pixel shows the sample so far from its middle
+_FINEST = 0.1  # of the mean step: below it two pixels are nearly at one place
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep1D:
+    """The columns of one direction, the left one first: their x, and when they are in the line, 0..1 of its period."""
+
+    x: Floats
+    time: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Distortion:
+    """Where the pixels of a scan of rows x columns were, in any unit of length, the same for x and y or not.
+
+    ``forward`` and ``backward`` are the directions that were imaged. ``y`` and ``drift`` (of x) stand at ``rows`` + 1
+    times of the frame, the beginning of the first row to the end of the last one; ``lag`` is 1 where y moves on within
+    a row, 0 where it steps.
+    """
+
+    rows: int
+    columns: int
+    forward: Sweep1D | None
+    backward: Sweep1D | None
+    y: Floats
+    drift: Floats
+    lag: float = 1.0
+
+    def side(self, forward: bool) -> Sweep1D:
+        """One of the two. Raises ``KeyError`` if it was not imaged."""
+        found = self.forward if forward else self.backward
+        if found is None:
+            raise KeyError(forward)
+        return found
+
+    @property
+    def sides(self) -> list[tuple[bool, Sweep1D]]:
+        """Those that were imaged."""
+        return [(way, one) for way, one in ((True, self.forward), (False, self.backward)) if one is not None]
+
+    @cached_property
+    def x_range(self) -> tuple[float, float]:
+        """Left and right edge of all that was imaged, drift aside, half a pixel beyond the outer pixels."""
+        edges = [_edges(one.x) for _, one in self.sides]
+        return min(low for low, _ in edges), max(high for _, high in edges)
+
+    @property
+    def y_range(self) -> tuple[float, float]:
+        """The edge of the first row and that of the last one."""
+        return float(self.y[0]), float(self.y[-1])
+
+    @cached_property
+    def grid(self) -> tuple[Floats, Floats]:
+        """x of the columns and y of the rows of the straight image, which has as many."""
+        low, high = self.x_range
+        first, last = self.y_range
+        x = low + (high - low) * (np.arange(self.columns) + _HALF) / self.columns
+        return x, first + (last - first) * (np.arange(self.rows) + _HALF) / self.rows
+
+    def check(self) -> None:
+        """Raise ``Unphysical`` where pixels do not follow each other, as of branches that run backwards."""
+        for way, one in self.sides:
+            step = np.diff(one.x)
+            if not float(np.min(step)) > _FINEST * float(np.mean(np.abs(step))):
+                at = int(np.argmin(step))
+                raise Unphysical(
+                    f"the {'trace' if way else 'retrace'} stands still or goes back at column {at + 1}; is this the "
+                    f"scanner, and are --turn and --window those of the scan?"
+                )
+        step = np.diff(self.y)
+        if not float(np.min(step)) > _FINEST * float(np.mean(np.abs(step))):
+            raise Unphysical(
+                f"the slow axis stands still or goes back at row {int(np.argmin(step)) + 1}; are --slow-turn, --lines "
+                f"and --slow-window those of the scan?"
+            )
+
+    def sources(self, forward: bool) -> tuple[Floats, Floats, Bools]:
+        """For each pixel of the straight image the row and the column that it comes from, and which are in the image.
+
+        Shapes (rows, columns). Beyond the outer pixels' middles coordinates stay on these, for half a pixel.
+        """
+        side = self.side(forward)
+        x, y = self.grid
+        times = np.arange(self.rows + 1.0)
+        at = np.interp(y, self.y, times)  # when y is there, in rows of time
+        drift = np.interp(at, times, self.drift)
+        column = _inverted(side.x, x[None, :] - drift[:, None])
+        time = np.interp(column, np.arange(self.columns), side.time)
+        row = at[:, None] - _HALF - self.lag * (time - _HALF)
+        inside = (row >= -_HALF) & (row <= self.rows - _HALF) & (column >= -_HALF) & (column <= self.columns - _HALF)
+        return np.clip(row, 0.0, self.rows - 1.0), np.clip(column, 0.0, self.columns - 1.0), inside
+
+    def moved(self, forward: bool) -> tuple[Floats, Floats]:
+        """By how many pixels of the straight image its parts were displaced in the taken one, in x and y; NaN outside.
+
+        Shapes (rows, columns).
+        """
+        row, column, inside = self.sources(forward)
+        own_row, own_column = np.mgrid[: self.rows, : self.columns].astype(np.float64)
+        nowhere = np.where(inside, 0.0, np.nan)
+        return column - own_column + nowhere, row - own_row + nowhere
+
+
+@dataclass(frozen=True, eq=False)
+class Resampler:
+    """One direction of a distortion, for any number of channels."""
+
+    row: Floats
+    column: Floats
+    inside: Bools
+
+    @classmethod
+    def of(cls, distortion: Distortion, forward: bool) -> "Resampler":
+        """What belongs where."""
+        return cls(*distortion.sources(forward))
+
+    def __call__(self, image: Floats) -> Floats:
+        """The straight image, rows x columns; NaN where nothing was imaged. Cubic splines, used once."""
+        at = np.stack([self.row, self.column])
+        found: Floats = map_coordinates(image, at, order=_ORDER, mode="mirror")
+        return np.where(self.inside, found, np.nan)
+
+
+def _edges(x: Floats) -> tuple[float, float]:
+    """Half a pixel beyond the first and the last."""
+    return float(1.5 * x[0] - 0.5 * x[1]), float(1.5 * x[-1] - 0.5 * x[-2])
+
+
+def _inverted(x: Floats, at: Floats) -> Floats:
+    """The columns at which x is ``at``; straight on for half a pixel at either end, then beyond it for good."""
+    low, high = _edges(x)
+    count = len(x)
+    places = np.concatenate([[-_HALF], np.arange(count), [count - _HALF]])
+    found: Floats = np.interp(at, np.concatenate([[low], x, [high]]), places, left=-1.0, right=count)
+    return found
