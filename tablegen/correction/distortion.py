@@ -2,7 +2,8 @@
 
 x depends on the column alone, since a line is settled, but for a drift that depends on the row; y on the time in the
 frame, which goes on within a row. So what belongs to a place of the straight grid is found by two inversions in one
-dimension each.
+dimension each. Where an axis goes back for a moment after a turn, as creep makes it, the pixels until there are left
+out: what they show is shown again.
 """
 
 from dataclasses import dataclass
@@ -16,7 +17,8 @@ from tablegen.problems import Unphysical
 
 _ORDER = 3  # of the splines
 _HALF = 0.5  # of a pixel: a pixel shows the sample so far from its middle
-_FINEST = 0.1  # of the mean step: below it two pixels are nearly at one place
+_OUTER = 0.25  # of a sweep at either end, where an axis may still go back
+_FINEST = 0.02  # of the mean step: below it two pixels are at one place
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,13 +61,20 @@ class Distortion:
     @cached_property
     def x_range(self) -> tuple[float, float]:
         """Left and right edge of all that was imaged, drift aside, half a pixel beyond the outer pixels."""
-        edges = [_edges(one.x) for _, one in self.sides]
+        edges = [_edges(one.x[ascending(one.x)]) for _, one in self.sides]
         return min(low for low, _ in edges), max(high for _, high in edges)
 
     @property
     def y_range(self) -> tuple[float, float]:
         """The edge of the first row and that of the last one."""
-        return float(self.y[0]), float(self.y[-1])
+        y = self.y[ascending(self.y)]
+        return float(y[0]), float(y[-1])
+
+    @property
+    def left_out(self) -> tuple[int, int]:
+        """The rows at the beginning and at the end that are left out."""
+        kept = ascending(self.y)
+        return kept.start, self.rows + 1 - kept.stop
 
     @cached_property
     def grid(self) -> tuple[Floats, Floats]:
@@ -78,18 +87,15 @@ class Distortion:
     def check(self) -> None:
         """Raise ``Unphysical`` where pixels do not follow each other, as of branches that run backwards."""
         for way, one in self.sides:
-            step = np.diff(one.x)
-            if not float(np.min(step)) > _FINEST * float(np.mean(np.abs(step))):
-                at = int(np.argmin(step))
+            if (at := _standing(one.x)) is not None:
                 raise Unphysical(
                     f"the {'trace' if way else 'retrace'} stands still or goes back at column {at + 1}; is this the "
-                    f"scanner, and are --turn and --window those of the scan?"
+                    f"scanner, and are turn and window those of the scan?"
                 )
-        step = np.diff(self.y)
-        if not float(np.min(step)) > _FINEST * float(np.mean(np.abs(step))):
+        if (at := _standing(self.y)) is not None:
             raise Unphysical(
-                f"the slow axis stands still or goes back at row {int(np.argmin(step)) + 1}; are --slow-turn, --lines "
-                f"and --slow-window those of the scan?"
+                f"the slow axis stands still or goes back at row {at + 1}; are its turn, its window and the lines those "
+                "of the scan?"
             )
 
     def sources(self, forward: bool) -> tuple[Floats, Floats, Bools]:
@@ -100,7 +106,8 @@ class Distortion:
         side = self.side(forward)
         x, y = self.grid
         times = np.arange(self.rows + 1.0)
-        at = np.interp(y, self.y, times)  # when y is there, in rows of time
+        kept = ascending(self.y)
+        at = np.interp(y, self.y[kept], times[kept])  # when y is there, in rows of time
         drift = np.interp(at, times, self.drift)
         column = _inverted(side.x, x[None, :] - drift[:, None])
         time = np.interp(column, np.arange(self.columns), side.time)
@@ -144,10 +151,28 @@ def _edges(x: Floats) -> tuple[float, float]:
     return float(1.5 * x[0] - 0.5 * x[1]), float(1.5 * x[-1] - 0.5 * x[-2])
 
 
+def ascending(values: Floats) -> slice:
+    """The part from the lowest value near the beginning to the highest one near the end."""
+    outer = max(round(_OUTER * len(values)), 1)
+    first = int(np.argmin(values[:outer]))
+    last = len(values) - 1 - int(np.argmax(values[: -outer - 1 : -1]))
+    return slice(first, last + 1)
+
+
+def _standing(values: Floats) -> int | None:
+    """Where the ascending part stands still or goes back; None where it does nowhere."""
+    kept = ascending(values)
+    step = np.diff(values[kept])
+    at = int(np.argmin(step))
+    return kept.start + at if not float(step[at]) > _FINEST * float(np.mean(step)) * (0 < at < len(step) - 1) else None
+
+
 def _inverted(x: Floats, at: Floats) -> Floats:
     """The columns at which x is ``at``; straight on for half a pixel at either end, then beyond it for good."""
-    low, high = _edges(x)
-    count = len(x)
-    places = np.concatenate([[-_HALF], np.arange(count), [count - _HALF]])
-    found: Floats = np.interp(at, np.concatenate([[low], x, [high]]), places, left=-1.0, right=count)
+    kept = ascending(x)
+    part = x[kept]
+    low, high = _edges(part)
+    count = len(part)
+    places = np.concatenate([[-_HALF], np.arange(count), [count - _HALF]]) + kept.start
+    found: Floats = np.interp(at, np.concatenate([[low], part, [high]]), places, left=-1.0, right=len(x))
     return found
