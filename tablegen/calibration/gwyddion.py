@@ -9,12 +9,18 @@ from math import prod
 
 import numpy as np
 
+from tablegen.calibration.image_formats.channel import Channel, loaded
 from tablegen.numerics.arrays import Floats
 
 _MAGIC = b"GWYP"
 _MAX_COMPONENTS = 100_000  # of an object or a list; files have some hundred
 _FIXED = {b"b": 1, b"c": 1, b"i": 4, b"q": 8, b"d": 8}
 _ITEMS = {b"C": 1, b"I": 4, b"Q": 8, b"D": 8}
+
+
+def gwy_channels(content: bytes, _: str) -> list[Channel]:
+    """The data fields of a .gwy file as channels. Raises ``ValueError`` with what is wrong."""
+    return [loaded(number, title, matrix) for number, title, matrix in data_fields(content)]
 
 
 def data_fields(content: bytes) -> list[tuple[int, str, Floats]]:

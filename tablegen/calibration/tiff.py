@@ -10,14 +10,14 @@ import struct
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from io import BytesIO
 from math import prod
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from tablegen.problems import shortened
+from tablegen.calibration.image_formats.channel import Channel, Matrix, first_line
 
 _MAX_PAGES = 1000
 _DEFLATE, _LZMA = (8, 32946), (34925,)  # values of the tag Compression
@@ -28,7 +28,20 @@ class TiffImage:
     """The shape of a page, and what reads it; that raises ``ValueError``."""
 
     shape: tuple[int, ...]
-    load: Callable[[], npt.NDArray[np.generic]]
+    load: Callable[[], Matrix]
+
+
+def tiff_channels(content: bytes, _: str) -> list[Channel]:
+    """The pages of a .tif file, in grey. Raises ``ValueError`` with what is wrong."""
+    pages = tiff_pages(content)
+    for page in pages:
+        if len(page.shape) == 3 and page.shape[-1] in (3, 4):
+            raise ValueError("is in colour, not heights; export it in grey, 16 bits or floating point")
+    return [Channel(number, "", page.shape, partial(_of_frame, page)) for number, page in enumerate(pages)]
+
+
+def _of_frame(page: TiffImage, _: int) -> Matrix:
+    return page.load()
 
 
 def tiff_pages(content: bytes) -> list[TiffImage]:
@@ -45,8 +58,8 @@ def tiff_pages(content: bytes) -> list[TiffImage]:
         raise _unreadable(error) from None
 
 
-def _loader(page: Any, content: bytes) -> Callable[[], npt.NDArray[np.generic]]:
-    def load() -> npt.NDArray[np.generic]:
+def _loader(page: Any, content: bytes) -> Callable[[], Matrix]:
+    def load() -> Matrix:
         try:
             _require_bounded(page, content)
             return np.asarray(page.asarray())
@@ -58,8 +71,7 @@ def _loader(page: Any, content: bytes) -> Callable[[], npt.NDArray[np.generic]]:
 
 def _unreadable(error: Exception) -> ValueError:
     advice = "save it without compression" if "codec" in str(error) else "copy or export it again"
-    first = (str(error).strip() or type(error).__name__).splitlines()[0]
-    return ValueError(f"is not a readable TIFF file ({shortened(first, 100)}); {advice}")
+    return ValueError(f"is not a readable TIFF file ({first_line(error)}); {advice}")
 
 
 def _require_end(content: bytes) -> None:
