@@ -115,8 +115,8 @@ class PeriodicModel:
 
     ``order`` is that of the polynomial in y; ``off`` what is added to x, forward and backward: where it is known that
     the branches are not (17), so that phases stay within a small part of a period. ``row_off``, (bases, rows), is what
-    is added to the polynomials, in periods. Parameters are the coordinates of the branch forward, then backward, the lag of y within the line (1 where y is a ramp, 0 where it
-    steps), then of each base vector q and s_1, s_2, ...
+    is added to the polynomials, in periods. Parameters are the coordinates of the branch forward, then backward, the
+    lag of y within the line (1 where y is a ramp, 0 where it steps), then of each base vector q and s_1, s_2, ...
     """
 
     def __init__(
@@ -193,6 +193,18 @@ class PeriodicModel:
         return PeriodicModel(
             self.geometry, self.images, [tuple(spot) for spot in self.spots.tolist()], self.order, off, row_off
         )
+
+    def row_waves(self, state: FitState) -> Complexes:
+        """Each base vector's wave as each row of both images has it; its phase is what the polynomials miss.
+
+        Of shape (bases, rows).
+        """
+        other = self.with_spots([tuple(one) for one in np.eye(self.bases, dtype=np.int64).tolist()])
+        row = np.conj(other._rows(state.parameters)[0])
+        found = np.zeros((self.bases, self.geometry.rows), dtype=np.complex128)
+        for forward, heights in self.images:
+            found += row * (np.conj(other._columns(state.parameters, forward)[0]) @ heights.T)
+        return found
 
     def phase_slopes(self, state: FitState) -> list[Floats]:
         """Of each image what more phase of each base vector does, in heights a period: (bases, rows, columns)."""

@@ -22,6 +22,7 @@ _COMMANDS = {
     "calibrate": ("calibrate", "calibrate"),
     "simulate": ("simulate", "simulate"),
     "refine": ("refine", "refine"),
+    "correct": ("correct", "correct"),
     "verify": ("verify", "verify"),
     "upload": ("upload", "upload"),
     "status": ("device_status", "device_status"),

@@ -94,7 +94,7 @@ class Distortion:
                 )
         if (at := _standing(self.y)) is not None:
             raise Unphysical(
-                f"the slow axis stands still or goes back at row {at + 1}; are its turn, its window and the lines those "
+                f"the slow axis stands still or goes back at row {at + 1}; are turn, window and lines those "
                 "of the scan?"
             )
 

@@ -9,10 +9,11 @@ from dataclasses import dataclass
 from math import hypot
 
 import numpy as np
+import numpy.typing as npt
 
 from tablegen.calibration.image_fit import check_fit
 from tablegen.calibration.image_model import begin, grown, prepared
-from tablegen.calibration.periodic import BASES, LAG, FitState, PeriodicModel, settle
+from tablegen.calibration.periodic import LAG, FitState, PeriodicModel, settle
 from tablegen.correction.distortion import Distortion, Sweep1D
 from tablegen.numerics.arrays import Bools, Floats
 from tablegen.problems import Unphysical
@@ -21,9 +22,11 @@ _MOST_BENDS = 20  # terms of what the branches leave, in each direction
 _LEAST_BENDS = 5
 _BENDS_A_PERIOD = 1.2  # terms; what is finer than a period passes for the shape of the sample
 _ROW_BENDS = 20  # terms of what the polynomial in the rows leaves of a phase
+_FOLLOWING = 0.5  # of what a step of a phase differs from the one before
 _ROUNDS = 40
 _SETTLED = 1e-4  # of the line and of the frame: the largest change in a round
 _STIFFNESS = 1e-9  # of the penalty on n^4, against the mean square of what a term does
+_MOST_BENT_LATTICE = 0.5  # by how much a frame may be higher than wide, or sheared, in all
 _LEAST_ANGLE = 0.2  # sine of the angle between two waves that tell y from x
 
 
@@ -41,13 +44,46 @@ class PeriodicScan:
     explained: float
     tells_y: bool
 
-    def size_of(self, pitch: float, aspect: float) -> float:
-        """The length of the line where the longest period of the sample is ``pitch``, of the same unit.
+    def of_pitch(self, pitch_nm: float, aspect: float) -> Distortion:
+        """The same in nm, where the bars of a grating, or the densest rows of a lattice, are ``pitch_nm`` apart.
 
-        ``aspect`` is the height of the frame over the length of the line. Raises ``Unphysical`` without a frame.
+        ``aspect`` is the height of the frame over the length of the line.
         """
-        least = min(hypot(q, s / aspect) for q, s in self.waves.tolist())
-        return pitch * least
+        length = pitch_nm * min(hypot(q, s / aspect) for q, s in self.waves.tolist())
+        return _scaled(self.distortion, length, length * aspect, 0.0)
+
+    def of_lattice(self, constant_nm: float) -> Distortion:
+        """The same in nm, where the sample is a hexagonal or a square lattice of this constant, turned as it may be.
+
+        This gives the height of the frame too, and the shear of a steady drift. Raises ``Unphysical`` for a sample that
+        is no such lattice.
+        """
+        if not self.tells_y:
+            raise Unphysical("the images show waves of one direction; for a grating give its pitch, not a lattice")
+        found = []
+        for angle in (60.0, 90.0, 120.0):
+            k = constant_nm * np.sin(np.radians(angle))
+            turned = np.radians(angle)
+            ideal = np.array([[1.0, 0.0], [np.cos(turned), np.sin(turned)]]) / k  # waves, periods a nm
+            apart = np.linalg.inv(ideal)
+            frame = apart @ self.waves  # from frames to nm, turned
+            metric = np.linalg.cholesky(frame.T @ frame).T
+            across, shear, along = float(metric[0, 0]), float(metric[0, 1]), float(metric[1, 1])
+            found.append((abs(np.log(along / across)) + abs(shear / across), across, along, shear))
+        worst, across, along, shear = min(found)
+        if worst > _MOST_BENT_LATTICE:
+            raise Unphysical(
+                f"as a hexagonal or square lattice the frame would be {across:.4g} x {along:.4g} nm and sheared by "
+                f"{shear:.4g} nm; is the sample such a lattice, and was the frame as high as its lines are long?"
+            )
+        return _scaled(self.distortion, across, along, shear)
+
+
+def _scaled(found: Distortion, across: float, along: float, shear: float) -> Distortion:
+    """Lines of a length and frames of a height in nm, the last line further right by ``shear``."""
+    drift = across * found.drift + shear * (found.y - 0.5 * (found.y[0] + found.y[-1]))
+    sides = [None if one is None else Sweep1D(across * one.x, one.time) for one in (found.forward, found.backward)]
+    return Distortion(found.rows, found.columns, sides[0], sides[1], along * found.y, drift, found.lag)
 
 
 def periodic_scan(
@@ -80,9 +116,14 @@ def _bent(model: PeriodicModel, state: FitState, free: Bools) -> tuple[PeriodicM
     q = float(model.q(state.parameters)[0])
     bends = _series(geometry.columns, int(np.clip(round(_BENDS_A_PERIOD * q), _LEAST_BENDS, _MOST_BENDS)))
     row_bends = _series(geometry.rows, _ROW_BENDS)
+    phases = np.stack([_followed(wave) for wave in model.row_waves(state)])
+    model = model.with_offsets(model.off, _less_line(phases @ np.linalg.pinv(row_bends) @ row_bends))
+    state = settle(model, state.parameters, free)
     change = np.inf
     for _ in range(_ROUNDS):
-        bent = [_more_x(bends, left, steep) for left, steep in zip(state.left, state.steepness, strict=True)]
+        bent: list[Floats] = [
+            _more_x(bends, left, steep) for left, steep in zip(state.left, state.steepness, strict=True)
+        ]
         more = _without_line(bent, [model.columns(state.parameters, way).x for way, _ in model.images])
         rows = _more_phase(row_bends, state.left, model.phase_slopes(state))
         change = max(float(np.max(np.abs(one))) for one in (*more, rows / q))
@@ -99,8 +140,8 @@ def _bent(model: PeriodicModel, state: FitState, free: Bools) -> tuple[PeriodicM
 def _series(count: int, terms: int) -> Floats:
     """(terms, count): Chebyshev polynomials, which follow a sweep best where it turns."""
     place = (2.0 * np.arange(count) + 1.0) / count - 1.0
-    found: Floats = np.polynomial.chebyshev.chebvander(place, min(terms, count // 3) - 1).T
-    return found
+    series = np.polynomial.chebyshev.chebvander(place, min(terms, count // 3) - 1)
+    return np.asarray(series.T, dtype=np.float64)
 
 
 def _penalty(terms: int, normal: Floats) -> Floats:
@@ -122,7 +163,7 @@ def _more_x(basis: Floats, left: Floats, steep: Floats) -> Floats:
 def _without_line(more: list[Floats], places: list[Floats]) -> list[Floats]:
     """Less what all have in common as a line in x: that is the sample's place and its period."""
     line = np.polyfit(np.concatenate(places), np.concatenate(more), 1)
-    return [np.asarray(one - np.polyval(line, x)) for one, x in zip(more, places, strict=True)]
+    return [np.asarray(one - np.polyval(line, x), np.float64) for one, x in zip(more, places, strict=True)]
 
 
 def _more_phase(basis: Floats, left: tuple[Floats, ...], slopes: list[Floats]) -> Floats:
@@ -137,9 +178,27 @@ def _more_phase(basis: Floats, left: tuple[Floats, ...], slopes: list[Floats]) -
                 weight = np.sum(slope[i] * slope[j], axis=1)
                 normal[part, j * count : (j + 1) * count] += (basis * weight) @ basis.T
     normal += np.diag(np.tile(_penalty(count, normal), bases))
-    found = np.linalg.solve(normal, aim).reshape(bases, count) @ basis
-    rows = np.arange(found.shape[1], dtype=np.float64)
-    return np.stack([one - np.polyval(np.polyfit(rows, one, 1), rows) for one in found])
+    return _less_line(np.linalg.solve(normal, aim).reshape(bases, count) @ basis)
+
+
+def _followed(wave: npt.NDArray[np.complex128]) -> Floats:
+    """The phase of each row in periods, followed from the middle outwards: each step is near the one before."""
+    seen = np.angle(wave) / (2.0 * np.pi)
+    out = seen.copy()
+    middle = len(seen) // 2
+    for way in (1, -1):
+        step = 0.0
+        for k in range(middle + way, len(seen) if way > 0 else -1, way):
+            guess = out[k - way] + step
+            out[k] = seen[k] + np.round(guess - seen[k])
+            step += _FOLLOWING * (out[k] - out[k - way] - step)
+    return out
+
+
+def _less_line(phases: Floats) -> Floats:
+    """Each row less its best line."""
+    rows = np.arange(phases.shape[1], dtype=np.float64)
+    return np.stack([one - np.polyval(np.polyfit(rows, one, 1), rows) for one in phases])
 
 
 def _scan(model: PeriodicModel, state: FitState) -> PeriodicScan:
@@ -149,7 +208,7 @@ def _scan(model: PeriodicModel, state: FitState) -> PeriodicScan:
     times = np.arange(rows + 1) / rows - 0.5
     powers = times ** np.arange(1, model.order + 1)[:, None]
     phases = model.s(parameters) @ powers  # (bases, rows + 1)
-    phases += np.stack([_at_edges(one) for one in model.row_off])
+    phases = phases + np.stack([_at_edges(one) for one in model.row_off])
     slopes = np.array([np.polynomial.polynomial.polyfit(times, phase, 1)[1] for phase in phases])
     tells_y = model.bases == 2 and _independent(q, slopes)
     if tells_y:

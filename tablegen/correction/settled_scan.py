@@ -146,13 +146,16 @@ def scanner_distortion(
     y: AxisScan,
     rows: int,
     columns: int,
+    lines: int | None = None,
+    back: bool = False,
     sides: tuple[bool, ...] = (True, False),
     delay_pixels: float = 0.0,
 ) -> Distortion:
     """Where the pixels of a scan were, in nm, 0 at the left edge and at the first row.
 
-    Columns are evenly spread in time over the window of each sweep of ``x``, rows over that of the sweep there of
-    ``y``; columns show the sample ``delay_pixels`` late. Raises ``Rejected`` and ``Unphysical``.
+    Columns are evenly spread in time over the window of each sweep of ``x``; they show the sample ``delay_pixels``
+    late. Rows follow each other, ``lines`` in a period of ``y``, from where its window begins, on its way there, or
+    ``back``; see ``lines_of``. Raises ``Rejected`` and ``Unphysical``.
     """
     moved = model.moved("x", x)
     low, high = x.window
@@ -163,11 +166,10 @@ def scanner_distortion(
         way = (place if forward else 1.0 - place) - late
         time = x.turn * way if forward else x.turn + (1.0 - x.turn) * way
         found[forward] = Sweep1D(_at(moved, time), time)
-    first, last = y.window
-    frame = y.turn * (first + (last - first) * np.arange(rows + 1) / rows)
-    whole = Distortion(
-        rows, columns, found.get(True), found.get(False), _at(model.moved("y", y), frame), np.zeros(rows + 1)
-    )
+    begin = y.turn + (1.0 - y.turn) * (1.0 - y.window[1]) if back else y.turn * y.window[0]
+    frame = begin + np.arange(rows + 1) / (lines or lines_of(rows, y, back))
+    slow = _at(model.moved("y", y), frame) * (-1.0 if back else 1.0)
+    whole = Distortion(rows, columns, found.get(True), found.get(False), slow, np.zeros(rows + 1))
     whole.check()
     left, top = whole.x_range[0], whole.y_range[0]
 
@@ -175,6 +177,11 @@ def scanner_distortion(
         return None if one is None else replace(one, x=one.x - left)
 
     return replace(whole, forward=shifted(whole.forward), backward=shifted(whole.backward), y=whole.y - top)
+
+
+def lines_of(rows: int, y: AxisScan, back: bool = False) -> int:
+    """Lines in a period of the slow axis of which the window of one way has so many rows."""
+    return round(rows / ((1.0 - y.turn if back else y.turn) * (y.window[1] - y.window[0])))
 
 
 def _at(moved: Floats, time: Floats) -> Floats:

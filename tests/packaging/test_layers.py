@@ -29,6 +29,7 @@ LAYERS = (
     "calibration",
     "refinement",
     "virtual",
+    "correction",
     "api",
     "cli",
     "__main__",
