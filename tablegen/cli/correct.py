@@ -44,7 +44,7 @@ Exit status: 0 done, 2 wrong input, 4 cannot write, 6 a library is missing, 130 
     "--output",
     type=click.Path(path_type=Path),
     metavar="FILE|DIRECTORY",
-    help="Corrected image: .gwy, .tif, .npy or .png. With --each or --pairs a directory. Without it nothing is written.",
+    help="Corrected image: .gwy, .tif, .npy or .png. With --each or --pairs a directory. Without it none.",
 )
 @click.option("--scanner", type=click.Path(path_type=Path), metavar="FILE", help="Scanner file that knows the scanner.")
 @click.option(

@@ -35,6 +35,10 @@ def correct_text(found: StraightScan, images: Images) -> list[str]:
         f"{y:.3g} pixels ({100.0 * y / rows:.3g} %) along y"
     )
     lines += _agreement(found)
+    if found.lattice is not None:
+        across, along = record["lattice_off_percent"]
+        of_y = "" if found.lattice.y is None else f", {along:.2g} % along y"
+        lines.append(f"lattice       off a perfect one by up to {across:.2g} % along x{of_y}, after")
     return [*lines, *(f"note: {text}" for text in _notes(found, images))]
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from tablegen.correction.agreement import Agreement, agreement
 from tablegen.correction.distortion import Distortion, Resampler
+from tablegen.correction.residual_lattice import ResidualLattice, residual_lattice
 from tablegen.numerics.arrays import Floats
 from tablegen.version import __version__
 
@@ -31,12 +32,14 @@ class StraightScan:
     """Pictures put straight, NaN where nothing was imaged; their size in nm, or None; and what was done.
 
     ``distortion`` is by what they were bent, ``agreement`` that of the channel that was judged, None without a retrace.
+    ``lattice`` is what is left of its bends, None without a period.
     """
 
     pictures: tuple[Picture, ...]
     size_nm: tuple[float, float] | None
     distortion: Distortion
     agreement: Agreement | None
+    lattice: ResidualLattice | None
     taken: tuple[Picture, ...]
     judged: tuple[int, ...]
     record: dict[str, Any] = field(default_factory=dict)
@@ -79,6 +82,7 @@ def put_straight(
         if found.worst is not None:
             before_and_after["apart_pixels"] = dict(zip(names, (round(v, 4) for v in found.worst), strict=True))
     rows, columns = distortion.rows, distortion.columns
+    lattice = residual_lattice(pictures[judged[0]].heights)
     record: dict[str, Any] = {
         "program": f"tablegen {__version__}",
         "command": "correct",
@@ -90,4 +94,7 @@ def put_straight(
         record["size_nm"] = [round(value, 6) for value in size_nm]
     if before_and_after:
         record["trace_retrace"] = before_and_after
-    return StraightScan(pictures, size_nm, distortion, found, tuple(taken), tuple(judged), record)
+    if lattice is not None:
+        off = (100.0 * worst / count for worst, count in zip(lattice.worst, (columns, rows), strict=True))
+        record["lattice_off_percent"] = [round(value, 4) for value in off]
+    return StraightScan(pictures, size_nm, distortion, found, lattice, tuple(taken), tuple(judged), record)
