@@ -3,11 +3,13 @@
 import json
 import os
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from tablegen.cli.bar import Bar
 from tablegen.cli.common import OutputFile, fail, finite, require, written
 from tablegen.cli.exit_status import ExitStatus
 from tablegen.cli.progress import Progress
@@ -159,17 +161,28 @@ def correct(images: tuple[Path, ...], **options: Any) -> int:
     _require(images, suffix, options["plot"])
     jobs = _jobs(images, options)
     targets = _targets(jobs, options, suffix)
-    records = []
-    with Progress() as progress:
-        for number, (trace, retrace) in enumerate(jobs):
-            progress.now(_of(number, len(jobs), trace))
-            try:
+    records: list[dict[str, Any]] = []
+    refused: list[object] = []  # the others of a batch are corrected all the same
+    bar = Bar(unit="images") if several else None
+    for number, (trace, retrace) in enumerate(jobs):
+        if bar is not None:
+            bar(number, len(jobs))
+        try:
+            with nullcontext() if bar is not None else Progress() as progress:
+                if progress is not None:
+                    progress.now(f"correcting {trace.name}")
                 found, taken = _corrected(trace, retrace, options)
-                records.append(_put(found, taken, targets[number], suffix, options))
-            except _Refused as refused:
-                fail(refused.lines, ExitStatus.WRONG_INPUT)
-    if options["as_json"]:
+            if bar is not None:
+                bar.hide()
+            records.append(_put(found, taken, targets[number], suffix, options))
+        except _Refused as reason:
+            refused += reason.lines
+    if bar is not None:
+        bar.close()
+    if options["as_json"] and records:
         click.echo(json.dumps(records if several else records[0], indent=2, allow_nan=False))
+    if refused:
+        fail(refused, ExitStatus.WRONG_INPUT)
     return ExitStatus.OK
 
 
@@ -179,10 +192,6 @@ class _Refused(Exception):
     def __init__(self, lines: Sequence[object]) -> None:
         super().__init__()
         self.lines = lines
-
-
-def _of(number: int, count: int, path: Path) -> str:
-    return f"correcting {path.name}" if count == 1 else f"correcting {path.name}, {number + 1} of {count}"
 
 
 def _check_usage(images: tuple[Path, ...], options: dict[str, Any]) -> None:

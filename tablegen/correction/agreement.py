@@ -50,7 +50,7 @@ def agreement(raw: tuple[Floats, Floats], straight: tuple[Floats, Floats], disto
         moved = [_mean_of_columns(distortion.moved(forward)[0]) for forward in (True, False)]
     known = np.isfinite(moved[0]) & np.isfinite(moved[1])
     by = np.interp(place, columns[known], (moved[1] - moved[0])[known])
-    return Agreement((_difference(*raw), _difference(*straight)), place, (after + by, after))
+    return Agreement((difference(*raw), difference(*straight)), place, (after + by, after))
 
 
 def _mean_of_columns(values: Floats) -> Floats:
@@ -60,7 +60,8 @@ def _mean_of_columns(values: Floats) -> Floats:
     return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
 
-def _difference(one: Floats, other: Floats) -> float:
+def difference(one: Floats, other: Floats) -> float:
+    """The rms of the difference of two images over that of both, each line less its mean; where both are no NaN."""
     both: Bools = np.isfinite(one) & np.isfinite(other)
     first, second = (_levelled(image, both) for image in (one, other))
     power = float(np.sum(first**2) + np.sum(second**2))

@@ -9,15 +9,19 @@ import numpy as np
 
 from tablegen.calibration.image_files import ScanImage, channels_of, read_channels, read_image
 from tablegen.config.load import load, load_scanner
-from tablegen.correction.distortion import Distortion
+from tablegen.correction.agreement import difference
+from tablegen.correction.distortion import Distortion, Resampler
 from tablegen.correction.periodic_scan import PeriodicScan, periodic_scan
 from tablegen.correction.settled_scan import AxisScan, ScannerModel, lines_of, scanner_distortion, triangle
 from tablegen.correction.straight import Picture, StraightScan, put_straight
+from tablegen.numerics.arrays import Floats
 from tablegen.planning.drive import size_law_of
 from tablegen.planning.line_plan import LinePlan, make_plan
 from tablegen.problems import Problem, Rejected, Unphysical
 from tablegen.reading import CONFIGURATION, file_sha256
 
+_ALIKE = 0.3  # of the contrast: trace and retrace that differ by less are what they are said to be
+_BETTER = 0.6  # times the difference: how much better mirrored or exchanged images have to agree
 _OLD_TURN = 0.5  # of the slow axis of an instrument that scans up, then down
 
 
@@ -80,7 +84,7 @@ class Images:
         """The trace that is judged, or whatever there is."""
         return self.channels[self.judged[0]]
 
-    def heights(self, number: int) -> np.typing.NDArray[np.float64]:
+    def heights(self, number: int) -> Floats:
         """Of a channel, left on the left."""
         found = self.channels[number].heights
         mirrored = self.mirrored and not self.forward[number]
@@ -245,7 +249,7 @@ def _rows_window(first: float, y: AxisScan, back: bool) -> tuple[float, float]:
 def _played(line: LinePlan) -> AxisScan:
     drive, series = line.drive, line.drive_series
 
-    def volts(time: np.typing.NDArray[np.float64]) -> np.typing.NDArray[np.float64]:
+    def volts(time: Floats) -> Floats:
         return np.asarray(drive.v_offset + drive.v_amplitude * (series.value(time) - 0.5), dtype=np.float64)
 
     return AxisScan(volts, float(line.rate), drive.turn, line.band_limit.window)
@@ -339,7 +343,34 @@ def by_fit(
     return _made(images, found, size, record), fit
 
 
+def check_order(images: Images, distortion: Distortion) -> None:
+    """Raise ``Unphysical`` where trace and retrace agree far better mirrored, or exchanged.
+
+    Each of both is put straight as the other one would be, and compared.
+    """
+    if len(images.judged) < 2:
+        return
+    ways = [Resampler.of(distortion, way) for way in (True, False)]
+    trace, retrace = (images.heights(i) for i in images.judged)
+
+    def left(one: Floats, other: Floats) -> float:
+        return difference(ways[0](one), ways[1](other))
+
+    given = left(trace, retrace)
+    if given < _ALIKE:
+        return
+    turned = np.ascontiguousarray(retrace[:, ::-1])
+    if left(trace, turned) < _BETTER * given:
+        advice = "leave --retrace-mirrored out" if images.mirrored else "give --retrace-mirrored"
+        raise Unphysical(f"the retrace agrees with the trace only when it is mirrored; {advice}")
+    if left(retrace, trace) < _BETTER * given:
+        raise Unphysical(
+            "trace and retrace agree only when they are exchanged; is the retrace the first of both files?"
+        )
+
+
 def _made(images: Images, found: Distortion, size: tuple[float, float] | None, record: dict[str, Any]) -> StraightScan:
+    check_order(images, found)
     if images.left_out:
         record["left_out"] = list(images.left_out)
     return put_straight(images.pictures, found, size, images.judged, record)

@@ -120,7 +120,7 @@ class ScannerModel:
             factor_at=lambda v: surface.small.factor(normalised_offset(v * v_max, v_max)),
             rate_gain=None if law is None else lambda hz: frequency_gain(hz, law.alpha, law.reference_hz),
             folder=self.folder,
-            scan_file=Document("the scan", None),
+            scan_file=Document("the image", None),
             scanner_file=self.file,
             problems=problems,
         )
