@@ -4,6 +4,7 @@ Needs the extra ``images`` for .tif, .png and .jpk. What each format says is in 
 """
 
 import hashlib
+import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from tablegen.calibration.gwyddion import gwy_channels
+from tablegen.calibration.image_formats.asd import asd_channels
 from tablegen.calibration.image_formats.channel import (
     MAX_PIXELS,
     Channel,
@@ -22,7 +24,11 @@ from tablegen.calibration.image_formats.channel import (
     partner,
     quoted,
 )
+from tablegen.calibration.image_formats.igor import ibw_channels
+from tablegen.calibration.image_formats.jpk import jpk_channels
 from tablegen.calibration.image_formats.matrix import npy_channels, text_channels
+from tablegen.calibration.image_formats.nanonis import sxm_channels
+from tablegen.calibration.image_formats.nanoscope import spm_channels
 from tablegen.calibration.image_formats.picture import png_channels
 from tablegen.calibration.table import Source, file_content
 from tablegen.calibration.tiff import tiff_channels
@@ -33,7 +39,8 @@ from tablegen.reading import IMAGE
 
 _MIN_PIXELS = 32  # rows and columns
 _MAX_HEIGHT = 1e30  # in any unit; squares of heights have to be numbers
-MODULES = {".png": "PIL", ".tif": "tifffile", ".tiff": "tifffile"}  # what reads them, beside numpy
+_NUMBERED = re.compile(r"\.\d{3}")  # Nanoscope's images of one name, .000 to .999
+MODULES = {".png": "PIL", **dict.fromkeys((".tif", ".tiff", ".jpk", ".jpk-qi-image"), "tifffile")}  # beside numpy
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +148,8 @@ def _opened(path: Path) -> _ImageFile:
     """The channels of a file. Raises ``Rejected``."""
     name = shown_path(path)
     file = _ImageFile(name, Source(path.name, ""), [])
-    reader = _READERS.get(path.suffix.lower())
+    ending = path.suffix.lower()
+    reader = spm_channels if _NUMBERED.fullmatch(ending) else _READERS.get(ending)
     with file.named():
         if reader is None:
             what = path.suffix or "no ending"
@@ -164,14 +172,19 @@ def _read(file: _ImageFile, channel: Channel, frame: int | None) -> ScanImage:
         least = f"{_MIN_PIXELS} x {_MIN_PIXELS}"
         raise ValueError(f"{what}has {size} pixels; at least {least} and at most 2^25 are read")
     if frame is None and channel.frames > 1:
-        raise ValueError(f"{what}is a movie of {channel.frames} frames; choose one, 0 to {channel.frames - 1}")
+        raise ValueError(
+            f"{what}is a movie of {channel.frames} frames; choose one with --frame, 0 to {channel.frames - 1}"
+        )
     chosen = frame or 0
     if not 0 <= chosen < channel.frames:
         raise ValueError(f"{what}has no frame {chosen}; the last one is {channel.frames - 1}")
-    matrix = channel.load(chosen)
-    if matrix.dtype.kind not in "iufb":
-        raise ValueError(f"{what}has values of the type {matrix.dtype}; heights are real numbers")
-    heights = matrix.astype(np.float64)
+    with np.errstate(all="ignore"):  # of factors in a damaged file; what is not finite is counted below
+        matrix = channel.load(chosen)
+        if matrix.dtype.kind not in "iufb":
+            raise ValueError(f"{what}has values of the type {matrix.dtype}; heights are real numbers")
+        if matrix.shape != channel.shape:
+            raise ValueError(f"{what}has {matrix.size} pixels, not {size}; copy it again")
+        heights = matrix.astype(np.float64)
     bad = int(np.sum(~np.isfinite(heights)))
     if bad:
         raise ValueError(f"{what}{bad} pixels are not finite; crop or interpolate them")
@@ -204,4 +217,10 @@ _READERS: dict[str, Callable[[bytes, str], list[Channel]]] = {
     ".png": png_channels,
     ".gwy": gwy_channels,
     **dict.fromkeys((".txt", ".asc", ".csv", ".dat"), text_channels),
+    ".asd": asd_channels,
+    ".ibw": ibw_channels,
+    ".spm": spm_channels,
+    ".jpk": jpk_channels,
+    ".jpk-qi-image": jpk_channels,
+    ".sxm": sxm_channels,
 }

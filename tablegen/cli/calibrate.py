@@ -14,13 +14,20 @@ from tablegen.cli.calibration_run import (
     full_scale,
     in_file,
     read_columns,
-    read_heights,
     shared_options,
     size_law,
     within,
 )
-from tablegen.cli.common import fail, require
+from tablegen.cli.common import fail
 from tablegen.cli.exit_status import ExitStatus
+from tablegen.cli.image_pairs import (
+    CommandOfPairs,
+    channel_option,
+    frame_option,
+    pair_option,
+    read_both,
+    retrace_channel_option,
+)
 
 _RHO_HELP = "Exponent rho of (22); used if all data have the same amplitude, otherwise fitted."
 _REFERENCE_HELP = (
@@ -247,21 +254,12 @@ def hysteresis(
 calibrate.add_command(operator)
 
 
-@calibrate.command(short_help="Fit beta_max, rho, u_peak to trace and retrace images.")
+@calibrate.command(cls=CommandOfPairs, short_help="Fit beta_max, rho, u_peak to trace and retrace images.")
 @shared_options
-@click.option(
-    "--pair",
-    "pairs",
-    type=(click.FloatRange(min=0.0, min_open=True), click.Path(path_type=Path), click.Path(path_type=Path)),
-    metavar="VOLTS TRACE RETRACE",
-    multiple=True,
-    required=True,
-    help="Scan voltage at the piezo in volts, peak to peak, and its two images. Repeat the option for each amplitude.",
-)
-@click.option("--channel", metavar="NAME|N", help="Data channel, for image files with several channels.")
-@click.option(
-    "--retrace-channel", metavar="NAME|N", help="Data channel of the retrace image.  [default: same as --channel]"
-)
+@pair_option
+@channel_option
+@retrace_channel_option
+@frame_option
 @click.option(
     "--retrace-mirrored",
     is_flag=True,
@@ -300,6 +298,7 @@ def images(
     pairs: tuple[tuple[float, Path, Path], ...],
     channel: str | None,
     retrace_channel: str | None,
+    frame: int | None,
     retrace_mirrored: bool,
     window: tuple[float, float],
     turn: float,
@@ -313,7 +312,8 @@ def images(
     several amplitudes.
 
     \b
-    Files:   .npy, .tif, .png, .gwy, or a matrix of numbers: .txt, .asc, .csv, .dat.
+    Files:   .asd, .ibw, .spm and .000 to .999, .jpk, .jpk-qi-image, .sxm, .gwy,
+             .npy, .tif, .png, or a matrix of numbers: .txt, .asc, .csv, .dat.
     Columns: pixels at equal time steps within --window of each sweep.
     Rows:    scan lines in order of time. Both images have the left end of the line at the
              left; otherwise give --retrace-mirrored.
@@ -321,15 +321,11 @@ def images(
     \b
     Example:
       tablegen calibrate images --axis x --v-max 100 --pair 50 t1.npy r1.npy --pair 100 t2.npy r2.npy
+      tablegen calibrate images --axis x --v-max 100 --pair 50 1.ibw --pair 100 2.ibw --channel Height
     """
-    from tablegen.calibration.image_files import MODULES
     from tablegen.calibration.images import Pair, fit_images
 
-    needed = {MODULES.get(path.suffix.lower()) for _, *paths in pairs for path in paths} - {None}
-    require(*sorted(filter(None, needed)), extra="images")
-    read = [
-        (read_heights(trace, channel), read_heights(retrace, retrace_channel or channel)) for _, trace, retrace in pairs
-    ]
+    read = [read_both(trace, retrace, channel, retrace_channel, frame) for _, trace, retrace in pairs]
     v_max = full_scale(common)
     taken = [
         Pair(

@@ -17,7 +17,8 @@ FirstRow = Literal["top", "bottom"]
 MAX_PIXELS = 1 << 25  # 5792 x 5792; more than that in floating point would be most of a computer's memory
 _MAX_LISTED = 12  # channels in a message
 _MAX_TITLE = 60  # characters of a channel in a message
-_DIRECTION = re.compile(r"(.*?)[\s_\-\[(]*(retrace|trace|forward|backward)\s*[\])]*", re.IGNORECASE | re.DOTALL)
+_MAX_SPLIT = 1000  # characters of a title that is looked into
+_DIRECTION = re.compile(r"(.+?)[\s_\-\[(]*(retrace|trace|forward|backward)\s*[\])]*", re.IGNORECASE | re.DOTALL)
 _MEANT: dict[str, Direction] = {"trace": "trace", "forward": "trace", "retrace": "retrace", "backward": "retrace"}
 
 
@@ -51,6 +52,8 @@ def loaded(number: int, title: str, matrix: Matrix) -> Channel:
 
 def split_direction(title: str) -> tuple[str, Direction | None]:
     """``HeightRetrace``, ``Height (Retrace)`` or ``Height backward`` as ``Height`` and its direction."""
+    if len(title) > _MAX_SPLIT or title.strip().lower() in _MEANT:  # "Retrace" is no trace of "Re"
+        return title, None
     found = _DIRECTION.fullmatch(title)
     return (found[1], _MEANT[found[2].lower()]) if found else (title, None)
 
