@@ -313,9 +313,12 @@ def by_fit(
     images: Images, taken: Taken, pitch_nm: float | None = None, lattice_nm: float | None = None
 ) -> tuple[StraightScan, PeriodicScan]:
     """Put straight by a fit to a periodic sample, and the fit. Raises ``Unphysical``."""
-    if len(images.judged) < 2:
-        raise Unphysical("a fit needs trace and retrace of one scan; give the retrace too, or its --retrace-channel")
-    trace, retrace = (images.channels[i].heights for i in images.judged)
+    if not images.forward[images.judged[0]]:
+        raise Unphysical("is a retrace by the file; a fit needs the trace")
+    trace, retrace = (*(images.channels[i].heights for i in images.judged), None)[:2]
+    if retrace is None and not all(images.forward):
+        raise Unphysical("has channels of the retrace, and none that is the judged one's; give --retrace-channel")
+    assert trace is not None
     fit = periodic_scan(trace, retrace, taken.x.turn, taken.x.window, images.mirrored, taken.delay_pixels)
     first, (rows, columns) = images.first, images.shape
     size: tuple[float, float] | None = None

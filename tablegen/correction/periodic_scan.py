@@ -88,17 +88,17 @@ def _scaled(found: Distortion, across: float, along: float, shear: float) -> Dis
 
 def periodic_scan(
     trace: Floats,
-    retrace: Floats,
+    retrace: Floats | None = None,
     turn: float = 0.5,
     window: tuple[float, float] = (0.0, 1.0),
     retrace_mirrored: bool = False,
     delay_pixels: float = 0.0,
 ) -> PeriodicScan:
-    """Both images rows x columns of heights in any unit, rows in the order of time; as for ``fit_pair``.
+    """Images rows x columns of heights in any unit, rows in the order of time, as for ``fit_pair``; or a trace alone.
 
     Raises ``Unphysical`` where the images do not show one periodic sample, or too little of it.
     """
-    if retrace_mirrored:
+    if retrace_mirrored and retrace is not None:
         retrace = np.ascontiguousarray(retrace[:, ::-1])
     geometry, heights = prepared(trace, retrace, turn, window, delay_pixels)
     spot, bends = begin(geometry, heights, retrace_mirrored)
@@ -125,9 +125,10 @@ def _bent(model: PeriodicModel, state: FitState, free: Bools) -> tuple[PeriodicM
             _more_x(bends, left, steep) for left, steep in zip(state.left, state.steepness, strict=True)
         ]
         more = _without_line(bent, [model.columns(state.parameters, way).x for way, _ in model.images])
+        off = [one + by for one, by in zip(model.off, [*more, np.zeros_like(more[0])], strict=False)]
         rows = _more_phase(row_bends, state.left, model.phase_slopes(state))
         change = max(float(np.max(np.abs(one))) for one in (*more, rows / q))
-        model = model.with_offsets((model.off[0] + more[0], model.off[1] + more[1]), model.row_off + rows)
+        model = model.with_offsets((off[0], off[1]), model.row_off + rows)
         state = settle(model, state.parameters, free)
         if change < _SETTLED:
             return model, state

@@ -223,7 +223,6 @@ def test_wrong_input_is_named_and_nothing_is_written(lab: Path) -> None:
         (("trace.npy", "other.npy"), DRIVE, "all channels must be of one scan"),
         (("flat.npy",), DRIVE, "all pixels are 1"),
         (("noise.npy", "retrace.npy"), FIT, "no period stands out"),
-        (("trace.npy",), FIT, "a fit needs trace and retrace"),
         (("trace.npy", "retrace.npy"), (*FIT, "--channel", "Phase"), "has no channel 'Phase'"),
         (("trace.npy", "trace.npy"), FIT, "the same image"),
         (("gone.npy",), DRIVE, "gone.npy"),

@@ -1,5 +1,6 @@
 """Old frames of piezos that are known put straight: 0.3 % of the width, half a pixel, and no more noise."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from tablegen.correction.distortion import Resampler
 from tablegen.correction.job import AxisTaken, Choice, Images, Taken, by_fit, by_scanner, read_scan
 from tablegen.correction.straight import StraightScan
 from tablegen.problems import Unphysical
-from tablegen.virtual.imaging import grating
+from tablegen.virtual.imaging import FrameImages, grating
 
 REACH_PERCENT = 0.3
 TAKEN = Taken(x=AxisTaken(size_v=V, offset_v=OFFSET_V), rate_hz=RATE_HZ)
@@ -104,6 +105,18 @@ def test_the_laws_are_inverted_and_not_expanded(tmp_path: Path) -> None:
     assert found.size == pytest.approx((0.0, 0.0), abs=0.01)
     assert scan.agreement is not None
     assert scan.agreement.difference[1] < 0.05  # nine pixels a period, interpolated
+
+
+@pytest.mark.common
+def test_a_trace_alone_by_a_fit(tmp_path: Path) -> None:
+    frame = old_frame("bouc-wen", **DRIFT)
+    scan, fit = by_fit(read_scan(save_pair(frame, tmp_path)[0], None, Choice()), Taken(), lattice_nm=60.0)
+    assert fit.tells_y
+    assert scan.agreement is None
+    both = replace(scan.distortion, backward=scan.distortion.forward)  # judged as if the retrace were another trace
+    found = off(both, FrameImages(frame.trace, frame.trace))
+    assert found.x < REACH_PERCENT
+    assert found.y < REACH_PERCENT
 
 
 @pytest.mark.common
