@@ -15,7 +15,7 @@ from tablegen.cli.exit_status import ExitStatus
 from tablegen.cli.progress import Progress
 
 if TYPE_CHECKING:
-    from tablegen.correction.job import Choice, Images, Taken
+    from tablegen.correction.job import Choice, Images, OldScan
     from tablegen.correction.straight import StraightScan
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -291,13 +291,13 @@ def _choice(options: dict[str, Any]) -> "Choice":
     return Choice(**{name: options[name] for name in ("channel", "retrace_channel", "retrace_mirrored", "frame")})
 
 
-def _taken(options: dict[str, Any]) -> "Taken":
-    from tablegen.correction.job import AxisTaken, Taken
+def _taken(options: dict[str, Any]) -> "OldScan":
+    from tablegen.correction.job import OldAxis, OldScan
 
     keys = ("size_v", "size_nm", "offset_v", "turn", "window")
-    x, y = (AxisTaken(**{key: options[f"{axis}{key}"] for key in keys}) for axis in ("", "slow_"))
+    x, y = (OldAxis(**{key: options[f"{axis}{key}"] for key in keys}) for axis in ("", "slow_"))
     rest = {key: options[key] for key in ("rate_hz", "lines", "delay_pixels")}
-    return Taken(x=x, y=y, back=options["slow_back"], **rest)
+    return OldScan(x=x, y=y, back=options["slow_back"], **rest)
 
 
 def _put(

@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from tablegen.calibration.image_files import ScanImage, channels_of, read_channels, read_image
+from tablegen.compensation import models
 from tablegen.config.load import load, load_scanner
 from tablegen.correction.agreement import difference
 from tablegen.correction.distortion import Distortion, Resampler
@@ -26,7 +27,7 @@ _OLD_TURN = 0.5  # of the slow axis of an instrument that scans up, then down
 
 
 @dataclass(frozen=True, kw_only=True)
-class AxisTaken:
+class OldAxis:
     """How an axis was driven; what is None is not known, and taken as ``Conditions`` says."""
 
     size_v: float | None = None
@@ -37,7 +38,7 @@ class AxisTaken:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Taken:
+class OldScan:
     """How a scan was taken: volts at the piezo, peak to peak, of a triangle on each axis.
 
     Instead of ``size_v`` the size in nm that a scan file would have: its volts come from the scanner file. The offset
@@ -45,8 +46,8 @@ class Taken:
     are those of its period, ``back`` that the rows are of its way back. Columns are ``delay_pixels`` late.
     """
 
-    x: AxisTaken = field(default_factory=AxisTaken)
-    y: AxisTaken = field(default_factory=lambda: AxisTaken(turn=_OLD_TURN))
+    x: OldAxis = field(default_factory=OldAxis)
+    y: OldAxis = field(default_factory=lambda: OldAxis(turn=_OLD_TURN))
     rate_hz: float | None = None
     lines: int | None = None
     back: bool = False
@@ -200,7 +201,7 @@ def _height(channel: ScanImage) -> bool:
     return any(word in channel.channel.lower() for word in ("height", "topo", "zsensor", "z sensor"))
 
 
-def by_scanner(images: Images, scanner: Path, taken: Taken) -> StraightScan:
+def by_scanner(images: Images, scanner: Path, taken: OldScan) -> StraightScan:
     """Put straight by a scanner file. Raises ``Rejected`` and ``Unphysical``."""
     model = _model(scanner)
     rate_hz = taken.rate_hz or images.first.line_rate_hz
@@ -219,7 +220,7 @@ def by_scanner(images: Images, scanner: Path, taken: Taken) -> StraightScan:
     return _scanned(images, model, x, y, lines, taken, {})
 
 
-def by_scan_file(images: Images, scan: Path, scanner: Path | None, taken: Taken) -> StraightScan:
+def by_scan_file(images: Images, scan: Path, scanner: Path | None, taken: OldScan) -> StraightScan:
     """The same of an image of a build: the drive is that of the scan file, the scanner its own unless given."""
     setup = load(scan)
     plan = make_plan(setup)
@@ -260,7 +261,7 @@ def _model(scanner: Path) -> ScannerModel:
     return ScannerModel(its, file, scanner.parent)
 
 
-def _axis(model: ScannerModel, axis: Literal["x", "y"], taken: AxisTaken, rate_hz: float) -> AxisScan:
+def _axis(model: ScannerModel, axis: Literal["x", "y"], taken: OldAxis, rate_hz: float) -> AxisScan:
     """A triangle."""
     v_max = model.scanner.v_max
     size_v = taken.size_v
@@ -275,7 +276,7 @@ def _axis(model: ScannerModel, axis: Literal["x", "y"], taken: AxisTaken, rate_h
 
 
 def _scanned(
-    images: Images, model: ScannerModel, x: AxisScan, y: AxisScan, lines: int, taken: Taken, how: dict[str, Any]
+    images: Images, model: ScannerModel, x: AxisScan, y: AxisScan, lines: int, taken: OldScan, how: dict[str, Any]
 ) -> StraightScan:
     rows, columns = images.shape
     ways = tuple(sorted(set(images.forward), reverse=True))
@@ -292,7 +293,7 @@ def _scanned(
         drive = scan.drive()
         low, high = float(np.min(drive)), float(np.max(drive))
         one: dict[str, Any] = {
-            "model": "triangle" if axis.hysteresis is None else axis.hysteresis.model(),
+            "model": models.UNCOMPENSATED if axis.hysteresis is None else axis.hysteresis.model(),
             "drive_v": round(high - low, 6),
             "offset_v": round(0.5 * (high + low), 6),
             "rate_hz": round(scan.rate_hz, 9),
@@ -310,7 +311,7 @@ def _scanned(
 
 
 def by_fit(
-    images: Images, taken: Taken, pitch_nm: float | None = None, lattice_nm: float | None = None
+    images: Images, taken: OldScan, pitch_nm: float | None = None, lattice_nm: float | None = None
 ) -> tuple[StraightScan, PeriodicScan]:
     """Put straight by a fit to a periodic sample, and the fit. Raises ``Unphysical``."""
     if not images.forward[images.judged[0]]:

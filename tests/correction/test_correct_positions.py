@@ -9,13 +9,13 @@ from correcting import LATTICE, LAWS, OFFSET_V, PLANTS, RATE_HZ, V, off, old_fra
 from sets import common
 
 from tablegen.correction.distortion import Resampler
-from tablegen.correction.job import AxisTaken, Choice, Images, Taken, by_fit, by_scanner, read_scan
+from tablegen.correction.job import Choice, Images, OldAxis, OldScan, by_fit, by_scanner, read_scan
 from tablegen.correction.straight import StraightScan
 from tablegen.problems import Unphysical
 from tablegen.virtual.imaging import FrameImages, grating
 
 REACH_PERCENT = 0.3
-TAKEN = Taken(x=AxisTaken(size_v=V, offset_v=OFFSET_V), rate_hz=RATE_HZ)
+TAKEN = OldScan(x=OldAxis(size_v=V, offset_v=OFFSET_V), rate_hz=RATE_HZ)
 DRIFT = {"drift": (0.02, 0.01), "tilt": (0.5, 0.3)}
 
 
@@ -48,7 +48,7 @@ def check_agreement(scan: StraightScan) -> None:
 def test_a_lattice_by_a_fit(plant: str, tmp_path: Path) -> None:
     """Noise of 5 %, drift of 2 % and tilt; both axes, their sizes, and the shear of the drift."""
     frame = old_frame(plant, **DRIFT)
-    scan, fit = by_fit(read_scan(*save_pair(frame, tmp_path), Choice()), Taken(), lattice_nm=60.0)
+    scan, fit = by_fit(read_scan(*save_pair(frame, tmp_path), Choice()), OldScan(), lattice_nm=60.0)
     assert fit.tells_y
     found = off(scan.distortion, frame)
     assert found.x < REACH_PERCENT
@@ -82,8 +82,8 @@ def test_512_pixels_of_a_window_and_a_fast_flyback(plant: str, tmp_path: Path) -
     shape = {"pixels": 512, "lines": 152, "turn": (0.5, 0.95), "window": (0.05, 0.95)}
     frame = old_frame(plant, **shape)
     images = read_scan(*save_pair(frame, tmp_path), Choice())
-    x = AxisTaken(size_v=V, offset_v=OFFSET_V, window=(0.05, 0.95))
-    taken = Taken(x=x, y=AxisTaken(turn=0.95), rate_hz=RATE_HZ)
+    x = OldAxis(size_v=V, offset_v=OFFSET_V, window=(0.05, 0.95))
+    taken = OldScan(x=x, y=OldAxis(turn=0.95), rate_hz=RATE_HZ)
     fitted, _ = by_fit(images, taken, lattice_nm=60.0)
     operator = by_scanner(images, scanner_file(plant, tmp_path), taken)
     for scan in (fitted, operator):
@@ -110,7 +110,7 @@ def test_the_laws_are_inverted_and_not_expanded(tmp_path: Path) -> None:
 @pytest.mark.common
 def test_a_trace_alone_by_a_fit(tmp_path: Path) -> None:
     frame = old_frame("bouc-wen", **DRIFT)
-    scan, fit = by_fit(read_scan(save_pair(frame, tmp_path)[0], None, Choice()), Taken(), lattice_nm=60.0)
+    scan, fit = by_fit(read_scan(save_pair(frame, tmp_path)[0], None, Choice()), OldScan(), lattice_nm=60.0)
     assert fit.tells_y
     assert scan.agreement is None
     both = replace(scan.distortion, backward=scan.distortion.forward)  # judged as if the retrace were another trace
@@ -122,7 +122,7 @@ def test_a_trace_alone_by_a_fit(tmp_path: Path) -> None:
 @pytest.mark.common
 def test_a_grating_tells_the_fast_axis_alone(tmp_path: Path) -> None:
     frame = old_frame("plays", surface=grating(50.0))
-    scan, fit = by_fit(read_scan(*save_pair(frame, tmp_path), Choice()), Taken(), pitch_nm=50.0)
+    scan, fit = by_fit(read_scan(*save_pair(frame, tmp_path), Choice()), OldScan(), pitch_nm=50.0)
     found = off(scan.distortion, frame)
     assert not fit.tells_y
     assert found.x < REACH_PERCENT
@@ -136,7 +136,7 @@ def test_a_wrong_drive_is_seen_without_the_truth(tmp_path: Path) -> None:
     """What trace against retrace is printed for: at half the drive they stay apart, where the noise is 17 %."""
     images, scanner = by_laws(tmp_path)
     right = by_scanner(images, scanner, TAKEN)
-    wrong = by_scanner(images, scanner, Taken(x=AxisTaken(size_v=45.0), rate_hz=RATE_HZ))
+    wrong = by_scanner(images, scanner, OldScan(x=OldAxis(size_v=45.0), rate_hz=RATE_HZ))
     assert right.agreement is not None
     assert wrong.agreement is not None
     assert right.agreement.difference[1] < 0.2
