@@ -4,6 +4,7 @@ from tablegen.correction.job import Images
 from tablegen.correction.straight import StraightScan
 
 _WORSE = 1.05  # times the distance before: the correction does not fit the image
+_OTHER = 1.4  # times the size of the file: another size
 _FEW_PERIODS = 8.0  # in the line
 _FAR = 1.0  # pixels of trace and retrace that stay apart
 
@@ -72,6 +73,9 @@ def _notes(found: StraightScan, images: Images) -> list[str]:
         notes.append(
             f"{first + last} rows were taken while the slow axis still went back after its turn; they are left out"
         )
+    said = _of_file(images)
+    if said is not None and found.size_nm is not None and not 1.0 / _OTHER < found.size_nm[0] / said[0] < _OTHER:
+        notes.append("the file has quite another size; is the drive that of this image?")
     periods = found.record.get("periods_in_the_line")
     if periods is not None and max(map(abs, periods)) < _FEW_PERIODS:
         notes.append("with so few periods the line is only as straight as its waves are told apart; image more of them")

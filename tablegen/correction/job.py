@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from tablegen.calibration.image_checks import check_heights, check_pair, check_size
 from tablegen.calibration.image_files import ScanImage, channels_of, read_channels, read_image
 from tablegen.compensation import models
 from tablegen.config.load import load, load_scanner
@@ -335,6 +336,8 @@ def by_fit(
             found = fit.of_pitch(pitch_nm or 0.0, aspect)
             record["pitch_nm"] = pitch_nm
         size = found.x_range[1] - found.x_range[0], found.y_range[1] - found.y_range[0]
+        if first.width_nm is not None:
+            check_size(size[0], first.width_nm, "the file")
     elif first.width_nm is not None and first.height_nm is not None:
         size = first.width_nm, first.height_nm
     record |= {
@@ -354,8 +357,8 @@ def check_order(images: Images, distortion: Distortion) -> None:
     """
     if len(images.judged) < 2:
         return
-    ways = [Resampler.of(distortion, way) for way in (True, False)]
     trace, retrace = (images.heights(i) for i in images.judged)
+    ways = [Resampler.of(distortion, way) for way in (True, False)]
 
     def left(one: Floats, other: Floats) -> float:
         return difference(ways[0](one), ways[1](other))
@@ -374,6 +377,11 @@ def check_order(images: Images, distortion: Distortion) -> None:
 
 
 def _made(images: Images, found: Distortion, size: tuple[float, float] | None, record: dict[str, Any]) -> StraightScan:
+    judged = [images.heights(i) for i in images.judged]
+    if len(judged) == 2:
+        check_pair(judged[0], judged[1])
+    else:
+        check_heights("image", judged[0])
     check_order(images, found)
     if images.left_out:
         record["left_out"] = list(images.left_out)

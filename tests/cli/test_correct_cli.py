@@ -205,6 +205,7 @@ def test_wrong_input_is_named_and_nothing_is_written(lab: Path) -> None:
     np.save(lab / "noise.npy", np.random.default_rng(0).standard_normal((96, 128)))
     np.save(lab / "other.npy", trace[:, ::2])
     np.save(lab / "flat.npy", np.ones((96, 128)))
+    np.save(lab / "clipped.npy", np.minimum(trace, np.percentile(trace, 80)))
     np.save(lab / "mirrored.npy", np.load(lab / "retrace.npy")[:, ::-1])
     (lab / "scan.toml").write_text('dac = 1\nname = "x"\n', "utf-8")
     before = sorted(lab.iterdir())
@@ -225,6 +226,9 @@ def test_wrong_input_is_named_and_nothing_is_written(lab: Path) -> None:
         (("noise.npy", "retrace.npy"), FIT, "no period stands out"),
         (("trace.npy", "retrace.npy"), (*FIT, "--channel", "Phase"), "has no channel 'Phase'"),
         (("trace.npy", "trace.npy"), FIT, "the same image"),
+        (("trace.npy", "trace.npy"), DRIVE, "the same image"),
+        (("clipped.npy", "retrace.npy"), DRIVE, "is saturated"),
+        (("clipped.npy", "retrace.npy"), FIT, "is saturated"),
         (("gone.npy",), DRIVE, "gone.npy"),
     ]
     for images, words, part in cases:

@@ -39,16 +39,19 @@ def test_every_option_of_the_page_is_one_and_those_of_the_drive_are_told() -> No
 
 
 def test_the_measured_numbers_are_within_reach() -> None:
-    """0.3 % of the width, half a pixel of 512; the tests of corrections make such numbers again."""
+    """0.3 % of the width is the aim, half a pixel of 512; the tests of corrections make such numbers again."""
     rows = [row.groups() for row in map(ROW.match, PAGE.splitlines()) if row]
     assert len(rows) == 12
+    readme = " ".join((REPOSITORY / "README.md").read_text("utf-8").split())
+    assert "falls from 4 to 7 % of the width to 0.2 % or less" in readme
     for _, how, *numbers, _, apart in rows:
         errors = [float(number) for number in numbers]
         if how == "as taken":
+            assert 3.5 < max(errors[:2]) < 7.5
             assert min(errors) > 2.0
             assert float(apart) > 50.0
         else:
-            assert max(errors) < 0.3
+            assert max(errors) <= 0.2
             assert float(apart) <= 0.5
 
 
