@@ -10,6 +10,7 @@ from math import hypot
 
 import numpy as np
 import numpy.typing as npt
+from scipy.ndimage import gaussian_filter1d
 
 from tablegen.calibration.image_fit import check_fit
 from tablegen.calibration.image_model import begin, grown, prepared
@@ -18,9 +19,12 @@ from tablegen.correction.distortion import Distortion, Sweep1D
 from tablegen.numerics.arrays import Bools, Floats
 from tablegen.problems import Unphysical
 
+Complexes = npt.NDArray[np.complex128]
 _MOST_BENDS = 20  # terms of what the branches leave, in each direction
 _LEAST_BENDS = 5
-_BENDS_A_PERIOD = 1.2  # terms; what is finer than a period passes for the shape of the sample
+_BENDS_A_PERIOD = 1.7  # terms; what is finer than a period passes for the shape of the sample
+_SAME_WAVE = 2.0  # periods in the line: nearer waves are not told apart by a line
+_AVERAGED = 0.45  # of a period against another wave: the standard deviation of a mean that leaves 2 % of it
 _ROW_BENDS = 20  # terms of what the polynomial in the rows leaves of a phase
 _FOLLOWING = 0.5  # of what a step of a phase differs from the one before
 _ROUNDS = 40
@@ -116,7 +120,8 @@ def _bent(model: PeriodicModel, state: FitState, free: Bools) -> tuple[PeriodicM
     q = float(model.q(state.parameters)[0])
     bends = _series(geometry.columns, int(np.clip(round(_BENDS_A_PERIOD * q), _LEAST_BENDS, _MOST_BENDS)))
     row_bends = _series(geometry.rows, _ROW_BENDS)
-    phases = np.stack([_followed(wave) for wave in model.row_waves(state)])
+    waves = model.row_waves(state)
+    phases = np.stack([_followed(_without_others(model, state, base, wave)) for base, wave in enumerate(waves)])
     model = model.with_offsets(model.off, _less_line(phases @ np.linalg.pinv(row_bends) @ row_bends))
     state = settle(model, state.parameters, free)
     change = np.inf
@@ -182,7 +187,21 @@ def _more_phase(basis: Floats, left: tuple[Floats, ...], slopes: list[Floats]) -
     return _less_line(np.linalg.solve(normal, aim).reshape(bases, count) @ basis)
 
 
-def _followed(wave: npt.NDArray[np.complex128]) -> Floats:
+def _without_others(model: PeriodicModel, state: FitState, base: int, wave: Complexes) -> Complexes:
+    """A base vector's wave in the rows, averaged over so many that other waves of as many periods in the line vanish."""
+    q, s = model.q(state.parameters), model.s(state.parameters)[:, 0]
+    nearest = np.inf
+    for spot in (*model.spots, *-model.spots):
+        beside, ahead = float(spot @ q - q[base]), float(spot @ s - s[base])
+        if abs(beside) < _SAME_WAVE and abs(ahead) > _SAME_WAVE:
+            nearest = min(nearest, abs(ahead))
+    width = _AVERAGED * model.geometry.rows / nearest
+    if width < 0.1:
+        return wave
+    return np.asarray(gaussian_filter1d(wave.real, width) + 1j * gaussian_filter1d(wave.imag, width))
+
+
+def _followed(wave: Complexes) -> Floats:
     """The phase of each row in periods, followed from the middle outwards: each step is near the one before."""
     seen = np.angle(wave) / (2.0 * np.pi)
     out = seen.copy()
