@@ -66,7 +66,7 @@ class Hysteresis(Parameters, frozen=True, tag_field="model"):
         raise NotImplementedError(type(self))
 
     def loop(self, wanted: WantedLine, low: float, high: float) -> tuple[Loop, LogarithmicCreep] | None:
-        """What a settled drive between two shares of v_max does, and the creep behind it.
+        """What a settled drive between two shares of v_max does, and the creep behind it; its mean is the offset.
 
         The loop is ``wanted.size_nm`` long. None where ``wanted.problems`` grew. By default it is that of the line's
         sweeps, without creep.

@@ -188,7 +188,7 @@ def _more_phase(basis: Floats, left: tuple[Floats, ...], slopes: list[Floats]) -
 
 
 def _without_others(model: PeriodicModel, state: FitState, base: int, wave: Complexes) -> Complexes:
-    """A base vector's wave in the rows, averaged over so many that other waves of as many periods in the line vanish."""
+    """A base vector's wave in the rows, averaged over so many that waves of as many periods in the line vanish."""
     q, s = model.q(state.parameters), model.s(state.parameters)[:, 0]
     nearest = np.inf
     for spot in (*model.spots, *-model.spots):

@@ -100,7 +100,7 @@ class ScannerModel:
                 response = dynamics_of(its.resonance, self.folder)
         problems.stop_if_any()
         assert size_law is not None
-        amplitude, offset_v = (high - low) / v_max, 0.5 * (low + high)
+        amplitude, offset_v = (high - low) / v_max, float(np.mean(drive))
         share = _scan_share(surface, normalised_offset(offset_v, v_max), gain, amplitude)
         hysteresis = models.get(models.UNCOMPENSATED)() if its.hysteresis is None else its.hysteresis
         wanted = WantedLine(

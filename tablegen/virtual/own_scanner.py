@@ -67,7 +67,7 @@ class OwnAxis:
         Raises ``Unphysical`` where a departing branch would run backwards.
         """
         u = volts / self.v_max
-        loop = self.operator.loop(float(np.min(u)), float(np.max(u)), self.factor)
+        loop = self.operator.loop(float(np.min(u)), float(np.max(u)), self.factor, float(np.mean(u)))
         rate_hz = 1.0 / (len(u) * tick_s)
         return settled(loop, u, rate_hz, self.operator.creep, self.response, self.harmonics)
 

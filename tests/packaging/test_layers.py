@@ -30,6 +30,7 @@ LAYERS = (
     "refinement",
     "virtual",
     "correction",
+    "report",
     "api",
     "cli",
     "__main__",
