@@ -29,7 +29,7 @@ _ROW_BENDS = 20  # terms of what the polynomial in the rows leaves of a phase
 _FOLLOWING = 0.5  # of what a step of a phase differs from the one before
 _ROUNDS = 40
 _SETTLED = 1e-4  # of the line and of the frame: the largest change in a round
-_STIFFNESS = 1e-9  # of the penalty on n^4, against the mean square of what a term does
+_STIFFNESS = 1e-6  # of the penalty on n^4, against the mean square of what a term does
 _MOST_BENT_LATTICE = 0.5  # by how much a frame may be higher than wide, or sheared, in all
 _LEAST_ANGLE = 0.2  # sine of the angle between two waves that tell y from x
 
@@ -122,16 +122,19 @@ def _bent(model: PeriodicModel, state: FitState, free: Bools) -> tuple[PeriodicM
     row_bends = _series(geometry.rows, _ROW_BENDS)
     waves = model.row_waves(state)
     phases = np.stack([_followed(_without_others(model, state, base, wave)) for base, wave in enumerate(waves)])
-    model = model.with_offsets(model.off, _less_line(phases @ np.linalg.pinv(row_bends) @ row_bends))
+    along = phases @ np.linalg.pinv(row_bends)  # coefficients of all that is added, for what keeps it smooth
+    across = [np.zeros(len(bends)) for _ in model.images]
+    model = model.with_offsets(model.off, _less_line(along @ row_bends))
     state = settle(model, state.parameters, free)
     change = np.inf
     for _ in range(_ROUNDS):
-        bent: list[Floats] = [
-            _more_x(bends, left, steep) for left, steep in zip(state.left, state.steepness, strict=True)
-        ]
-        more = _without_line(bent, [model.columns(state.parameters, way).x for way, _ in model.images])
-        off = [one + by for one, by in zip(model.off, [*more, np.zeros_like(more[0])], strict=False)]
-        rows = _more_phase(row_bends, state.left, model.phase_slopes(state))
+        by = [_more_x(bends, *one) for one in zip(state.left, state.steepness, across, strict=True)]
+        across = [one + step for one, step in zip(across, by, strict=True)]
+        more = _without_line([step @ bends for step in by], [model.columns(state.parameters, way).x for way, _ in model.images])
+        off = [one + step for one, step in zip(model.off, [*more, np.zeros_like(more[0])], strict=False)]
+        ahead = _more_phase(row_bends, state.left, model.phase_slopes(state), along)
+        along = along + ahead
+        rows = _less_line(ahead @ row_bends)
         change = max(float(np.max(np.abs(one))) for one in (*more, rows / q))
         model = model.with_offsets((off[0], off[1]), model.row_off + rows)
         state = settle(model, state.parameters, free)
@@ -157,12 +160,12 @@ def _penalty(terms: int, normal: Floats) -> Floats:
     return found
 
 
-def _more_x(basis: Floats, left: Floats, steep: Floats) -> Floats:
-    """By how much x of each column is to be more, by least squares over all rows."""
+def _more_x(basis: Floats, left: Floats, steep: Floats, known: Floats) -> Floats:
+    """By how much more of each term x of the columns is to have than ``known``, by least squares over all rows."""
     weight, aim = np.sum(steep**2, axis=0), np.sum(steep * left, axis=0)
     normal = (basis * weight) @ basis.T
-    normal += np.diag(_penalty(len(basis), normal))
-    found: Floats = np.linalg.solve(normal, basis @ aim) @ basis
+    penalty = _penalty(len(basis), normal)
+    found: Floats = np.linalg.solve(normal + np.diag(penalty), basis @ aim - penalty * known)
     return found
 
 
@@ -172,8 +175,8 @@ def _without_line(more: list[Floats], places: list[Floats]) -> list[Floats]:
     return [np.asarray(one - np.polyval(line, x), np.float64) for one, x in zip(more, places, strict=True)]
 
 
-def _more_phase(basis: Floats, left: tuple[Floats, ...], slopes: list[Floats]) -> Floats:
-    """By how much the phase of each base vector is to be more in each row, less a line: (bases, rows)."""
+def _more_phase(basis: Floats, left: tuple[Floats, ...], slopes: list[Floats], known: Floats) -> Floats:
+    """The same of the phase of each base vector along the rows: (bases, terms)."""
     count, bases = len(basis), len(slopes[0])
     normal, aim = np.zeros((bases * count, bases * count)), np.zeros(bases * count)
     for image, slope in zip(left, slopes, strict=True):
@@ -183,8 +186,9 @@ def _more_phase(basis: Floats, left: tuple[Floats, ...], slopes: list[Floats]) -
             for j in range(bases):
                 weight = np.sum(slope[i] * slope[j], axis=1)
                 normal[part, j * count : (j + 1) * count] += (basis * weight) @ basis.T
-    normal += np.diag(np.tile(_penalty(count, normal), bases))
-    return _less_line(np.linalg.solve(normal, aim).reshape(bases, count) @ basis)
+    penalty = np.tile(_penalty(count, normal), bases)
+    found = np.linalg.solve(normal + np.diag(penalty), aim - penalty * known.ravel())
+    return np.asarray(found.reshape(bases, count), dtype=np.float64)
 
 
 def _without_others(model: PeriodicModel, state: FitState, base: int, wave: Complexes) -> Complexes:
