@@ -27,6 +27,11 @@ class LineErrors:
     size: float
     sides: Floats | None = field(default=None, compare=False, repr=False)
 
+    @property
+    def figures(self) -> tuple[float, float, float, float]:
+        """The four numbers in their order."""
+        return self.rms, self.scaling, self.mismatch, self.size
+
 
 WORST = LineErrors(100.0, 100.0, 100.0, 100.0)  # of a loop that cannot be
 

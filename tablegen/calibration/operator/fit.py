@@ -1,7 +1,7 @@
 """Settled lines -> the operator: family, creep, residual and size, by what each predicts of a line left out."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import astuple, dataclass, replace
+from dataclasses import dataclass, replace
 from itertools import combinations, product
 
 import numpy as np
@@ -170,7 +170,7 @@ def _fit_family(name: str, lines: Sequence[PeriodicLine], main: float, factor: F
     operator, rows, sizes = whole.operator(lengths, factor)
     inside = tuple(_errors(line, operator, factor) for line in whole.settled)
     measured = tuple(
-        MeasuredLine(line.name, line.stroke, line.centre, line.rate_hz, astuple(errors), astuple(left))
+        MeasuredLine(line.name, line.stroke, line.centre, line.rate_hz, errors.figures, left.figures)
         for line, errors, left in zip(lines, out, inside, strict=True)
     )
     operator = replace(operator, lines=measured)
