@@ -63,13 +63,14 @@ def _mean_of_columns(values: Floats) -> Floats:
 def difference(one: Floats, other: Floats) -> float:
     """The rms of the difference of two images over that of both, each line less its mean; where both are no NaN."""
     both: Bools = np.isfinite(one) & np.isfinite(other)
-    first, second = (_levelled(image, both) for image in (one, other))
+    first, second = (levelled(np.where(both, image, np.nan)) for image in (one, other))
     power = float(np.sum(first**2) + np.sum(second**2))
     return sqrt(float(np.sum((first - second) ** 2)) / power) if power > 0.0 else 0.0
 
 
-def _levelled(image: Floats, seen: Bools) -> Floats:
-    """Each line less its mean, where it is seen; 0 elsewhere."""
+def levelled(image: Floats) -> Floats:
+    """Each line less its mean; 0 where nothing was imaged, which is NaN."""
+    seen = np.isfinite(image)
     count = np.maximum(np.sum(seen, axis=1, keepdims=True), 1)
     mean = np.sum(np.where(seen, image, 0.0), axis=1, keepdims=True) / count
     return np.where(seen, image - mean, 0.0)

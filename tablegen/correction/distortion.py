@@ -16,7 +16,9 @@ from tablegen.numerics.arrays import Bools, Floats
 from tablegen.problems import Unphysical
 
 _ORDER = 3  # of the splines
-_HALF = 0.5  # of a pixel: a pixel shows the sample so far from its middle
+_MARGIN = 12  # pixels: what is further away does not matter to a spline
+_HALF = 0.5  # of a pixel: it is so far from its middle to its edge
+_ROUNDING = 1e-6  # of a pixel
 _OUTER = 0.25  # of a sweep at either end, where an axis may still go back
 _FINEST = 0.02  # of the mean step: below it two pixels are at one place
 
@@ -101,7 +103,7 @@ class Distortion:
     def sources(self, forward: bool) -> tuple[Floats, Floats, Bools]:
         """For each pixel of the straight image the row and the column that it comes from, and which are in the image.
 
-        Shapes (rows, columns). Beyond the outer pixels' middles coordinates stay on these, for half a pixel.
+        Shapes (rows, columns). Nothing is taken from beyond the middles of the outer pixels.
         """
         side = self.side(forward)
         x, y = self.grid
@@ -112,8 +114,10 @@ class Distortion:
         column = _inverted(side.x, x[None, :] - drift[:, None])
         time = np.interp(column, np.arange(self.columns), side.time)
         row = at[:, None] - _HALF - self.lag * (time - _HALF)
-        inside = (row >= -_HALF) & (row <= self.rows - _HALF) & (column >= -_HALF) & (column <= self.columns - _HALF)
-        return np.clip(row, 0.0, self.rows - 1.0), np.clip(column, 0.0, self.columns - 1.0), inside
+        last_row, last_column = self.rows - 1.0, self.columns - 1.0
+        inside = (row >= -_ROUNDING) & (row <= last_row + _ROUNDING)
+        inside &= (column >= -_ROUNDING) & (column <= last_column + _ROUNDING)
+        return np.clip(row, 0.0, last_row), np.clip(column, 0.0, last_column), inside
 
     def moved(self, forward: bool) -> tuple[Floats, Floats]:
         """By how many pixels of the straight image its parts were displaced in the taken one, in x and y; NaN outside.
@@ -140,9 +144,13 @@ class Resampler:
         return cls(*distortion.sources(forward))
 
     def __call__(self, image: Floats) -> Floats:
-        """The straight image, rows x columns; NaN where nothing was imaged. Cubic splines, used once."""
-        at = np.stack([self.row, self.column])
-        found: Floats = map_coordinates(image, at, order=_ORDER, mode="mirror")
+        """The straight image, rows x columns; NaN where nothing was imaged. Cubic splines, used once.
+
+        They end as the image goes on if it is turned about its outer pixels: a slope is no edge then.
+        """
+        wide = np.pad(image, _MARGIN, mode="reflect", reflect_type="odd")
+        at = np.stack([self.row, self.column]) + _MARGIN
+        found: Floats = map_coordinates(wide, at, order=_ORDER, mode="mirror")
         return np.where(self.inside, found, np.nan)
 
 

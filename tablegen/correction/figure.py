@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
+from tablegen.correction.agreement import levelled
 from tablegen.correction.straight import Picture, StraightScan
 from tablegen.numerics.arrays import Floats, Ints
 
@@ -150,7 +151,7 @@ def _apart(panel: Any, scan: StraightScan) -> None:
 
 
 def _levelled(heights: Floats) -> Floats:
-    return np.asarray(heights - np.nanmedian(heights, axis=1, keepdims=True), dtype=np.float64)
+    return np.where(np.isfinite(heights), levelled(heights), np.nan)
 
 
 def _upright(values: Floats, bottom_first: bool) -> Floats:

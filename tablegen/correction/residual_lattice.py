@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
+from tablegen.correction.agreement import levelled
 from tablegen.numerics.arrays import Bools, Floats
 
 _LEAST_PERIODS = 4.0  # in the picture, of a wave that is followed
@@ -40,8 +41,7 @@ def residual_lattice(image: Floats) -> ResidualLattice | None:
     The lattice is the one that fits best: its constants, angles and turn are not judged.
     """
     seen = np.isfinite(image)
-    middle = np.nanmedian(image, axis=1, keepdims=True)
-    flat = np.where(seen, image - np.where(np.isfinite(middle), middle, 0.0), 0.0)
+    flat = levelled(image)
     waves = _strongest(flat)
     if not waves:
         return None
