@@ -12,7 +12,7 @@ from tablegen.numerics.arrays import Bools, Floats, Ints
 from tablegen.problems import Unphysical
 
 _MIN_PIXELS = 32  # along and across
-_ROW_POLYNOMIAL_ORDER = 3  # order of the polynomial over rows: drift, and hysteresis of the slow axis
+ROW_POLYNOMIAL_ORDER = 3  # order of the polynomial over rows: drift, and hysteresis of the slow axis
 _MAX_SPOTS = 14
 _MAX_SPOT_INDEX = {1: 12, 2: 3}  # largest index of a spot, by number of bases
 _MIN_SPOT_ERRORS = 6.0  # standard errors of an amplitude
@@ -103,13 +103,13 @@ def check_signs(forward: float, backward: float, least: float, advice: str) -> N
 def grown(
     geometry: Geometry, heights: list[Floats], spot: Spot, bends: tuple[Bend, Bend]
 ) -> tuple[PeriodicModel, FitState, Bools]:
-    """The fit, first of the strongest spot, then with another base vector if there is one, and all spots seen."""
+    """The fit, first of the strongest spot, then of all."""
     images = list(zip((True, False), heights, strict=True))
-    start = np.zeros(BASES + 1 + _ROW_POLYNOMIAL_ORDER)
+    start = np.zeros(BASES + 1 + ROW_POLYNOMIAL_ORDER)
     start[:4] = np.concatenate([bend.shape.coordinates for bend in bends])
     start[LAG] = 1.0
     start[BASES] = 0.5 * (bends[0].q + bends[1].q)
-    start[BASES + 1 :] = row_polynomial(geometry, heights[0], bends[0], spot, _ROW_POLYNOMIAL_ORDER)
+    start[BASES + 1 :] = row_polynomial(geometry, heights[0], bends[0], spot, ROW_POLYNOMIAL_ORDER)
     free = np.ones(len(start), bool)
     free[LAG] = False
     nowhere = np.zeros(geometry.columns)
@@ -121,9 +121,16 @@ def grown(
             alone = free.copy()
             alone[[2, 3] if i == 0 else [0, 1]] = False
             start[:4] = settle(
-                PeriodicModel(geometry, [images[i]], [(1,)], _ROW_POLYNOMIAL_ORDER, off), start, alone
+                PeriodicModel(geometry, [images[i]], [(1,)], ROW_POLYNOMIAL_ORDER, off), start, alone
             ).parameters[:4]
-    model = PeriodicModel(geometry, images, [(1,)], _ROW_POLYNOMIAL_ORDER, off)
+    return described(geometry, images, start, free, off)
+
+
+def described(
+    geometry: Geometry, images: list[tuple[bool, Floats]], start: Floats, free: Bools, off: tuple[Floats, Floats]
+) -> tuple[PeriodicModel, FitState, Bools]:
+    """The fit from parameters of one base vector: with another one if there is one, and all spots seen."""
+    model = PeriodicModel(geometry, images, [(1,)], ROW_POLYNOMIAL_ORDER, off)
     state = settle(model, start, free)
     model = _with_spots(model, state)
     state = settle(model, state.parameters, free)
@@ -133,14 +140,14 @@ def grown(
         state.parameters[:2],
         _multiples(model, state.parameters),
         float(np.max(np.abs(state.amplitudes))),
-        _ROW_POLYNOMIAL_ORDER,
+        ROW_POLYNOMIAL_ORDER,
     )
     if other is not None:
         found, polynomial = other
         start = np.concatenate([state.parameters, [found.q], polynomial])
-        free = np.append(free, np.ones(1 + _ROW_POLYNOMIAL_ORDER, bool))
+        free = np.append(free, np.ones(1 + ROW_POLYNOMIAL_ORDER, bool))
         pairs = [(*spot, 0) for spot in model.spots.tolist()]
-        model = PeriodicModel(geometry, images, [*pairs, (0, 1)], _ROW_POLYNOMIAL_ORDER, off)
+        model = PeriodicModel(geometry, images, [*pairs, (0, 1)], ROW_POLYNOMIAL_ORDER, off)
         state = settle(model, start, free)
         free = free.copy()
         free[LAG] = True  # two directions tell a shift in y from one in x

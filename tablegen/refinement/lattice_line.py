@@ -1,0 +1,78 @@
+"""Trace and retrace of a periodic sample, taken of the running scan -> the line that was reached, with its errors."""
+
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from tablegen.calibration.image_model import prepared
+from tablegen.calibration.periodic import Geometry
+from tablegen.numerics.arrays import Floats
+from tablegen.planning.line_plan import Plan
+from tablegen.problems import Unphysical
+from tablegen.refinement.departure import asked_position
+from tablegen.refinement.free_rows import ColumnModes, FreeRows, FreeRowsFit, FreeRowsState
+from tablegen.refinement.image_line import ImageLine, error_modes, mode_degrees
+from tablegen.refinement.lattice_start import START_DEGREE, lattice_start
+
+_DEGREES_A_PERIOD = 1.5  # of a grating, which tells the position where its bars have edges
+_MOST_DEGREES = 24  # harmonic 16 makes some six periods in a window
+_LEAST_DEGREES = 4
+
+
+@dataclass(frozen=True)
+class ImageOptions:
+    """How images were stored; see ``docs/refine.md``."""
+
+    retrace_mirrored: bool = False
+    delay_pixels: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class LatticeLine:
+    """What a pair of images says of x: the line, and the fit it rests on."""
+
+    geometry: Geometry
+    model: FreeRows
+    fit: FreeRowsFit
+    line: ImageLine
+    apart: float
+
+
+def lattice_line(plan: Plan, trace: Floats, retrace: Floats, options: ImageOptions) -> LatticeLine:
+    """x from heights, rows x columns, rows in the order of time, left on the left. Raises ``Unphysical``."""
+    line = plan.x
+    turn, window = line.drive.turn, line.band_limit.window
+    if options.retrace_mirrored:
+        retrace = np.ascontiguousarray(retrace[:, ::-1])
+    geometry, heights = prepared(trace, retrace, turn, window, options.delay_pixels)
+    moves = plan.y.program.hold == 1
+    modes = column_modes(plan, geometry, START_DEGREE)
+    advice = "leave --retrace-mirrored out" if options.retrace_mirrored else "it needs --retrace-mirrored"
+    start = lattice_start(geometry, heights, modes, moves, advice)
+    waves = len(start.state.q)
+    span = (window[1] - window[0]) * float(np.max(np.abs(start.state.q)))
+    degree = _MOST_DEGREES if waves > 1 else int(np.clip(_DEGREES_A_PERIOD * span, _LEAST_DEGREES, _MOST_DEGREES))
+    few, many = (mode_degrees(n, True) for n in (START_DEGREE, degree))
+    finer = column_modes(plan, geometry, degree)
+    error = np.linalg.lstsq(finer.values.T, modes.values.T @ start.state.modes, rcond=None)[0]
+    model = FreeRows(geometry, heights, start.spots, finer, moves)
+    fit = model.fit(replace(start.state, modes=error))
+    count = len(finer.values)
+    asked = partial(asked_position, line)
+    found = ImageLine(
+        asked, line.drive.size_nm, turn, window, degree, True, fit.state.modes, fit.covariance[:count, :count]
+    )
+    return LatticeLine(geometry, model, fit, found, start.apart)
+
+
+def column_modes(plan: Plan, geometry: Geometry, degree: int) -> ColumnModes:
+    """At the middle of every column, trace then retrace."""
+    line = plan.x
+    turn = line.drive.turn
+    forward = np.repeat([True, False], geometry.columns)
+    sweep = np.concatenate([geometry.sweep(True), geometry.sweep(False)])
+    times = np.where(forward, turn * sweep, turn + (1.0 - turn) * sweep)
+    place = np.where(forward, sweep, 1.0 - sweep)
+    values = error_modes(place, forward, line.band_limit.window, degree, True)
+    return ColumnModes(values, asked_position(line, times), times - 0.5)
