@@ -1,5 +1,6 @@
 """Trace and retrace of a periodic sample, taken of the running scan -> the line that was reached, with its errors."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -9,9 +10,8 @@ from tablegen.calibration.image_model import prepared
 from tablegen.calibration.periodic import Geometry
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import Plan
-from tablegen.problems import Unphysical
 from tablegen.refinement.departure import asked_position
-from tablegen.refinement.free_rows import ColumnModes, FreeRows, FreeRowsFit, FreeRowsState
+from tablegen.refinement.free_rows import ColumnModes, FreeRows, FreeRowsFit
 from tablegen.refinement.image_line import ImageLine, error_modes, mode_degrees
 from tablegen.refinement.lattice_start import START_DEGREE, lattice_start
 
@@ -53,7 +53,6 @@ def lattice_line(plan: Plan, trace: Floats, retrace: Floats, options: ImageOptio
     waves = len(start.state.q)
     span = (window[1] - window[0]) * float(np.max(np.abs(start.state.q)))
     degree = _MOST_DEGREES if waves > 1 else int(np.clip(_DEGREES_A_PERIOD * span, _LEAST_DEGREES, _MOST_DEGREES))
-    few, many = (mode_degrees(n, True) for n in (START_DEGREE, degree))
     finer = column_modes(plan, geometry, degree)
     error = np.linalg.lstsq(finer.values.T, modes.values.T @ start.state.modes, rcond=None)[0]
     model = FreeRows(geometry, heights, start.spots, finer, moves)
@@ -64,6 +63,25 @@ def lattice_line(plan: Plan, trace: Floats, retrace: Floats, options: ImageOptio
         asked, line.drive.size_nm, turn, window, degree, True, fit.state.modes, fit.covariance[:count, :count]
     )
     return LatticeLine(geometry, model, fit, found, start.apart)
+
+
+def averaged(frames: Sequence[LatticeLine]) -> ImageLine:
+    """x over all frames, of which each has its own noise."""
+    lines = [frame.line for frame in frames]
+    degree = min(line.degree for line in lines)
+    kept = [[i for i, d in enumerate(mode_degrees(line.degree, line.both)) if d <= degree] for line in lines]
+    count = len(lines)
+    return (
+        replace(
+            lines[0],
+            degree=degree,
+            coefficients=sum(line.coefficients[i] for line, i in zip(lines, kept, strict=True)) / count,
+            line_covariance=sum(line.line_covariance[np.ix_(i, i)] for line, i in zip(lines, kept, strict=True))
+            / count**2,
+        )
+        if count > 1
+        else lines[0]
+    )
 
 
 def column_modes(plan: Plan, geometry: Geometry, degree: int) -> ColumnModes:

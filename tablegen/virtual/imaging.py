@@ -112,13 +112,15 @@ class Conditions:
 
     ``noise`` is rms, of the heights' peak to peak. ``drift`` along x and y is a share of what the frame shows, over the
     frame, faster as it goes on. ``tilt`` along x and y is the rise of a plane over the frame, of the heights' peak to
-    peak. Columns show the sample ``late`` pixels late, as of a feedback.
+    peak. Columns show the sample ``late`` pixels late, as of a feedback. ``frame`` counts frames, from 0: drift goes on
+    from one to the next.
     """
 
     noise: float = 0.05
     drift: tuple[float, float] = (0.0, 0.0)
     tilt: tuple[float, float] = (0.0, 0.0)
     late: float = 0.0
+    frame: int = 0
     seed: int = 0
 
 
@@ -228,7 +230,7 @@ def _frame(
         seen = column.times - conditions.late * column.lasts
         frame = (numbers[:, None] + column.times) / lines
         x, y = np.broadcast_arrays(positions[0](seen % 1.0), positions[1](frame % 1.0))
-        gone = (frame - frame[0, 0]) / (len(numbers) / lines)
+        gone = (frame - numbers[0] / lines + conditions.frame) / (len(numbers) / lines)
         drift = [share * float(np.ptp(moved)) * gone**2 for share, moved in zip(conditions.drift, (x, y), strict=True)]
         heights = surface(x + drift[0], y + drift[1])
         contrast = float(np.ptp(heights))

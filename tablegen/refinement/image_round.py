@@ -1,0 +1,140 @@
+"""A round from images of the running scan to what goes into the scan file, and whether it should."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from tablegen.config.load import Setup
+from tablegen.numerics.arrays import Floats
+from tablegen.planning.line_plan import LinePlan, Plan, make_plan
+from tablegen.problems import Unphysical
+from tablegen.refinement.image_line import ImageLine
+from tablegen.refinement.lattice_line import ImageOptions, LatticeLine, averaged, lattice_line
+from tablegen.refinement.learning import Lesson, learn
+from tablegen.refinement.round import Options, Round, allowed, finished, why_worse, with_lesson
+from tablegen.refinement.slow_line import slow_line
+
+_MIN_EXPLAINED = 0.03  # share of the variance of an image
+_LITTLE_EXPLAINED = 0.5
+_SURE_LAG = 0.2  # standard error with which the order of time is told
+_FAR_APART = 0.4  # periods
+_MIN_PIXELS_PER_PERIOD = 4.0
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ImageRound(Round):
+    """What trace and retrace say."""
+
+    frames: tuple[LatticeLine, ...]
+    measured: ImageLine
+
+    @property
+    def periods(self) -> float:
+        """In the whole line of x, of the wave that has most."""
+        return float(np.max(np.abs(self.frames[0].fit.state.q)))
+
+
+def refine_images(
+    setup: Setup,
+    axis: Literal["x", "y"],
+    pairs: Sequence[tuple[Floats, Floats]],
+    options: Options,
+    images: ImageOptions | None = None,
+) -> ImageRound:
+    """Learn from heights in any unit, rows x columns, of a grating or a lattice that the running scan images.
+
+    ``pairs`` are trace and retrace of frames that follow each other, one or more. Rows are in the order of time,
+    columns those of the scan's imaging window. Raises ``Rejected`` where the scan, or
+    the scan with the new layer, cannot be planned, and ``Unphysical`` for images that are not of this scan, or that
+    bounds forbid.
+    """
+    plan = make_plan(setup)
+    line: LinePlan = getattr(plan, axis)
+    limits = allowed(line, options)
+    frames = tuple(_frame(plan, trace, retrace, images or ImageOptions()) for trace, retrace in pairs)
+    measured = averaged(frames) if axis == "x" else slow_line(plan, frames)
+    lesson = learn(line, measured, options.gain, limits.used)
+    refinement, changed = with_lesson(setup, line, lesson)
+    return ImageRound(
+        line=line,
+        bound=limits,
+        lesson=lesson,
+        refinement=refinement,
+        setup=changed,
+        worse=why_worse(setup, axis, lesson),
+        remarks=_remarks(line, frames, lesson),
+        frames=frames,
+        measured=measured,
+    )
+
+
+def _frame(plan: Plan, trace: Floats, retrace: Floats, images: ImageOptions) -> LatticeLine:
+    _check_shape(plan, trace)
+    found = lattice_line(plan, trace, retrace, images)
+    _check(found)
+    return found
+
+
+def _check_shape(plan: Plan, trace: Floats) -> None:
+    """A column is a pixel of the imaging window."""
+    if plan.x.band_limit.directions != "both":
+        raise Unphysical("this scan images forward only; a retrace image says nothing of it: image both directions")
+    columns, pixels = trace.shape[-1], plan.schedule.pixels
+    if columns != pixels:
+        raise Unphysical(
+            f"the images have {columns} columns, and this scan {pixels} pixels over its imaging window; do not crop or "
+            f"resample them, or set timing.pixels to what your instrument takes over that window"
+        )
+
+
+def _check(seen: LatticeLine) -> None:
+    fit = seen.fit
+    least = min(fit.explained)
+    if least < _MIN_EXPLAINED:
+        name = "trace" if fit.explained[0] < fit.explained[1] else "retrace"
+        raise Unphysical(
+            f"{100.0 * max(least, 0.0):.0f} % of the {name}'s contrast is a periodic sample; the rest is something "
+            f"else, or trace and retrace are not of one scan"
+        )
+    lag, error = fit.lag
+    if len(fit.state.q) > 1 and seen.model.moves and error < _SURE_LAG and lag < 0.0:
+        raise Unphysical(
+            "the sample turns from trace to retrace against the order of time: the images are exchanged, or both "
+            "mirrored, or their rows upside down"
+        )
+
+
+def _remarks(line: LinePlan, frames: Sequence[LatticeLine], lesson: Lesson) -> tuple[str, ...]:
+    found = [text for frame in frames[:1] for text in _remarks_of(frame)]
+    if lesson.harmonics == 0:
+        found.append("the error is within the noise of the images: there is nothing more to learn from them")
+    elif finished(lesson):
+        found.append("most of the remaining error is noise: give several frames, or stop refining")
+    if line.axis == "y" and len(frames) == 1:
+        found.append(
+            "a drift that becomes faster or slower counts as an error of y; give two frames that follow each other, "
+            "which tell it"
+        )
+    found.append("images do not show that the build of this scan file was running")
+    return tuple(found)
+
+
+def _remarks_of(seen: LatticeLine) -> list[str]:
+    found, fit, geometry = [], seen.fit, seen.geometry
+    explained = min(fit.explained)
+    if explained < _LITTLE_EXPLAINED:
+        found.append(f"{100.0 * explained:.0f} % of the contrast is periodic, the rest noise, debris or defects")
+    span = (geometry.window[1] - geometry.window[0]) * float(np.max(np.abs(fit.state.q)))
+    if geometry.columns / span < _MIN_PIXELS_PER_PERIOD:
+        found.append(f"the shortest period has {geometry.columns / span:.2g} pixels; scan less, or take more pixels")
+    if seen.apart > _FAR_APART:
+        found.append(
+            f"trace and retrace are {seen.apart:.2g} periods apart, and beyond half a period they would be taken for "
+            f"the next one; calibrate first, or take a sample of a longer period"
+        )
+    if fit.loud:
+        shown = ", ".join(str(i + 1) for i in fit.loud[:5]) + (", ..." if len(fit.loud) > 5 else "")
+        found.append(f"{len(fit.loud)} rows differ from the others (row {shown}); they counted less")
+    return found
