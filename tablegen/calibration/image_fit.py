@@ -8,16 +8,15 @@ from scipy.special import chdtrc
 
 from tablegen.calibration.branch import BINS, WINDOW, AmplitudeFit, measured_branch
 from tablegen.calibration.estimate import Curve, Estimate
+from tablegen.calibration.image_checks import MIN_PERIODS
+from tablegen.calibration.image_errors import LeftInBins, covariance, loud_rows, pixel_noise
 from tablegen.calibration.image_model import begin, check_signs, grown, prepared
 from tablegen.calibration.periodic import FitState, PeriodicModel
-from tablegen.calibration.spots import MIN_PERIODS
-from tablegen.calibration.trace import correlation_length
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.numerics.arrays import Bools, Floats
 from tablegen.problems import Unphysical
 
 _MIN_EXPLAINED_VARIANCE = 0.03  # share of the variance
-_ARITHMETIC_ERROR = 1e-7  # share of the line that rounding may leave
 _MAX_MISFIT_PERCENT = 3.0  # percent of the line that the model may leave
 _MAX_SHAPE_ERROR = 0.05  # largest standard error of the first coordinate of a branch
 _MISFIT_SIGNIFICANCE = 1e-3  # probability that noise alone is taken for misfit
@@ -95,7 +94,7 @@ def _both(model: PeriodicModel, state: FitState) -> list[tuple[tuple[bool, Float
 
 def _result(model: PeriodicModel, state: FitState, free: Bools, v_scan: float) -> ImageFit:
     geometry, x = model.geometry, state.parameters
-    noise = _noise(state)
+    noise = pixel_noise(state)
     residual, scaling, curves, misfit, clean = _positions(model, state)
     worst = float(np.max(np.abs(residual)))
     if worst > _MAX_MISFIT_PERCENT:
@@ -103,10 +102,11 @@ def _result(model: PeriodicModel, state: FitState, free: Bools, v_scan: float) -
             f"no branches of the harmonic model join these images: up to {worst:.2g} % of the line is left; are trace "
             f"and retrace of one scan, --window and --turn right, and the drive a triangle?"
         )
-    covariance, widened = _covariance(model, state, free, misfit, clean)
-    if float(np.sqrt(np.max(np.diag(covariance)[[0, 2]]))) > _MAX_SHAPE_ERROR:
+    shapes = np.arange(len(free)) < 4
+    found, widened = covariance(model, state, free, shapes, misfit, clean)
+    if float(np.sqrt(np.max(np.diag(found)[[0, 2]]))) > _MAX_SHAPE_ERROR:
         raise Unphysical("these images do not determine the shape of the branches; scan more periods, or average")
-    forward, backward = (measured_branch(x[i : i + 2], covariance[i : i + 2, i : i + 2]) for i in (0, 2))
+    forward, backward = (measured_branch(x[i : i + 2], found[i : i + 2, i : i + 2]) for i in (0, 2))
     line = np.linspace(0.0, 1.0, 201)
     lagging = [BranchShape.at(x[i : i + 2]) for i in (0, 2)]
     apart = lagging[0].value(line) - line + lagging[1].value(1.0 - line) - (1.0 - line)
@@ -132,43 +132,8 @@ def _result(model: PeriodicModel, state: FitState, free: Bools, v_scan: float) -
         explained=1.0 - 2.0 * state.cost / sum(float(np.vdot(image, image)) for _, image in model.images),
         registration_percent=100.0 * float(apart[np.argmax(np.abs(apart))]),
         widened=sqrt(widened),
-        strays=_loud_rows(state),
+        strays=loud_rows(state),
     )
-
-
-def _loud_rows(state: FitState) -> tuple[int, ...]:
-    """Rows that leave far more than the others do."""
-    power = np.sqrt(np.mean(np.stack(state.left) ** 2, axis=(0, 2)))
-    middle = float(np.median(power))
-    spread = 1.4826 * float(np.median(np.abs(power - middle)))
-    return tuple(np.flatnonzero(power > middle + max(8.0 * spread, 0.5 * middle)).tolist())
-
-
-def _noise(state: FitState) -> float:
-    """Noise of a pixel, rms, from the differences of neighbouring pixels."""
-    left = np.concatenate(state.left)
-    return float(np.sqrt(np.mean(np.diff(left, axis=1) ** 2) / 2.0))
-
-
-def _covariance(
-    model: PeriodicModel, state: FitState, free: Bools, misfit: float, clean: list[Floats]
-) -> tuple[Floats, float]:
-    """The covariance of all parameters, 0 for those that are not free; and the factor by which it was widened.
-
-    From what each line says by itself, so that noise may have any spectrum along the line. It is widened where
-    neighbouring lines say the same, and by ``misfit``; ``clean`` are the images that are left without that.
-    """
-    joint = np.concatenate([free, np.ones(2 * len(model.spots), bool)])
-    inverse = np.linalg.pinv(state.hessian[np.ix_(joint, joint)], rcond=1e-13, hermitian=True)
-    count = int(np.sum(free))
-    influence = (model.scores_of(state, clean)[:, joint] @ inverse)[:, :count]
-    lines = len(influence)
-    shapes = influence[:, :4] / np.maximum(np.sqrt(np.mean(influence[:, :4] ** 2, axis=0)), 1e-300)
-    widened = max(correlation_length(shapes), misfit)
-    covariance = influence.T @ influence * (widened * lines / max(lines - len(inverse), 1))
-    whole = np.zeros((len(free), len(free)))
-    whole[np.ix_(free, free)] = covariance
-    return whole, widened
 
 
 def _positions(
@@ -179,22 +144,18 @@ def _positions(
     Then by how much it is larger than noise would have it, at least 1, and what is left of the images without it.
     """
     geometry = model.geometry
-    place = np.minimum((np.arange(geometry.columns) * BINS) // geometry.columns, BINS - 1)
-    count = np.bincount(place, minlength=BINS)
     residuals, scaling, lines, clean, beyond = [], [], [], [], 0.0
     span = geometry.window[1] - geometry.window[0]
     for forward, left, steep in zip((True, False), state.left, state.steepness, strict=True):
-        bins = np.arange(BINS)[:, None] == place
-        weights, products = (bins @ values.T for values in (steep**2, steep * left))  # (bins, rows)
-        weight = np.maximum(np.sum(weights, axis=1), 1e-300)
-        more = np.sum(products, axis=1) / weight
-        spread = np.sum((products - more[:, None] * weights) ** 2, axis=1)
-        clean.append(left - steep * more[place])
+        binned = LeftInBins.of(geometry, left, steep)
+        clean.append(binned.clean)
         columns = model.columns(state.parameters, forward)
+        place = binned.place
+        count = np.bincount(place, minlength=BINS)
         # The model's own x is without what was added to it: that is a part of the error.
         known = np.bincount(place, model.off[0 if forward else 1], minlength=BINS) / count
-        off = known + more
-        beyond += float(np.sum(off**2 / (spread / weight**2 + _ARITHMETIC_ERROR**2)))
+        off = known + binned.off
+        beyond += float(np.sum((off / binned.error) ** 2))
         at, x = (np.bincount(place, values, minlength=BINS) / count for values in (geometry.place, columns.x))
         x = x - known
         stretch = np.diff(x + off) / np.diff(at)

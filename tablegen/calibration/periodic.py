@@ -23,7 +23,7 @@ from tablegen.problems import Unphysical
 Complexes = npt.NDArray[np.complex128]
 
 LAG, BASES = 4, 5  # indices of parameters; the coordinates of both branches come before them
-_COLUMN_TERMS = 5  # 1, x, and x by both coordinates; the time within the line
+_COLUMN_TERMS = 5  # 1, x, and x by both coordinates; the time within the line; ripples follow
 _MIN_BRANCH_SLOPE = 0.05  # least du/dtau of a branch that is tried
 _ROW_PARABOLA_TERMS = 3  # terms of a row's parabola
 _MAX_STEPS = 100
@@ -116,7 +116,8 @@ class PeriodicModel:
     ``order`` is that of the polynomial in y; ``off`` what is added to x, forward and backward: where it is known that
     the branches are not (17), so that phases stay within a small part of a period. Parameters are the
     coordinates of the branch forward, then backward, the lag of y within the line (1 where y is a ramp, 0 where it
-    steps), then of each base vector q and s_1, s_2, ...
+    steps), then of each base vector q and s_1, s_2, ..., then how much of each of ``ripples`` is added to x, forward
+    and backward: rows of (count, columns) each, for branches that are not (17).
     """
 
     def __init__(
@@ -126,20 +127,24 @@ class PeriodicModel:
         spots: Sequence[tuple[int, ...]],
         order: int,
         off: tuple[Floats, Floats],
+        ripples: tuple[Floats, Floats] | None = None,
     ) -> None:
         self.geometry, self.order, self.off = geometry, order, off
+        nothing = np.zeros((0, geometry.columns))
+        self.ripples = (nothing, nothing) if ripples is None else ripples
         self.images = tuple(images)
         self.spots: Ints = np.array(spots, dtype=np.int64)
         self.bases = self.spots.shape[1]
         self.y_powers = geometry.y ** np.arange(order + 1)[:, None]
+        self.rippled_from = BASES + self.bases * (order + 1)  # the first parameter of the ripples
 
     def q(self, parameters: Floats) -> Floats:
         """Periods in the line of each base vector."""
-        return parameters[BASES :: self.order + 1]
+        return parameters[BASES : self.rippled_from : self.order + 1]
 
     def s(self, parameters: Floats) -> Floats:
         """(bases, order)."""
-        return parameters[BASES:].reshape(self.bases, self.order + 1)[:, 1:]
+        return parameters[BASES : self.rippled_from].reshape(self.bases, self.order + 1)[:, 1:]
 
     def allowed(self, parameters: Floats) -> bool:
         """Whether both branches run forward."""
@@ -177,14 +182,16 @@ class PeriodicModel:
         return FitState(parameters, amplitudes, tuple(left), tuple(steepness), cost, hessian, scores)
 
     def columns(self, parameters: Floats, forward: bool) -> Columns:
-        """Where the columns of a direction are, ``off`` with it."""
+        """Where the columns of a direction are, ``off`` and ripples with it."""
         i = 0 if forward else 2
         column = Columns.of(self.geometry, forward, parameters[i : i + 2])
-        return replace(column, x=column.x + self.off[0 if forward else 1])
+        at = 0 if forward else 1
+        more = parameters[self.rippled_from :].reshape(2, -1)[at] @ self.ripples[at]
+        return replace(column, x=column.x + self.off[at] + more)
 
     def with_spots(self, spots: Sequence[tuple[int, ...]]) -> "PeriodicModel":
         """The same of other spots."""
-        return PeriodicModel(self.geometry, self.images, spots, self.order, self.off)
+        return PeriodicModel(self.geometry, self.images, spots, self.order, self.off, self.ripples)
 
     def scores_of(self, state: FitState, left: Sequence[Floats]) -> Floats:
         """``FitState.scores`` were this left of each image."""
@@ -208,16 +215,17 @@ class PeriodicModel:
         time = column.time / self.geometry.rows
         along = self.q(parameters)[:, None] * column.x + float(parameters[LAG]) * self.s(parameters)[:, :1] * time
         wave = np.exp(2j * pi * (self.spots @ along))
-        parts = np.stack([np.ones_like(time), column.x, *column.slopes, time])
+        ripples = self.ripples[0 if forward else 1]
+        parts = np.stack([np.ones_like(time), column.x, *column.slopes, time, *ripples])
         levelled: Complexes = np.asarray(self.geometry.levelled(parts[:, None, :] * wave), dtype=np.complex128)
         return levelled
 
     def _laid_out(self, rows: Complexes, columns: Complexes) -> tuple[Complexes, Complexes, tuple[Ints, Ints]]:
         """Parts as rows of two matrices, and which of them make each term: (1, each column part), (y^n, 1)."""
-        count = len(self.spots)
+        count, terms = len(self.spots), _COLUMN_TERMS + len(self.ripples[0])
         spot = np.arange(count)
-        row = [spot] * _COLUMN_TERMS + [spot + n * count for n in range(1, self.order + 1)]
-        column = [spot + b * count for b in range(_COLUMN_TERMS)] + [spot] * self.order
+        row = [spot] * terms + [spot + n * count for n in range(1, self.order + 1)]
+        column = [spot + b * count for b in range(terms)] + [spot] * self.order
         return (
             rows.reshape(-1, rows.shape[-1]),
             columns.reshape(-1, columns.shape[-1]),
@@ -231,8 +239,10 @@ class PeriodicModel:
         waves = 2j * pi * amplitudes
         q, s = self.q(parameters), self.s(parameters)
         along, across = self.spots @ q, self.spots @ s[:, 0]
+        rippled = len(self.ripples[0])
+        terms = _COLUMN_TERMS + rippled
         for first in (0, 2):
-            table = np.zeros((len(parameters) + 2 * count, _COLUMN_TERMS + order, count), dtype=np.complex128)
+            table = np.zeros((len(parameters) + 2 * count, terms + order, count), dtype=np.complex128)
             table[first, 2] = table[first + 1, 3] = waves * along
             table[LAG, 4] = waves * across
             for j in range(self.bases):
@@ -240,8 +250,10 @@ class PeriodicModel:
                 share = waves * self.spots[:, j]
                 table[at, 1] = share
                 for n in range(1, order + 1):
-                    table[at + n, _COLUMN_TERMS + n - 1] = share
+                    table[at + n, terms + n - 1] = share
                 table[at + 1, 4] = share * float(parameters[LAG])
+            for k in range(rippled):
+                table[self.rippled_from + first // 2 * rippled + k, _COLUMN_TERMS + k] = waves * along
             spot = np.arange(count)
             table[len(parameters) + spot, 0, spot] = 1.0
             table[len(parameters) + count + spot, 0, spot] = 1j

@@ -10,18 +10,17 @@ from itertools import product
 
 import numpy as np
 
+from tablegen.calibration.image_checks import MAX_PERIODS_PER_COLUMN, MIN_PERIODS
 from tablegen.calibration.periodic import Geometry
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.numerics.arrays import Bools, Floats
 from tablegen.problems import Unphysical
 
-MIN_PERIODS = 3.0
 _MIN_SEARCHED_PERIODS = 1.4  # periods; what is slower goes with the parabola of the rows
 _MAX_BEND = 0.13  # first coordinate of a branch: a tenth of the scan, and what a skew peak adds
 _MAX_SKEW = 0.2  # second coordinate
 _COARSE_STEP = 0.02
 _FINE_STEP_PERIODS = 0.25  # periods between neighbours of the search
-_MAX_PERIODS_PER_COLUMN = 0.33  # periods a column, where a branch may compress them by a third
 _MIN_SECOND_AMPLITUDE = 0.1  # share of the strongest amplitude
 _MIN_SIDE_DISTANCE = 0.12  # share of the frame: over it another wave of the same q, of another s, averages out
 _MIN_SPOT_POWER = 25.0  # times the mean power: what white noise does not reach
@@ -72,7 +71,7 @@ def strongest(geometry: Geometry, heights: Floats) -> Spot:
     bend = float(peak[0] - 2.0 * peak[1] + peak[2])
     s = row + (0.5 * float(peak[0] - peak[2]) / bend if bend < 0.0 else 0.0)
     q = column / span
-    if q * (geometry.window[1] - geometry.window[0]) > _MAX_PERIODS_PER_COLUMN * geometry.columns:
+    if q * (geometry.window[1] - geometry.window[0]) > MAX_PERIODS_PER_COLUMN * geometry.columns:
         raise Unphysical(f"{q:.3g} periods in {geometry.columns} columns are too fine; scan less, or take more pixels")
     if q < MIN_PERIODS - 0.5:
         raise Unphysical(f"the line has about {q:.2g} periods; at least {MIN_PERIODS:g} are needed: scan more of them")

@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from math import pi
 
 import numpy as np
-import numpy.typing as npt
 
 from tablegen.calibration.periodic import Complexes, Geometry
 from tablegen.numerics.arrays import Floats, Ints
@@ -126,8 +125,10 @@ class FreeRows:
 
     def positions(self, state: FreeRowsState) -> Floats:
         """Of all columns, trace then retrace, in lines."""
-        found: Floats = self.modes.asked + state.modes @ self.modes.values
-        return found
+        return np.asarray(self.modes.asked + state.modes @ self.modes.values, dtype=np.float64)
+
+    def _count(self, state: FreeRowsState) -> int:
+        return len(state.modes) + len(state.q) + 2 * len(state.amplitudes)
 
     def _pace(self, rows: Floats) -> Floats:
         """(rows, waves): by how much phases go on in a line."""
@@ -135,8 +136,8 @@ class FreeRows:
             return np.zeros_like(rows)
         y = self.geometry.y
         fitted = np.polynomial.polynomial.polyfit(y, rows, min(_PACE_ORDER, len(y) - 1))
-        found: Floats = np.polynomial.polynomial.polyval(y, np.polynomial.polynomial.polyder(fitted)).T
-        return found / self.geometry.rows
+        steps = np.polynomial.polynomial.polyval(y, np.polynomial.polynomial.polyder(fitted)).T
+        return np.asarray(steps / self.geometry.rows, dtype=np.float64)
 
     def _waves(self, state: FreeRowsState, rows: slice, pace: Floats) -> Complexes:
         """(spots, rows, 2 columns)."""
@@ -163,8 +164,7 @@ class FreeRows:
 
     def _chunks(self, state: FreeRowsState, lag: bool = False) -> Iterator[_Chunk]:
         """With ``lag`` a last derivative is that by a factor of what goes on in a line."""
-        count = len(state.modes) + len(state.q) + 2 * len(state.amplitudes)
-        step = max(_CHUNK_VALUES // (self.heights.shape[1] * count), 1)
+        step = max(_CHUNK_VALUES // (self.heights.shape[1] * self._count(state)), 1)
         pace = self._pace(state.rows)
         x = self.positions(state) - self._centre
         for first in range(0, self.geometry.rows, step):
@@ -178,7 +178,7 @@ class FreeRows:
                 axis=-1,
             )  # (rows, 2 columns, waves)
             steep = slopes @ state.q
-            parts = [steep[:, :, None] * self.modes.values.T, slopes * x[:, None]]
+            parts: list[Floats] = [steep[:, :, None] * self.modes.values.T, slopes * x[:, None]]
             parts += [np.moveaxis(np.real(waves), 0, -1), np.moveaxis(-np.imag(waves), 0, -1)]
             if lag:
                 parts.append(np.sum(slopes * pace[rows, None, :], axis=-1, keepdims=True) * self.modes.time[:, None])
@@ -188,7 +188,8 @@ class FreeRows:
 
     def _solved(self, state: FreeRowsState, weights: Floats) -> tuple[Floats, Callable[[Floats], Floats]]:
         """The step of the parameters, and what it does to the rows' phases."""
-        normal, right, kept = 0.0, 0.0, []
+        count = self._count(state)
+        normal, right, kept = np.zeros((count, count)), np.zeros(count), []
         for chunk in self._chunks(state):
             weight = weights[chunk.rows]
             basis, triangle = np.linalg.qr(chunk.across)
@@ -196,10 +197,10 @@ class FreeRows:
             seen = (np.swapaxes(basis, 1, 2) @ chunk.left[:, :, None])[:, :, 0]
             free = chunk.derivatives - basis @ on_rows
             flat = (np.sqrt(weight)[:, None, None] * free).reshape(-1, free.shape[-1])
-            normal = normal + flat.T @ flat
-            right = right + np.einsum("i,ijp,ij->p", weight, free, chunk.left, optimize=True)
+            normal += flat.T @ flat
+            right += np.einsum("i,ijp,ij->p", weight, free, chunk.left, optimize=True)
             kept.append((_inverted(triangle), on_rows, seen))
-        step = _pseudo_inverse(np.asarray(normal)) @ right
+        step = _pseudo_inverse(normal) @ right
 
         def of_rows(taken: Floats) -> Floats:
             return np.concatenate([(back @ (seen - on @ taken)[:, :, None])[:, :, 0] for back, on, seen in kept])
@@ -237,19 +238,18 @@ class FreeRows:
         return found
 
     def _result(self, state: FreeRowsState, weights: Floats) -> FreeRowsFit:
-        count = len(state.modes) + len(state.q)
-        normal, scores = 0.0, []
-        inverses = []
+        count, whole = len(state.modes) + len(state.q), np.zeros((self._count(state) + 1,) * 2)
+        scores, inverses = [], []
         for chunk in self._chunks(state, lag=True):
             basis, triangle = np.linalg.qr(chunk.across)
             free = chunk.derivatives - basis @ (np.swapaxes(basis, 1, 2) @ chunk.derivatives)
             weight = weights[chunk.rows]
             flat = (np.sqrt(weight)[:, None, None] * free).reshape(-1, free.shape[-1])
-            normal = normal + flat.T @ flat
+            whole += flat.T @ flat
             scores.append(weight[:, None] * np.einsum("ijp,ij->ip", free, chunk.left, optimize=True))
             back = _inverted(triangle)
             inverses.append(back @ np.swapaxes(back, 1, 2))
-        whole, by_row = np.asarray(normal), np.concatenate(scores)
+        by_row = np.concatenate(scores)
         # Without the lag, which is 1; then with it, to see whether it is.
         covariance = _spread(by_row[:, :-1] @ _pseudo_inverse(whole[:-1, :-1])[:, :count], len(whole))
         late = by_row @ _pseudo_inverse(whole)[:, -1]
@@ -276,15 +276,14 @@ def _spread(influence: Floats, parameters: int) -> Floats:
     """The covariance of what rows, each by itself, say."""
     rows = len(influence)
     centred = influence - np.mean(influence, axis=0)
-    found: Floats = centred.T @ centred * (rows / max(rows - 0.5 * parameters, 1.0))
-    return found
+    return np.asarray(centred.T @ centred * (rows / max(rows - 0.5 * parameters, 1.0)), dtype=np.float64)
 
 
 def _pseudo_inverse(normal: Floats) -> Floats:
     """Of a matrix of positive scale: what nothing determines is left alone."""
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
-    inverse: npt.NDArray[np.float64] = np.linalg.pinv(normal / np.outer(scale, scale), rcond=_RCOND, hermitian=True)
-    return inverse / np.outer(scale, scale)
+    inverse = np.linalg.pinv(normal / np.outer(scale, scale), rcond=_RCOND, hermitian=True)
+    return np.asarray(inverse / np.outer(scale, scale), dtype=np.float64)
 
 
 def _inverted(triangles: Floats) -> Floats:

@@ -10,11 +10,12 @@ from tablegen.config.load import Setup
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, Plan, make_plan
 from tablegen.problems import Unphysical
-from tablegen.refinement.image_line import ImageLine
-from tablegen.refinement.lattice_line import ImageOptions, LatticeLine, averaged, lattice_line
+from tablegen.refinement.lattice_line import ImageOptions, LatticeLine, lattice_line
 from tablegen.refinement.learning import Lesson, learn
+from tablegen.refinement.registration import Mismatch, mismatch
 from tablegen.refinement.round import Options, Round, allowed, finished, why_worse, with_lesson
 from tablegen.refinement.slow_line import slow_line
+from tablegen.refinement.window_line import WindowLine, averaged
 
 _MIN_EXPLAINED = 0.03  # share of the variance of an image
 _LITTLE_EXPLAINED = 0.5
@@ -28,7 +29,7 @@ class ImageRound(Round):
     """What trace and retrace say."""
 
     frames: tuple[LatticeLine, ...]
-    measured: ImageLine
+    measured: WindowLine
 
     @property
     def periods(self) -> float:
@@ -54,7 +55,7 @@ def refine_images(
     line: LinePlan = getattr(plan, axis)
     limits = allowed(line, options)
     frames = tuple(_frame(plan, trace, retrace, images or ImageOptions()) for trace, retrace in pairs)
-    measured = averaged(frames) if axis == "x" else slow_line(plan, frames)
+    measured = averaged([frame.line for frame in frames]) if axis == "x" else slow_line(plan, frames)
     lesson = learn(line, measured, options.gain, limits.used)
     refinement, changed = with_lesson(setup, line, lesson)
     return ImageRound(
@@ -108,17 +109,12 @@ def _check(seen: LatticeLine) -> None:
 
 def _remarks(line: LinePlan, frames: Sequence[LatticeLine], lesson: Lesson) -> tuple[str, ...]:
     found = [text for frame in frames[:1] for text in _remarks_of(frame)]
-    if lesson.harmonics == 0:
-        found.append("the error is within the noise of the images: there is nothing more to learn from them")
-    elif finished(lesson):
-        found.append("most of the remaining error is noise: give several frames, or stop refining")
     if line.axis == "y" and len(frames) == 1:
         found.append(
             "a drift that becomes faster or slower counts as an error of y; give two frames that follow each other, "
             "which tell it"
         )
-    found.append("images do not show that the build of this scan file was running")
-    return tuple(found)
+    return tuple(found + _learning_remarks(lesson))
 
 
 def _remarks_of(seen: LatticeLine) -> list[str]:
@@ -138,3 +134,59 @@ def _remarks_of(seen: LatticeLine) -> list[str]:
         shown = ", ".join(str(i + 1) for i in fit.loud[:5]) + (", ..." if len(fit.loud) > 5 else "")
         found.append(f"{len(fit.loud)} rows differ from the others (row {shown}); they counted less")
     return found
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class MismatchRound(Round):
+    """What trace and retrace of a sample without a period say: residuals are half of what the two differ by."""
+
+    frames: tuple[Mismatch, ...]
+    measured: WindowLine
+
+
+def refine_mismatch(
+    setup: Setup,
+    axis: Literal["x", "y"],
+    pairs: Sequence[tuple[Floats, Floats]],
+    options: Options,
+    images: ImageOptions | None = None,
+) -> MismatchRound:
+    """Learn from heights of any sample what trace and retrace differ by, half in each; see ``refine_images``.
+
+    What both directions share stays as it is: no sample without a period tells it.
+    """
+    plan = make_plan(setup)
+    if axis == "y":
+        raise Unphysical("trace and retrace say nothing of y; it needs a sample with a period")
+    limits = allowed(plan.x, options)
+    for trace, _ in pairs:
+        _check_shape(plan, trace)
+    frames = tuple(mismatch(plan, trace, retrace, images or ImageOptions()) for trace, retrace in pairs)
+    measured = averaged([frame.line for frame in frames])
+    lesson = learn(plan.x, measured, options.gain, limits.used)
+    refinement, changed = with_lesson(setup, plan.x, lesson, "mismatch")
+    remarks = [
+        "only what trace and retrace differ by was seen, and is corrected, half of it in each; an error that both "
+        "share stays, and is in none of these figures",
+        *_learning_remarks(lesson),
+    ]
+    return MismatchRound(
+        line=plan.x,
+        bound=limits,
+        lesson=lesson,
+        refinement=refinement,
+        setup=changed,
+        worse=why_worse(setup, axis, lesson, "mismatch"),
+        remarks=tuple(remarks),
+        frames=frames,
+        measured=measured,
+    )
+
+
+def _learning_remarks(lesson: Lesson) -> list[str]:
+    found = []
+    if lesson.harmonics == 0:
+        found.append("the error is within the noise of the images: there is nothing more to learn from them")
+    elif finished(lesson):
+        found.append("most of the remaining error is noise: give several frames, or stop refining")
+    return [*found, "images do not show that the build of this scan file was running"]

@@ -1,6 +1,5 @@
 """Trace and retrace of a periodic sample, taken of the running scan -> the line that was reached, with its errors."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -12,8 +11,8 @@ from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import Plan
 from tablegen.refinement.departure import asked_position
 from tablegen.refinement.free_rows import ColumnModes, FreeRows, FreeRowsFit
-from tablegen.refinement.image_line import ImageLine, error_modes, mode_degrees
 from tablegen.refinement.lattice_start import START_DEGREE, lattice_start
+from tablegen.refinement.window_line import WindowLine, error_modes
 
 _DEGREES_A_PERIOD = 1.5  # of a grating, which tells the position where its bars have edges
 _MOST_DEGREES = 24  # harmonic 16 makes some six periods in a window
@@ -35,7 +34,7 @@ class LatticeLine:
     geometry: Geometry
     model: FreeRows
     fit: FreeRowsFit
-    line: ImageLine
+    line: WindowLine
     apart: float
 
 
@@ -54,34 +53,15 @@ def lattice_line(plan: Plan, trace: Floats, retrace: Floats, options: ImageOptio
     span = (window[1] - window[0]) * float(np.max(np.abs(start.state.q)))
     degree = _MOST_DEGREES if waves > 1 else int(np.clip(_DEGREES_A_PERIOD * span, _LEAST_DEGREES, _MOST_DEGREES))
     finer = column_modes(plan, geometry, degree)
-    error = np.linalg.lstsq(finer.values.T, modes.values.T @ start.state.modes, rcond=None)[0]
+    error = np.asarray(np.linalg.lstsq(finer.values.T, modes.values.T @ start.state.modes, rcond=None)[0], np.float64)
     model = FreeRows(geometry, heights, start.spots, finer, moves)
     fit = model.fit(replace(start.state, modes=error))
     count = len(finer.values)
     asked = partial(asked_position, line)
-    found = ImageLine(
-        asked, line.drive.size_nm, turn, window, degree, True, fit.state.modes, fit.covariance[:count, :count]
+    found = WindowLine(
+        asked, line.drive.size_nm, turn, window, degree, "both", fit.state.modes, fit.covariance[:count, :count]
     )
     return LatticeLine(geometry, model, fit, found, start.apart)
-
-
-def averaged(frames: Sequence[LatticeLine]) -> ImageLine:
-    """x over all frames, of which each has its own noise."""
-    lines = [frame.line for frame in frames]
-    degree = min(line.degree for line in lines)
-    kept = [[i for i, d in enumerate(mode_degrees(line.degree, line.both)) if d <= degree] for line in lines]
-    count = len(lines)
-    return (
-        replace(
-            lines[0],
-            degree=degree,
-            coefficients=sum(line.coefficients[i] for line, i in zip(lines, kept, strict=True)) / count,
-            line_covariance=sum(line.line_covariance[np.ix_(i, i)] for line, i in zip(lines, kept, strict=True))
-            / count**2,
-        )
-        if count > 1
-        else lines[0]
-    )
 
 
 def column_modes(plan: Plan, geometry: Geometry, degree: int) -> ColumnModes:
@@ -92,5 +72,5 @@ def column_modes(plan: Plan, geometry: Geometry, degree: int) -> ColumnModes:
     sweep = np.concatenate([geometry.sweep(True), geometry.sweep(False)])
     times = np.where(forward, turn * sweep, turn + (1.0 - turn) * sweep)
     place = np.where(forward, sweep, 1.0 - sweep)
-    values = error_modes(place, forward, line.band_limit.window, degree, True)
+    values = error_modes(place, forward, line.band_limit.window, degree, "both")
     return ColumnModes(values, asked_position(line, times), times - 0.5)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tablegen.calibration.image_model import ROW_POLYNOMIAL_ORDER, described
+from tablegen.calibration.image_model import described, row_order
 from tablegen.calibration.periodic import BASES, LAG, Geometry
 from tablegen.calibration.spots import Bend, bend_of, column_phase, row_polynomial, strongest
 from tablegen.compensation.hysteresis import BranchShape
@@ -43,12 +43,12 @@ def lattice_start(
     if backward.match < 0.3 * forward.match:
         raise Unphysical("the retrace does not show the trace's pattern; are they from one scan?")
     straight = Bend(0.5 * (forward.q + backward.q), BranchShape(), forward.match)
-    polynomial = row_polynomial(geometry, heights[0], straight, spot, ROW_POLYNOMIAL_ORDER)
+    polynomial = row_polynomial(geometry, heights[0], straight, spot, row_order())
     q, error, apart = straight.q, np.zeros(len(modes.values)), 0.0
     if q > _MIN_TRACKED_PERIODS:
         q, error, apart = _tracked(geometry, heights, modes, straight, polynomial, moves)
     off = np.split(modes.asked + error @ modes.values - np.tile(geometry.place, 2), 2)
-    start = np.zeros(BASES + 1 + ROW_POLYNOMIAL_ORDER)
+    start = np.zeros(BASES + 1 + row_order())
     start[LAG] = 1.0 if moves else 0.0
     start[BASES], start[BASES + 1 :] = q, polynomial
     free = np.ones(len(start), bool)

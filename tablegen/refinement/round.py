@@ -104,11 +104,16 @@ def refine(
     )
 
 
-def with_lesson(setup: Setup, line: LinePlan, lesson: Lesson) -> tuple[Refinement | None, Setup]:
+BeforeOf = Literal["line", "mismatch"]
+
+
+def with_lesson(
+    setup: Setup, line: LinePlan, lesson: Lesson, before_of: BeforeOf | None = None
+) -> tuple[Refinement | None, Setup]:
     """The new layer, if there is one, and the scan with it. Raises ``Rejected`` where that cannot be built."""
     if not lesson.layer.harmonics:
         return None, setup
-    refinement = _refinement(setup, line, lesson)
+    refinement = msgspec.structs.replace(_refinement(setup, line, lesson), before_of=before_of)
     changed = with_refinement(setup, line.axis, refinement)
     make_plan(changed)  # what is written can be built
     return refinement, changed
@@ -151,10 +156,13 @@ def allowed(line: LinePlan, options: Options) -> Bound:
     return limits
 
 
-def why_worse(setup: Setup, axis: str, lesson: Lesson) -> str:
-    """Whether the layer that was played made things worse, against the measurement before it; empty where not."""
+def why_worse(setup: Setup, axis: str, lesson: Lesson, before_of: BeforeOf | None = None) -> str:
+    """Whether the layer that was played made things worse, against the measurement before it; empty where not.
+
+    Only measurements of the same are compared.
+    """
     played: Refinement | None = getattr(setup.scan, axis).refinement
-    if played is None or played.before_percent is None:
+    if played is None or played.before_percent is None or played.before_of != before_of:
         return ""
     before, now = played.before_percent, lesson.before.rms_percent
     if np.hypot(1.05 * before, 3.0 * lesson.noise_percent) >= now:

@@ -10,8 +10,8 @@ from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import Plan
 from tablegen.problems import Unphysical
 from tablegen.refinement.departure import asked_position
-from tablegen.refinement.image_line import ImageLine, error_modes
 from tablegen.refinement.lattice_line import LatticeLine
+from tablegen.refinement.window_line import WindowLine, error_modes
 
 _MOST_DEGREES = 24
 _ROWS_A_DEGREE = 4
@@ -19,7 +19,7 @@ _MIN_PERIODS = 3.0  # along y, in the frame
 _SAME_WAVES = 0.2  # how far waves of two frames may be from whole numbers of each other
 
 
-def slow_line(plan: Plan, frames: Sequence[LatticeLine]) -> ImageLine:
+def slow_line(plan: Plan, frames: Sequence[LatticeLine]) -> WindowLine:
     """y over the lines of its way up, which the rows are, from the phases of the waves in each.
 
     ``frames`` follow each other without a pause. What the scanner does it does in each of them; what changes from one
@@ -50,7 +50,7 @@ def slow_line(plan: Plan, frames: Sequence[LatticeLine]) -> ImageLine:
     window = line.band_limit.window
     degree = min(_MOST_DEGREES, rows // _ROWS_A_DEGREE)
     place = times / line.drive.turn
-    modes = error_modes(place, np.ones(rows, bool), window, degree, both=False).T
+    modes = error_modes(place, np.ones(rows, bool), window, degree, "forward").T
     weight = 1.0 / np.sqrt(spread + np.median(spread))
     columns = np.column_stack([straight, modes]) * weight[:, None]
     inverse = np.linalg.inv(columns.T @ columns)
@@ -59,13 +59,13 @@ def slow_line(plan: Plan, frames: Sequence[LatticeLine]) -> ImageLine:
     correlated = correlation_length(left)
     freedom = max(rows / correlated - columns.shape[1], 1.0)
     covariance = inverse[2:, 2:] * float(left @ left) / freedom
-    return ImageLine(
+    return WindowLine(
         partial(asked_position, line),
         line.drive.size_nm,
         line.drive.turn,
         window,
         degree,
-        False,
+        "forward",
         np.asarray(solved[2:], dtype=np.float64),
         np.asarray(covariance, dtype=np.float64),
     )
