@@ -58,15 +58,17 @@ class FreeRowsState:
 @dataclass(frozen=True, eq=False)
 class FreeRowsFit:
     """The least squares: ``covariance`` of (modes, q), from what rows say by themselves, so that noise may have any
-    spectrum along a line. ``lag`` is how much of ``r_b`` the images show, 1 where rows and columns are in the order of
-    time, with its standard error. ``left`` of the images, unit variance; ``explained`` share of each image's variance;
-    ``loud`` are rows unlike the others, counted from 0.
+    spectrum along a line.
+
+    ``lags`` are how much of ``r_b`` the images show, each with its standard error: from trace to retrace, and along the
+    line. Both are 1 where rows and columns are in the order of time. ``left`` of the images, of unit variance;
+    ``explained`` share of each image's variance; ``loud`` are rows unlike the others, counted from 0.
     """
 
     state: FreeRowsState
     covariance: Floats
     phases: RowPhases
-    lag: tuple[float, float]
+    lags: tuple[tuple[float, float], tuple[float, float]]
     left: tuple[Floats, Floats]
     explained: tuple[float, float]
     loud: tuple[int, ...]
@@ -130,6 +132,11 @@ class FreeRows:
     def _count(self, state: FreeRowsState) -> int:
         return len(state.modes) + len(state.q) + 2 * len(state.amplitudes)
 
+    def _times(self) -> Floats:
+        """(2 columns, 2): the mean time of each direction, and how far a column's is from it."""
+        mean = np.repeat([np.mean(half) for half in np.split(self.modes.time, 2)], self.geometry.columns)
+        return np.column_stack([mean, self.modes.time - mean])
+
     def _pace(self, rows: Floats) -> Floats:
         """(rows, waves): by how much phases go on in a line."""
         if not self.moves:
@@ -163,7 +170,7 @@ class FreeRows:
         return found
 
     def _chunks(self, state: FreeRowsState, lag: bool = False) -> Iterator[_Chunk]:
-        """With ``lag`` a last derivative is that by a factor of what goes on in a line."""
+        """With ``lag`` the last two derivatives are those by factors of what goes on in a line."""
         step = max(_CHUNK_VALUES // (self.heights.shape[1] * self._count(state)), 1)
         pace = self._pace(state.rows)
         x = self.positions(state) - self._centre
@@ -181,7 +188,7 @@ class FreeRows:
             parts: list[Floats] = [steep[:, :, None] * self.modes.values.T, slopes * x[:, None]]
             parts += [np.moveaxis(np.real(waves), 0, -1), np.moveaxis(-np.imag(waves), 0, -1)]
             if lag:
-                parts.append(np.sum(slopes * pace[rows, None, :], axis=-1, keepdims=True) * self.modes.time[:, None])
+                parts.append(np.sum(slopes * pace[rows, None, :], axis=-1, keepdims=True) * self._times())
             left = self.heights[rows] - self._levelled(np.real(np.tensordot(state.amplitudes, waves, 1)))
             derivatives = self._levelled(np.concatenate(parts, axis=-1))
             yield _Chunk(rows, derivatives, self._levelled(slopes), left)
@@ -238,7 +245,7 @@ class FreeRows:
         return found
 
     def _result(self, state: FreeRowsState, weights: Floats) -> FreeRowsFit:
-        count, whole = len(state.modes) + len(state.q), np.zeros((self._count(state) + 1,) * 2)
+        count, whole = len(state.modes) + len(state.q), np.zeros((self._count(state) + 2,) * 2)
         scores, inverses = [], []
         for chunk in self._chunks(state, lag=True):
             basis, triangle = np.linalg.qr(chunk.across)
@@ -250,10 +257,11 @@ class FreeRows:
             back = _inverted(triangle)
             inverses.append(back @ np.swapaxes(back, 1, 2))
         by_row = np.concatenate(scores)
-        # Without the lag, which is 1; then with it, to see whether it is.
-        covariance = _spread(by_row[:, :-1] @ _pseudo_inverse(whole[:-1, :-1])[:, :count], len(whole))
-        late = by_row @ _pseudo_inverse(whole)[:, -1]
-        lag = 1.0 + float(np.sum(late)), float(np.sqrt(_spread(late[:, None], len(whole))[0, 0]))
+        # Without the lags, which are 1; then with them, to see whether they are.
+        covariance = _spread(by_row[:, :-2] @ _pseudo_inverse(whole[:-2, :-2])[:, :count], len(whole))
+        late = by_row @ _pseudo_inverse(whole)[:, -2:]
+        errors = np.sqrt(np.diag(_spread(late, len(whole)))).tolist()
+        first, second = zip((1.0 + np.sum(late, axis=0)).tolist(), errors, strict=True)
         left = self._left(state)
         images = np.split(self.heights, 2, axis=1)
         both = np.split(left, 2, axis=1)
@@ -265,7 +273,7 @@ class FreeRows:
             state=state,
             covariance=covariance,
             phases=RowPhases(state.rows, noise * np.concatenate(inverses)),
-            lag=lag,
+            lags=(first, second),
             left=(both[0], both[1]),
             explained=(explained[0], explained[1]),
             loud=tuple(np.flatnonzero(weights < 1.0).tolist()),
@@ -282,11 +290,10 @@ def _spread(influence: Floats, parameters: int) -> Floats:
 def _pseudo_inverse(normal: Floats) -> Floats:
     """Of a matrix of positive scale: what nothing determines is left alone."""
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
-    inverse = np.linalg.pinv(normal / np.outer(scale, scale), rcond=_RCOND, hermitian=True)
-    return np.asarray(inverse / np.outer(scale, scale), dtype=np.float64)
+    both = np.outer(scale, scale)
+    return np.asarray(np.linalg.pinv(normal / both, rcond=_RCOND, hermitian=True) / both, dtype=np.float64)
 
 
 def _inverted(triangles: Floats) -> Floats:
     """Of each row; of one in which a wave has no contrast, nothing."""
-    found: Floats = np.linalg.pinv(triangles, rcond=1e-6)
-    return found
+    return np.asarray(np.linalg.pinv(triangles, rcond=1e-6), dtype=np.float64)

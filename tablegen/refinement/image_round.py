@@ -20,7 +20,7 @@ from tablegen.refinement.window_line import WindowLine, averaged
 _MIN_EXPLAINED = 0.03  # share of the variance of an image
 _LITTLE_EXPLAINED = 0.5
 _SURE_LAG = 0.2  # standard error with which the order of time is told
-_FAR_APART = 0.4  # periods
+_FAR_APART = 0.35  # periods
 _MIN_PIXELS_PER_PERIOD = 4.0
 
 
@@ -99,11 +99,18 @@ def _check(seen: LatticeLine) -> None:
             f"{100.0 * max(least, 0.0):.0f} % of the {name}'s contrast is a periodic sample; the rest is something "
             f"else, or trace and retrace are not of one scan"
         )
-    lag, error = fit.lag
-    if len(fit.state.q) > 1 and seen.model.moves and error < _SURE_LAG and lag < 0.0:
+    if len(fit.state.q) < 2 or not seen.model.moves or max(error for _, error in fit.lags) > _SURE_LAG:
+        return
+    between, along = (lag < 0.0 for lag, _ in fit.lags)
+    if between or along:
+        what = {
+            (True, True): "the images are exchanged, or their rows upside down",
+            (False, True): "both images are mirrored",
+            (True, False): "the images are exchanged or upside down, and mirrored; or one of them is cropped",
+        }[between, along]
         raise Unphysical(
-            "the sample turns from trace to retrace against the order of time: the images are exchanged, or both "
-            "mirrored, or their rows upside down"
+            f"the pattern goes on from trace to retrace against the order of time: {what}; the left end must be where "
+            f"the trace begins, and the first row the first in time"
         )
 
 

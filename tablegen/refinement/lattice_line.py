@@ -5,10 +5,12 @@ from functools import partial
 
 import numpy as np
 
+from tablegen.calibration.image_checks import ALIASING_HINT, check_periods
 from tablegen.calibration.image_model import prepared
 from tablegen.calibration.periodic import Geometry
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import Plan
+from tablegen.problems import Unphysical
 from tablegen.refinement.departure import asked_position
 from tablegen.refinement.free_rows import ColumnModes, FreeRows, FreeRowsFit
 from tablegen.refinement.lattice_start import START_DEGREE, lattice_start
@@ -17,6 +19,7 @@ from tablegen.refinement.window_line import WindowLine, error_modes
 _DEGREES_A_PERIOD = 1.5  # of a grating, which tells the position where its bars have edges
 _MOST_DEGREES = 24  # harmonic 16 makes some six periods in a window
 _LEAST_DEGREES = 4
+_FAR_APART = 0.5  # periods
 
 
 @dataclass(frozen=True)
@@ -50,7 +53,15 @@ def lattice_line(plan: Plan, trace: Floats, retrace: Floats, options: ImageOptio
     advice = "leave --retrace-mirrored out" if options.retrace_mirrored else "it needs --retrace-mirrored"
     start = lattice_start(geometry, heights, modes, moves, advice)
     waves = len(start.state.q)
-    span = (window[1] - window[0]) * float(np.max(np.abs(start.state.q)))
+    most = float(np.max(np.abs(start.state.q)))
+    check_periods(most, window[1] - window[0], geometry.columns)
+    if start.apart > _FAR_APART:
+        raise Unphysical(
+            f"trace and retrace are {start.apart:.2g} periods of the sample apart, and beyond half a period it is not "
+            f"known which belong together; if one was cropped, do not; else calibrate first, or take a sample of a "
+            f"longer period{ALIASING_HINT}"
+        )
+    span = (window[1] - window[0]) * most
     degree = _MOST_DEGREES if waves > 1 else int(np.clip(_DEGREES_A_PERIOD * span, _LEAST_DEGREES, _MOST_DEGREES))
     finer = column_modes(plan, geometry, degree)
     error = np.asarray(np.linalg.lstsq(finer.values.T, modes.values.T @ start.state.modes, rcond=None)[0], np.float64)

@@ -22,11 +22,11 @@ from tablegen.refinement.departure import asked_position
 from tablegen.refinement.lattice_line import ImageOptions, column_modes
 from tablegen.refinement.window_line import WindowLine
 
-_BLURS = (6.0, 3.0, 1.5)  # pixels, one after the other
+_BLURS = (6.0, 3.0, 1.0)  # pixels, one after the other
 _DEGREES = (3, 6, 12)  # of the polynomial meanwhile
 _STEPS = 8
 _SETTLED = 1e-3  # pixels
-_EDGE = 3  # columns and rows at the edges that are not compared
+_EDGE = 1  # columns and rows at the edges that are not compared
 _LEAST_MATCH = 0.3  # correlation of what is compared
 _MOST_PIXELS = 12.0  # columns that trace and retrace may be apart
 
