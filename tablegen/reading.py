@@ -54,7 +54,7 @@ def other_than_file(path: str | os.PathLike[str]) -> str | None:
 
 def read_bytes(path: str | os.PathLike[str], kind: Kind) -> bytes:
     """The whole of a file. Raises ``OSError`` where it cannot be read, is no regular file, or too large."""
-    return b"".join(_chunks(path, kind))
+    return b"".join(chunks_of(path, kind))
 
 
 def read_text(path: str | os.PathLike[str], kind: Kind, encoding: str = "utf-8", errors: str = "strict") -> str:
@@ -65,7 +65,7 @@ def read_text(path: str | os.PathLike[str], kind: Kind, encoding: str = "utf-8",
 def file_sha256(path: str | os.PathLike[str], kind: Kind = BUILD_FILE) -> str:
     """The digest of a file, in hexadecimal digits, of which no more than a part is held at a time."""
     digest = sha256()
-    for chunk in _chunks(path, kind):
+    for chunk in chunks_of(path, kind):
         digest.update(chunk)
     return digest.hexdigest()
 
@@ -85,7 +85,8 @@ def size_shown(count: int) -> str:
     return f"{count >> 20} MiB" if count >= 1 << 20 else f"{count >> 10} KiB"
 
 
-def _chunks(path: str | os.PathLike[str], kind: Kind) -> Iterator[bytes]:
+def chunks_of(path: str | os.PathLike[str], kind: Kind) -> Iterator[bytes]:
+    """The bytes of a file, a part at a time; what ``read_bytes`` refuses is refused before the first part of it."""
     count = 0
     with _opened(path) as handle:
         size = os.fstat(handle).st_size

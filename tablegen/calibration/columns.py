@@ -7,17 +7,24 @@ from math import degrees, inf
 Conversion = Callable[[float], float]
 
 
-def _times(factor: float) -> Conversion:
-    return lambda value: value * factor
+@dataclass(frozen=True, slots=True)
+class Times:
+    """A conversion that is a factor."""
+
+    factor: float
+
+    def __call__(self, value: float) -> float:
+        """In the unit of the fits."""
+        return value * self.factor
 
 
-_VOLTS = {"v": _times(1.0), "mv": _times(1e-3), "kv": _times(1e3)}
-_NANOMETRES = {"nm": _times(1.0), "pm": _times(1e-3), "um": _times(1e3), "mm": _times(1e6)}
-_SECONDS = {"s": _times(1.0), "ms": _times(1e-3), "us": _times(1e-6)}
-_HERTZ = {"hz": _times(1.0), "khz": _times(1e3), "mhz": _times(1e6)}
-_GAIN = {"": _times(1.0), "db": lambda value: 10.0 ** (value / 20.0)}
-_DEGREES = {"deg": _times(1.0), "rad": degrees}
-_NUMBER = {"": _times(1.0)}
+_VOLTS = {"v": Times(1.0), "mv": Times(1e-3), "kv": Times(1e3)}
+_NANOMETRES = {"nm": Times(1.0), "pm": Times(1e-3), "um": Times(1e3), "mm": Times(1e6)}
+_SECONDS = {"s": Times(1.0), "ms": Times(1e-3), "us": Times(1e-6)}
+_HERTZ = {"hz": Times(1.0), "khz": Times(1e3), "mhz": Times(1e6)}
+_GAIN: Mapping[str, Conversion] = {"": Times(1.0), "db": lambda value: 10.0 ** (value / 20.0)}
+_DEGREES: Mapping[str, Conversion] = {"deg": Times(1.0), "rad": degrees}
+_NUMBER = {"": Times(1.0)}
 
 
 # No quantity that has to be above 0 is as small as this in any of these units, and nothing divided by it overflows.

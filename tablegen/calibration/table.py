@@ -11,7 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from tablegen.calibration.columns import Column, Conversion
+from tablegen.calibration.columns import Column, Conversion, Times
+from tablegen.calibration.csv_blocks import Block, blocks_of, plain_rows
 from tablegen.figures import shown_path
 from tablegen.numerics.arrays import Floats, Ints
 from tablegen.problems import Problem, Rejected
@@ -57,43 +58,78 @@ def read_table(path: Path, needed: Sequence[Column], optional: Sequence[Column] 
     Lines that are blank or begin with # count for nothing. Raises ``Rejected`` with file, line and column.
     """
     name = shown_path(path)
-    content = file_content(path, name)
-    rows = _rows(file_text(content, name), name)
-    header_line, header = next(rows, (0, ""))
-    if not header_line:
-        raise Rejected([Problem(name, 0, "", f"is empty; a header with {_list(needed)} is needed")])
-    separator = next((mark for mark in (";", "\t") if mark in header), ",")
     wanted = [*needed, *optional]
-    places = _places(name, header_line, _cells(header, separator), wanted, needed)
-    reader = _Reader(name, separator, len(_cells(header, separator)), places)
-    values, lines = array("d"), array("q")
-    for line, text in rows:
-        values.extend(reader.row(line, text))
-        lines.append(line)
-        if len(reader.problems) > _MAX_PROBLEMS:
-            break
-    if reader.problems:
-        found = reader.problems[:_MAX_PROBLEMS]
-        if len(reader.problems) > _MAX_PROBLEMS:
-            found.append(Problem(name, found[-1].line, "", "more faults follow; stopped"))
-        raise Rejected(found)
-    if not lines:
+    digest = hashlib.sha256()
+    reader: _Reader | None = None
+    header_line = 0
+    for block in _blocks(path, name):
+        digest.update(block.content)
+        if reader is None:
+            rows = _rows(file_text(block.content, name, block.line), name, block.line)
+            header_line, header = next(rows, (0, ""))
+            if header_line:
+                separator = next((mark for mark in (";", "\t") if mark in header), ",")
+                cells = _cells(header, separator)
+                reader = _Reader(name, separator, len(cells), _places(name, header_line, cells, wanted, needed))
+                reader.add_rows(rows)
+        elif not reader.full:
+            reader.add(block)
+    if reader is None:
+        raise Rejected([Problem(name, 0, "", f"is empty; a header with {_list(needed)} is needed")])
+    columns, lines = reader.columns()
+    if not len(lines):
         raise Rejected([Problem(name, header_line, "", "no numbers follow the header")])
-    table = np.array(values, dtype=np.float64).reshape(len(lines), len(places))
-    columns = {column.name: table[:, i] for i, (_, column, _, _) in enumerate(places)}
-    source = Source(path.name, hashlib.sha256(content).hexdigest()[:16])
-    return MeasuredTable(name, source, columns, np.array(lines, dtype=np.int64))
+    return MeasuredTable(name, Source(path.name, digest.hexdigest()[:16]), columns, lines)
 
 
 _Place = tuple[int, Column, Conversion, str]  # where it stands, what it is, how it converts, how it is spelt
 
 
 class _Reader:
-    """Rows of text to rows of numbers; notes what is wrong and goes on."""
+    """Rows of text to columns of numbers; notes what is wrong and goes on."""
 
     def __init__(self, name: str, separator: str, width: int, places: list[_Place]) -> None:
         self.problems: list[Problem] = []
         self._name, self._separator, self._width, self._places = name, separator, width, places
+        self._values = [array("d") for _ in places]
+        self._lines = array("q")
+
+    @property
+    def full(self) -> bool:
+        """Whether there are more faults than are told."""
+        return len(self.problems) > _MAX_PROBLEMS
+
+    def add(self, block: Block) -> None:
+        """All lines of a block: at once where they are plain numbers in their ranges, otherwise one by one."""
+        rows = plain_rows(block.content, self._separator, self._width)
+        found = [] if rows is None else [_converted(rows[:, place[0]], place) for place in self._places]
+        values = [each for each in found if each is not None]
+        if rows is None or len(values) < len(self._places):
+            self.add_rows(_rows(file_text(block.content, self._name, block.line), self._name, block.line))
+            return
+        for known, each in zip(self._values, values, strict=True):
+            known.frombytes(each.tobytes())
+        self._lines.frombytes(np.arange(block.line, block.line + len(rows), dtype=np.int64).tobytes())
+
+    def add_rows(self, rows: Iterator[tuple[int, str]]) -> None:
+        """Lines one by one, until there are too many faults."""
+        for line, text in rows:
+            for known, value in zip(self._values, self.row(line, text), strict=False):
+                known.append(value)
+            self._lines.append(line)
+            if self.full:
+                return
+
+    def columns(self) -> tuple[dict[str, Floats], Ints]:
+        """By name, and the line of every row. Raises ``Rejected`` with all that was wrong."""
+        if self.problems:
+            found = self.problems[:_MAX_PROBLEMS]
+            if self.full:
+                found.append(Problem(self._name, found[-1].line, "", "more faults follow; stopped"))
+            raise Rejected(found)
+        values = (np.frombuffer(known, dtype=np.float64) for known in self._values)
+        columns = {place[1].name: each for place, each in zip(self._places, values, strict=True)}
+        return columns, np.frombuffer(self._lines, dtype=np.int64)
 
     def row(self, line: int, text: str) -> list[float]:
         """The numbers of one row."""
@@ -130,6 +166,15 @@ class _Reader:
         return value
 
 
+def _converted(written: Floats, place: _Place) -> Floats | None:
+    """A column in the unit of the fits; None where that is no plain factor, or a value is out of its range."""
+    _, column, convert, _ = place
+    if not isinstance(convert, Times):
+        return None
+    found: Floats = written * convert.factor
+    return found if bool(np.all((column.above < found) & (found < column.below))) else None
+
+
 def _places(
     name: str, line: int, header: list[str], wanted: Sequence[Column], needed: Sequence[Column]
 ) -> list[_Place]:
@@ -160,40 +205,57 @@ def _places(
     return places
 
 
+def _blocks(path: Path, name: str) -> Iterator[Block]:
+    """Raises ``Rejected``."""
+    _require_file(path, name)
+    try:
+        yield from blocks_of(path, MEASUREMENT)
+    except OSError as error:
+        raise _unreadable(name, error) from None
+
+
 def file_content(path: Path, name: str, kind: Kind = MEASUREMENT) -> bytes:
     """The bytes of a measurement. Raises ``Rejected``."""
-    if not os.path.isfile(path):
-        raise Rejected([Problem(name, 0, "", "is not a file")])
+    _require_file(path, name)
     try:
         return read_bytes(path, kind)
     except OSError as error:
-        raise Rejected([Problem(name, 0, "", f"cannot be read: {error.strerror or error}")]) from None
+        raise _unreadable(name, error) from None
 
 
-def file_text(content: bytes, name: str) -> str:
-    """UTF-8 without its mark. Raises ``Rejected``."""
-    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
+def _require_file(path: Path, name: str) -> None:
+    if not os.path.isfile(path):
+        raise Rejected([Problem(name, 0, "", "is not a file")])
+
+
+def _unreadable(name: str, error: OSError) -> Rejected:
+    return Rejected([Problem(name, 0, "", f"cannot be read: {error.strerror or error}")])
+
+
+def file_text(content: bytes, name: str, line: int = 1) -> str:
+    """UTF-8 without its mark; ``line`` is the number of its first line. Raises ``Rejected``."""
+    if line == 1 and content.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise Rejected([Problem(name, 1, "", "is UTF-16; save it as UTF-8")])
     try:
-        return content.decode("utf-8-sig")  # spreadsheets write a byte order mark
+        return content.decode("utf-8-sig" if line == 1 else "utf-8")  # spreadsheets write a byte order mark
     except UnicodeDecodeError as error:
-        line = content.count(b"\n", 0, error.start) + 1
+        line += content.count(b"\n", 0, error.start)
         why = f"byte 0x{content[error.start]:02x} is not UTF-8"
         raise Rejected([Problem(name, line, "", why)]) from None
 
 
-def lines_of(text: str, name: str) -> Iterator[tuple[int, str]]:
-    """The lines of a text with their numbers from 1. Raises ``Rejected`` for one that is no line of any table."""
-    for number, found in enumerate(_LINE.finditer(text), 1):
+def lines_of(text: str, name: str, first: int = 1) -> Iterator[tuple[int, str]]:
+    """The lines of a text, numbered from ``first``. Raises ``Rejected`` for one that is no line of any table."""
+    for number, found in enumerate(_LINE.finditer(text), first):
         if found.end(1) - found.start() > _MAX_LINE:
             why = f"a line of {found.end(1) - found.start()} characters; at most 2^20 are read"
             raise Rejected([Problem(name, number, "", why)])
         yield number, found[1]
 
 
-def _rows(text: str, name: str) -> Iterator[tuple[int, str]]:
+def _rows(text: str, name: str, first: int) -> Iterator[tuple[int, str]]:
     """What counts, with line numbers."""
-    lines = lines_of(text, name)
+    lines = lines_of(text, name, first)
     return ((n, line) for n, line in lines if line.strip(" \t;,") and not line.lstrip().startswith("#"))
 
 

@@ -11,7 +11,7 @@ from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 from tablegen.waveform.series import FourierSeries
 
-_CHUNK_SAMPLES = 1 << 14  # samples that are worked out at a time
+_CHUNK_SAMPLES = 1 << 12  # samples that are worked out at a time
 _OUTLIER_SIGMAS = 7.0  # standard deviations
 _GRID = 1024  # points of a period at which the asked position is taken
 
@@ -86,10 +86,10 @@ def fit_displacement(
         raise Unphysical(
             f"{periods + settle:.3g} periods are recorded, which leaves no whole period after {settle} to settle"
         )
-    used = turns >= turns[0] + settle - 0.5 / per_turn if settle else np.ones(len(turns), bool)
+    left_out = int(np.searchsorted(turns, turns[0] + settle - 0.5 / per_turn)) if settle else 0
     if order is None:
         order = int(np.searchsorted([1.99, 3.99, 5.99], periods, side="right"))
-    t, measured = turns[used], displacement_nm[used]
+    t, measured = turns[left_out:], displacement_nm[left_out:]
     middle, height = float(np.mean(measured)), float(np.ptp(measured))
     if not height > 0.0:
         raise Unphysical("the displacement does not move")
@@ -97,19 +97,29 @@ def fit_displacement(
     span = float(t[-1] - t[0])
 
     def basis(rows: slice) -> Floats:
-        angle = 2.0 * pi * np.outer(t[rows] % 1.0, np.arange(1, count + 1))
+        """1, cosines, sines and the drift, a row each."""
+        angle = 2.0 * pi * (t[rows] % 1.0)
         s = 2.0 * (t[rows] - t[0]) / span - 1.0
-        drift = [s**n - s ** (n % 2) for n in range(2, order + 1)]  # 0 at both ends, and so nearly apart from the line
-        ramp = [s] if order else []
-        return np.column_stack([np.ones(len(s)), np.cos(angle), np.sin(angle), *ramp, *drift])
+        out = np.empty((1 + 2 * count + order, len(s)))
+        out[0] = 1.0
+        once = np.cos(angle) + 1j * np.sin(angle)
+        wave = once.copy()
+        for n in range(1, count + 1):
+            out[n], out[count + n] = wave.real, wave.imag
+            wave *= once
+        if order:
+            out[1 + 2 * count] = s
+        for n in range(2, order + 1):  # 0 at both ends, and so nearly apart from the line
+            out[2 * count + n] = s**n - s ** (n % 2)
+        return out
 
     normal: Floats = np.zeros((1 + 2 * count + order,) * 2)
     right = np.zeros(len(normal))
     parts = [slice(first, first + _CHUNK_SAMPLES) for first in range(0, len(t), _CHUNK_SAMPLES)]
     for rows in parts:
         b = basis(rows)
-        normal += b.T @ b
-        right += b.T @ ((measured[rows] - middle) / height)
+        normal += b @ b.T
+        right += b @ ((measured[rows] - middle) / height)
     size = np.linalg.eigvalsh(normal)
     if len(t) <= len(normal) or size[0] <= 1e-9 * size[-1]:
         raise Unphysical(
@@ -117,11 +127,12 @@ def fit_displacement(
         )
     inverse = np.linalg.inv(normal)
     c = inverse @ right
-    left, drift = np.empty(len(t)), np.empty(len(t))
+    left, drift = np.empty(len(t)), []
     for rows in parts:
         b = basis(rows)
-        left[rows] = (measured[rows] - middle) / height - b @ c
-        drift[rows] = b[:, 1 + 2 * count :] @ c[1 + 2 * count :]
+        left[rows] = (measured[rows] - middle) / height - c @ b
+        there = c[1 + 2 * count :] @ b[1 + 2 * count :]
+        drift += [float(np.min(there)), float(np.max(there))]
     correlated = correlation_length(left)
     freedom = max(len(t) / correlated - len(c), 1.0)
     covariance: Floats = np.array(
@@ -130,9 +141,10 @@ def fit_displacement(
     scaled: Floats = height * c[: 1 + 2 * count]
     series = FourierSeries(middle + float(scaled[0]), scaled[1 : count + 1].copy(), scaled[count + 1 :].copy())
     noise = height * float(np.sqrt(left @ left / max(len(t) - len(c), 1)))
-    left_out = int(np.sum(~used))
-    farthest = int(np.argmax(np.abs(left)))  # it pulls the fit, and the others seem off too
-    stands_out = abs(float(left[farthest])) > max(_OUTLIER_SIGMAS * 1.4826 * float(np.median(np.abs(left))), 1e-6)
+    distance = np.abs(left)
+    farthest = int(np.argmax(distance))  # it pulls the fit, and the others seem off too
+    most = float(distance[farthest])
+    stands_out = most > max(_OUTLIER_SIGMAS * 1.4826 * float(np.median(distance, overwrite_input=True)), 1e-6)
     stray = left_out + farthest if stands_out else None
-    moved = height * float(np.ptp(drift))
+    moved = height * (max(drift) - min(drift))
     return Displacement(series, covariance, noise, moved, correlated, periods, len(t), left_out, stray)

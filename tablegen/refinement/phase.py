@@ -1,6 +1,8 @@
 """When each sample of a trace was taken, in periods of the scan: from the recorded drive, or from a trigger."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from math import ceil, pi
 
 import numpy as np
@@ -12,6 +14,7 @@ from tablegen.problems import Unphysical
 from tablegen.waveform.series import FourierSeries
 
 MIN_SAMPLES_PER_PERIOD = 40  # samples per period
+_MOST_AT_ONCE = 1 << 18  # samples
 _GRID_POINTS = 1 << 16  # points per period, between which the known waveform is linear
 _MAX_CLOCK_DIFFERENCE = 0.01  # relative difference allowed between the clocks of generator and recorder
 _MAX_DRIVE_DIFFERENCE = 0.05  # difference allowed between recorded drive and plan, share of the amplitude
@@ -55,24 +58,34 @@ def phase_by_drive(line: LinePlan, time_s: Floats, drive_v: Floats, delay_s: flo
     w, slope = _tabled(line.drive_series, 0), _tabled(line.drive_series, 1)
     amplitude, middle = line.drive.v_amplitude, line.drive.v_offset
 
-    def turns(x: Floats) -> Floats:
-        return (time_s - float(x[1])) / float(x[0])
+    def turns(x: Floats, rows: slice = slice(None)) -> Floats:
+        return (time_s[rows] - float(x[1])) / float(x[0])
 
-    def residuals(x: Floats) -> Floats:
-        left: Floats = float(x[2]) + float(x[3]) * (_at(w, turns(x)) - 0.5) - drive_v
+    def residuals(x: Floats, rows: slice = slice(None)) -> Floats:
+        left: Floats = float(x[2]) + float(x[3]) * (_at(w, turns(x, rows)) - 0.5) - drive_v[rows]
         return left / amplitude
 
-    def jacobian(x: Floats) -> Floats:
-        t = turns(x)
+    def jacobian(x: Floats, rows: slice = slice(None)) -> Floats:
+        t = turns(x, rows)
         steep = float(x[3]) * _at(slope, t) / float(x[0])
         return np.column_stack([-steep * t, -steep, np.ones_like(t), _at(w, t) - 0.5]) / amplitude
 
     first = [period, start, float(np.mean(drive_v)), float(np.ptp(drive_v))]
     scales = [0.01 * nominal, 0.05 * nominal, amplitude, amplitude]
-    found = solve(residuals, first, ("period", "start", "middle", "amplitude"), scales, jacobian=jacobian)
-    x = found.values
+    few = slice(None, None, ceil(len(time_s) / _MOST_AT_ONCE))
+    found = solve(
+        lambda x: residuals(x, few),
+        first,
+        ("period", "start", "middle", "amplitude"),
+        scales,
+        jacobian=lambda x: jacobian(x, few),
+    )
+    x, left = found.values, found.residuals
+    if len(left) < len(time_s):  # so near the minimum, one step with all samples reaches it
+        x = x - _step(residuals, jacobian, x, np.array(scales), len(time_s))
+        left = np.concatenate([residuals(x, rows) for rows in _parts(len(time_s))])
     relative = float(x[3]) / amplitude
-    departure = _averaged(turns(x), found.residuals) / max(abs(relative), 1e-9)
+    departure = _averaged(turns(x), left) / max(abs(relative), 1e-9)
     if abs(float(x[0]) / nominal - 1.0) > _MAX_CLOCK_DIFFERENCE:
         raise Unphysical(
             f"the recorded drive has a period of {x[0]:.6g} s, this scan {nominal:.6g} s; is time_s in seconds?"
@@ -88,8 +101,29 @@ def phase_by_drive(line: LinePlan, time_s: Floats, drive_v: Floats, delay_s: flo
             f"built from this file"
         )
     t = turns(x)
-    _check_layer(line, t, -found.residuals / relative)
+    _check_layer(line, t[few], -left[few] / relative)
     return Phase(t - delay_s / float(x[0]), float(x[0]), (relative, departure))
+
+
+def _step(
+    residuals: Callable[[Floats, slice], Floats],
+    jacobian: Callable[[Floats, slice], Floats],
+    x: Floats,
+    scales: Floats,
+    samples: int,
+) -> Floats:
+    """Gauss and Newton's, of all samples."""
+    normal, right = np.zeros((len(x), len(x))), np.zeros(len(x))
+    for rows in _parts(samples):
+        j = jacobian(x, rows) * scales
+        normal += j.T @ j
+        right += j.T @ residuals(x, rows)
+    return np.asarray(scales * np.linalg.solve(normal, right), dtype=np.float64)
+
+
+def _parts(samples: int) -> list[slice]:
+    """A long trace in parts that fit into memory with their derivatives."""
+    return [slice(first, first + _MOST_AT_ONCE) for first in range(0, samples, _MOST_AT_ONCE)]
 
 
 def _check_times(time_s: Floats, period_s: float) -> None:
@@ -116,11 +150,11 @@ def _first_guess(series: FourierSeries, time_s: Floats, drive_v: Floats, nominal
     turns = (time_s - time_s[0]) / nominal_s
     pieces = max(int(np.floor(turns[-1] + 0.02)), 1)
     angles = []
-    for i in range(pieces):
-        inside = (turns >= i) & (turns < i + 1)
-        wave = np.exp(-2j * pi * turns[inside])
+    edges = np.searchsorted(turns, np.arange(pieces + 1.0))
+    for first, stop in pairwise(edges.tolist()):
+        wave = np.exp(-2j * pi * turns[first:stop])
         basis = np.column_stack([np.ones(len(wave)), wave.real, wave.imag])
-        c = np.linalg.lstsq(basis, drive_v[inside], rcond=None)[0]
+        c = np.linalg.lstsq(basis, drive_v[first:stop], rcond=None)[0]
         angles.append(np.angle(c[1] + 1j * c[2]))  # angle of exp(2 pi i turns)
     # The drive is cos(2 pi (turns + angle)): a clock that is off lets the angle grow.
     angle = np.unwrap(angles) / (2.0 * pi)
@@ -147,11 +181,20 @@ def _at(table: Floats, turns: Floats) -> Floats:
 
 
 def _averaged(turns: Floats, left: Floats) -> float:
-    """Rms of what is left, averaged over the periods in pieces of one: without the noise of a reading."""
-    place = np.minimum(((turns - np.floor(turns)) * _BINS_PER_PERIOD).astype(np.int64), _BINS_PER_PERIOD - 1)
-    count = np.bincount(place, minlength=_BINS_PER_PERIOD)
-    mean = np.bincount(place, left, minlength=_BINS_PER_PERIOD)[count > 0] / count[count > 0]
-    return float(np.sqrt(np.mean(mean**2)))
+    """Rms of what is left, averaged over the periods in pieces of one, less what noise has in it.
+
+    Noise is what neighbouring readings differ by: a short trace has few readings in a piece, which average little.
+    """
+    count, total = np.zeros(_BINS_PER_PERIOD), np.zeros(_BINS_PER_PERIOD)
+    for rows in _parts(len(turns)):
+        place = ((turns[rows] - np.floor(turns[rows])) * _BINS_PER_PERIOD).astype(np.int64)
+        place = np.minimum(place, _BINS_PER_PERIOD - 1)
+        count += np.bincount(place, minlength=_BINS_PER_PERIOD)
+        total += np.bincount(place, left[rows], minlength=_BINS_PER_PERIOD)
+    readings = count[count > 0]
+    mean = total[count > 0] / readings
+    noise = 0.5 * sum(float(np.sum(np.diff(left[rows]) ** 2)) for rows in _parts(len(left))) / len(left)
+    return float(np.sqrt(max(float(np.mean(mean**2)) - noise * float(np.mean(1.0 / readings)), 0.0)))
 
 
 def _check_layer(line: LinePlan, turns: Floats, left: Floats) -> None:

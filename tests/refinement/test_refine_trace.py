@@ -13,6 +13,7 @@ from refining import scan_text
 from tablegen.config.load import load
 from tablegen.planning.line_plan import LinePlan, make_plan
 from tablegen.problems import Unphysical
+from tablegen.refinement import phase
 from tablegen.refinement.displacement import fit_displacement
 from tablegen.refinement.phase import phase_by_drive, phase_by_trigger
 from tablegen.waveform.series import FourierSeries
@@ -57,6 +58,7 @@ def drive(line: LinePlan, turns: np.ndarray) -> np.ndarray:
     seed=st.integers(0, 99),
 )
 @example(start=0.0, clock=0.0, periods=1.5, samples=50.0, noise=0.00390625, late=0.0, seed=20)
+@example(start=0.25, clock=0.0, periods=1.5, samples=50.0, noise=0.005, late=0.0, seed=53)
 @settings(max_examples=40, deadline=None)
 def test_the_drive_says_when_each_sample_was_taken(
     line: LinePlan, start: float, clock: float, periods: float, samples: float, noise: float, late: float, seed: int
@@ -74,6 +76,20 @@ def test_the_drive_says_when_each_sample_was_taken(
     assert found.drive[0] == pytest.approx(1.0, abs=0.01)
     # Averaged in 64 pieces of a period, in each of which a short trace has a single reading or two.
     assert found.drive[1] < 1.6 * noise * min(1.0, 1.2 * np.sqrt(64 / len(turns))) + 1e-6
+
+
+def test_a_long_trace_is_fitted_in_parts_as_a_whole(line: LinePlan, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of its first fit only every so many samples take part; one step with all of them ends where a whole fit does."""
+    turns = 0.3 + np.arange(50_001) / 500
+    noise = 0.1 * np.random.default_rng(3).standard_normal(len(turns))
+    time, volts = turns * 0.01 * 1.0007, drive(line, turns) + noise
+    whole = phase_by_drive(line, time, volts, 0.0)
+    monkeypatch.setattr(phase, "_MOST_AT_ONCE", 3000)
+    parts = phase_by_drive(line, time, volts, 0.0)
+    assert np.max(np.abs(parts.turns - whole.turns)) < 1e-7  # a hundredth of the standard error
+    assert parts.drive == pytest.approx(whole.drive, abs=1e-6)
+    monkeypatch.setattr(phase, "_step", lambda *_: np.zeros(4))
+    assert np.max(np.abs(phase_by_drive(line, time, volts, 0.0).turns - whole.turns)) > 1e-6
 
 
 def test_a_trigger_is_a_line_start(line: LinePlan) -> None:
