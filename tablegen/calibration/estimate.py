@@ -2,8 +2,12 @@
 
 from dataclasses import dataclass
 from math import isfinite, nan
+from typing import TYPE_CHECKING
 
 from tablegen.numerics.arrays import Floats
+
+if TYPE_CHECKING:
+    from tablegen.calibration.image_sizes import ImageSize
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +48,8 @@ class Fit:
 
     ``residual_percent`` is in the paper's metric: scale error of each point in percent for sizes and gains, position
     error in percent of the scan for hysteresis. ``before_percent`` is the largest error without the correction.
-    ``outliers`` are the rows, counted from 0, that do not fit to the others; they were kept.
+    ``outliers`` are the rows, counted from 0, that do not fit to the others; they were kept. ``images`` are those of
+    which sizes were taken, a row each; none where sizes were given.
     """
 
     points: int
@@ -53,6 +58,7 @@ class Fit:
     remarks: tuple[str, ...]
     outliers: tuple[int, ...]
     curves: tuple[Curve, ...]
+    images: "tuple[ImageSize, ...]" = ()
 
     @property
     def rms_percent(self) -> float:

@@ -5,10 +5,12 @@ Nothing is read beyond the end of the object that holds it, so that a damaged fi
 
 import struct
 from collections.abc import Iterator
-from math import prod
+from dataclasses import dataclass, replace
+from math import isfinite, prod
 
 import numpy as np
 
+from tablegen.calibration.image_formats.channel import Channel, loaded
 from tablegen.numerics.arrays import Floats
 
 _MAGIC = b"GWYP"
@@ -17,13 +19,35 @@ _FIXED = {b"b": 1, b"c": 1, b"i": 4, b"q": 8, b"d": 8}
 _ITEMS = {b"C": 1, b"I": 4, b"Q": 8, b"D": 8}
 
 
-def data_fields(content: bytes) -> list[tuple[int, str, Floats]]:
-    """Number, title and matrix of each data field, by number. Raises ``ValueError`` with what is wrong."""
+@dataclass(frozen=True, eq=False)
+class DataField:
+    """An image of the file: its number and title, the values, the sides in m where those are lengths, and the unit."""
+
+    number: int
+    title: str
+    values: Floats
+    width_m: float | None
+    height_m: float | None
+    unit: str
+
+
+def gwy_channels(content: bytes, _: str) -> list[Channel]:
+    """The data fields of a .gwy file as channels. Raises ``ValueError`` with what is wrong."""
+    channels = []
+    for field in data_fields(content):
+        width, height = (None if side is None else side * 1e9 for side in (field.width_m, field.height_m))
+        channel = loaded(field.number, field.title, field.values)
+        channels.append(replace(channel, unit=field.unit, width_nm=width, height_nm=height))
+    return channels
+
+
+def data_fields(content: bytes) -> list[DataField]:
+    """The data fields, by number. Raises ``ValueError`` with what is wrong."""
     if content[:4] != _MAGIC:
         raise ValueError("does not begin as a Gwyddion file does")
     _, outer, _ = _object(content, 4, len(content))
     titles: dict[int, str] = {}
-    fields: dict[int, Floats] = {}
+    fields: dict[int, tuple[int, int]] = {}
     for name, kind, at, end in _components(content, *outer):
         number, _, rest = name.removeprefix("/").partition("/")
         if not number.isdecimal() or len(number) > 6:
@@ -31,24 +55,43 @@ def data_fields(content: bytes) -> list[tuple[int, str, Floats]]:
         if rest == "data/title" and kind == b"s":
             titles[int(number)] = content[at : end - 1].decode("utf-8", "replace")
         elif rest == "data" and kind == b"o":
-            fields[int(number)] = _field(content, at, end)
-    return [(number, titles.get(number, ""), fields[number]) for number in sorted(fields)]
+            fields[int(number)] = at, end
+    return [_field(content, *fields[number], number, titles.get(number, "")) for number in sorted(fields)]
 
 
-def _field(content: bytes, at: int, end: int) -> Floats:
+def _field(content: bytes, at: int, end: int, number: int, title: str) -> DataField:
     name, inside, _ = _object(content, at, end)
     size: dict[str, int] = {}
+    sides: dict[str, float] = {}
+    units = {"si_unit_xy": "", "si_unit_z": ""}
     values = None
     for key, kind, start, stop in _components(content, *inside):
         if key in ("xres", "yres") and kind == b"i":
             size[key] = struct.unpack("<i", content[start:stop])[0]
+        elif key in ("xreal", "yreal") and kind == b"d":
+            sides[key] = struct.unpack("<d", content[start:stop])[0]
+        elif key in units and kind == b"o":
+            units[key] = _unit(content, start, stop)
         elif key == "data" and kind == b"D":
             values = np.frombuffer(content[start + 4 : stop], dtype="<f8").astype(np.float64)
     if values is None or len(size) != 2:
         raise ValueError(f"an object {name[:40]!r} has no data, xres or yres")
     if min(size.values()) < 1 or prod(size.values()) != len(values):
         raise ValueError(f"a data field of {size['xres']} x {size['yres']} has {len(values)} values")
-    return values.reshape(size["yres"], size["xres"])
+    lengths = [
+        side if units["si_unit_xy"] == "m" and isfinite(side) and side > 0.0 else None
+        for side in (sides.get("xreal", 0.0), sides.get("yreal", 0.0))
+    ]
+    matrix = values.reshape(size["yres"], size["xres"])
+    return DataField(number, title, matrix, lengths[0], lengths[1], units["si_unit_z"])
+
+
+def _unit(content: bytes, at: int, end: int) -> str:
+    _, inside, _ = _object(content, at, end)
+    for key, kind, start, stop in _components(content, *inside):
+        if key == "unitstr" and kind == b"s":
+            return content[start : stop - 1].decode("utf-8", "replace")
+    return ""
 
 
 def _object(content: bytes, at: int, end: int) -> tuple[str, tuple[int, int], int]:

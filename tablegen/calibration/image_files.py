@@ -1,252 +1,226 @@
-"""Images of heights from files: .npy, .tif, .png, Gwyddion's .gwy, and matrices of numbers as text.
+"""Images of heights from files: those of instruments, Gwyddion's .gwy, .npy, .tif, .png, and numbers as text.
 
-Needs the extra ``images`` for .tif and .png.
+Needs the extra ``images`` for .tif, .png and .jpk. What each format says is in docs/image_files.md.
 """
 
 import hashlib
 import re
-import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
-from io import BytesIO
 from math import prod
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
-from tablegen.calibration.gwyddion import data_fields
-from tablegen.calibration.table import Source, file_content, file_text, lines_of
-from tablegen.calibration.tiff import tiff_pages
+from tablegen.calibration.gwyddion import gwy_channels
+from tablegen.calibration.image_formats.asd import asd_channels
+from tablegen.calibration.image_formats.channel import (
+    MAX_PIXELS,
+    Channel,
+    Direction,
+    FirstRow,
+    choose,
+    partner,
+    quoted,
+)
+from tablegen.calibration.image_formats.igor import ibw_channels
+from tablegen.calibration.image_formats.jpk import jpk_channels
+from tablegen.calibration.image_formats.matrix import npy_channels, text_channels
+from tablegen.calibration.image_formats.nanonis import sxm_channels
+from tablegen.calibration.image_formats.nanoscope import spm_channels
+from tablegen.calibration.image_formats.picture import png_channels
+from tablegen.calibration.table import Source, file_content
+from tablegen.calibration.tiff import tiff_channels
 from tablegen.figures import shown_path
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Problem, Rejected, shortened
 from tablegen.reading import IMAGE
 
 _MIN_PIXELS = 32  # rows and columns
-_MAX_PIXELS = 1 << 25  # 5792 x 5792; more than that in floating point would be most of a computer's memory
 _MAX_HEIGHT = 1e30  # in any unit; squares of heights have to be numbers
-_MAX_CHANNELS_LISTED = 12  # channels in a message
-_MAX_TITLE = 60  # characters of a channel in a message
-_DECIMAL_COMMA = re.compile(r"[+-]?\d+(,\d+)?([eE][+-]?\d+)?")
-MODULES = {".png": "PIL", ".tif": "tifffile", ".tiff": "tifffile"}  # what reads them, beside numpy
+_NUMBERED = re.compile(r"\.\d{3}")  # Nanoscope's images of one name, .000 to .999
+MODULES = {".png": "PIL", **dict.fromkeys((".tif", ".tiff", ".jpk", ".jpk-qi-image"), "tifffile")}  # beside numpy
 
 
 @dataclass(frozen=True, eq=False)
 class ScanImage:
-    """Heights, rows x columns, row 0 first in time; ``file`` as messages call it."""
+    """Heights, rows x columns, and what the file says of them; ``file`` as messages call it.
+
+    Row 0 is the first in time, as far as the file tells; the left end of the line is at the left in both directions.
+    What a file does not say is None, or empty.
+    """
 
     file: str
     source: Source
-    heights: Floats
+    heights: Floats  # in ``unit``
+    channel: str = ""  # title in the file, such as "HeightRetrace"
+    number: int = 0  # of the channel in the file
+    signal: str = ""  # title without the direction, such as "Height"
+    direction: Direction | None = None
+    unit: str = ""  # of the heights, such as "m", "nm" or "V"
+    width_nm: float | None = None  # of the line, all pixels
+    height_nm: float | None = None  # of the slow axis, all rows
+    line_rate_hz: float | None = None  # lines in one direction per second
+    first_row: FirstRow | None = None  # where row 0 is in the picture
+    frame: int = 0  # counted from 0
+    frames: int = 1  # images of a movie
 
 
-_Matrix = npt.NDArray[np.generic]
+def read_image(
+    path: Path, channel: str | None = None, direction: Direction | None = None, frame: int | None = None
+) -> ScanImage:
+    """An image of heights.
+
+    ``channel`` is the title, or the number, of the data in a file that has several; or the title without the
+    direction, of which ``direction`` then chooses. ``frame`` counts from 0 in a movie. Raises ``Rejected`` with file
+    and reason.
+    """
+    file = _opened(path)
+    with file.named():
+        return _read(file, choose(file.channels, channel, direction), frame)
+
+
+def read_pair(
+    trace: Path,
+    retrace: Path | None = None,
+    channel: str | None = None,
+    retrace_channel: str | None = None,
+    frame: int | None = None,
+) -> tuple[ScanImage, ScanImage]:
+    """Trace and retrace of one scan, from two files, or from one that has both.
+
+    The retrace is ``retrace_channel``, or the retrace that belongs to the trace's channel, or the channel of the same
+    name. Raises ``Rejected`` with file and reason, also where a file calls the trace a retrace, or the reverse.
+    """
+    first = _opened(trace)
+    second = first if retrace is None or retrace == trace else _opened(retrace)
+    with first.named():
+        one = _required(choose(first.channels, channel, "trace"), "trace")
+        read = _read(first, one, frame)
+    with second.named():
+        other = partner(second.channels, one) if retrace_channel is None else None
+        other = _required(other or choose(second.channels, retrace_channel or channel, "retrace"), "retrace")
+        if first is second and one is other:
+            raise ValueError(f"channel {one.number} ({quoted(one.title)}) has no retrace in this file; give it too")
+        return read, _read(second, other, frame)
+
+
+def _required(channel: Channel, direction: Direction) -> Channel:
+    if channel.direction not in (None, direction):
+        what = f"channel {channel.number} ({quoted(channel.title)}) is the {channel.direction} by the file"
+        raise ValueError(f"{what}; the {direction} is needed here. Are trace and retrace exchanged?")
+    return channel
+
+
+def read_channels(path: Path, frame: int | None = None) -> list[ScanImage]:
+    """All channels of a file, each of which has to be an image of heights. Raises ``Rejected``."""
+    file = _opened(path)
+    with file.named():
+        if not file.channels:
+            raise ValueError("contains no image")
+        return [_read(file, channel, frame) for channel in file.channels]
+
+
+def channels_of(path: Path) -> list[Channel]:
+    """What a file has, without reading more of it than its format needs for that. Raises ``Rejected``."""
+    return _opened(path).channels
 
 
 @dataclass(frozen=True, eq=False)
-class _Channel:
-    """One image of a file: what it is called, its shape by the file, and what reads it, once that is known to fit."""
+class _ImageFile:
+    """A file whose structure was read, and where it came from."""
 
-    number: int
-    title: str
-    shape: tuple[int, ...]
-    load: Callable[[], _Matrix]
+    name: str
+    source: Source
+    channels: list[Channel]
+
+    @contextmanager
+    def named(self) -> Iterator[None]:
+        """Turn a ``ValueError`` into ``Rejected`` with the name of the file."""
+        try:
+            yield
+        except ValueError as reason:
+            raise Rejected([Problem(self.name, 0, "", str(reason))]) from None
 
 
-def _loaded(number: int, title: str, matrix: _Matrix) -> _Channel:
-    return _Channel(number, title, matrix.shape, lambda: matrix)
-
-
-def read_image(path: Path, channel: str | None = None) -> ScanImage:
-    """An image of heights.
-
-    ``channel`` is the title or the number of the data in a file that has several. Raises ``Rejected`` with file and
-    reason.
-    """
+def _opened(path: Path) -> _ImageFile:
+    """The channels of a file. Raises ``Rejected``."""
     name = shown_path(path)
+    file = _ImageFile(name, Source(path.name, ""), [])
+    ending = path.suffix.lower()
+    reader = spm_channels if _NUMBERED.fullmatch(ending) else _READERS.get(ending)
+    with file.named():
+        if reader is None:
+            what = path.suffix or "no ending"
+            raise ValueError(f"{what} is not one of {', '.join(_READERS)}; export it as one of these")
+        content = file_content(path, name, IMAGE)
+        if not content:
+            raise ValueError("is empty")
+        return _ImageFile(
+            name, Source(path.name, hashlib.sha256(content).hexdigest()[:16]), list(reader(content, name))
+        )
 
-    def refuse(why: str) -> Rejected:
-        return Rejected([Problem(name, 0, "", why)])
 
-    reader = _READERS.get(path.suffix.lower())
-    if reader is None:
-        raise refuse(f"{path.suffix or 'no ending'} is not one of {', '.join(_READERS)}; export it as one of these")
-    content = file_content(path, name, IMAGE)
-    if not content:
-        raise refuse("is empty")
-    try:
-        channels = reader(content, name)
-        chosen = _chosen(channels, channel)
-        what = f"channel {chosen.number} ({_quoted(chosen.title)}): " if len(channels) > 1 else ""
-        size = " x ".join(map(str, chosen.shape))
-        if len(chosen.shape) != 2:
-            raise refuse(f"{what}has the shape {shortened(size, 60)}; rows x columns are needed")
-        if min(chosen.shape) < _MIN_PIXELS or prod(chosen.shape) > _MAX_PIXELS:
-            least = f"{_MIN_PIXELS} x {_MIN_PIXELS}"
-            raise refuse(f"{what}has {size} pixels; at least {least} and at most 2^25 are read")
-        matrix = chosen.load()
-    except ValueError as reason:
-        raise refuse(str(reason)) from None
-    if matrix.dtype.kind not in "iufb":
-        raise refuse(f"{what}has values of the type {matrix.dtype}; heights are real numbers")
-    heights = matrix.astype(np.float64)
+def _read(file: _ImageFile, channel: Channel, frame: int | None) -> ScanImage:
+    """The image of a channel, which has to be heights. Raises ``ValueError``."""
+    what = f"channel {channel.number} ({quoted(channel.title)}): " if len(file.channels) > 1 else ""
+    size = " x ".join(map(str, channel.shape))
+    if len(channel.shape) != 2:
+        raise ValueError(f"{what}has the shape {shortened(size, 60)}; rows x columns are needed")
+    if min(channel.shape) < _MIN_PIXELS or prod(channel.shape) > MAX_PIXELS:
+        least = f"{_MIN_PIXELS} x {_MIN_PIXELS}"
+        raise ValueError(f"{what}has {size} pixels; at least {least} and at most 2^25 are read")
+    if frame is None and channel.frames > 1:
+        raise ValueError(
+            f"{what}is a movie of {channel.frames} frames; choose one with --frame, 0 to {channel.frames - 1}"
+        )
+    chosen = frame or 0
+    if not 0 <= chosen < channel.frames:
+        raise ValueError(f"{what}has no frame {chosen}; the last one is {channel.frames - 1}")
+    with np.errstate(all="ignore"):  # of factors in a damaged file; what is not finite is counted below
+        matrix = channel.load(chosen)
+        if matrix.dtype.kind not in "iufb":
+            raise ValueError(f"{what}has values of the type {matrix.dtype}; heights are real numbers")
+        if matrix.shape != channel.shape:
+            raise ValueError(f"{what}has {matrix.size} pixels, not {size}; copy it again")
+        heights = matrix.astype(np.float64)
     bad = int(np.sum(~np.isfinite(heights)))
     if bad:
-        raise refuse(f"{what}{bad} pixels are not finite; crop or interpolate them")
+        raise ValueError(f"{what}{bad} pixels are not finite; crop or interpolate them")
     if np.max(np.abs(heights)) > _MAX_HEIGHT:
-        raise refuse(f"{what}has heights beyond {_MAX_HEIGHT:g}; is it damaged?")
+        raise ValueError(f"{what}has heights beyond {_MAX_HEIGHT:g}; is it damaged?")
     if not np.ptp(heights) > 1.0 / _MAX_HEIGHT:
-        raise refuse(f"{what}all pixels are {heights.flat[0]:g}; was a different channel saved?")
-    return ScanImage(name, Source(path.name, hashlib.sha256(content).hexdigest()[:16]), heights)
-
-
-def _chosen(channels: list[_Channel], wanted: str | None) -> _Channel:
-    """By title, or by number. Raises ``ValueError``."""
-    if not channels:
-        raise ValueError("contains no image")
-    there = ", ".join(
-        f"{one.number} ({shortened(one.title, _MAX_TITLE)})" if one.title else f"{one.number}"
-        for one in channels[:_MAX_CHANNELS_LISTED]
+        raise ValueError(f"{what}all pixels are {heights.flat[0]:g}; was a different channel saved?")
+    return ScanImage(
+        file=file.name,
+        source=file.source,
+        heights=heights,
+        channel=channel.title,
+        number=channel.number,
+        signal=channel.signal,
+        direction=channel.direction,
+        unit=channel.unit,
+        width_nm=channel.width_nm,
+        height_nm=channel.height_nm,
+        line_rate_hz=channel.line_rate_hz,
+        first_row=channel.first_row,
+        frame=chosen,
+        frames=channel.frames,
     )
-    there += ", ..." if len(channels) > _MAX_CHANNELS_LISTED else ""
-    if wanted is None:
-        if len(channels) > 1:
-            raise ValueError(f"has several channels, {there}; choose with --channel")
-        return channels[0]
-    found = [one for one in channels if one.title == wanted] or [one for one in channels if str(one.number) == wanted]
-    if len(found) != 1:
-        raise ValueError(f"has {'no' if not found else 'more than one'} channel {_quoted(wanted)}; there is {there}")
-    return found[0]
 
 
-def _quoted(title: str) -> str:
-    return f"'{shortened(title, _MAX_TITLE)}'"
-
-
-def _npy(content: bytes, _: str) -> list[_Channel]:
-    if content[:2] == b"PK":
-        raise ValueError("is an .npz archive; save one array with numpy.save")
-    file = BytesIO(content)
-    try:
-        version = np.lib.format.read_magic(file)
-        read_header = {
-            (1, 0): np.lib.format.read_array_header_1_0,
-            (2, 0): np.lib.format.read_array_header_2_0,
-        }[version]
-        shape, by_columns, kind = read_header(file)
-        if kind.hasobject or kind.itemsize == 0 or len(shape) > 3 or min(shape, default=0) < 0:
-            raise ValueError("no array of numbers in up to three dimensions")
-        if prod(shape) * kind.itemsize > len(content) - file.tell():
-            raise ValueError(f"{len(content) - file.tell()} bytes are fewer than those of {prod(shape)} values")
-        flat = np.frombuffer(content, kind, prod(shape), file.tell())
-        array = flat.reshape(shape, order="F" if by_columns else "C")
-    except Exception as error:  # the header is read by the parser of Python, which raises whatever it meets
-        raise ValueError(f"is not a complete .npy file of numbers ({_first_line(error)})") from None
-    if array.ndim == 3:
-        return [_loaded(number, "", image) for number, image in enumerate(array)]
-    return [_loaded(0, "", array)]
-
-
-def _png(content: bytes, _: str) -> list[_Channel]:
-    from PIL import Image as Pillow
-
-    def damaged(error: Exception) -> ValueError:
-        return ValueError(f"is not a complete PNG file ({_first_line(error)})")
-
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            picture = Pillow.open(BytesIO(content), formats=("PNG",))
-    except Exception as error:  # the library raises whatever a damaged structure leads to
-        raise damaged(error) from None
-    if picture.mode not in ("1", "L", "LA", "RGB", "RGBA", "P", "PA") and not picture.mode.startswith("I"):
-        raise ValueError(f"has pixels of the kind {picture.mode}; export it in grey, 16 bits, or as numbers")
-
-    def load() -> _Matrix:
-        try:
-            picture.load()
-            if picture.mode in ("1", "L") or picture.mode.startswith("I"):
-                return np.asarray(picture)
-            colours = np.asarray(picture.convert("RGB"))
-        except Exception as error:
-            raise damaged(error) from None
-        if np.array_equal(colours[..., 0], colours[..., 1]) and np.array_equal(colours[..., 0], colours[..., 2]):
-            return colours[..., 0]
-        raise ValueError("is in colour, not heights; export it in grey, 16 bits, or as numbers")
-
-    return [_Channel(0, "", picture.size[::-1], load)]
-
-
-def _tiff(content: bytes, _: str) -> list[_Channel]:
-    pages = tiff_pages(content)
-    for page in pages:
-        if len(page.shape) == 3 and page.shape[-1] in (3, 4):
-            raise ValueError("is in colour, not heights; export it in grey, 16 bits or floating point")
-    return [_Channel(number, "", page.shape, page.load) for number, page in enumerate(pages)]
-
-
-def _gwy(content: bytes, _: str) -> list[_Channel]:
-    return [_loaded(number, title, matrix) for number, title, matrix in data_fields(content)]
-
-
-def _ascii(content: bytes, name: str) -> list[_Channel]:
-    """Rows of numbers; the first tells what separates. Between blanks, tabs and semicolons a comma is a decimal one."""
-    mark: str | None = None
-    width = 0
-    values: list[Floats] = []
-    for line, text in lines_of(file_text(content, name), name):
-        text = text.strip()
-        if not text or text.startswith("#"):
-            continue
-        if not values:
-            mark = _separator(text)
-        cells = text.strip(mark).split(mark) if mark else text.split()
-        if mark != ",":
-            cells = [cell.replace(",", ".") for cell in cells]
-        try:
-            row = np.array([float(cell) for cell in cells])
-        except ValueError:
-            wrong = next(cell for cell in cells if not _is_number(cell)).strip()
-            why = f"{wrong[:40]!r} is not a number; comment lines must begin with #"
-            raise Rejected([Problem(name, line, "", why)]) from None
-        width = width or len(row)
-        if len(row) != width:
-            raise Rejected([Problem(name, line, "", f"{len(row)} numbers where the first row has {width}")])
-        values.append(row)
-        if width * len(values) > _MAX_PIXELS:
-            raise ValueError("has more than 2^25 numbers, which is the most that are read")
-    if not values:
-        raise ValueError("has no numbers")
-    return [_loaded(0, "", np.array(values))]
-
-
-def _separator(row: str) -> str | None:
-    """What separates the numbers of a row; None for blanks."""
-    mark = next((mark for mark in (";", "\t") if mark in row), None)
-    if mark is not None or "," not in row:
-        return mark
-    cells = row.split()
-    return None if len(cells) > 1 and all(map(_DECIMAL_COMMA.fullmatch, cells)) else ","
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return True
-
-
-def _first_line(error: BaseException) -> str:
-    return shortened((str(error).strip() or type(error).__name__).splitlines()[0], 100)
-
-
-_READERS: dict[str, Callable[[bytes, str], list[_Channel]]] = {
-    ".npy": _npy,
-    ".tif": _tiff,
-    ".tiff": _tiff,
-    ".png": _png,
-    ".gwy": _gwy,
-    **dict.fromkeys((".txt", ".asc", ".csv", ".dat"), _ascii),
+_READERS: dict[str, Callable[[bytes, str], list[Channel]]] = {
+    ".npy": npy_channels,
+    ".tif": tiff_channels,
+    ".tiff": tiff_channels,
+    ".png": png_channels,
+    ".gwy": gwy_channels,
+    **dict.fromkeys((".txt", ".asc", ".csv", ".dat"), text_channels),
+    ".asd": asd_channels,
+    ".ibw": ibw_channels,
+    ".spm": spm_channels,
+    ".jpk": jpk_channels,
+    ".jpk-qi-image": jpk_channels,
+    ".sxm": sxm_channels,
 }

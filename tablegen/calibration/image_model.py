@@ -20,6 +20,7 @@ _MIN_SPOT_AMPLITUDE = 0.003  # share of the strongest amplitude
 _MAX_DELAY = 0.1  # share of the line
 _MIN_TRACKED_PERIODS = 8.0  # periods
 _PHASE_TOLERANCE = 0.01  # periods, rms
+_SAME_WAVE = 0.5  # periods: how near waves are that are one
 _MIN_MISFIT_RATIO = 1.5  # how much worse another count of periods has to be
 
 
@@ -56,7 +57,7 @@ def begin(geometry: Geometry, heights: list[Floats], mirrored: bool) -> tuple[Sp
     spot = strongest(geometry, heights[0])
     forward = bend_of(geometry, heights[0], True, spot, spot.sharpest)
     if len(heights) == 1:
-        check_signs(forward.shape.peak()[0], 0.0, 0.02, "")
+        check_signs(forward.shape.xi, 0.0, 0.02, "")
         return spot, (forward,)
     backward = bend_of(geometry, heights[1], False, spot)
     turned = bend_of(geometry, heights[1][:, ::-1], False, spot)
@@ -66,8 +67,8 @@ def begin(geometry: Geometry, heights: list[Floats], mirrored: bool) -> tuple[Sp
     if backward.match < 0.3 * forward.match:
         raise Unphysical("the retrace does not show the trace's pattern; are they from one scan?")
     # A grating square to the lines looks the same mirrored; then the bend tells.
-    signs = [bend.shape.peak()[0] for bend in (forward, backward)]
-    check_signs(signs[0], signs[1], 0.02, advice)
+    # xi is the mean lag of a sweep; few periods leave its skew, and with it the sign of the peak, open.
+    check_signs(forward.shape.xi, backward.shape.xi, 0.02, advice)
     return spot, (forward, backward)
 
 
@@ -145,7 +146,12 @@ def described(
         float(np.max(np.abs(state.amplitudes))),
         _ROW_POLYNOMIAL_ORDER,
     )
-    if other is not None:
+    part = 1 if other is None else _part_of(state, model, other[0], other[1])
+    if part > 1:  # the strongest wave was a harmonic of the sample's period
+        model, state = model.divided(state, part)
+        model = _with_spots(model, state)
+        state = settle(model, state.parameters, free)
+    elif other is not None:
         second, polynomial = other
         start = np.concatenate([state.parameters, [second.q], polynomial])
         free = np.append(free, np.ones(1 + _ROW_POLYNOMIAL_ORDER, bool))
@@ -213,6 +219,17 @@ def _turns(place: Floats, apart: Floats, q: float) -> int:
             f"of more of the sweep, with a --window near 0 1"
         )
     return tried[0][1]
+
+
+def _part_of(state: FitState, model: PeriodicModel, other: Spot, polynomial: Floats) -> int:
+    """2 or 3 where the other wave is halves or thirds of the first: then one grating has both. 1 where it is not."""
+    q, s = float(model.q(state.parameters)[0]), float(model.s(state.parameters)[0, 0])
+    other_s = float(polynomial[0])
+    for part in (2, 3):
+        times = round(part * other.q / q)
+        if times % part and np.hypot(other.q - times * q / part, other_s - times * s / part) < _SAME_WAVE:
+            return part
+    return 1
 
 
 def _multiples(model: PeriodicModel, parameters: Floats) -> Floats:

@@ -1,7 +1,7 @@
 """Least squares with standard errors that can be believed, and with the parameters that data cannot determine."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import nan, sqrt
 
 import numpy as np
@@ -13,6 +13,7 @@ from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 
 _NORMAL_AT_2_SIGMA = 0.9772498680518208  # the normal distribution's at 2: what two standard errors cover, on one side
+_SCATTER_STEPS = 20
 _SINGULAR_VALUE_LIMIT = 1e-10  # relative to the largest; finite differences leave less than this of a zero
 
 
@@ -21,6 +22,8 @@ class Solution:
     """Values, their covariance for a unit variance of the residuals, and what is left.
 
     ``undetermined`` names the parameters that can move by their whole scale without the data noticing.
+    ``known_errors`` says that residuals are in standard errors, known without their scatter, unless that is more:
+    then ``scatter`` is what was added to each error, a share of the value.
     """
 
     names: tuple[str, ...]
@@ -29,20 +32,27 @@ class Solution:
     residuals: Floats
     jacobian: Floats
     undetermined: tuple[str, ...]
+    known_errors: bool = False
+    scatter: float = 0.0
 
     @property
     def freedom(self) -> int:
-        """Points less parameters."""
-        return len(self.residuals) - len(self.values)
+        """Points less parameters that were fitted."""
+        return len(self.residuals) - len(self.names)
 
     @property
     def variance(self) -> float:
-        """Variance of the residuals; nan where there are no more points than parameters."""
+        """Variance of the residuals; nan where it is not known and there are no more points than parameters."""
+        if self.known_errors:
+            return 1.0
         return float(self.residuals @ self.residuals) / self.freedom if self.freedom > 0 else nan
 
     def estimate(self, name: str) -> Estimate:
         """One parameter, its error widened for few points."""
         i = self.names.index(name)
+        if self.known_errors:
+            widened = few_points(self.freedom) if self.scatter > 0.0 else 1.0
+            return Estimate(float(self.values[i]), sqrt(self.unit_covariance[i, i]) * widened)
         error = sqrt(self.unit_covariance[i, i] * self.variance) if self.freedom > 0 else nan
         return Estimate(float(self.values[i]), error * few_points(self.freedom))
 
@@ -98,3 +108,27 @@ def solve(
         blind |= errors * few_points(freedom) > scales
     undetermined = tuple(name for name, is_blind in zip(names, blind, strict=True) if is_blind)
     return Solution(tuple(names), values, covariance, left, jac, undetermined)
+
+
+def with_errors(fit: Callable[[Floats], Solution], values: Floats, errors: Floats) -> Solution:
+    """A fit of values whose standard errors are known; ``fit`` solves for some errors, residuals in units of them.
+
+    Where values scatter by more than that, since no law is exact, all get one relative error more: as much as makes
+    their scatter the expected one (Paule and Mandel, 1982). Else precise values would bend the law for all others.
+    """
+
+    def at(share: float) -> Solution:
+        return replace(fit(np.hypot(errors, share * values)), known_errors=True, scatter=share)
+
+    def excess(solution: Solution) -> float:
+        return float(solution.residuals @ solution.residuals) - solution.freedom
+
+    found = at(0.0)
+    if found.freedom <= 0 or excess(found) <= 0.0:
+        return found
+    low, high = 0.0, float(np.max(np.abs(found.residuals) * errors / values))
+    for _ in range(_SCATTER_STEPS):
+        middle = 0.5 * (low + high)
+        found = at(middle)
+        low, high = (middle, high) if excess(found) > 0.0 else (low, middle)
+    return at(high)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tablegen.calibration.estimate import Curve, Estimate, Fit
-from tablegen.calibration.least_squares import Solution, solve
+from tablegen.calibration.least_squares import Solution, solve, with_errors
 from tablegen.calibration.outliers import outliers
 from tablegen.compensation.offset import OffsetLaw, normalised_offset
 from tablegen.compensation.size import SizeLaw
@@ -30,13 +30,19 @@ class OffsetFit(Fit):
 
 
 def fit_offset(
-    offset_v: Floats, apparent_nm: Floats, v_max: float, size_law: SizeLaw | None = None, size_v: float | None = None
+    offset_v: Floats,
+    apparent_nm: Floats,
+    v_max: float,
+    size_law: SizeLaw | None = None,
+    size_v: float | None = None,
+    errors_nm: Floats | None = None,
 ) -> OffsetFit:
     """The law of (1) through apparent sizes (nm, of one object, or lattice constants) at three or more offsets (V).
 
     Least squares; exact for three different offsets. m multiplies the drive, and a drive that is m times as large makes
     the scan more than m times as large, (6): with the size law and ``size_v``, the scan voltage of the images, apparent
-    sizes are R(V) / R(V / m). Without, they are taken for m itself, as ``OffsetLaw.fit`` does. Raises ``Unphysical``.
+    sizes are R(V) / R(V / m). Without, they are taken for m itself, as ``OffsetLaw.fit`` does. ``errors_nm``, where
+    they are known, are the sizes' weights, as in ``fit_size``. Raises ``Unphysical``.
     """
     outside = (offset_v < 0.0) | (offset_v > v_max)
     if outside.any():
@@ -55,12 +61,15 @@ def fit_offset(
         v = size_v / v_max
         return size_law.size_nm(v) / np.array([size_law.size_nm(v / one) for one in np.maximum(m, 0.1).tolist()])
 
-    def residuals(x: Floats) -> Floats:
-        left: Floats = (x[2] * looks(shape @ np.array([1.0, x[0], x[1]])) - apparent_nm) / scale
-        return left
+    def solved(errors: Floats) -> Solution:
+        def residuals(x: Floats) -> Floats:
+            left: Floats = (x[2] * looks(shape @ np.array([1.0, x[0], x[1]])) - apparent_nm) / errors
+            return left
+
+        return solve(residuals, start, _NAMES, [0.5, 0.5, scale])
 
     scale = float(np.mean(apparent_nm))
-    solution = solve(residuals, start, _NAMES, [0.5, 0.5, scale])
+    solution = solved(np.full(len(p), scale)) if errors_nm is None else with_errors(solved, apparent_nm, errors_nm)
     centre = float(solution.values[2])
     expected = centre * looks(shape @ np.array([1.0, *solution.values[:2]]))
     found = outliers(solution.jacobian, solution.residuals, _MIN_SCATTER)
@@ -96,7 +105,9 @@ def _shape(p: Floats) -> Floats:
 
 def _remarks(p: Floats, solution: Solution) -> list[str]:
     remarks = []
-    if solution.freedom == 0:
+    if solution.freedom == 0 and solution.known_errors:
+        remarks.append("three points fit exactly: errors are those of the images alone; measure at two more offsets")
+    elif solution.freedom == 0:
         remarks.append("three points fit exactly, so errors cannot be estimated; measure at two more offsets")
     low, high = float(np.min(p)), float(np.max(p))
     for name, gap, volts in (("m_minus", low + 1.0, "0 V"), ("m_plus", 1.0 - high, "v_max")):

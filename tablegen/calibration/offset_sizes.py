@@ -21,12 +21,17 @@ class OffsetSizesFit(Fit):
 
 
 def fit_offset_sizes(
-    offset_v: Floats, apparent_nm: Floats, size_v: Floats, v_max: float, size_law: SizeLaw
+    offset_v: Floats,
+    apparent_nm: Floats,
+    size_v: Floats,
+    v_max: float,
+    size_law: SizeLaw,
+    errors_nm: Floats | None = None,
 ) -> OffsetFit | OffsetSizesFit:
     """m over offset and size: ``fit_offset`` for the images of each scan voltage (V, peak to peak at the piezo).
 
     Images of one scan voltage have to show one object, or a lattice, at three or more offsets; those of another one may
-    show another. Of one scan voltage it is the fit of ``fit_offset``. Raises ``Unphysical``.
+    show another. Of one scan voltage it is the fit of ``fit_offset``, as are ``errors_nm``. Raises ``Unphysical``.
     """
     volts = np.unique(size_v).tolist()
     if volts[-1] > v_max:
@@ -36,7 +41,8 @@ def fit_offset_sizes(
     for one in volts:
         rows = np.flatnonzero(size_v == one)
         try:
-            fit = fit_offset(offset_v[rows], apparent_nm[rows], v_max, size_law, one)
+            errors = None if errors_nm is None else errors_nm[rows]
+            fit = fit_offset(offset_v[rows], apparent_nm[rows], v_max, size_law, one, errors)
         except Unphysical as reason:
             raise Unphysical(f"images of {one:g} V: {reason}" if len(volts) > 1 else str(reason)) from None
         fits.append(fit)

@@ -193,6 +193,14 @@ class PeriodicModel:
         """The same of other spots."""
         return PeriodicModel(self.geometry, self.images, spots, self.order, self.off, self.ripples)
 
+    def divided(self, state: FitState, part: int) -> "tuple[PeriodicModel, FitState]":
+        """The same with base waves of one ``part`` of these."""
+        spots = list(map(tuple, (self.spots * part).tolist()))
+        parameters = state.parameters.copy()
+        parameters[BASES : self.rippled_from] /= part
+        model = PeriodicModel(self.geometry, self.images, spots, self.order, self.off, self.ripples)
+        return model, replace(state, parameters=parameters)
+
     def scores_of(self, state: FitState, left: Sequence[Floats]) -> Floats:
         """``FitState.scores`` were this left of each image."""
         forward_terms, backward_terms = self._terms(state.parameters, state.amplitudes)

@@ -1,12 +1,13 @@
 """Actual against set scan sizes -> k, beta and the threshold, equations (6)-(12)."""
 
 from dataclasses import dataclass
+from math import hypot
 from typing import Literal
 
 import numpy as np
 
 from tablegen.calibration.estimate import Curve, Estimate, Fit
-from tablegen.calibration.least_squares import Solution, solve
+from tablegen.calibration.least_squares import Solution, solve, with_errors
 from tablegen.calibration.outliers import outliers
 from tablegen.figures import at_most
 from tablegen.numerics.arrays import Floats
@@ -36,11 +37,16 @@ def fit_size(
     base_nm: float = 200.0,
     threshold: float | None = None,
     noise: Literal["relative", "absolute"] = "relative",
+    errors_nm: Floats | None = None,
+    shared: float = 0.0,
 ) -> SizeFit:
     """The law of (6) and (10) through actual sizes (nm) at drives (V_scan, volts peak to peak at the piezo).
 
     ``threshold`` (of v_max) is kept where it is given, and where the points cannot tell. ``noise`` says whether errors
-    of the sizes are in proportion to them, as in images, or the same for all, as of a sensor. Raises ``Unphysical``.
+    of the sizes are in proportion to them, as in images, or the same for all, as of a sensor. ``errors_nm``, where
+    they are known, take its place: the fit weighs sizes by them, and by one relative error more where sizes miss the
+    law by more than that. ``shared`` is a relative error that all sizes have together; it counts for k. Raises
+    ``Unphysical``.
     """
     v = drive_v / v_max
     if float(np.max(v)) > 1.0:
@@ -53,19 +59,26 @@ def fit_size(
     if threshold is not None and not 0.0 < threshold <= 1.0:
         raise Unphysical(f"a threshold of {threshold:g} is not above 0 and at most 1; it is a fraction of v_max")
     weight = actual_nm if noise == "relative" else np.full(len(v), float(np.max(actual_nm)))
-    fit = _SizeModel(v, actual_nm, weight, v_max, base_nm)
     kept = threshold if threshold is not None else TYPICAL_THRESHOLD
     remarks: list[str] = []
-    solution = fit.solve(kept)
+    fit = _SizeModel(v, actual_nm, weight, v_max, base_nm)
     free = fit.best_threshold() if threshold is None and different >= 4 else None
-    if free is not None:
-        solution = free
-    elif threshold is None:
+    solution = free or fit.solve(kept)
+    if errors_nm is not None:
+
+        def weighed(errors: Floats) -> Solution:
+            model = _SizeModel(v, actual_nm, errors, v_max, base_nm)
+            return (model.best_threshold() if free is not None else None) or model.solve(kept)
+
+        solution = with_errors(weighed, actual_nm, errors_nm)
+        free = solution if free is not None and _NAMES[2] in solution.names else None
+    if free is None and threshold is None:
         remarks.append(
             f"the threshold is not determined by these points and was left at {kept:g}; it takes four sizes or "
             f"more, some of them above 0.6 of v_max and some below 0.4"
         )
     k, beta = (solution.estimate(name) for name in _NAMES[:2])
+    k = Estimate(k.value, hypot(k.standard_error, shared * k.value))
     v_threshold = solution.estimate(_NAMES[2]) if free is not None else Estimate(kept)
     if not _LEAST_BETA * 0.999 < beta.value < _LARGEST_BETA * 0.999:
         raise Unphysical(
@@ -174,7 +187,9 @@ def _unit(v: Floats, beta: float, threshold: float) -> Floats:
 
 def _remarks(solution: Solution, v: Floats, at_base: float, base_nm: float, actual_nm: Floats) -> list[str]:
     remarks = []
-    if solution.freedom <= 0 or len(solution.residuals) == len(solution.names):
+    if solution.known_errors and len(solution.residuals) == len(solution.names):
+        remarks.append("as many sizes as parameters: errors are those of the images alone; measure more sizes")
+    elif solution.freedom <= 0 or len(solution.residuals) == len(solution.names):
         remarks.append("as many points as parameters fit exactly, so errors cannot be estimated; measure more points")
     if not float(np.min(v)) * 0.8 <= at_base <= float(np.max(v)) * 1.25:
         low, high = float(np.min(actual_nm)), float(np.max(actual_nm))

@@ -10,6 +10,7 @@ from tablegen.calibration.estimate import Estimate, Fit
 from tablegen.calibration.frequency import FrequencyFit
 from tablegen.calibration.hysteresis import HysteresisFit, TurnFit
 from tablegen.calibration.image_fit import ImageFit
+from tablegen.calibration.image_sizes import ImageSize
 from tablegen.calibration.offset import OffsetFit
 from tablegen.calibration.offset_sizes import OffsetSizesFit
 from tablegen.calibration.points import measured_points
@@ -87,7 +88,8 @@ def change(
     name of a file, the measured response takes the place of the resonance. ``forced`` is said in the comment.
     """
     by_force = ", meaningless, written by --force" if forced else ""
-    residual = f"{fit.points} points, residual {fit.rms_percent:.2g} % rms{by_force}"
+    counted = "images" if fit.images else "points"
+    residual = f"{fit.points} {counted}, residual {fit.rms_percent:.2g} % rms{by_force}"
     files = [f"from {_printable(source.name)}, sha256 {source.sha256}" for source in sources]
     if isinstance(fit, HysteresisFit):
         branches, comments = [], []
@@ -149,6 +151,8 @@ def record(fit: Fit, axis: str, sources: Sequence[Source]) -> dict[str, Any]:
         "doubts": list(doubts(fit)),
         "outliers": list(fit.outliers),
     }
+    if fit.images:
+        data["images"] = [_image_record(one) for one in fit.images]
     if isinstance(fit, OffsetFit):
         data["size_v"] = fit.size_v
     if isinstance(fit, HysteresisFit):
@@ -161,6 +165,25 @@ def record(fit: Fit, axis: str, sources: Sequence[Source]) -> dict[str, Any]:
     else:
         data["parameters"] = {key.strip("()"): _plain(estimate) for key, estimate, _ in parameters(fit)}
     return data
+
+
+def _image_record(image: ImageSize) -> dict[str, Any]:
+    shown = {
+        "aspect": image.size.aspect,
+        "drift": image.size.drift,
+        "open_percent": image.open_percent,
+    }
+    return {
+        "name": image.name,
+        "v_scan": image.v_scan,
+        "v_offset": image.v_offset,
+        "size_nm": _plain(image.size.nm),
+        "shared_error": image.size.shared,
+        "periods": image.periods,
+        "angle_deg": image.size.angle_deg,
+        "noise_percent": image.noise_percent,
+        **{key: value if isfinite(value) else None for key, value in shown.items()},
+    }
 
 
 def _branch_record(branch: TurnFit) -> dict[str, Any]:

@@ -20,6 +20,7 @@ _COMMANDS = {
     "check": ("check", "check"),
     "show": ("show", "show"),
     "calibrate": ("calibrate", "calibrate"),
+    "channels": ("channels", "channels"),
     "simulate": ("simulate", "simulate"),
     "refine": ("refine", "refine"),
     "verify": ("verify", "verify"),

@@ -1,4 +1,4 @@
-"""``tablegen calibrate operator``: traces of a sensor to an operator of the piezo, in a file of its own."""
+"""``tablegen calibrate operator``: traces of a sensor, or images, to an operator of the piezo, in a file of its own."""
 
 import json
 from collections.abc import Sequence
@@ -10,9 +10,21 @@ import click
 from tablegen.cli.calibration_run import Common, full_scale, read_columns, scanner_axis, shared_options
 from tablegen.cli.common import fail, written
 from tablegen.cli.exit_status import ExitStatus
+from tablegen.cli.image_samples import (
+    PAIR_NAME,
+    CommandOfOperatorPairs,
+    image_option,
+    read_sample_image,
+    refuse_sample,
+    sample_of,
+    sample_options,
+    taking_of,
+)
 from tablegen.reading import CONFIGURATION, read_text
 
 if TYPE_CHECKING:
+    from tablegen.calibration.image_files import ScanImage
+    from tablegen.calibration.image_sizes import SampleImage
     from tablegen.calibration.operator.advice import NextTrace
     from tablegen.calibration.operator.fit import OperatorFit
     from tablegen.calibration.operator.periodic_line import PeriodicLine
@@ -22,11 +34,24 @@ if TYPE_CHECKING:
 _MEASURES = "    rms   scaling  mismatch"
 
 
-@click.command(short_help="Identify an operator of the piezo from sensor traces.")
+@click.command(cls=CommandOfOperatorPairs, short_help="Identify an operator of the piezo from sensor traces or images.")
 @shared_options
-@click.argument("data", type=click.Path(path_type=Path), metavar="DATA.CSV...", nargs=-1, required=True)
-def operator(common: Common, data: tuple[Path, ...]) -> int:
-    """Identify what the piezo does at every size and offset from sensor traces: an operator.
+@click.argument("data", type=click.Path(path_type=Path), metavar="[DATA.CSV]...", nargs=-1)
+@image_option(
+    "VOLTS OFFSET_V RATE_HZ",
+    3,
+    "Scan voltage and offset at the piezo in volts, line rate in Hz, and two images of a sample of known constant, "
+    "scanned with a triangle. RETRACE is left out if the first file has both. Repeat the option for each scan.",
+    (PAIR_NAME,),
+)
+@sample_options
+def operator(
+    common: Common,
+    data: tuple[Path, ...],
+    images: tuple[tuple[float, float, float, Path, Path], ...],
+    **given: Any,
+) -> int:
+    """Identify what the piezo does at every size and offset from sensor traces, from images, or both: an operator.
 
     Builds then find waveforms that are straight on this operator, and `show` says what to expect on the scanner. The
     laws (1) to (23) of the scanner file stay: m of (1) gives the size at offsets without a trace.
@@ -39,10 +64,13 @@ def operator(common: Common, data: tuple[Path, ...]) -> int:
     Columns: time_s, drive_v, displacement_nm. A file with several traces also has the column
     trace, a number for each trace; without it, a new trace starts where time_s goes back.
 
+    In place of a trace, or beside traces, a pair of images of a lattice or a grating of known constant does, from turn
+    to turn of a triangle: --pair.
+
     Calibrate `resonance` and `offset` first: their parts of the scanner file are used.
 
     \b
-    Example:
+    Examples:
       tablegen calibrate operator --axis x 10v.csv 25v.csv 50v.csv 75v.csv 97v.csv --scanner scanner.toml --write
     """
     from tablegen.calibration.columns import DISPLACEMENT, DRIVE, TIME, TRACE
@@ -54,7 +82,12 @@ def operator(common: Common, data: tuple[Path, ...]) -> int:
 
     if common.plot is not None:
         raise click.UsageError("--plot is not available for operator")
+    if not data and not images:
+        raise click.UsageError("give traces, DATA.CSV..., or images with --pair VOLTS OFFSET_V RATE_HZ TRACE RETRACE")
+    if not images:
+        refuse_sample(given)
     tables = [read_columns(path, [TIME, DRIVE, DISPLACEMENT], [TRACE]) for path in data]
+    pairs = [read_sample_image(v, at, trace, retrace, given) for v, at, _, trace, retrace in images]
     v_max = full_scale(common)
     response, offset_law = scanner_axis(common, v_max)
     lines = []
@@ -64,18 +97,42 @@ def operator(common: Common, data: tuple[Path, ...]) -> int:
                 lines.append(periodic_line(trace, v_max))
             except Unphysical as reason:
                 fail([f"{table.file}: {trace.name}: {reason}"], ExitStatus.WRONG_INPUT)
+    lines += _imaged(images, pairs, v_max, given)
+    sources: list[MeasuredTable | ScanImage] = [*tables, *(one for _, files in pairs for one in files)]
     try:
         fit = fit_operator(lines, response, lambda centre: offset_law.factor(2.0 * centre - 1.0))
     except Unphysical as reason:
-        fail([f"{', '.join(table.file for table in tables)}: {reason}"], ExitStatus.WRONG_INPUT)
+        fail([f"{', '.join(table.file for table in sources)}: {reason}"], ExitStatus.WRONG_INPUT)
     further = next_trace(fit, lines, v_max)
     if common.as_json:
-        click.echo(json.dumps(_record(fit, lines, further, common.axis, tables), indent=2, allow_nan=False))
+        click.echo(json.dumps(_record(fit, lines, further, common.axis, sources), indent=2, allow_nan=False))
     else:
         click.echo("\n".join(_text(fit, lines, further, common.axis, v_max)))
     if common.write:
-        _write(common, fit, tables, v_max)
+        _write(common, fit, sources, v_max)
     return ExitStatus.OK
+
+
+def _imaged(
+    images: "tuple[tuple[float, float, float, Path, Path], ...]",
+    pairs: "list[tuple[SampleImage, list[ScanImage]]]",
+    v_max: float,
+    given: dict[str, Any],
+) -> "list[PeriodicLine]":
+    """The lines of pairs of images; what is wrong with one ends the command."""
+    from tablegen.calibration.operator.imaged_line import imaged_line
+    from tablegen.problems import Unphysical
+
+    if not images:
+        return []
+    sample, taking = sample_of(given), taking_of(given)
+    lines = []
+    for (_, _, rate_hz, *_), (image, _) in zip(images, pairs, strict=True):
+        try:
+            lines.append(imaged_line(image, rate_hz, v_max, sample, taking)[0])
+        except Unphysical as reason:
+            fail([f"{image.name}: {reason}"], ExitStatus.WRONG_INPUT)
+    return lines
 
 
 def _text(
@@ -115,7 +172,7 @@ def _record(
     lines: "Sequence[PeriodicLine]",
     further: "NextTrace",
     axis: str,
-    tables: "Sequence[MeasuredTable]",
+    tables: "Sequence[MeasuredTable | ScanImage]",
 ) -> dict[str, Any]:
     """The same for programs."""
     from tablegen.compensation.models.operator import OperatorModel
@@ -148,7 +205,7 @@ def _record(
     }
 
 
-def _write(common: Common, fit: "OperatorFit", tables: "Sequence[MeasuredTable]", v_max: float) -> None:
+def _write(common: Common, fit: "OperatorFit", tables: "Sequence[MeasuredTable | ScanImage]", v_max: float) -> None:
     """The operator's file, then the scanner file that names it."""
     from tablegen.calibration.operator.record import operator_file
     from tablegen.calibration.scanner_file import Change, new_file, updated

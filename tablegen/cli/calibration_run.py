@@ -113,17 +113,6 @@ def read_columns(path: Path, needed: "Sequence[Column]", optional: "Sequence[Col
         fail(rejected.problems, ExitStatus.WRONG_INPUT)
 
 
-def read_heights(path: Path, channel: str | None) -> "ScanImage":
-    """An image; what is wrong with it ends the command."""
-    from tablegen.calibration.image_files import read_image
-    from tablegen.problems import Rejected
-
-    try:
-        return read_image(path, channel)
-    except Rejected as rejected:
-        fail(rejected.problems, ExitStatus.WRONG_INPUT)
-
-
 def within(table: "MeasuredTable", from_hz: float, to_hz: float) -> "MeasuredTable":
     """The rows from one frequency to the other; none ends the command."""
     from dataclasses import replace

@@ -26,7 +26,10 @@ def calibration_text(
     rows = [(name, *figures(estimate), meaning) for name, estimate, meaning in parameters(fit)]
     widths = [max(len(row[i]) for row in rows) for i in range(3)]
     files = ", ".join(table.source.name for table in tables)
-    counted = "pixels" if isinstance(tables[0], ScanImage) else "samples" if hysteresis else "points"
+    if hysteresis:
+        counted = "pixels" if isinstance(tables[0], ScanImage) else "samples"
+    else:
+        counted = "images" if fit.images else "points"
     lines = [f"{change(fit, []).kind} of {axis}, {fit.points} {counted} of {files}", ""]
     lines += [
         f"{name:<{widths[0]}}  {value:>{widths[1]}} {error:<{widths[2]}}  {meaning}"
@@ -41,15 +44,45 @@ def calibration_text(
     ]
     if isinstance(fit, HysteresisFit):
         lines += [*_traces(fit), ""]
+    if fit.images:
+        lines += [*image_lines(fit), ""]
     for curve in fit.curves:
         lines += [*scatter(curve), ""]
     for row in fit.outliers:
         place = f"{tables[0].file}:{tables[0].lines[row]}" if isinstance(tables[0], MeasuredTable) else tables[0].file
+        place, part = (fit.images[row].name, "image") if fit.images else (place, "row")
         lines.append(
-            f"outlier: {place}: far from the other points, but used. Remove the row if the measurement was wrong"
+            f"outlier: {place}: far from the other points, but used. Remove the {part} if the measurement was wrong"
         )
     lines += [f"note: {remark}" for remark in fit.remarks]
     return lines + [f"warning: {doubt}" for doubt in doubts(fit, points)]
+
+
+def image_lines(fit: Fit) -> list[str]:
+    """What each image says: a table."""
+    offsets = fit.images[0].v_offset is not None
+    head = (
+        "V_scan",
+        *(("offset [V]",) * offsets),
+        "size [nm]",
+        "periods",
+        "angle",
+        "noise [%]",
+        "drift [%]",
+        "open [%]",
+    )
+    rows: list[tuple[str, ...]] = [(*head, "left [%]", "image")]
+    for one, left in zip(fit.images, fit.residual_percent, strict=True):
+        at = (f"{one.v_offset:.4g}",) if one.v_offset is not None else ()
+        drift, apart = (
+            f"{value:.2g}" if isfinite(value) else "-" for value in (100.0 * one.size.drift, one.open_percent)
+        )
+        shown = f"{one.periods:.3g}", f"{one.size.angle_deg:.1f}", f"{one.noise_percent:.2g}", drift, apart
+        rows.append((f"{one.v_scan:.4g}", *at, " ".join(figures(one.size.nm)), *shown, f"{left:+.2f}", one.name))
+    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+    lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+    lines.append("open: how far trace and retrace are apart at the turns, where they meet, of the line")
+    return lines
 
 
 def _traces(fit: HysteresisFit) -> list[str]:

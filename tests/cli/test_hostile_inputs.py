@@ -19,6 +19,7 @@ import pytest
 import tifffile
 from editing import SCAN, SCANNER, edited, run, write_pair
 from image_writers import npy
+from instrument_files import sxm
 from limits import PATIENCE_S, within
 from sets import quick
 
@@ -183,6 +184,27 @@ DAMAGED: dict[str, tuple[str, Callable[[], bytes], str]] = {
             b"GWYPGwyContainer\0" + struct.pack("<I", 99_999_995) + b"a\0S" + struct.pack("<I", 2**31) + bytes(10**8)
         ),
         "texts or objects in one",
+    ),
+    "scan of the world": (
+        "a.sxm",
+        lambda: re.sub(rb"(SCAN_PIXELS:\n).*", rb"\g<1>999999 999999", sxm({"Z": (np.eye(40), np.eye(40))})),
+        "ends in the middle of its images (2 images of 999999 x 999999 pixels by its header)",
+    ),
+    "header without end": (
+        "a.spm",
+        lambda: b"\\*File list\r\n" + b"\\*Ciao image list\r\n" * (4 << 20),
+        "has no end of its header",
+    ),
+    "a million tags": (
+        "a.jpk",
+        lambda: (
+            b"II*\0\x08\0\0\0"
+            + b"".join(
+                struct.pack("<H", 50_000) + bytes(600_000) + struct.pack("<I", 8 + 600_006 * page)
+                for page in range(1, 20)
+            )
+        ),
+        "more than 100000 tags",
     ),
     "a row of commas": ("a.csv", lambda: b"1," * (4 << 20), "a line of 8388608 characters"),
 }

@@ -139,7 +139,7 @@ def test_a_mirrored_retrace_and_a_window(lab: Path) -> None:
     ("words", "said"),
     [
         ([], "Missing option '--pair'"),
-        (["--pair", "100", "t100.npy"], "Got unexpected extra argument"),
+        (["--pair", "100", "t100.npy"], "t100.npy: channel 0 ('') has no retrace in this file; give it too"),
         (["--pair", "x", "t100.npy", "r100.npy"], "'x' is not a valid float"),
         (["--pair", "0", "t100.npy", "r100.npy"], "0.0 is not in the range"),
         (["--pair", "100", "t100.npy", "absent.npy"], "absent.npy: is not a file"),

@@ -19,6 +19,7 @@ import pytest
 from editing import SCAN, SCANNER, Outcome, edited, run, write_pair
 from gwyfile.objects import GwyContainer, GwyDataField
 from image_writers import ascii_of, npy, png
+from instrument_files import asd, ibw, jpk, spm, sxm
 from limits import limit
 from mutating import damaged, damaged_json
 from PIL import Image as Pillow
@@ -57,6 +58,9 @@ def pictures() -> dict[str, bytes]:
     container["/0/data/title"] = "Height"
     container["/0/data"] = GwyDataField(HEIGHTS[:33, :33])
     made["gwy"] = b"GWYP" + container.serialize()
+    both = {"Height": (HEIGHTS / 3000.0, HEIGHTS / 3000.0)}  # -100 nm to 100 nm are the most of a writer
+    made |= {"sxm": sxm(both), "spm": spm(both), "jpk": jpk(both), "asd": asd({"TP": HEIGHTS[np.newaxis] / 3000.0})}
+    made["ibw"] = ibw({"HeightTrace": HEIGHTS}, {"ScanRate": "1"})
     return made
 
 

@@ -36,7 +36,7 @@ ALLOWED = {
     ("verification/verilog_target.py", "shutil.copyfile"): "as in directory.py",
     ("link/transport.py", "open"): "a serial port",
     ("calibration/csv_blocks.py", "np.loadtxt"): "bytes that were read already",
-    ("calibration/image_files.py", "Pillow.open"): "bytes that were read already",
+    ("calibration/image_formats/picture.py", "Pillow.open"): "bytes that were read already",
 }
 PARSERS = {"json.loads", "tomllib.loads", "tomlkit.parse", "msgspec.json.decode"}
 PARSED = {

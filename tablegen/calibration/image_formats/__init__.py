@@ -1,0 +1,1 @@
+"""What reads the images of one format each: bytes to channels, without trust in what the bytes say."""

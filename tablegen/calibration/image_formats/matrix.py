@@ -1,0 +1,90 @@
+"""Matrices of numbers: .npy files, and rows of text."""
+
+import re
+from io import BytesIO
+from math import prod
+
+import numpy as np
+
+from tablegen.calibration.image_formats.channel import MAX_PIXELS, Channel, first_line, loaded
+from tablegen.calibration.table import file_text, lines_of
+from tablegen.numerics.arrays import Floats
+from tablegen.problems import Problem, Rejected
+
+_DECIMAL_COMMA = re.compile(r"[+-]?\d+(,\d+)?([eE][+-]?\d+)?")
+
+
+def npy_channels(content: bytes, _: str) -> list[Channel]:
+    """The images of a .npy file. Raises ``ValueError`` with what is wrong."""
+    if content[:2] == b"PK":
+        raise ValueError("is an .npz archive; save one array with numpy.save")
+    file = BytesIO(content)
+    try:
+        version = np.lib.format.read_magic(file)
+        read_header = {
+            (1, 0): np.lib.format.read_array_header_1_0,
+            (2, 0): np.lib.format.read_array_header_2_0,
+        }[version]
+        shape, by_columns, kind = read_header(file)
+        if kind.hasobject or kind.itemsize == 0 or len(shape) > 3 or min(shape, default=0) < 0:
+            raise ValueError("no array of numbers in up to three dimensions")
+        if prod(shape) * kind.itemsize > len(content) - file.tell():
+            raise ValueError(f"{len(content) - file.tell()} bytes are fewer than those of {prod(shape)} values")
+        flat = np.frombuffer(content, kind, prod(shape), file.tell())
+        array = flat.reshape(shape, order="F" if by_columns else "C")
+    except Exception as error:  # the header is read by the parser of Python, which raises whatever it meets
+        raise ValueError(f"is not a complete .npy file of numbers ({first_line(error)})") from None
+    if array.ndim == 3:
+        return [loaded(number, "", image) for number, image in enumerate(array)]
+    return [loaded(0, "", array)]
+
+
+def text_channels(content: bytes, name: str) -> list[Channel]:
+    """Rows of numbers; the first tells what separates. Between blanks, tabs and semicolons a comma is a decimal one.
+
+    Raises ``Rejected`` with the line, or ``ValueError``.
+    """
+    mark: str | None = None
+    width = 0
+    values: list[Floats] = []
+    for line, text in lines_of(file_text(content, name), name):
+        text = text.strip()
+        if not text or text.startswith("#"):
+            continue
+        if not values:
+            mark = _separator(text)
+        cells = text.strip(mark).split(mark) if mark else text.split()
+        if mark != ",":
+            cells = [cell.replace(",", ".") for cell in cells]
+        try:
+            row = np.array([float(cell) for cell in cells])
+        except ValueError:
+            wrong = next(cell for cell in cells if not _is_number(cell)).strip()
+            why = f"{wrong[:40]!r} is not a number; comment lines must begin with #"
+            raise Rejected([Problem(name, line, "", why)]) from None
+        width = width or len(row)
+        if len(row) != width:
+            raise Rejected([Problem(name, line, "", f"{len(row)} numbers where the first row has {width}")])
+        values.append(row)
+        if width * len(values) > MAX_PIXELS:
+            raise ValueError("has more than 2^25 numbers, which is the most that are read")
+    if not values:
+        raise ValueError("has no numbers")
+    return [loaded(0, "", np.array(values))]
+
+
+def _separator(row: str) -> str | None:
+    """What separates the numbers of a row; None for blanks."""
+    mark = next((mark for mark in (";", "\t") if mark in row), None)
+    if mark is not None or "," not in row:
+        return mark
+    cells = row.split()
+    return None if len(cells) > 1 and all(map(_DECIMAL_COMMA.fullmatch, cells)) else ","
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,48 @@
+"""Trace and retrace images of a sample of known constant -> one settled line, as from a sensor."""
+
+import numpy as np
+
+from tablegen.calibration.image_line import fit_line, shows_turns
+from tablegen.calibration.image_scale import LineSize, size_of_line
+from tablegen.calibration.image_sizes import Sample, SampleImage, Taking
+from tablegen.calibration.operator.periodic_line import PHASES, PeriodicLine
+from tablegen.problems import Unphysical
+
+
+def imaged_line(
+    image: SampleImage, rate_hz: float, v_max: float, sample: Sample, taking: Taking
+) -> tuple[PeriodicLine, LineSize]:
+    """The line of a triangle of ``v_scan`` about ``v_offset``, at ``rate_hz``, and its size.
+
+    ``noise_nm`` is the rms standard error of the position; that of the size is beside it. The columns have to show
+    both sweeps from turn to turn. Raises ``Unphysical``, without the image's name.
+    """
+    if image.retrace is None:
+        raise Unphysical("the retrace is missing: an operator needs both directions")
+    if image.v_offset is None:
+        raise Unphysical("the offset is missing: an operator is of the offset too")
+    low, high = image.v_offset - 0.5 * image.v_scan, image.v_offset + 0.5 * image.v_scan
+    if low < -0.02 * v_max or high > 1.02 * v_max:
+        raise Unphysical(f"a drive of {low:.4g}..{high:.4g} V is outside the driver's 0..{v_max:g} V")
+    line = fit_line(
+        image.trace, image.retrace, taking.turn, taking.window, taking.retrace_mirrored, taking.delay_pixels
+    )
+    if not shows_turns(line.geometry):
+        raise Unphysical("the turns are not in the images; save both sweeps from turn to turn, without overscan")
+    size = size_of_line(line, sample.cell, sample.grating, taking.aspect or image.aspect)
+    time = np.arange(PHASES) / PHASES
+    rising = time < taking.turn
+    drive = np.where(rising, time / taking.turn, (1.0 - time) / (1.0 - taking.turn))
+    position = np.where(rising, line.position(drive, True), line.position(drive, False))
+    error = np.where(rising, line.position_error(drive, True), line.position_error(drive, False))
+    nm = size.nm.value
+    bent = line.model.s(line.state.parameters)[0, 1:] @ line.model.y_powers[2:] / line.waves[0, 0]
+    return PeriodicLine(
+        image.name,
+        rate_hz,
+        line.geometry.rows,
+        (low + image.v_scan * drive) / v_max,
+        nm * position,
+        nm * float(np.sqrt(np.mean(error**2))),
+        nm * float(np.ptp(bent)),
+    ), size

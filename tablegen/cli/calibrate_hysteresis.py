@@ -1,0 +1,72 @@
+"""``tablegen calibrate hysteresis``: sensor traces to (17)-(22)."""
+
+from math import isfinite
+from pathlib import Path
+
+import click
+
+from tablegen.cli.calibration_options import points_option, rho_option
+from tablegen.cli.calibration_run import Common, finish, full_scale, read_columns, shared_options
+
+
+@click.command(short_help="Fit beta_max, rho, u_peak to sensor traces.")
+@shared_options
+@click.argument("data", type=click.Path(path_type=Path), metavar="DATA.CSV...", nargs=-1, required=True)
+@rho_option
+@click.option(
+    "--settle",
+    type=click.IntRange(min=0),
+    metavar="N",
+    help="Ignore the first N periods of each trace.  [default: 1 if a trace has three periods or more, otherwise 0]",
+)
+@click.option(
+    "--drift",
+    type=click.IntRange(0, 5),
+    metavar="N",
+    help="Order of the polynomial that describes drift.  [default: 1 to 3, more with more periods]",
+)
+@click.option(
+    "--delay-s",
+    default="0",
+    show_default=True,
+    metavar="S|fit",
+    help="Delay of the sensor relative to the drive in seconds, or `fit` to fit it.",
+)
+@points_option
+def hysteresis(
+    common: Common,
+    data: tuple[Path, ...],
+    rho: float,
+    settle: int | None,
+    drift: int | None,
+    delay_s: str,
+    points: bool,
+) -> int:
+    """Fit beta_max and rho, (22), and u_peak, (17), to sensor traces with a triangular drive.
+
+    Record one period or more at each of several amplitudes.
+
+    \b
+    Columns: time_s, drive_v, displacement_nm. A file with several traces also has the column
+    trace, a number for each trace; without it, a new trace starts where time_s goes back.
+
+    Traces with different turn (the forward fraction of the period) give separate parameter sets.
+
+    \b
+    Example:
+      tablegen calibrate hysteresis --axis x 30v.csv 60v.csv 100v.csv --scanner scanner.toml --write
+    """
+    from tablegen.calibration.columns import DISPLACEMENT, DRIVE, TIME, TRACE
+    from tablegen.calibration.hysteresis import fit_hysteresis
+    from tablegen.calibration.traces import split_traces
+
+    try:
+        delay = None if delay_s == "fit" else float(delay_s)
+        if delay is not None and not isfinite(delay):
+            raise ValueError
+    except ValueError:
+        raise click.UsageError(f"--delay-s {delay_s}: seconds, or fit") from None
+    tables = [read_columns(path, [TIME, DRIVE, DISPLACEMENT], [TRACE]) for path in data]
+    v_max = full_scale(common)
+    traces = [trace for table in tables for trace in split_traces(table)]
+    return finish(common, tables, lambda: fit_hysteresis(traces, v_max, rho, settle, drift, delay), points)

@@ -1,0 +1,337 @@
+"""Files of instruments: what is in them, by other readers of the same formats, and no damage that is not told."""
+
+import random
+import re
+import struct
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+
+import nanonispy2
+import numpy as np
+import pytest
+from gwyfile.objects import GwyContainer, GwyDataField
+from igor2 import binarywave
+from image_writers import gwy, npy
+from instrument_files import asd, ibw, jpk, spm, sxm
+from mutating import damaged
+
+from tablegen.calibration.image_files import ScanImage, channels_of, read_channels, read_image, read_pair
+from tablegen.calibration.image_formats.asd import asd_channels
+from tablegen.calibration.image_formats.channel import Channel, split_direction
+from tablegen.calibration.image_formats.igor import ibw_channels
+from tablegen.calibration.image_formats.jpk import jpk_channels
+from tablegen.calibration.image_formats.nanonis import sxm_channels
+from tablegen.calibration.image_formats.nanoscope import spm_channels
+from tablegen.problems import Rejected
+
+T, R, P, Q = np.random.default_rng(1).uniform(-20.0, 20.0, (4, 40, 48))  # nm
+NOTE = {"ScanSize": "5e-07", "FastScanSize": "5e-07", "SlowScanSize": "2.5e-07", "ScanRate": "2.5", "ScanDown": "0"}
+LABELS = {"HeightTrace": T, "HeightRetrace": R, "ZSensorTrace": P, "ZSensorRetrace": Q}
+ASYLUM = {label: heights * 1e-9 for label, heights in LABELS.items()}
+NANONIS = {"Z": (T * 1e-9, R * 1e-9), "Current": (P * 1e-9, Q * 1e-9)}
+MOVIE = {"TP": np.stack([T, R, P]), "ER": np.stack([P, Q, T])}
+
+
+def put(folder: Path, name: str, content: bytes) -> Path:
+    path = folder / name
+    path.write_bytes(content)
+    return path
+
+
+def why(path: Path, *arguments: str, read: Callable[..., object] = read_image) -> str:
+    with pytest.raises(Rejected) as caught:
+        read(path, *arguments)
+    (problem,) = caught.value.problems
+    return str(problem)
+
+
+# read
+
+FILES: dict[str, tuple[bytes, str, float, float, str, str]] = {
+    # name: content, signal, nm of a unit, the most that heights differ in nm, unit, where row 0 is
+    "a.sxm": (sxm(NANONIS), "Z", 1e9, 1e-5, "m", "bottom"),
+    "down.sxm": (sxm(NANONIS, scan_dir="down"), "Z", 1e9, 1e-5, "m", "top"),
+    "a.ibw": (ibw(ASYLUM, NOTE), "Height", 1e9, 1e-5, "m", "bottom"),
+    "big.ibw": (ibw(ASYLUM, NOTE, ">"), "Height", 1e9, 1e-5, "m", "bottom"),
+    "down.ibw": (ibw(ASYLUM, NOTE | {"ScanDown": "1"}, turned=True), "Height", 1e9, 1e-5, "m", "top"),
+    "a.spm": (spm({"Height S": (T, R), "Height": (P, Q)}, aspect="48:40"), "Height S", 1.0, 1e-3, "nm", "bottom"),
+    "a.003": (spm({"Height": (T, R)}, stored=4, frame="Down", aspect="6:5"), "Height", 1.0, 1e-7, "nm", "top"),
+    "a.jpk": (jpk({"measuredHeight": (T, R), "error": (P, Q)}), "measuredHeight", 1e9, 6e-3, "m", "bottom"),
+    "a.JPK-QI-image": (jpk({"height": (T, R)}, big=True), "height", 1e9, 6e-3, "m", "bottom"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_trace_and_retrace_of_one_file(name: str, tmp_path: Path) -> None:
+    """By the signal alone; the left end of the line at the left, the first row first in time, sizes and unit known."""
+    content, signal, nm, near, unit, first = FILES[name]
+    path = put(tmp_path, name, content)
+    trace, retrace = read_pair(path, channel=signal)
+    for image, heights, direction in ((trace, T, "trace"), (retrace, R, "retrace")):
+        assert np.max(np.abs(image.heights * nm - heights)) < near
+        assert (image.signal, image.direction, image.unit, image.first_row) == (signal, direction, unit, first)
+        assert image.width_nm == pytest.approx(500.0)
+        assert image.height_nm == pytest.approx(416.666667 if unit == "nm" else 250.0)
+        assert image.line_rate_hz == pytest.approx({".sxm": 2.0, ".jpk": 4.0}.get(path.suffix[:4].lower(), 2.5))
+        assert image.frames == 1
+        assert np.array_equal(read_image(path, image.channel).heights, image.heights)
+        assert np.array_equal(read_image(path, str(image.number)).heights, image.heights)
+        assert np.array_equal(read_image(path, signal, image.direction).heights, image.heights)
+
+
+@pytest.mark.parametrize("version", [0, 1, 2])
+def test_frames_of_a_movie(version: int, tmp_path: Path) -> None:
+    path = put(tmp_path, "a.asd", asd(MOVIE, version))
+    for signal, frames in MOVIE.items():
+        for number, heights in enumerate(frames):
+            image = read_image(path, signal, frame=number)
+            assert np.max(np.abs(image.heights - heights)) < 0.026  # half a level of the converter
+            assert (image.unit, image.frame, image.frames, image.direction) == ("nm", number, 3, None)
+            assert (image.width_nm, image.height_nm, image.line_rate_hz) == (400.0, 200.0, 80.0)
+    assert "is a movie of 3 frames; choose one with --frame, 0 to 2" in why(path, "TP")
+    with pytest.raises(Rejected, match="has no frame 3; the last one is 2"):
+        read_image(path, "TP", frame=3)
+    assert [one.frames for one in channels_of(path)] == [3, 3]
+
+
+def test_a_gwyddion_file_has_sizes_and_units(tmp_path: Path) -> None:
+    gwy(tmp_path / "a.gwy", **{"Z (Forward)": T, "Z (Backward)": R})
+    trace, retrace = read_pair(tmp_path / "a.gwy")
+    assert np.array_equal(trace.heights, T)
+    assert np.array_equal(retrace.heights, R)
+    assert (trace.width_nm, trace.height_nm, trace.unit, trace.signal) == (None, None, "m", "Z")
+    container = GwyContainer()
+    container["/0/data"] = GwyDataField(T, xreal=3e-6, yreal=2e-6, si_unit_xy="m", si_unit_z="V")
+    container.tofile(str(tmp_path / "b.gwy"))
+    image = read_image(tmp_path / "b.gwy")
+    assert (image.width_nm, image.height_nm, image.unit) == (pytest.approx(3000.0), pytest.approx(2000.0), "V")
+
+
+def test_all_channels_of_a_file(tmp_path: Path) -> None:
+    images = read_channels(put(tmp_path, "a.ibw", ibw(ASYLUM, NOTE)))
+    assert [image.channel for image in images] == list(LABELS)
+    for image, heights in zip(images, LABELS.values(), strict=True):
+        assert np.max(np.abs(image.heights * 1e9 - heights)) < 1e-5
+
+
+def test_another_reader_of_igor_agrees(tmp_path: Path) -> None:
+    for order in "<>":
+        wave = binarywave.load(put(tmp_path, "a.ibw", ibw(ASYLUM, NOTE, order)))["wave"]
+        assert wave["labels"][2] == [b"", *(label.encode() for label in LABELS)]
+        assert b"FastScanSize: 5e-07\r" in wave["note"]
+        for number, image in enumerate(read_channels(tmp_path / "a.ibw")):
+            assert np.array_equal(wave["wData"][:, :, number].T, image.heights)
+
+
+def test_another_reader_of_nanonis_agrees(tmp_path: Path) -> None:
+    path = put(tmp_path, "a.sxm", sxm(NANONIS))
+    other = nanonispy2.read.Scan(str(path))
+    assert other.header["scan_range"] == pytest.approx([5e-7, 2.5e-7])
+    for signal in NANONIS:
+        trace, retrace = read_pair(path, channel=signal)
+        assert np.array_equal(other.signals[signal]["forward"], trace.heights)
+        assert np.array_equal(other.signals[signal]["backward"][:, ::-1], retrace.heights)
+
+
+def test_a_nanonis_file_of_one_direction_and_the_other_byte_order(tmp_path: Path) -> None:
+    content = sxm({"Z": (T, R)}).replace(b"\tboth\t", b"\tbackward\t")
+    image = read_image(put(tmp_path, "a.sxm", content))
+    assert (image.channel, image.direction) == ("Z backward", "retrace")
+    assert np.max(np.abs(image.heights - T[:, ::-1])) < 1e-5  # the first block, from right to left
+    start = content.index(b"\x1a\x04") + 2
+    turned = (
+        content[:start].replace(b"MSBFIRST", b"LSBFIRST")
+        + np.frombuffer(content, ">f4", offset=start).astype("<f4").tobytes()
+    )
+    assert np.array_equal(read_image(put(tmp_path, "b.sxm", turned)).heights, image.heights)
+
+
+@pytest.mark.parametrize(
+    ("title", "signal", "direction"),
+    [
+        *(("HeightTrace", "Height", "trace"), ("ZSensorRetrace", "ZSensor", "retrace")),
+        *(("Z (Backward)", "Z", "retrace"), ("Height [Trace]", "Height", "trace")),
+        *(("height_retrace", "height", "retrace"), ("Z forward", "Z", "trace")),
+        *(("Height", "Height", None), ("Trace", "Trace", None), ("Retrace", "Retrace", None), ("", "", None)),
+        ("Traces of gold", "Traces of gold", None),
+    ],
+)  # fmt: skip
+def test_directions_in_titles(title: str, signal: str, direction: str | None) -> None:
+    assert split_direction(title) == (signal, direction)
+
+
+def test_a_title_without_end_is_not_looked_into() -> None:
+    assert split_direction(" " * (1 << 20) + "Trac") == (" " * (1 << 20) + "Trac", None)
+
+
+# chosen
+
+
+def test_pairs_of_two_files_and_of_one(tmp_path: Path) -> None:
+    both = put(tmp_path, "a.ibw", ibw(ASYLUM, NOTE))
+    for channel in ("ZSensor", "ZSensorTrace", "2"):
+        trace, retrace = read_pair(both, channel=channel)
+        assert (trace.channel, retrace.channel) == ("ZSensorTrace", "ZSensorRetrace")
+    trace, retrace = read_pair(both, both, "Height", "ZSensorRetrace")
+    assert (trace.channel, retrace.channel) == ("HeightTrace", "ZSensorRetrace")
+    one, other = (
+        put(tmp_path, f"{d}.ibw", ibw({f"Height{d}": ASYLUM[f"Height{d}"]}, NOTE)) for d in ("Trace", "Retrace")
+    )
+    trace, retrace = read_pair(one, other)
+    assert (trace.direction, retrace.direction) == ("trace", "retrace")
+    assert (trace.source.name, retrace.source.name) == ("Trace.ibw", "Retrace.ibw")
+
+
+def test_what_is_no_pair_is_said(tmp_path: Path) -> None:
+    both = put(tmp_path, "a.ibw", ibw(ASYLUM, NOTE))
+    one = put(tmp_path, "t.ibw", ibw({"HeightTrace": ASYLUM["HeightTrace"]}, NOTE))
+    other = put(tmp_path, "r.ibw", ibw({"HeightRetrace": ASYLUM["HeightRetrace"]}, NOTE))
+    plain = put(tmp_path, "a.npy", npy(T))
+    there = "0 (HeightTrace), 1 (HeightRetrace), 2 (ZSensorTrace), 3 (ZSensorRetrace)"
+
+    def refused(*arguments: Path | str | None) -> str:
+        return why(*arguments, read=read_pair)  # type: ignore[arg-type]
+
+    assert f"a.ibw: has several channels, {there}; choose with --channel" in refused(both)
+    assert f"a.ibw: has no channel 'Phase'; there is {there}" in refused(both, None, "Phase")
+    assert "t.ibw: channel 0 ('HeightTrace') is the trace by the file; the retrace is needed here" in refused(one)
+    assert "r.ibw: channel 0 ('HeightRetrace') is the retrace by the file; the trace is needed" in refused(other, one)
+    assert "a.npy: channel 0 ('') has no retrace in this file; give it too" in refused(plain)
+    assert "has several channels" in why(
+        put(tmp_path, "a.sxm", sxm({"Z": (T, R)}))
+    )  # of an image, either could be meant
+
+
+# damaged
+
+SMALL = np.random.default_rng(2).uniform(-20.0, 20.0, (3, 4))
+READERS: dict[str, tuple[bytes, Callable[[bytes, str], list[Channel]]]] = {
+    "sxm": (sxm({"Z": (SMALL, SMALL)}), sxm_channels),
+    "ibw": (ibw({"HeightTrace": SMALL, "HeightRetrace": SMALL}, NOTE), ibw_channels),
+    "spm": (spm({"Height": (SMALL, SMALL)}), spm_channels),
+    "jpk": (jpk({"height": (SMALL, SMALL)}), jpk_channels),
+    "asd0": (asd({"TP": np.stack([SMALL] * 2)}, 0), asd_channels),
+    "asd1": (asd({"TP": np.stack([SMALL] * 2)}, 1), asd_channels),
+}
+
+
+def read_or_refused(reader: Callable[[bytes, str], list[Channel]], content: bytes) -> bool:
+    """Whether it was read, with all its pixels; ``ValueError`` is all that it may raise."""
+    try:
+        channels = reader(content, "a")
+        with np.errstate(all="ignore"):
+            for channel in channels[:10]:
+                if len(channel.shape) == 2 and min(channel.shape) and np.prod(channel.shape, dtype=float) < 1e6:
+                    assert channel.load(channel.frames - 1).shape == channel.shape
+    except ValueError:
+        return False
+    return bool(channels)
+
+
+@pytest.mark.parametrize("kind", READERS)
+def test_a_file_that_ends_early_is_refused_wherever_it_ends(kind: str) -> None:
+    content, reader = READERS[kind]
+    whole = len(content)
+    step = 7 if kind == "spm" else 1  # 4096 bytes of header, most of them empty
+    assert read_or_refused(reader, content)
+    assert [cut for cut in range(0, whole, step) if read_or_refused(reader, content[:cut])] == []
+
+
+@pytest.mark.parametrize("kind", READERS)
+def test_damage_is_refused_or_read_and_never_worse(kind: str) -> None:
+    content, reader = READERS[kind]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        read = [read_or_refused(reader, damaged(content, random.Random(seed))) for seed in range(300)]
+    assert 0 < sum(read) < len(read)
+
+
+WORLD = 2_000_000_000
+HUGE: dict[str, tuple[str, Callable[[bytes], bytes], str]] = {
+    "sxm": ("sxm", lambda c: c.replace(b"       4       3\n", b" 999999 999999\n"), "ends in the middle of its images"),
+    "sxm, digits": ("sxm", lambda c: c.replace(b"       4       3\n", b" 9" * 4000), "no two numbers as SCAN_PIXELS"),
+    "sxm, rows": ("sxm", lambda c: re.sub(rb"(\t14.*\n)", rb"\1" * 2000, c), "has 4000 images; at most 1000 are read"),
+    "sxm, no end": ("sxm", lambda c: c.replace(b":SCANIT_END:", b":COMMENT2:"), "has no end of its header"),
+    "sxm, no mark": ("sxm", lambda c: c.replace(b"\x1a\x04", b"\x1a\x1a"), "no data after it"),
+    "sxm, integers": ("sxm", lambda c: c.replace(b"FLOAT  ", b"INT    "), "numbers of the kind 'INT MSBFIRST'"),
+    "sxm, no table": ("sxm", lambda c: c.replace(b"\tUnit\t", b"\tEinheit\t"), "does not say Name, Unit and Direction"),
+    "ibw": ("ibw", lambda c: summed(c, "<ii", 132, 40_000, 50_000), "2 images of 40000 x 50000 pixels have 96 bytes"),
+    "ibw, negative": ("ibw", lambda c: summed(c, "<i", 12, -5), "says that 2 images of 4 x 3 pixels have 96 bytes"),
+    "ibw, layers": ("ibw", lambda c: summed(c, "<i", 140, WORLD), "has 2000000000 channels; at most 1000"),
+    "ibw, text": ("ibw", lambda c: summed(c, "<h", 80, 0), "is a wave of text or of complex numbers"),
+    "ibw, curves": ("ibw", lambda c: summed(c, "<i", 136, 0), "does it hold force curves?"),
+    "ibw, note": ("ibw", lambda c: summed(c, "<i", 12, WORLD), "ends in the middle of its images or texts"),
+    "ibw, changed": ("ibw", lambda c: c[:200] + b"?" + c[201:], "has a header with a wrong checksum"),
+    "spm": ("spm", lambda c: c.replace(b"Samps/line: 4", b"Samps/line: 999999999"), "image 0 of 999999999 x 3"),
+    "spm, offset": ("spm", lambda c: c.replace(b"offset: 4096", b"offset: 9999999999"), "from byte 9999999999 of"),
+    "spm, minus": ("spm", lambda c: c.replace(b"length: 24", b"length: -4"), "has no whole number as data length"),
+    "spm, curves": ("spm", lambda c: c.replace(b"\\*File list\r", b"\\*Force file list\r"), "of force curves"),
+    "jpk, curves": ("jpk", lambda _: b"PK\x03\x04" + bytes(100), "is an archive of curves, not of images"),
+    "jpk, tags": ("jpk", lambda _: flood_of_tags(), "more than 100000 tags"),
+    "asd": ("asd1", lambda c: with_numbers(c, 36, WORLD), "2000000000 frames by its header and bytes for 2"),
+    "asd, pixels": ("asd1", lambda c: with_numbers(c, 48, WORLD, WORLD), "has frames of 2000000000 x"),
+    "asd, header": ("asd1", lambda c: with_numbers(c, 4, -4), "frames behind -4 bytes of header"),
+    "asd, name": ("asd0", lambda c: with_numbers(c, 16, WORLD), "ends in its header"),
+    "asd, version": ("asd1", lambda c: with_numbers(c, 0, 9), "of version 0, 1 or 2"),
+}  # fmt: skip
+
+
+def with_numbers(content: bytes, at: int, *values: int) -> bytes:
+    """Numbers of four bytes in a header."""
+    return content[:at] + struct.pack(f"<{len(values)}i", *values) + content[at + 4 * len(values) :]
+
+
+def summed(content: bytes, layout: str, at: int, *values: int) -> bytes:
+    """Numbers in the headers of an Igor file, with the checksum put right."""
+    made = bytearray(content)
+    struct.pack_into(layout, made, at, *values)
+    struct.pack_into("<H", made, 2, 0)
+    struct.pack_into("<H", made, 2, -int(np.frombuffer(bytes(made[:384]), "<u2").sum()) & 0xFFFF)
+    return bytes(made)
+
+
+def flood_of_tags() -> bytes:
+    """A few directories with more tags than any file has."""
+    tags, pages = 30_000, 4
+    size = 2 + 12 * tags + 4
+    ends = [*(8 + size * (page + 1) for page in range(pages - 1)), 0]
+    return b"II*\0\x08\0\0\0" + b"".join(
+        struct.pack("<H", tags) + bytes(12 * tags) + struct.pack("<I", after) for after in ends
+    )
+
+
+@pytest.mark.parametrize("what", HUGE)
+def test_numbers_that_the_file_cannot_have_are_refused(what: str) -> None:
+    kind, change, said = HUGE[what]
+    content, reader = READERS[kind]
+    changed = change(content)
+    assert changed != content
+    with pytest.raises(ValueError, match=re.escape(said)):
+        reader(changed, "a")
+
+
+def test_scales_that_overflow_are_no_heights(tmp_path: Path) -> None:
+    content = (
+        spm({"Height": (T, R)})
+        .replace(b"V/LSB) 20.00000 V", b"V/LSB) 1E+300000 V")
+        .replace(b"5.000000 nm", b"5E+300000 nm")
+    )
+    image = read_image(put(tmp_path, "a.spm", content), "Height trace")
+    assert image.unit == "LSB"  # a scale that is no number is none
+    content = spm({"Height": (T, R)}).replace(b"20.00000 V\r", b"20.0E+300 V\r").replace(b"5.000000 nm", b"5.0E+300 nm")
+    assert "pixels are not finite" in why(put(tmp_path, "b.spm", content), "Height trace")
+
+
+def test_an_image_says_what_it_has() -> None:
+    """What a file does not say is None or empty, never a guess."""
+    content = ibw({"HeightTrace": SMALL}, {})
+    (channel,) = ibw_channels(content, "a")
+    assert (channel.width_nm, channel.height_nm, channel.line_rate_hz, channel.first_row) == (None, None, None, None)
+    (trace, _) = spm_channels(spm({"Height": (SMALL, SMALL)}), "a")
+    assert (trace.width_nm, trace.height_nm) == (500.0, None)  # pixels that are not square: readers differ
+    content = spm({"Height": (SMALL, SMALL)}).replace(b"@Sens. Zsens", b"@Sens. Other")
+    assert spm_channels(content, "a")[0].unit == "V"
+    content = asd({"XX": np.stack([SMALL])})
+    assert asd_channels(content, "a")[0].unit == "LSB"
+    assert ScanImage.__dataclass_fields__["width_nm"].default is None

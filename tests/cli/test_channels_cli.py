@@ -1,0 +1,120 @@
+"""``tablegen channels``, and trace and retrace from the files of instruments."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from calibrating import Scanner, grating
+from editing import Outcome, run
+from image_writers import npy
+from instrument_files import asd, ibw, jpk, spm, sxm
+
+NOTE = {"FastScanSize": "5e-07", "SlowScanSize": "2.5e-07", "ScanRate": "2.5", "ScanDown": "0"}
+
+
+@pytest.fixture
+def lab(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with one scan of a grating in the files of several instruments."""
+    pair = Scanner().images(100.0, grating(16.0, pixels=128, lines=96), 0.05, np.random.default_rng(8))
+    scale = 15.0 / max(np.max(np.abs(pair.trace)), np.max(np.abs(pair.retrace)))
+    trace, retrace = pair.trace * scale, pair.retrace * scale
+    both = {"Height": (trace, retrace)}
+    (tmp_path / "t.npy").write_bytes(npy(trace))
+    (tmp_path / "r.npy").write_bytes(npy(retrace))
+    (tmp_path / "a.sxm").write_bytes(sxm(both))
+    labelled = {"DeflectionTrace": retrace, "HeightTrace": trace, "HeightRetrace": retrace}
+    (tmp_path / "a.ibw").write_bytes(ibw(labelled, NOTE))
+    (tmp_path / "a.001").write_bytes(spm(both | {"Phase": (retrace, trace)}))
+    (tmp_path / "a.jpk").write_bytes(jpk({"Height": (trace, retrace)}))
+    (tmp_path / "a.asd").write_bytes(asd({"TP": np.stack([retrace, trace]), "ER": np.stack([trace, retrace])}))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def one(*words: str) -> Outcome:
+    return run("calibrate", "images", "--axis", "x", "--v-max", "100", "--json", "--pair", "100", *words)
+
+
+def branches(outcome: Outcome) -> list[float]:
+    assert (outcome.status, outcome.err) == (0, "")
+    trace = json.loads(outcome.out)["branches"][0]["traces"][0]
+    return [trace[side][key]["value"] for side in ("forward", "backward") for key in ("beta", "u_peak")]
+
+
+@pytest.mark.common
+def test_a_pair_from_one_file_of_every_instrument(lab: Path) -> None:
+    expected = branches(one("t.npy", "r.npy"))
+    for words, near in (
+        (("a.sxm",), 1e-6),
+        (("a.ibw", "--channel", "Height"), 1e-6),
+        (("a.ibw", "a.ibw", "--channel", "1"), 1e-6),
+        (("a.001", "--channel", "Height"), 1e-4),
+        (("a.jpk", "--channel", "Height"), 1e-3),
+        (("a.asd", "--channel", "TP", "--retrace-channel", "ER", "--frame", "1"), 2e-3),
+    ):
+        assert branches(one(*words)) == pytest.approx(expected, abs=near), words
+
+
+def test_what_is_no_pair_is_said(lab: Path) -> None:
+    there = "0 (DeflectionTrace), 1 (HeightTrace), 2 (HeightRetrace)"
+    for words, said in (
+        (("a.ibw",), f"a.ibw: has several channels, {there}; choose with --channel"),
+        (("a.ibw", "--channel", "Phase"), f"a.ibw: has no channel 'Phase'; there is {there}"),
+        (("a.ibw", "--channel", "Deflection"), "is the trace by the file; the retrace is needed here"),
+        (("a.asd", "--channel", "TP", "--retrace-channel", "ER"), "is a movie of 2 frames; choose one with --frame, 0"),
+        (("a.asd", "--channel", "TP", "--frame", "2"), "has no frame 2; the last one is 1"),
+        (("t.npy",), "t.npy: channel 0 ('') has no retrace in this file; give it too"),
+    ):  # fmt: skip
+        outcome = one(*words)
+        assert outcome.status == 2
+        assert said in outcome.err
+
+
+def test_what_is_in_a_file(lab: Path) -> None:
+    outcome = run("channels", "a.ibw", "a.asd", "t.npy")
+    assert (outcome.status, outcome.err) == (0, "")
+    assert outcome.out.splitlines() == [
+        "a.ibw",
+        "   channel          direction  pixels    size [nm]  unit  lines [Hz]  frames  first row",
+        "0  DeflectionTrace  trace      128 x 96  500 x 250  m     2.5                 bottom",
+        "1  HeightTrace      trace      128 x 96  500 x 250  m     2.5                 bottom",
+        "2  HeightRetrace    retrace    128 x 96  500 x 250  m     2.5                 bottom",
+        "a.asd",
+        "   channel  direction  pixels    size [nm]  unit  lines [Hz]  frames  first row",
+        "0  TP                  128 x 96  400 x 200  nm    192         2",
+        "1  ER                  128 x 96  400 x 200  nm    192         2",
+        "t.npy",
+        "   channel  direction  pixels    size [nm]  unit  lines [Hz]  frames  first row",
+        "0                      128 x 96",
+    ]
+
+
+def test_the_same_as_data(lab: Path) -> None:
+    (file,) = json.loads(run("channels", "--json", "a.sxm").out)
+    assert file["file"] == "a.sxm"
+    assert file["channels"][1] == {
+        "number": 1,
+        "title": "Height backward",
+        "signal": "Height",
+        "direction": "retrace",
+        "rows_columns": [96, 128],
+        "width_nm": pytest.approx(500.0),
+        "height_nm": pytest.approx(250.0),
+        "unit": "m",
+        "line_rate_hz": pytest.approx(2.0),
+        "frames": 1,
+        "first_row": "bottom",
+    }
+
+
+def test_a_damaged_file_and_a_missing_library(lab: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (lab / "b.sxm").write_bytes((lab / "a.sxm").read_bytes()[:-1])
+    outcome = run("channels", "a.sxm", "b.sxm")
+    assert (outcome.status, outcome.out) == (2, "")
+    assert outcome.err.startswith("b.sxm: ends in the middle of its images (2 images of 128 x 96 pixels")
+    monkeypatch.setattr("tablegen.cli.common._installed", lambda module: module != "tifffile")
+    outcome = run("channels", "a.jpk")
+    assert outcome.status == 6
+    assert outcome.err == "tifffile is missing; install it with: pip install 'piezo-tablegen[images]'\n"
+    assert run("channels", "a.sxm").status == 0

@@ -1,0 +1,166 @@
+"""Files of instruments, each by its format's published description; what of a header no reader needs is zero.
+
+Heights are rows x columns, row 0 first in time and the left end of the line at the left, as tablegen has them; a
+writer stores them as the instrument does.
+"""
+
+import struct
+from collections.abc import Mapping
+
+import numpy as np
+
+from tablegen.numerics.arrays import Floats
+
+Both = Mapping[str, tuple[Floats, Floats]]  # trace and retrace by signal
+
+
+def sxm(signals: Both, nm: tuple[float, float] = (500.0, 250.0), scan_dir: str = "up", units: str = "m") -> bytes:
+    """Nanonis: big-endian floats in the order of time, so that backward lines begin at the right."""
+    rows, columns = next(iter(signals.values()))[0].shape
+    info = "".join(f"\t{14 + n}\t{name}\t{units}\tboth\t9.0E-9\t0.0E+0\n" for n, name in enumerate(signals))
+    header = (
+        ":NANONIS_VERSION:\n2\n:SCANIT_TYPE:\n              FLOAT            MSBFIRST\n:REC_DATE:\n 22.11.2026\n"
+        ":REC_TIME:\n12:34:56\n:REC_TEMP:\n      290.0000000000\n:ACQ_TIME:\n       128.2\n"
+        f":SCAN_PIXELS:\n       {columns}       {rows}\n:SCAN_FILE:\nC:\\scan.sxm\n"
+        ":SCAN_TIME:\n             4.000E-1             1.000E-1\n"
+        f":SCAN_RANGE:\n           {nm[0] * 1e-9:.6E}           {nm[1] * 1e-9:.6E}\n"
+        ":SCAN_OFFSET:\n             0.000000E+0         0.000000E+0\n:SCAN_ANGLE:\n            0.000E+0\n"
+        f":SCAN_DIR:\n{scan_dir}\n:BIAS:\n            1.000E+0\n:COMMENT:\nof a test\n"
+        f":DATA_INFO:\n\tChannel\tName\tUnit\tDirection\tCalibration\tOffset\n{info}\n:SCANIT_END:\n\n\n"
+    )
+    blocks = b"".join(t.astype(">f4").tobytes() + r[:, ::-1].astype(">f4").tobytes() for t, r in signals.values())
+    return header.encode("latin-1") + b"\x1a\x04" + blocks
+
+
+def ibw(channels: Mapping[str, Floats], note: Mapping[str, str], order: str = "<", turned: bool = False) -> bytes:
+    """Igor, version 5: values with x first; ``turned`` stores the row that is first in time last."""
+    rows, columns = next(iter(channels.values())).shape
+    stored = [heights[::-1] if turned else heights for heights in channels.values()]
+    values = b"".join(heights.astype(f"{order}f4").tobytes() for heights in stored)
+    text = "".join(f"{key}: {value}\r" for key, value in {"ImageNote": "", **note}.items()).encode()
+    labels = b"".join(label.encode().ljust(32, b"\0") for label in ("", *channels))
+    sizes = struct.pack(f"{order}15i", 320 + len(values), 0, len(text), *[0] * 5, 0, 0, len(labels), *[0] * 4)
+    wave = bytearray(320)
+    struct.pack_into(f"{order}ih", wave, 12, rows * columns * len(stored), 2)
+    wave[28:33] = b"Image"
+    struct.pack_into(f"{order}4i", wave, 68, columns, rows, len(stored), 0)
+    wave[148:149] = b"m"
+    head = struct.pack(f"{order}hh", 5, 0) + sizes + wave
+    checksum = -int(np.frombuffer(head, f"{order}i2").sum()) & 0xFFFF
+    return head[:2] + struct.pack(f"{order}H", checksum) + head[4:] + values + text + labels
+
+
+def spm(
+    signals: Both, nm: tuple[float, float] = (500.0, 500.0), frame: str = "Up", stored: int = 2, aspect: str = "1:1"
+) -> bytes:
+    """Nanoscope: the bottom row first, integers of 100 nm full scale."""
+    start, lists, blocks = 1 << 12, "", b""
+    for signal, both in signals.items():
+        for name, heights in zip(("Trace", "Retrace"), both, strict=True):
+            rows, columns = heights.shape
+            steps = np.round((heights[::-1] if frame == "Down" else heights) / 100.0 * 256.0**stored)
+            block = steps.astype(f"<i{stored}").tobytes()
+            lists += (
+                f"\\*Ciao image list\r\n\\Data offset: {start + len(blocks)}\r\n\\Data length: {len(block)}\r\n"
+                f"\\Bytes/pixel: 2\r\n\\Start context: OL\r\n\\Samps/line: {columns}\r\n\\Number of lines: {rows}\r\n"
+                f"\\Aspect Ratio: {aspect}\r\n\\Scan Size: {nm[0]:g} {nm[1]:g} nm\r\n\\Line Direction: {name}\r\n"
+                f"\\Frame direction: {frame}\r\n"
+                f'\\@2:Image Data: S [{signal.replace(" ", "")}] "{signal}"\r\n'
+                f"\\@2:Z scale: V [Sens. Zsens] (0.000305 V/LSB) 20.00000 V\r\n"
+                f"\\@2:Z offset: V [Sens. Zsens] (0.000305 V/LSB) 0 V\r\n"
+            )
+            blocks += block
+    header = (
+        "\\*File list\r\n\\Version: 0x09400202\r\n\\Date: 10:00:00 AM Sun Nov 22 2026\r\n"
+        "\\*Equipment list\r\n\\Description: MultiMode\r\n\\*Scanner list\r\n\\@Sens. Zsens: V 5.000000 nm/V\r\n"
+        f"\\*Ciao scan list\r\n\\Scan Size: {nm[0]:g} nm\r\n\\Scan Rate: 2.5\r\n{lists}\\*File list end\r\n\x1a"
+    )
+    return header.encode("cp1252").ljust(start, b"\0") + blocks
+
+
+def jpk(signals: Both, nm: tuple[float, float] = (500.0, 250.0), big: bool = False) -> bytes:
+    """JPK: a page with a picture and the grid, then pages of 16 bits, 0.01 nm a step from -100 nm."""
+    order = ">" if big else "<"
+    rows, columns = next(iter(signals.values()))[0].shape
+    grid = {0x8042: nm[0] * 1e-9, 0x8043: nm[1] * 1e-9, 0x8044: 0.0, 0x8045: 0, 0x8046: columns, 0x8047: rows}
+    grid |= {0x8049: 4.0, 0x8050: "settings"}
+    pages = [({**grid, 262: 2}, np.zeros((8, 8, 3), np.uint8))]
+    for signal, both in signals.items():
+        for flag, heights in enumerate(both):
+            steps = np.round((heights + 100.0) / 0.01).astype(f"{order}u2")
+            slots = {0x8080: 2, 0x8081: "nominal", **_slot(0, "volts", "LinearScaling", "V", 1.0, 2.0)}
+            slots |= _slot(1, "nominal", "LinearScaling", "m", 0.01e-9, -100e-9)
+            pages.append(({0x8050: signal, 0x8051: flag, 262: 1, **slots}, steps))
+    out = bytearray(b"MM\0*" if big else b"II*\0") + bytes(4)
+    at = 4  # where the place of the next directory stands
+    for tags, matrix in pages:
+        struct.pack_into(f"{order}I", out, at, len(out))
+        at = _page(out, order, tags, matrix)
+    return bytes(out)
+
+
+def _slot(slot: int, name: str, scaling: str, unit: str, factor: float, offset: float) -> dict[int, int | float | str]:
+    first = 0x8090 + 0x30 * slot
+    return {first: name, first + 0x12: unit, first + 0x13: scaling, first + 0x14: factor, first + 0x15: offset}
+
+
+def _page(out: bytearray, order: str, tags: Mapping[int, int | float | str], matrix: np.ndarray) -> int:
+    """Append a directory, what its tags point at, and its pixels; where the next directory is to be named."""
+    rows, columns, *colours = matrix.shape
+    pixels = matrix.tobytes()
+    own: dict[int, int | float | str] = {256: columns, 257: rows, 258: 8 * matrix.itemsize, 259: 1}
+    own |= {277: colours[0] if colours else 1, 278: rows, 279: len(pixels), **tags}
+    first = len(out) + 2
+    beyond = first + 12 * (len(own) + 1) + 4
+    entries, far = b"", b""
+    for code, value in sorted({**own, 273: 0}.items()):
+        if code == 273:
+            entries += struct.pack(f"{order}HHII", code, 4, 1, 0)
+        elif isinstance(value, int):
+            entries += struct.pack(f"{order}HHII", code, 4, 1, value)
+        else:
+            text = value.encode() + b"\0" if isinstance(value, str) else struct.pack(f"{order}d", value)
+            kind, count = (2, len(text)) if isinstance(value, str) else (12, 1)
+            near = text.ljust(4, b"\0") if len(text) <= 4 else struct.pack(f"{order}I", beyond + len(far))
+            entries += struct.pack(f"{order}HHI", code, kind, count) + near
+            far += text if len(text) > 4 else b""
+    place = sorted({**own, 273: 0}).index(273) * 12 + 8
+    entries = entries[:place] + struct.pack(f"{order}I", beyond + len(far)) + entries[place + 4 :]
+    out += struct.pack(f"{order}H", len(own) + 1) + entries + bytes(4) + far + pixels
+    return first + len(entries)
+
+
+def asd(
+    channels: Mapping[str, Floats], version: int = 1, nm: tuple[int, int] = (400, 200), code: int = 0x40000
+) -> bytes:
+    """High-speed AFM: frames x rows x columns of nm by signal, TP or ER; 12 bits over -5..5 V, 0.05 nm a level."""
+    frames, rows, columns = next(iter(channels.values())).shape
+    extension, gain, sensor = 10.24, 2.0, 20.48  # nm/V, 1, nm/V: 20.48 nm/V x 10 V / 4096
+    bipolar_5_v = 0x40000
+    body = b""
+    for name, movie in channels.items():
+        sign = 1.0 if name == "TP" else -1.0
+        levels = np.round((5.0 * 20.48 - sign * movie) / 0.05).astype("<i2")
+        for number, frame in enumerate(levels):
+            body += struct.pack("<i4h2f1x1b1h2i", number, 0, 0, 0, 0, 0.0, 0.0, 0, 0, 0, 0) + frame.tobytes()
+    names = [*channels, ""][:2]
+    user, comment = b"user", b"comment"
+    if version == 0:
+        head = struct.pack(
+            "<5i4h3fIi", 0, 0, len(user), 0, len(comment), columns, rows, *nm, 500.0, extension, gain, code, 12
+        )
+        head += bytes(1 + 4 + 2 + 2 + 6 + 8 + 12 + 4) + struct.pack("<iih", frames, 7, 1) + user
+        head += struct.pack("<2fi", sensor, 1.0, 0) + comment
+        head = "".join(name.ljust(2, "\0") for name in names).encode() + head
+        at = 4
+    else:
+        head = struct.pack("<5i", 0, 0, 65001, len(user), len(comment))
+        head += b"".join(name.encode("utf-16-le").ljust(4, b"\0") for name in names)
+        head += struct.pack("<8i", frames, frames, 0, 1, columns, rows, *nm) + bytes(1 + 4 + 24 + 8)
+        head += struct.pack("<3fi", 500.0, sensor, 1.0, 0) + bytes(12) + struct.pack("<iIi", 7, bipolar_5_v, 12)
+        head += struct.pack("<6f", 5000.0, 5000.0, 1.0, 1.0, extension, gain) + user + comment
+        if version == 2:
+            head += struct.pack("<iid5i", frames, 0, 0.0, 0, 0, 0, 0, 0)
+        at = 0
+    head = head[:at] + struct.pack("<2i", 4 + len(head), 32) + head[at + 8 :]
+    return struct.pack("<i", version) + head + body
