@@ -9,6 +9,7 @@ import click
 
 from tablegen.cli.common import OutputFile, fail, finite, require, scan_argument, written
 from tablegen.cli.exit_status import ExitStatus
+from tablegen.cli.image_samples import CommandOfRunningImages
 from tablegen.cli.refine_images import ImageArguments, image_options
 from tablegen.reading import CONFIGURATION, read_text
 
@@ -20,6 +21,7 @@ _FORMATS = (".png", ".svg", ".pdf")
 
 
 @click.command(
+    cls=CommandOfRunningImages,
     short_help="Correct remaining scan errors from a sensor trace or images.",
     epilog="""\b
 Examples:

@@ -8,8 +8,11 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 import click
 
-from tablegen.cli.common import fail, finite, require
+from tablegen.cli.calibration_options import delay_pixels_option, mirrored_option
+from tablegen.cli.common import fail
 from tablegen.cli.exit_status import ExitStatus
+from tablegen.cli.image_pairs import channel_option, frame_option, read_both, retrace_channel_option
+from tablegen.cli.image_samples import NO_RETRACE, constant_options, sample_of
 from tablegen.reading import CONFIGURATION, read_text
 
 if TYPE_CHECKING:
@@ -24,16 +27,24 @@ class ImageArguments:
     """What was given of ``--images`` and the options that go with it."""
 
     pairs: tuple[tuple[Path, Path], ...]
-    channel: str | None
-    retrace_channel: str | None
     retrace_mirrored: bool
     delay_pixels: float
+    channel: str | None
+    retrace_channel: str | None
+    frame: int | None
     mismatch: bool
+    constant: dict[str, Any]
 
     @property
     def names(self) -> str:
         """The files, as messages call them."""
-        return " and ".join(str(path) for path in dict.fromkeys(path for pair in self.pairs for path in pair))
+        files = dict.fromkeys(path for pair in self.pairs for path in pair if path != NO_RETRACE)
+        return " and ".join(map(str, files))
+
+    @property
+    def knows_constant(self) -> bool:
+        """Whether the constant of the sample was given."""
+        return any(self.constant[name] is not None for name in ("lattice_nm", "cell", "pitch_nm", "angle_deg"))
 
     def check(self, trace: Path | None, of_traces: Sequence[str]) -> None:
         """A trace or images, with their own options. Raises ``click.UsageError``."""
@@ -42,38 +53,45 @@ class ImageArguments:
         if self.pairs and of_traces:
             raise click.UsageError(f"{of_traces[0]} is for the trace of a sensor, not for --images")
         of_images = {
+            "--lattice-nm, --cell, --pitch-nm or --angle-deg": True if self.knows_constant else None,
             "--channel": self.channel,
             "--retrace-channel": self.retrace_channel,
-            "--retrace-mirrored": self.retrace_mirrored,
-            "--delay-pixels": self.delay_pixels,
-            "--mismatch": self.mismatch,
+            "--frame": self.frame,
+            "--retrace-mirrored": self.retrace_mirrored or None,
+            "--delay-pixels": self.delay_pixels or None,
+            "--mismatch": self.mismatch or None,
         }
-        given = next((name for name, value in of_images.items() if value), None)
+        given = next((name for name, value in of_images.items() if value is not None), None)
         if trace is not None and given is not None:
             raise click.UsageError(f"{given} is for --images")
+        if self.mismatch and self.knows_constant:
+            raise click.UsageError("--mismatch is for a sample without a period; it has no constant")
 
     def learn(self, scan: Path, axis: Literal["x", "y"], options: "Options") -> "tuple[Round, list[Source], str]":
         """The round, where the images came from, and the text of the scan file that was planned."""
-        from tablegen.calibration.image_files import MODULES
-        from tablegen.cli.calibration_run import read_heights
         from tablegen.config.load import load
         from tablegen.problems import Rejected, Unphysical
         from tablegen.refinement.image_round import refine_images, refine_mismatch
         from tablegen.refinement.lattice_line import ImageOptions
 
-        needed = {MODULES.get(path.suffix.lower()) for pair in self.pairs for path in pair}
-        require(*sorted(filter(None, needed)), extra="images")
+        sample = sample_of(self.constant) if self.knows_constant else None
         read = [
-            (read_heights(trace, self.channel), read_heights(retrace, self.retrace_channel or self.channel))
+            read_both(
+                trace, trace if retrace == NO_RETRACE else retrace, self.channel, self.retrace_channel, self.frame
+            )
             for trace, retrace in self.pairs
         ]
         heights = [(trace.heights, retrace.heights) for trace, retrace in read]
         sources = [image.source for pair in read for image in pair]
+        taken = ImageOptions(self.retrace_mirrored, self.delay_pixels)
+        found: Round
         try:
             setup = load(scan)
             text = read_text(scan, CONFIGURATION)
-            learn_from = refine_mismatch if self.mismatch else refine_images
-            found = learn_from(setup, axis, heights, options, ImageOptions(self.retrace_mirrored, self.delay_pixels))
+            if self.mismatch:
+                found = refine_mismatch(setup, axis, heights, options, taken)
+            else:
+                found = refine_images(setup, axis, heights, options, taken, sample)
         except Rejected as rejected:
             fail(rejected.problems, ExitStatus.WRONG_INPUT)
         except Unphysical as reason:
@@ -83,41 +101,30 @@ class ImageArguments:
         return found, sources, text
 
 
-_OPTIONS = (
+_OPTIONS: tuple[Callable[[Any], Any], ...] = (
     click.option(
         "--images",
         "pairs",
         type=(click.Path(path_type=Path), click.Path(path_type=Path)),
-        metavar="TRACE RETRACE",
+        metavar="TRACE [RETRACE]",
         multiple=True,
-        help="Images of the running scan, in place of TRACE.CSV: a grating or a lattice, of any constant. Repeat the "
-        "option for frames that follow each other without a pause.",
+        help="Images of the running scan, in place of TRACE.CSV: a grating or a lattice, of any constant. RETRACE is "
+        "left out if the first file has both. Repeat the option for frames that follow each other without a pause.",
     ),
-    click.option("--channel", metavar="NAME|N", help="Data channel, for image files with several channels."),
-    click.option(
-        "--retrace-channel", metavar="NAME|N", help="Data channel of the retrace image.  [default: same as --channel]"
-    ),
-    click.option(
-        "--retrace-mirrored",
-        is_flag=True,
-        help="The retrace image is stored in order of time: its left pixel is the right end of the line.",
-    ),
-    click.option(
-        "--delay-pixels",
-        type=float,
-        default=0.0,
-        callback=finite,
-        show_default=True,
-        metavar="N",
-        help="Delay of the images relative to the drive in pixels.",
-    ),
+    constant_options,
+    mirrored_option,
+    delay_pixels_option,
+    channel_option,
+    retrace_channel_option,
+    frame_option,
     click.option(
         "--mismatch",
         is_flag=True,
         help="The sample has no period: correct only what trace and retrace differ by.",
     ),
 )
-_NAMES = ("pairs", "channel", "retrace_channel", "retrace_mirrored", "delay_pixels", "mismatch")
+_CONSTANT = ("lattice_nm", "lattice", "cell", "pitch_nm", "angle_deg")
+_NAMES = ("pairs", "retrace_mirrored", "delay_pixels", "channel", "retrace_channel", "frame", "mismatch")
 
 
 def image_options(command: F) -> F:
@@ -125,7 +132,8 @@ def image_options(command: F) -> F:
 
     @wraps(command)
     def gathered(**given: Any) -> Any:
-        return command(images=ImageArguments(**{name: given.pop(name) for name in _NAMES}), **given)
+        constant = {name: given.pop(name) for name in _CONSTANT}
+        return command(images=ImageArguments(**{name: given.pop(name) for name in _NAMES}, constant=constant), **given)
 
     decorated: Any = gathered
     for option in reversed(_OPTIONS):

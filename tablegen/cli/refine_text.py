@@ -28,6 +28,7 @@ def refine_text(found: Round, name: str, sources: Sequence[Source]) -> list[str]
     lines += [
         f"its noise{'':<14}{lesson.noise_percent:8.4f}{'':<20}{lesson.chord_noise_percent:8.3f} rms of a chord",
         "",
+        *_size(found),
         *_learnt(found),
         *_bound(found),
         "",
@@ -52,6 +53,18 @@ def _what(found: Round, sources: Sequence[Source]) -> str:
         count = f"{len(found.frames)} frames of " if len(found.frames) > 1 else ""
         return f"{count}{rows} x {columns} pixels, trace against retrace, of {names}"
     raise TypeError(type(found).__name__)
+
+
+def _size(found: Round) -> list[str]:
+    """The length of x's line by the constant of the sample."""
+    if not isinstance(found, ImageRound) or found.size is None:
+        return []
+    size, asked = found.size.nm, found.asked_nm
+    by = 100.0 * (size.value / asked - 1.0)
+    return [
+        f"size of x: {size.value:.5g} +- {size.standard_error:.2g} nm from turn to turn, asked {asked:.5g} nm: "
+        f"{by:+.3g} +- {100.0 * size.standard_error / asked:.2g} %"
+    ]
 
 
 def _learnt(found: Round) -> list[str]:
@@ -158,7 +171,9 @@ def _measurement(found: Round, sources: Sequence[Source]) -> dict[str, Any]:
             "periods_of_the_sample": found.periods,
             "waves": len(first.fit.state.q),
             "periodic_share": min(first.fit.explained),
-            "asked_nm": line.drive.size_nm,
+            "asked_nm": found.asked_nm,
+            "size_nm": None if found.size is None else found.size.nm.value,
+            "size_standard_error_nm": None if found.size is None else found.size.nm.standard_error,
         }
     raise TypeError(type(found).__name__)
 

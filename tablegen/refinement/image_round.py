@@ -1,11 +1,15 @@
 """A round from images of the running scan to what goes into the scan file, and whether it should."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
+from tablegen.calibration.estimate import Estimate
+from tablegen.calibration.image_checks import check_size
+from tablegen.calibration.image_scale import LineSize, size_of_line
+from tablegen.calibration.image_sizes import Sample
 from tablegen.config.load import Setup
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, Plan, make_plan
@@ -21,15 +25,19 @@ _MIN_EXPLAINED = 0.03  # share of the variance of an image
 _LITTLE_EXPLAINED = 0.5
 _SURE_LAG = 0.2  # standard error with which the order of time is told
 _FAR_APART = 0.35  # periods
+_SIZE_NOTE_LIMIT, _SIZE_NOTE_ERRORS = 0.002, 3.0  # of the line, and standard errors: what gets a remark
 _MIN_PIXELS_PER_PERIOD = 4.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ImageRound(Round):
-    """What trace and retrace say."""
+    """What trace and retrace say; ``size`` is x's, where the constant of the sample is known, and
+    ``asked_nm`` what x was to have."""
 
     frames: tuple[LatticeLine, ...]
     measured: WindowLine
+    size: LineSize | None
+    asked_nm: float
 
     @property
     def periods(self) -> float:
@@ -43,11 +51,13 @@ def refine_images(
     pairs: Sequence[tuple[Floats, Floats]],
     options: Options,
     images: ImageOptions | None = None,
+    sample: Sample | None = None,
 ) -> ImageRound:
     """Learn from heights in any unit, rows x columns, of a grating or a lattice that the running scan images.
 
     ``pairs`` are trace and retrace of frames that follow each other, one or more. Rows are in the order of time,
-    columns those of the scan's imaging window. Raises ``Rejected`` where the scan, or
+    columns those of the scan's imaging window. With a ``sample`` of known constant the size of the line is compared as
+    well; it is not learnt. Raises ``Rejected`` where the scan, or
     the scan with the new layer, cannot be planned, and ``Unphysical`` for images that are not of this scan, or that
     bounds forbid.
     """
@@ -56,6 +66,7 @@ def refine_images(
     limits = allowed(line, options)
     frames = tuple(_frame(plan, trace, retrace, images or ImageOptions()) for trace, retrace in pairs)
     measured = averaged([frame.line for frame in frames]) if axis == "x" else slow_line(plan, frames)
+    size = None if sample is None else _size(plan, frames, sample)
     lesson = learn(line, measured, options.gain, limits.used)
     refinement, changed = with_lesson(setup, line, lesson)
     return ImageRound(
@@ -65,9 +76,11 @@ def refine_images(
         refinement=refinement,
         setup=changed,
         worse=why_worse(setup, axis, lesson),
-        remarks=_remarks(line, frames, lesson),
+        remarks=(*_size_remarks(plan, size), *_remarks(line, frames, lesson)),
         frames=frames,
         measured=measured,
+        size=size,
+        asked_nm=plan.x.drive.size_nm,
     )
 
 
@@ -99,7 +112,7 @@ def _check(seen: LatticeLine) -> None:
             f"{100.0 * max(least, 0.0):.0f} % of the {name}'s contrast is a periodic sample; the rest is something "
             f"else, or trace and retrace are not of one scan"
         )
-    if len(fit.state.q) < 2 or not seen.model.moves or max(error for _, error in fit.lags) > _SURE_LAG:
+    if len(fit.state.q) < 2 or not seen.rows_model.moves or max(error for _, error in fit.lags) > _SURE_LAG:
         return
     between, along = (lag < 0.0 for lag, _ in fit.lags)
     if between or along:
@@ -112,6 +125,31 @@ def _check(seen: LatticeLine) -> None:
             f"the pattern goes on from trace to retrace against the order of time: {what}; the left end must be where "
             f"the trace begins, and the first row the first in time"
         )
+
+
+def _size(plan: Plan, frames: Sequence[LatticeLine], sample: Sample) -> LineSize:
+    """Of x, the mean of the frames. Raises ``Unphysical`` where the sample is another, or the size is."""
+    x, y = plan.x, plan.y
+    low, high = y.band_limit.window
+    aspect = y.drive.size_nm * (high - low) / x.drive.size_nm
+    found = [size_of_line(frame, sample.cell, sample.grating, aspect) for frame in frames]
+    value = float(np.mean([one.nm.value for one in found]))
+    error = float(np.sqrt(np.mean([one.nm.standard_error**2 for one in found]) / len(found)))
+    check_size(value, x.drive.size_nm, "the scan file")
+    return replace(found[0], nm=Estimate(value, float(np.hypot(error, found[0].shared * value))))
+
+
+def _size_remarks(plan: Plan, size: LineSize | None) -> list[str]:
+    if size is None:
+        return []
+    asked, found, error = plan.x.drive.size_nm, size.nm.value, size.nm.standard_error
+    if abs(found / asked - 1.0) < max(_SIZE_NOTE_LIMIT, _SIZE_NOTE_ERRORS * error / asked):
+        return []
+    return [
+        f"the line of x is {found:.5g} nm where the scan file asks for {asked:.5g} nm "
+        f"({100.0 * (found / asked - 1.0):+.2f} %); sizes are not learnt: tablegen calibrate size --images corrects it "
+        f"at every size, or ask for {asked * asked / found:.5g} nm to have {asked:.5g} nm here"
+    ]
 
 
 def _remarks(line: LinePlan, frames: Sequence[LatticeLine], lesson: Lesson) -> tuple[str, ...]:
@@ -132,10 +170,10 @@ def _remarks_of(seen: LatticeLine) -> list[str]:
     span = (geometry.window[1] - geometry.window[0]) * float(np.max(np.abs(fit.state.q)))
     if geometry.columns / span < _MIN_PIXELS_PER_PERIOD:
         found.append(f"the shortest period has {geometry.columns / span:.2g} pixels; scan less, or take more pixels")
-    if seen.apart > _FAR_APART:
+    if seen.start.apart > _FAR_APART:
         found.append(
-            f"trace and retrace are {seen.apart:.2g} periods apart, and beyond half a period they would be taken for "
-            f"the next one; calibrate first, or take a sample of a longer period"
+            f"trace and retrace are {seen.start.apart:.2g} periods apart, and beyond half a period they would be taken "
+            f"for the next one; calibrate first, or take a sample of a longer period"
         )
     if fit.loud:
         shown = ", ".join(str(i + 1) for i in fit.loud[:5]) + (", ..." if len(fit.loud) > 5 else "")

@@ -7,13 +7,13 @@ import numpy as np
 
 from tablegen.calibration.image_checks import ALIASING_HINT, check_periods
 from tablegen.calibration.image_model import prepared
-from tablegen.calibration.periodic import Geometry
+from tablegen.calibration.periodic import FitState, Geometry, PeriodicModel
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import Plan
 from tablegen.problems import Unphysical
 from tablegen.refinement.departure import asked_position
 from tablegen.refinement.free_rows import ColumnModes, FreeRows, FreeRowsFit
-from tablegen.refinement.lattice_start import START_DEGREE, lattice_start
+from tablegen.refinement.lattice_start import START_DEGREE, LatticeStart, lattice_start
 from tablegen.refinement.window_line import WindowLine, error_modes
 
 _DEGREES_A_PERIOD = 1.5  # of a grating, which tells the position where its bars have edges
@@ -35,10 +35,42 @@ class LatticeLine:
     """What a pair of images says of x: the line, and the fit it rests on."""
 
     geometry: Geometry
-    model: FreeRows
+    rows_model: FreeRows
     fit: FreeRowsFit
     line: WindowLine
-    apart: float
+    start: LatticeStart
+
+    @property
+    def model(self) -> PeriodicModel:
+        """The waves that were found."""
+        return self.start.model
+
+    @property
+    def state(self) -> FitState:
+        """Of these waves."""
+        return self.start.fitted
+
+    @property
+    def amplitudes(self) -> Floats:
+        """(spots,), of unit variance of the heights."""
+        return np.abs(self.fit.state.amplitudes)
+
+    @property
+    def waves(self) -> Floats:
+        """(bases, 2): periods in the line from turn to turn, and in the rows, of each base wave."""
+        rows = np.polyfit(self.geometry.y, self.fit.phases.phase, 1)[0]
+        return np.stack([self.fit.state.q, rows], axis=1)
+
+    @property
+    def waves_covariance(self) -> Floats:
+        """Of q_1, s_1, q_2, s_2; that of rows by their scatter about a line, and drift is in that."""
+        count = len(self.fit.state.q)
+        phases, y = self.fit.phases.phase, self.geometry.y
+        left = phases - np.column_stack([y, np.ones_like(y)]) @ np.polyfit(y, phases, 1)
+        found = np.zeros((2 * count, 2 * count))
+        found[::2, ::2] = self.fit.covariance[-count:, -count:]
+        found[1::2, 1::2] = np.diag(np.mean(left**2, axis=0) / float(y @ y))
+        return found
 
 
 def lattice_line(plan: Plan, trace: Floats, retrace: Floats, options: ImageOptions) -> LatticeLine:
@@ -72,7 +104,7 @@ def lattice_line(plan: Plan, trace: Floats, retrace: Floats, options: ImageOptio
     found = WindowLine(
         asked, line.drive.size_nm, turn, window, degree, "both", fit.state.modes, fit.covariance[:count, :count]
     )
-    return LatticeLine(geometry, model, fit, found, start.apart)
+    return LatticeLine(geometry, model, fit, found, start)
 
 
 def column_modes(plan: Plan, geometry: Geometry, degree: int) -> ColumnModes:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tablegen.calibration.image_model import described, row_order
-from tablegen.calibration.periodic import BASES, LAG, Geometry
+from tablegen.calibration.periodic import BASES, LAG, FitState, Geometry, PeriodicModel
 from tablegen.calibration.spots import Bend, bend_of, column_phase, row_polynomial, strongest
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.numerics.arrays import Floats, Ints
@@ -19,11 +19,16 @@ _NEAR_BEND = 0.0  # of a branch that is straight
 
 @dataclass(frozen=True, eq=False)
 class LatticeStart:
-    """``spots`` are rows of whole numbers, one a wave; ``apart`` how far trace and retrace are apart, in periods."""
+    """``spots`` are rows of whole numbers, one a wave; ``apart`` how far trace and retrace are apart, in periods.
+
+    ``model`` and ``fitted`` are the fit with a polynomial in the rows, from which the state is.
+    """
 
     spots: Ints
     state: FreeRowsState
     apart: float
+    model: PeriodicModel
+    fitted: FitState
 
 
 def lattice_start(
@@ -57,7 +62,8 @@ def lattice_start(
     model, state, _ = described(geometry, sides, start, free, (off[0], off[1]))
     x = state.parameters
     rows = model.q(x) * float(np.mean(modes.asked)) + (model.s(x) @ model.y_powers[1:]).T
-    return LatticeStart(model.spots, FreeRowsState(error, model.q(x).copy(), state.amplitudes, rows), apart)
+    begun = FreeRowsState(error, model.q(x).copy(), state.amplitudes, rows)
+    return LatticeStart(model.spots, begun, apart, model, state)
 
 
 def _tracked(
