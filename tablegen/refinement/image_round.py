@@ -16,7 +16,7 @@ from tablegen.planning.line_plan import LinePlan, Plan, make_plan
 from tablegen.problems import Unphysical
 from tablegen.refinement.lattice_line import ImageOptions, LatticeLine, lattice_line
 from tablegen.refinement.learning import Lesson, learn
-from tablegen.refinement.registration import Mismatch, mismatch
+from tablegen.refinement.registration import SweepMismatch, mismatch
 from tablegen.refinement.round import Options, Round, allowed, finished, why_worse, with_lesson
 from tablegen.refinement.slow_line import slow_line
 from tablegen.refinement.window_line import WindowLine, averaged
@@ -185,7 +185,7 @@ def _remarks_of(seen: LatticeLine) -> list[str]:
 class MismatchRound(Round):
     """What trace and retrace of a sample without a period say: residuals are half of what the two differ by."""
 
-    frames: tuple[Mismatch, ...]
+    frames: tuple[SweepMismatch, ...]
     measured: WindowLine
 
 

@@ -11,7 +11,7 @@ from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan
 from tablegen.refinement.departure import Departure, asked_position, departure, straight_line
 from tablegen.refinement.displacement import harmonic_basis
-from tablegen.refinement.measured import MeasuredLine
+from tablegen.refinement.measured import LineMeasurement
 from tablegen.waveform.series import FourierSeries
 from tablegen.waveform.window_fit import normal_equations
 
@@ -41,7 +41,7 @@ class Lesson:
     chord_noise_percent: float
 
 
-def learn(line: LinePlan, measured: MeasuredLine, gain: float, harmonics: int) -> Lesson:
+def learn(line: LinePlan, measured: LineMeasurement, gain: float, harmonics: int) -> Lesson:
     """Learn harmonics 1..``harmonics`` at most from a period of the running scan, at a gain in (0, 2).
 
     The position error in the imaged windows, times the slope of the model's branch there, is what the drive lacks. It
@@ -77,7 +77,7 @@ def learn(line: LinePlan, measured: MeasuredLine, gain: float, harmonics: int) -
     return Lesson(layer, change, kept, before, after, 100.0 * float(noise), 100.0 * float(chord_noise))
 
 
-def _chords(line: LinePlan, seen: Departure, measured: MeasuredLine) -> Floats:
+def _chords(line: LinePlan, seen: Departure, measured: LineMeasurement) -> Floats:
     """From coefficients of the displacement to slopes over chords, in nm a line, at some places of the forward line."""
     x = seen.points.by_side(seen.points.position)["forward"]
     middle = np.linspace(float(x[0]) + 0.5 * CHORD, float(x[-1]) - 0.5 * CHORD, 41)
@@ -100,7 +100,7 @@ def _stands_out(coefficients: list[Floats], covariances: list[Floats]) -> bool:
     return bool(np.min(cost) < 0.0)
 
 
-def _noise_share(line: LinePlan, measured: MeasuredLine, size_nm: float) -> Floats:
+def _noise_share(line: LinePlan, measured: LineMeasurement, size_nm: float) -> Floats:
     """What of the coefficients of the displacement less what was asked, in nm, its noise explains.
 
     The error of a harmonic is taken for Gaussian, with a variance of its own. The likeliest variance is what chi

@@ -6,7 +6,7 @@ from typing import Protocol
 from tablegen.numerics.arrays import Floats
 
 
-class MeasuredLine(Protocol):
+class LineMeasurement(Protocol):
     """One settled period in nm, linear in coefficients whose errors are known."""
 
     @property

@@ -32,7 +32,7 @@ _MOST_PIXELS = 12.0  # columns that trace and retrace may be apart
 
 
 @dataclass(frozen=True, eq=False)
-class Mismatch:
+class SweepMismatch:
     """``match`` is the correlation of trace and retrace once they lie on each other."""
 
     geometry: Geometry
@@ -40,7 +40,7 @@ class Mismatch:
     match: float
 
 
-def mismatch(plan: Plan, trace: Floats, retrace: Floats, options: ImageOptions) -> Mismatch:
+def mismatch(plan: Plan, trace: Floats, retrace: Floats, options: ImageOptions) -> SweepMismatch:
     """What trace and retrace of x differ by, half in each. Raises ``Unphysical`` where they are not of one scan."""
     line = plan.x
     window = line.band_limit.window
@@ -99,7 +99,7 @@ def mismatch(plan: Plan, trace: Floats, retrace: Floats, options: ImageOptions) 
         coefficients,
         np.asarray(spread, dtype=np.float64),
     )
-    return Mismatch(geometry, found_line, match)
+    return SweepMismatch(geometry, found_line, match)
 
 
 def _laid(spline: Floats, columns: Floats) -> Floats:
