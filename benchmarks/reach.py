@@ -23,8 +23,10 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "tests" / "helpers"))
 
 from foreign_plants import SIX, TEN, V_MAX, BoucWen, Floats, ForeignPlant, ManyPlays, record, triangle
 
+from tablegen.certificate.expected import certified_expectation
+from tablegen.certificate.line_errors import EmittedPeriod
 from tablegen.cli import cli as tablegen
-from tablegen.compensation.operator.scan_line import Expected
+from tablegen.compensation.expectation import Expectation, Figure
 from tablegen.config.load import Setup, load
 from tablegen.planning.line_plan import make_plan
 from tablegen.problems import Rejected
@@ -58,14 +60,13 @@ PLANTS = {
 
 @dataclass(frozen=True)
 class Judged:
-    """A scan on its plant, percent of the line: what it left, and what the operator expected with what uncertainty."""
+    """A scan on its plant, percent of the line: what it left, and what its certificate expected."""
 
     offset: float
     share: float
     rate_hz: float
     left: dict[str, float]
-    expected: Expected | None = None
-    uncertainty: Expected | None = None
+    expected: Expectation | None = None
 
 
 def calibrated(plant: ForeignPlant, folder: Path, protocol: Sequence[tuple[float, float]] | None) -> Setup:
@@ -160,8 +161,7 @@ def judge(setup: Setup, plant: ForeignPlant, offset: float, share: float, rate_h
         "mismatch": float(np.max(np.abs(sides[0] - sides[1]))),
         "size": 100.0 * (slope / size_nm - 1.0),
     }
-    shape = line.drive.shape
-    return Judged(offset, share, rate_hz, left, getattr(shape, "expected", None), getattr(shape, "uncertainty", None))
+    return Judged(offset, share, rate_hz, left, certified_expectation(line, EmittedPeriod(line)))
 
 
 def scans(setup: Setup, plant: ForeignPlant) -> Iterator[Judged]:
@@ -207,6 +207,13 @@ def table(kinds: dict[str, dict[str, list[Judged]]]) -> list[str]:
     return out
 
 
+def figures_of(expected: Expectation, measure: str) -> list[Figure]:
+    """Those of a measure that have an uncertainty."""
+    found = getattr(expected, measure)
+    figures = found.values() if measure in ("rms", "scaling") else [found]
+    return [one for one in figures if one is not None and one.uncertainty is not None]
+
+
 def coverage(kinds: dict[str, dict[str, list[Judged]]]) -> list[str]:
     """How often what is left lies below what was expected and its uncertainty together."""
     out = []
@@ -216,9 +223,10 @@ def coverage(kinds: dict[str, dict[str, list[Judged]]]) -> list[str]:
             for measure in MEASURES:
                 inside = []
                 for one in judged:
-                    if one.expected is not None and one.uncertainty is not None:
-                        most = (np.max(np.abs(getattr(part, measure))) for part in (one.expected, one.uncertainty))
-                        inside.append(abs(one.left[measure]) <= sum(most))
+                    figures = [] if one.expected is None else figures_of(one.expected, measure)
+                    if figures:
+                        most = max(abs(figure.value) + (figure.uncertainty or 0.0) for figure in figures)
+                        inside.append(abs(one.left[measure]) <= most)
                 if inside:
                     shares.append(f"{measure} {100.0 * np.mean(inside):.0f} %")
             if shares:

@@ -19,6 +19,7 @@ _COMMANDS = {
     "build": ("build", "build"),
     "check": ("check", "check"),
     "show": ("show", "show"),
+    "report": ("report", "report"),
     "calibrate": ("calibrate", "calibrate"),
     "channels": ("channels", "channels"),
     "simulate": ("simulate", "simulate"),

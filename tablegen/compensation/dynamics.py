@@ -1,7 +1,7 @@
 """Linear dynamics of the scanner, and their inverse for each harmonic of the scan."""
 
 from dataclasses import dataclass
-from math import sqrt
+from math import inf, sqrt
 from typing import Protocol
 
 import numpy as np
@@ -25,6 +25,10 @@ class Response(Protocol):
     @property
     def half_width_hz(self) -> float:
         """Half the width of the resonance."""
+
+    @property
+    def highest_hz(self) -> float:
+        """Up to which it is known; ``inverse`` refuses what is above."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +55,11 @@ class SecondOrder:
     def half_width_hz(self) -> float:
         """Half the width at half the power."""
         return self.frequency_hz / (2.0 * self.quality)
+
+    @property
+    def highest_hz(self) -> float:
+        """All frequencies."""
+        return inf
 
 
 @dataclass(frozen=True)
@@ -84,6 +93,11 @@ class Measured:
         """Half the range over which the gain is above its maximum / sqrt(2)."""
         high = self.f_hz[self.gain >= float(np.max(self.gain)) / sqrt(2.0)]
         return max(float(high[-1] - high[0]) / 2.0, float(np.min(np.diff(self.f_hz))))
+
+    @property
+    def highest_hz(self) -> float:
+        """That of the last point."""
+        return float(self.f_hz[-1])
 
 
 def capped_inverse(response: Response, f_hz: Floats, max_boost_db: float) -> tuple[Floats, Floats, Bools]:

@@ -67,7 +67,7 @@ class OwnAxis:
         """
         u = volts / self.v_max
         bottom, top, count = int(np.argmin(u)), int(np.argmax(u)), len(u)
-        loop = self.operator.loop(float(u[bottom]), float(u[top]), self.factor)
+        loop = self.operator.loop(float(u[bottom]), float(u[top]), self.factor, float(np.mean(u)))
         rising = (np.arange(count) - bottom) % count < (top - bottom) % count
         place = np.where(rising, loop.position(u, True), loop.position(u, False))
         n = np.arange(1, min(self.harmonics, (count - 1) // 2) + 1)

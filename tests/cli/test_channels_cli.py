@@ -118,3 +118,11 @@ def test_a_damaged_file_and_a_missing_library(lab: Path, monkeypatch: pytest.Mon
     assert outcome.status == 6
     assert outcome.err == "tifffile is missing; install it with: pip install 'piezo-tablegen[images]'\n"
     assert run("channels", "a.sxm").status == 0
+
+
+def test_a_title_does_not_steer_the_terminal(lab: Path) -> None:
+    evil = {"Height\x1b[2JTrace": np.eye(40)}
+    (lab / "evil.ibw").write_bytes(ibw(evil, NOTE))
+    outcome = run("channels", "evil.ibw")
+    assert "\x1b" not in outcome.out
+    assert "Height\\x1b[2JTrace  trace" in outcome.out

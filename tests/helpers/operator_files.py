@@ -39,6 +39,7 @@ def operator_file(
             scaling_percent=20.0 * rms,
             mismatch_percent=3.0 * rms,
             size_percent=size,
+            in_fit_percent=[rms, 20.0 * rms, 3.0 * rms, size],  # all that is left out is noise
         )
         for stroke in STROKES
     ]

@@ -29,6 +29,7 @@ LAYERS = (
     "calibration",
     "refinement",
     "virtual",
+    "report",
     "api",
     "cli",
     "__main__",

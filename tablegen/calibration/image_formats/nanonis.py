@@ -4,11 +4,11 @@ Rows are in the order of time. Backward lines are too, from right to left, and a
 """
 
 from functools import partial
-from math import isfinite, prod
+from math import prod
 
 import numpy as np
 
-from tablegen.calibration.image_formats.channel import Channel, Direction, FirstRow, Matrix, quoted
+from tablegen.calibration.image_formats.channel import Channel, Direction, FirstRow, Matrix, positive, quoted
 
 _MAGIC = b":NANONIS_VERSION:"
 _END, _DATA = b":SCANIT_END:", b"\x1a\x04"
@@ -97,14 +97,8 @@ def _whole(tags: dict[str, list[str]]) -> tuple[int, int]:
 
 def _lengths(tags: dict[str, list[str]], name: str, unit: float) -> tuple[float | None, float | None]:
     """Two positive numbers in units, each None where it is none."""
-    found: list[float | None] = []
-    for word in [*_words(tags, name), "", ""][:2]:
-        try:
-            value = float(word) * unit
-        except ValueError:
-            value = 0.0
-        found.append(value if isfinite(value) and value > 0.0 else None)
-    return found[0], found[1]
+    first, second = [*_words(tags, name), "", ""][:2]
+    return positive(first, unit), positive(second, unit)
 
 
 def _blocks(tags: dict[str, list[str]]) -> list[tuple[str, str, Direction]]:

@@ -5,11 +5,11 @@ The first row is the bottom one; it is the last in time, and rows are turned, if
 
 import re
 from functools import partial
-from math import isfinite, prod
+from math import prod
 
 import numpy as np
 
-from tablegen.calibration.image_formats.channel import Channel, Direction, FirstRow, Matrix
+from tablegen.calibration.image_formats.channel import Channel, Direction, FirstRow, Matrix, positive
 
 _END = b"\\*File list end"
 _MAX_HEADER = 4 << 20  # bytes; files have some hundred thousand at most
@@ -79,7 +79,7 @@ def _channel(content: bytes, number: int, image: _List, others: _List) -> Channe
         unit,
         width,
         height,
-        _positive(others.get("scan rate", "").split(" ")[0]),
+        positive(others.get("scan rate", "").split(" ")[0]),
         first if down in ("up", "down") else None,
     )
 
@@ -98,23 +98,15 @@ def _whole(number: int, image: _List, key: str) -> int:
     return int(word)
 
 
-def _positive(text: str) -> float | None:
-    try:
-        value = float(text)
-    except ValueError:
-        return None
-    return value if isfinite(value) and value > 0.0 else None
-
-
 def _size(image: _List, columns: int, rows: int) -> tuple[float | None, float | None]:
     """Width and height in nm; no height where the pixels are not square by the aspect ratio, since readers differ."""
     words = image.get("scan size", "").split()
     nm = _NM.get(words[-1]) if words else None
-    width = _positive(words[0]) if nm else None
+    width = positive(words[0]) if nm else None
     if width is None or nm is None:
         return None, None
     across, _, along = image.get("aspect ratio", "").partition(":")
-    ratio = (_positive(across) or 0.0) / (_positive(along) or 1.0)
+    ratio = (positive(across) or 0.0) / (positive(along) or 1.0)
     square = not ratio or abs(ratio * rows / columns - 1.0) < 0.01
     return width * nm, width * nm * rows / columns if square else None
 
@@ -122,14 +114,14 @@ def _size(image: _List, columns: int, rows: int) -> tuple[float | None, float | 
 def _scale(text: str, others: _List, stored: int) -> tuple[float, str]:
     """The unit of the values, and how much of it is one step; steps where the file does not say."""
     found = _SCALED.match(text)
-    most = _positive(found["value"]) if found else None
+    most = positive(found["value"]) if found else None
     if found is None or most is None:
         return 1.0, "LSB"
     step = most / 256.0**stored
     if not found["by"]:
         return step, found["unit"]
     sensitivity = _SCALED.match(others.get(f"@{found['by'].lower()}", ""))
-    each = _positive(sensitivity["value"]) if sensitivity else None
+    each = positive(sensitivity["value"]) if sensitivity else None
     if sensitivity is None or each is None:
         return step, found["unit"]
     return step * each, sensitivity["unit"].removesuffix("/V") or found["unit"]

@@ -43,7 +43,7 @@ def creep_of_fields(
     def misfit(creep: LogarithmicCreep) -> float:
         left = [left_of(line.without(None, creep), family) for line in lines]
         if several:
-            sizes = [one.extent_nm * factor(line.centre) / line.stroke for one, line in zip(left, lines, strict=True)]
+            sizes = [one.extent_nm * factor(line.mean) / line.stroke for one, line in zip(left, lines, strict=True)]
             values = np.array(sizes)[:, None]
             return _unlikelihood(lines, values / np.mean(values) - 1.0, still=False)
         return _unlikelihood(lines, np.stack([one.coefficients for one in left]), still=True)

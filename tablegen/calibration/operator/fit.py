@@ -12,6 +12,7 @@ from tablegen.calibration.operator.errors import WORST, LineErrors, compare
 from tablegen.calibration.operator.family import STARTS, CreepOf, fit_family, groups_of
 from tablegen.calibration.operator.periodic_line import PeriodicLine
 from tablegen.calibration.operator.shrinkage import shrunk
+from tablegen.calibration.operator.units import check_units
 from tablegen.compensation.dynamics import Response
 from tablegen.compensation.operator.creep import NO_CREEP, LogarithmicCreep
 from tablegen.compensation.operator.field import Field, Lengths, through
@@ -69,6 +70,7 @@ def fit_operator(lines: Sequence[PeriodicLine], response: Response | None, facto
 def _check(lines: Sequence[PeriodicLine]) -> None:
     if len(lines) < _MIN_LINES:
         raise Unphysical(f"{len(lines)} traces are not enough for an operator; at least {_MIN_LINES} are needed")
+    check_units(lines)
     strokes = [line.stroke for line in lines]
     if max(strokes) < _MIN_SPREAD * min(strokes):
         low, high = (100.0 * share for share in (min(strokes), max(strokes)))
@@ -141,8 +143,8 @@ class _Family:
         """Both fields through what is left, and the rows and sizes that they go through."""
         points = np.array([(line.stroke, line.centre) for line in self.settled])
         rows = shrunk(points, self.left, lengths)
-        sizes = _sizes(self.plays, self.settled, self.left, self.main, factor)
         residual = through(points, rows, lengths, straight=True)
+        sizes = _sizes(self.plays, residual, self.settled, self.left, self.main, factor)
         size = through(points, sizes[:, None], lengths)
         return Operator(self.plays, residual, size, self.creep, self.main, ()), rows, sizes
 
@@ -166,18 +168,12 @@ def _fit_family(name: str, lines: Sequence[PeriodicLine], main: float, factor: F
         tried.append((float(np.exp(np.mean([np.log(errors.rms) for errors in out]))), lengths, out))
     score, lengths, out = min(tried, key=lambda one: one[0])
     operator, rows, sizes = whole.operator(lengths, factor)
+    inside = tuple(_errors(line, operator, factor) for line in whole.settled)
     measured = tuple(
-        MeasuredLine(
-            line.name,
-            line.stroke,
-            line.centre,
-            line.rate_hz,
-            (errors.rms, errors.scaling, errors.mismatch, errors.size),
-        )
-        for line, errors in zip(lines, out, strict=True)
+        MeasuredLine(line.name, line.stroke, line.centre, line.rate_hz, errors.figures, left.figures)
+        for line, errors, left in zip(lines, out, inside, strict=True)
     )
     operator = replace(operator, lines=measured)
-    inside = tuple(_errors(line, operator, factor) for line in whole.settled)
     return OperatorFit(operator, name, rows, sizes, inside, tuple(out), {name: score})
 
 
@@ -187,16 +183,25 @@ def _straight(lines: Sequence[PeriodicLine]) -> Plays:
     return replace(NO_PLAYS, reversible=np.array([gain]))
 
 
-def _sizes(family: Plays, lines: Sequence[PeriodicLine], left: Sequence[Left], main: float, factor: Factor) -> Floats:
+def _sizes(
+    family: Plays, residual: Field, lines: Sequence[PeriodicLine], left: Sequence[Left], main: float, factor: Factor
+) -> Floats:
     """Measured extents over expected ones, less 1."""
     nothing = Field(np.zeros((0, 2)), np.zeros((0, 1)), Lengths(1.0, 1.0, 1.0))
-    bare = Operator(family, nothing, nothing, NO_CREEP, main, ())
-    extents = [bare.expected_extent(line.stroke, line.centre, factor(line.centre) / factor(main)) for line in lines]
-    return np.array([one.extent_nm / extent - 1.0 for one, extent in zip(left, extents, strict=True)])
+    bare = Operator(family, residual, nothing, NO_CREEP, main, ())
+
+    def extent(line: PeriodicLine) -> float:
+        here = factor(line.mean) / factor(main)
+        try:
+            return bare.loop(line.low, line.high, here, line.mean).extent_nm
+        except Unphysical:  # where a line is left out; its errors are the worst then
+            return bare.expected_extent(line.stroke, line.mean, here)
+
+    return np.array([one.extent_nm / extent(line) - 1.0 for one, line in zip(left, lines, strict=True)])
 
 
 def _errors(line: PeriodicLine, operator: Operator, factor: Factor) -> LineErrors:
     try:
-        return compare(line, operator.loop(line.low, line.high, factor(line.centre) / factor(operator.centre)))
+        return compare(line, operator.loop(line.low, line.high, factor(line.mean) / factor(operator.centre), line.mean))
     except Unphysical:
         return WORST

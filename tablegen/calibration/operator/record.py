@@ -40,6 +40,7 @@ def operator_file(fit: OperatorFit, axis: str, v_max: float, sources: Sequence[s
                 scaling_percent=scaling,
                 mismatch_percent=mismatch,
                 size_percent=size,
+                in_fit_percent=list(line.in_fit),
             )
         )
     file = OperatorFile(

@@ -69,6 +69,7 @@ class LineTable(_Table, frozen=True, kw_only=True):
     scaling_percent: _Number
     mismatch_percent: _Number
     size_percent: _Number
+    in_fit_percent: Annotated[list[_Number], Meta(min_length=4, max_length=4)]
 
 
 class OperatorFile(_Table, frozen=True, kw_only=True):
@@ -144,6 +145,7 @@ def _operator(file: OperatorFile) -> Operator:
             line.centre,
             line.rate_hz,
             (line.rms_percent, line.scaling_percent, line.mismatch_percent, line.size_percent),
+            (line.in_fit_percent[0], line.in_fit_percent[1], line.in_fit_percent[2], line.in_fit_percent[3]),
         )
         for line in file.lines
     )

@@ -1,6 +1,6 @@
 """The operator: a hysteresis family, the measured residual over it, the size at every offset, and creep."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -22,7 +22,8 @@ class MeasuredLine:
     """One trace that the operator rests on: where it was, and by how much it is missed when it is left out.
 
     Strokes and centres are shares of v_max. ``left_out`` is the rms residual, the scaling error and the mismatch of
-    trace and retrace inside the window, in percent, and the error of the size in percent.
+    trace and retrace inside the window, in percent, and the error of the size in percent; ``in_fit`` is what is left of
+    these where the trace is not left out, that is noise.
     """
 
     name: str
@@ -30,6 +31,7 @@ class MeasuredLine:
     centre: float
     rate_hz: float
     left_out: tuple[float, float, float, float]
+    in_fit: tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,11 +50,12 @@ class Operator:
     centre: float
     lines: tuple[MeasuredLine, ...]
 
-    def loop(self, low: float, high: float, factor: float = 1.0) -> Loop:
-        """The settled loop between two normalised drives.
+    def loop(self, low: float, high: float, factor: float = 1.0, mean: float | None = None) -> Loop:
+        """The settled loop between two normalised drives, of a drive with a ``mean``; default: the middle of both.
 
-        ``factor`` is m of (1) at this offset over that at ``self.centre``. Raises ``Unphysical`` where a branch would
-        stand still or run backwards.
+        ``factor`` is m of (1) at the mean over that at ``self.centre``. The size is that of a triangle about the mean,
+        since (1) goes with it; where the middle between the turns is another one, the loop is as much larger as its own
+        bend says. Raises ``Unphysical`` where a branch would stand still or run backwards.
         """
         stroke, centre = high - low, 0.5 * (low + high)
         rising, falling, _ = self._family(low, high)
@@ -60,9 +63,11 @@ class Operator:
         half = len(row) // 2
         x = 2.0 * self._grid - 1.0
         rising, falling = rising + chebyshev(row[:half], x), falling + chebyshev(row[half:], x)
-        extent = self.expected_extent(stroke, centre, factor) * (1.0 + float(self.size.at(stroke, centre)[0]))
         rising, falling = _closed(rising, falling)
+        mean = centre if mean is None else mean
+        extent = self.expected_extent(stroke, mean, factor) * (1.0 + float(self.size.at(stroke, mean)[0]))
         loop = Loop(low, high, _monotonic_ends(rising), _monotonic_ends(falling), extent)
+        loop = replace(loop, extent_nm=extent * (1.0 + loop.grown(mean)))
         if not loop.least_slope > 0.5 * _LEAST_SLOPE:
             raise Unphysical(
                 f"at a stroke of {stroke:.3g} and a centre of {centre:.3g} of v_max the operator's branches run "
