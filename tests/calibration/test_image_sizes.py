@@ -30,7 +30,7 @@ def shown(seen: Seen, noise: float = 0.0, seed: int = 0, alone: bool = False, v:
     return SampleImage("an image", v, None, both.trace, None if alone else both.retrace)
 
 
-def size(image: SampleImage, sample: Sample, **options: object) -> Estimate:
+def size(image: SampleImage, sample: KnownSample, **options: object) -> Estimate:
     return sizes_of([image], V_MAX, sample, Taking(**options)).images[0].size.nm  # type: ignore[arg-type]
 
 
@@ -147,7 +147,7 @@ def test_known_errors_are_weights_and_a_law_that_is_missed_adds_scatter() -> Non
 # what is refused
 
 
-def refused(image: SampleImage, sample: Sample = BARS, **options: object) -> str:
+def refused(image: SampleImage, sample: KnownSample = BARS, **options: object) -> str:
     with pytest.raises(Unphysical) as caught:
         size(image, sample, **options)
     assert str(caught.value).startswith("an image: ")
