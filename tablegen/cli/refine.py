@@ -166,13 +166,11 @@ def refine(
         written(plot.parent, {plot.name: draw(found.curves, kind)})
     refused = found.worse or _learnt_before(scan, axis, found, sources, text)
     if report is not None:
-        from tablegen.cli.refine_text import what_was_measured
         from tablegen.refinement.scan_file import rounds_of
         from tablegen.report.learnt import round_page
 
         earlier = rounds_of(text, str(scan), axis) if found.line.layer is not None else []
-        content = round_page(found, name, what_was_measured(found, sources), sources, earlier, refused)
-        written(report.parent, {report.name: content})
+        written(report.parent, {report.name: round_page(found, name, sources, earlier, refused)})
     if refused and not force:
         fail([f"{files}: {refused}"], ExitStatus.WRONG_INPUT)
     if write:

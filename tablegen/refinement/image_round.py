@@ -6,10 +6,10 @@ from typing import Literal
 
 import numpy as np
 
-from tablegen.calibration.estimate import Estimate
+from tablegen.calibration.estimate import Estimate, LineSize
 from tablegen.calibration.image_checks import check_size
-from tablegen.calibration.image_scale import LineSize, size_of_line
-from tablegen.calibration.image_sizes import Sample
+from tablegen.calibration.image_scale import size_of_line
+from tablegen.calibration.image_sizes import KnownSample
 from tablegen.config.load import Setup
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, Plan, make_plan
@@ -44,6 +44,11 @@ class ImageRound(Round):
         """In the whole line of x, of the wave that has most."""
         return float(np.max(np.abs(self.frames[0].fit.state.q)))
 
+    @property
+    def recorded(self) -> str:
+        """Frames, pixels and periods."""
+        return f"{_pixels(self.frames)}, {self.periods:.4g} periods in the line"
+
 
 def refine_images(
     setup: Setup,
@@ -51,7 +56,7 @@ def refine_images(
     pairs: Sequence[tuple[Floats, Floats]],
     options: Options,
     images: ImageOptions | None = None,
-    sample: Sample | None = None,
+    sample: KnownSample | None = None,
 ) -> ImageRound:
     """Learn from heights in any unit, rows x columns, of a grating or a lattice that the running scan images.
 
@@ -127,7 +132,7 @@ def _check(seen: LatticeLine) -> None:
         )
 
 
-def _size(plan: Plan, frames: Sequence[LatticeLine], sample: Sample) -> LineSize:
+def _size(plan: Plan, frames: Sequence[LatticeLine], sample: KnownSample) -> LineSize:
     """Of x, the mean of the frames. Raises ``Unphysical`` where the sample is another, or the size is."""
     x, y = plan.x, plan.y
     low, high = y.band_limit.window
@@ -188,6 +193,11 @@ class MismatchRound(Round):
     frames: tuple[SweepMismatch, ...]
     measured: WindowLine
 
+    @property
+    def recorded(self) -> str:
+        """Frames and pixels."""
+        return f"{_pixels(self.frames)}, trace against retrace"
+
 
 def refine_mismatch(
     setup: Setup,
@@ -235,3 +245,9 @@ def _learning_remarks(lesson: Lesson) -> list[str]:
     elif finished(lesson):
         found.append("most of the remaining error is noise: give several frames, or stop refining")
     return [*found, "images do not show that the build of this scan file was running"]
+
+
+def _pixels(frames: Sequence[LatticeLine] | Sequence[SweepMismatch]) -> str:
+    rows, columns = frames[0].geometry.rows, frames[0].geometry.columns
+    count = f"{len(frames)} frames of " if len(frames) > 1 else ""
+    return f"{count}{rows} x {columns} pixels"

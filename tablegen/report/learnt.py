@@ -16,32 +16,27 @@ from tablegen.version import __version__
 _TURNS = np.linspace(0.0, 1.0, 601)
 
 
-def round_page(
-    found: Round, name: str, measured: str, sources: Sequence[Source], earlier: Sequence[str], refused: str
-) -> bytes:
-    """The page of a round.
-
-    ``measured`` says what was, ``earlier`` are the comments of rounds before, ``refused`` why it is not learnt from.
-    """
+def round_page(found: Round, name: str, sources: Sequence[Source], earlier: Sequence[str], refused: str) -> bytes:
+    """The page of a round. ``earlier`` are the comments of rounds before, ``refused`` why it is not learnt from."""
     axis, lesson = found.line.axis, found.lesson
     findings = [Finding("note", 0.0, remark) for remark in found.remarks]
     both = f"{lesson.before.rms_percent:.3g} % rms measured; {lesson.after.rms_percent:.2g} % predicted after it."
     verdict = TableCell(f"\u2713 {both}", "good")
     if refused:
         findings.insert(0, Finding("limit", 1.0, refused, "\u2717 not used"))
-        verdict = TableCell("\u2717 This measurement is not learnt from.", "bad")
+        verdict = TableCell("\u2717 This trace is not learnt from.", "bad")
     elif not lesson.harmonics:
         verdict = TableCell("Nothing was learnt: what is left is noise.", "quiet")
-    found_in = [_errors(found, measured), _layer(found)]
+    found_in = [_errors(found), _layer(found)]
     if earlier:
         rows = tuple(row(str(number), said) for number, said in enumerate(earlier, 1))
         found_in.append(Section("rounds", "Rounds before", (Grid("", ("round", "learnt from"), rows),)))
-    files = "; ".join(f"{source.name}, sha256 {source.sha256}" for source in sources)
+    files = ", ".join(f"{source.name}, sha256 {source.sha256}" for source in sources)
     foot = f"From {files}; tablegen {__version__}."
     return document(f"{name}: refinement of {axis}", verdict, findings, found_in, "", foot)
 
 
-def _errors(found: Round, measured: str) -> Section:
+def _errors(found: Round) -> Section:
     lesson = found.lesson
     rows = []
     for label, departure in (("measured", lesson.before), ("predicted", lesson.after)):
@@ -63,15 +58,14 @@ def _errors(found: Round, measured: str) -> Section:
         charts.append(
             Chart(f"residual-{side}", title, "position on the line", "residual [% of the line]", curves, marks=zero)
         )
-    return Section(
-        "errors", "Measured and predicted", (Grid("", head, tuple(rows)), Charts(tuple(charts))), f"{measured}."
-    )
+    parts = (Grid("", head, tuple(rows)), Charts(tuple(charts)))
+    return Section("errors", "Measured and predicted", parts, f"{found.recorded}.")
 
 
 def _layer(found: Round) -> Section:
     lesson, bound = found.lesson, found.bound
     curves = (
-        DrawnCurve("this round", "before", _TURNS, 100.0 * lesson.change.value(_TURNS)),
+        DrawnCurve("this round", "other", _TURNS, 100.0 * lesson.change.value(_TURNS)),
         DrawnCurve("the layer now", "forward", _TURNS, 100.0 * lesson.layer.value(_TURNS)),
     )
     text = (
