@@ -66,7 +66,10 @@ def of_formulas(steps: Sequence[float]) -> float:
 
 
 def _deviations(freedom: float) -> float:
-    """Within which Student's t is with 90 %, that is ``expectation.LEVEL_PERCENT``, to second order in the inverse of the degrees of freedom."""
+    """Within which Student's t is with 90 %, to second order in the inverse of the degrees of freedom.
+
+    That is ``expectation.LEVEL_PERCENT``.
+    """
     return 1.645 + (1.524 + 1.42 / freedom) / freedom
 
 
