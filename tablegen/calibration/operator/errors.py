@@ -29,7 +29,7 @@ class LineErrors:
 
     @property
     def figures(self) -> tuple[float, float, float, float]:
-        """All four."""
+        """The four numbers in their order."""
         return self.rms, self.scaling, self.mismatch, self.size
 
 
