@@ -16,7 +16,7 @@ from tablegen.calibration.frequency import fit_frequency
 from tablegen.calibration.hysteresis import HysteresisFit, Trace, fit_hysteresis
 from tablegen.calibration.image_scale import Cell, Grating
 from tablegen.calibration.image_sizes import ImageSizes, SampleImage, Taking, sizes_of
-from tablegen.calibration.image_sizes import Sample as Known
+from tablegen.calibration.image_sizes import KnownSample as Known
 from tablegen.calibration.images import Pair, fit_images
 from tablegen.calibration.offset import fit_offset
 from tablegen.calibration.resonance import fit_resonance
