@@ -192,7 +192,8 @@ def _text(
 ) -> list[str]:
     """What was found, what it leaves of every trace, and what to measure next."""
     creep = fit.operator.creep
-    tried = ", ".join(f"{name} {score:.3g} %" for name, score in fit.candidates.items())
+    pure = {name: score for name, score in fit.candidates.items() if name == fit.family or "," not in name}
+    tried = ", ".join(f"{name} {score:.3g} %" for name, score in pure.items())
     out = [
         f"operator of {axis} from {len(lines)} traces",
         "",

@@ -52,7 +52,7 @@ def bouc_wen_played(core: BoucWen) -> Play:
         for u in parts:
             moved = np.empty(len(u))
             for k, drive in enumerate(u.tolist()):
-                h = core._moved(h, drive - before)
+                h = core.moved(h, before, drive - before)
                 before = drive
                 moved[k] = drive * (1.0 + core.bend * drive) - core.depth * h
             out.append(1250.0 * moved)
