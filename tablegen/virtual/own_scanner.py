@@ -12,6 +12,7 @@ from tablegen.compensation.dynamics import Response
 from tablegen.compensation.models.operator import OperatorLine
 from tablegen.compensation.operator.field import Field, Lengths, covariance
 from tablegen.compensation.operator.operator import Operator
+from tablegen.compensation.operator.settled import settled
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan
 
@@ -67,20 +68,9 @@ class OwnAxis:
         Raises ``Unphysical`` where a departing branch would run backwards.
         """
         u = volts / self.v_max
-        bottom, top, count = int(np.argmin(u)), int(np.argmax(u)), len(u)
-        loop = self.operator.loop(float(u[bottom]), float(u[top]), self.factor, float(np.mean(u)))
-        rising = (np.arange(count) - bottom) % count < (top - bottom) % count
-        place = np.where(rising, loop.position(u, True), loop.position(u, False))
-        n = np.arange(1, min(self.harmonics, (count - 1) // 2) + 1)
-        f_hz = n / (count * tick_s)
-        real, imaginary = self.operator.creep.response(f_hz)
-        linear = real + 1j * imaginary
-        if self.response is not None:
-            real, imaginary = self.response.inverse(f_hz)
-            linear = linear / (real + 1j * imaginary)
-        spectrum = np.fft.rfft(place)
-        spectrum[n] *= linear
-        return loop.extent_nm * np.fft.irfft(spectrum, count)
+        loop = self.operator.loop(float(np.min(u)), float(np.max(u)), self.factor, float(np.mean(u)))
+        rate_hz = 1.0 / (len(u) * tick_s)
+        return settled(loop, u, rate_hz, self.operator.creep, self.response, self.harmonics)
 
 
 def operator_line(line: LinePlan) -> OperatorLine:

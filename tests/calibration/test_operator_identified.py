@@ -75,7 +75,7 @@ def test_noiseless_traces_of_an_operator_that_the_family_has_are_met() -> None:
     st.tuples(*[st.floats(-0.05, 0.05)] * 3),
 )
 @example([3, 1, 0, 2], 1.0, 0.0, 0.0, (0.0, 0.0, 0.0))
-@settings(max_examples=4)
+@settings(max_examples=2)
 def test_order_scale_origin_start_and_drift_change_nothing_else(
     order: list[int], scale: float, origin_nm: float, start: float, drift: tuple[float, float, float]
 ) -> None:
