@@ -100,6 +100,7 @@ figures: $(VENV)/installed-plot
 	$(BIN)/python docs/figures/make_figures.py
 	$(BIN)/python docs/figures/make_virtual.py
 	$(BIN)/python docs/figures/make_operator.py
+	$(BIN)/python docs/figures/make_correct.py
 	@.ci/system-packages chromium
 	$(BIN)/python docs/figures/make_report.py
 

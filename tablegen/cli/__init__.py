@@ -24,6 +24,7 @@ _COMMANDS = {
     "channels": ("channels", "channels"),
     "simulate": ("simulate", "simulate"),
     "refine": ("refine", "refine"),
+    "correct": ("correct", "correct"),
     "verify": ("verify", "verify"),
     "upload": ("upload", "upload"),
     "status": ("device_status", "device_status"),

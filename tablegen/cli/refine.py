@@ -94,6 +94,7 @@ Exit status: 0 done, 2 wrong input, 4 cannot write, 6 a library is missing.""",
     metavar="FILE",
     help="Plot the errors to FILE: .png, .svg or .pdf.",
 )
+@click.option("--report", type=OutputFile(), metavar="FILE", help="Write the round to FILE as an HTML page.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")
 def refine(
     scan: Path,
@@ -110,6 +111,7 @@ def refine(
     drift: int | None,
     force: bool,
     plot: Path | None,
+    report: Path | None,
     as_json: bool,
 ) -> int:
     """Correct the scan errors that the scanner model leaves, by iterative learning from the running scan.
@@ -163,6 +165,12 @@ def refine(
         kind: Any = plot.suffix[1:]
         written(plot.parent, {plot.name: draw(found.curves, kind)})
     refused = found.worse or _learnt_before(scan, axis, found, sources, text)
+    if report is not None:
+        from tablegen.refinement.scan_file import rounds_of
+        from tablegen.report.learnt import round_page
+
+        earlier = rounds_of(text, str(scan), axis) if found.line.layer is not None else []
+        written(report.parent, {report.name: round_page(found, name, sources, earlier, refused)})
     if refused and not force:
         fail([f"{files}: {refused}"], ExitStatus.WRONG_INPUT)
     if write:

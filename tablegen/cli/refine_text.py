@@ -41,18 +41,7 @@ def refine_text(found: Round, name: str, sources: Sequence[Source]) -> list[str]
 def _what(found: Round, sources: Sequence[Source]) -> str:
     """What was measured."""
     names = " and ".join(source.name for source in sources[:2]) + (" and others" if len(sources) > 2 else "")
-    if isinstance(found, TraceRound):
-        measured = found.displacement
-        return f"{measured.periods:.4g} periods of {found.phase.period_s:.6g} s, {measured.samples} samples of {names}"
-    if isinstance(found, ImageRound):
-        rows, columns = found.frames[0].geometry.rows, found.frames[0].geometry.columns
-        count = f"{len(found.frames)} frames of " if len(found.frames) > 1 else ""
-        return f"{count}{rows} x {columns} pixels, {found.periods:.4g} periods in the line, of {names}"
-    if isinstance(found, MismatchRound):
-        rows, columns = found.frames[0].geometry.rows, found.frames[0].geometry.columns
-        count = f"{len(found.frames)} frames of " if len(found.frames) > 1 else ""
-        return f"{count}{rows} x {columns} pixels, trace against retrace, of {names}"
-    raise TypeError(type(found).__name__)
+    return f"{found.recorded}{'' if isinstance(found, TraceRound) else ','} of {names}"
 
 
 def _size(found: Round) -> list[str]:

@@ -44,6 +44,11 @@ class ImageRound(Round):
         """In the whole line of x, of the wave that has most."""
         return float(np.max(np.abs(self.frames[0].fit.state.q)))
 
+    @property
+    def recorded(self) -> str:
+        """Frames, pixels and periods."""
+        return f"{_pixels(self.frames)}, {self.periods:.4g} periods in the line"
+
 
 def refine_images(
     setup: Setup,
@@ -188,6 +193,11 @@ class MismatchRound(Round):
     frames: tuple[SweepMismatch, ...]
     measured: WindowLine
 
+    @property
+    def recorded(self) -> str:
+        """Frames and pixels."""
+        return f"{_pixels(self.frames)}, trace against retrace"
+
 
 def refine_mismatch(
     setup: Setup,
@@ -235,3 +245,9 @@ def _learning_remarks(lesson: Lesson) -> list[str]:
     elif finished(lesson):
         found.append("most of the remaining error is noise: give several frames, or stop refining")
     return [*found, "images do not show that the build of this scan file was running"]
+
+
+def _pixels(frames: Sequence[LatticeLine] | Sequence[SweepMismatch]) -> str:
+    rows, columns = frames[0].geometry.rows, frames[0].geometry.columns
+    count = f"{len(frames)} frames of " if len(frames) > 1 else ""
+    return f"{count}{rows} x {columns} pixels"

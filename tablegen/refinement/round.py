@@ -47,6 +47,11 @@ class Round:
     remarks: tuple[str, ...]
 
     @property
+    def recorded(self) -> str:
+        """How much was recorded, in words."""
+        raise NotImplementedError
+
+    @property
     def curves(self) -> list[Curve]:
         """Residual of each direction: measured, and as predicted with the new layer."""
         before, after = self.lesson.before, self.lesson.after
@@ -65,6 +70,12 @@ class TraceRound(Round):
 
     phase: Phase
     displacement: Displacement
+
+    @property
+    def recorded(self) -> str:
+        """Periods and samples."""
+        found = self.displacement
+        return f"{found.periods:.4g} periods of {self.phase.period_s:.6g} s, {found.samples} samples"
 
 
 def refine(

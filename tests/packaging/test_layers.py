@@ -29,6 +29,7 @@ LAYERS = (
     "calibration",
     "refinement",
     "virtual",
+    "correction",
     "report",
     "api",
     "cli",

@@ -12,8 +12,8 @@ from tablegen.calibration.operator.branches import left_of
 from tablegen.calibration.operator.family import CreepOf
 from tablegen.calibration.operator.periodic_line import PeriodicLine
 from tablegen.compensation.operator.creep import LogarithmicCreep
+from tablegen.compensation.operator.family import Family
 from tablegen.compensation.operator.field import Lengths, covariance
-from tablegen.compensation.operator.plays import Plays
 from tablegen.numerics.arrays import Floats
 
 _LOSSES = tuple(0.004 * i for i in range(13))  # of creep, per decade
@@ -27,7 +27,7 @@ Factor = Callable[[float], float]
 
 
 def creep_of_fields(
-    lines: Sequence[PeriodicLine], family: Plays, factor: Factor, creep_of: CreepOf
+    lines: Sequence[PeriodicLine], family: Family, factor: Factor, creep_of: CreepOf
 ) -> LogarithmicCreep:
     """The loss per decade with which the fields over stroke and centre are the likeliest, whatever the hysteresis.
 

@@ -15,8 +15,9 @@ from tablegen.calibration.operator.branches import DEGREE, left_of
 from tablegen.calibration.operator.periodic_line import PHASES, PeriodicLine
 from tablegen.compensation.dynamics import Response
 from tablegen.compensation.operator.creep import LogarithmicCreep
+from tablegen.compensation.operator.family import Family
 from tablegen.compensation.operator.field import Lengths, covariance
-from tablegen.compensation.operator.plays import NO_PLAYS, Plays
+from tablegen.compensation.operator.plays import NO_PLAYS
 from tablegen.problems import Unphysical
 
 _MOST = 0.02  # of the shortest period: larger delays are not looked for
@@ -43,7 +44,7 @@ def fit_delay(lines: Sequence[PeriodicLine], response: Response | None) -> Estim
             )
     still = [_in_phase(line.without(response, None), response) for line in lines]
     gain = float(np.mean([np.ptp(line.displacement_nm) / line.stroke for line in still]))
-    straight = replace(NO_PLAYS, reversible=np.array([gain]))
+    straight = Family(NO_PLAYS).over(np.array([gain]))
     period_s = min(1.0 / line.rate_hz for line in lines)
     count = round(_MOST / _COARSE)
     known: dict[float, float] = {}
@@ -95,7 +96,7 @@ def _in_phase(line: PeriodicLine, response: Response | None) -> PeriodicLine:
     return replace(line, displacement_nm=np.fft.irfft(spectrum, PHASES))
 
 
-def _unlikelihood(lines: Sequence[PeriodicLine], straight: Plays, delay_s: float, loss: float) -> float:
+def _unlikelihood(lines: Sequence[PeriodicLine], straight: Family, delay_s: float, loss: float) -> float:
     """-2 log of the likelihood of what the lines are beside straight ones, of the best length."""
     creep = None
     if loss > 0.0:

@@ -13,7 +13,9 @@ from tablegen.compensation.dynamics import capped_inverse
 from tablegen.compensation.expectation import Expectation, Figure
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.compensation.line import LineShape, WantedLine, WholeLine
+from tablegen.compensation.operator.creep import LogarithmicCreep
 from tablegen.compensation.operator.file import read_operator
+from tablegen.compensation.operator.loop import Loop
 from tablegen.compensation.operator.operator import Operator
 from tablegen.compensation.operator.scan_line import Expected, Found, Wanted, find_waveform
 from tablegen.compensation.operator.transient import after_offset, after_size
@@ -96,7 +98,27 @@ class OperatorModel(WithBranches, frozen=True, kw_only=True, tag="operator"):
 
     def line(self, wanted: WantedLine) -> LineShape | None:
         """Learnt on the operator, from a straight line on."""
-        path = wanted.folder / self.file
+        operator = self._read(wanted)
+        if operator is None:
+            return None
+        with wanted.at("file"):
+            return _line(operator, wanted)
+        return None
+
+    def loop(self, wanted: WantedLine, low: float, high: float) -> tuple[Loop, LogarithmicCreep] | None:
+        """That of the operator, of the size that it gives."""
+        operator = self._read(wanted)
+        if operator is None:
+            return None
+        with wanted.at("file"):
+            _check_reach(operator, high - low, 0.5 * (low + high), wanted.v_max)
+            here, factor = _at(operator, wanted)
+            return here.loop(low, high, factor, wanted.v_offset / wanted.v_max), here.creep
+        return None
+
+    def _read(self, wanted: WantedLine) -> Operator | None:
+        """The file's; None where ``wanted.problems`` grew."""
+        path, before = wanted.folder / self.file, len(wanted.problems.found)
         try:
             operator, file = read_operator(path, shown_path(path))
         except Rejected as rejected:
@@ -106,23 +128,27 @@ class OperatorModel(WithBranches, frozen=True, kw_only=True, tag="operator"):
             wanted.problem("file", f"{self.file} is the operator of {file.axis}")
         if abs(file.v_max - wanted.v_max) > 1e-6 * wanted.v_max:
             wanted.problem("file", f"{self.file} was identified with v_max = {file.v_max:g} V, not {wanted.v_max:g} V")
-        with wanted.at("file"):
-            return _line(operator, wanted)
-        return None
+        return operator if len(wanted.problems.found) == before else None
 
     def described(self, line: LineShape) -> str:
         """Its file."""
         return f"{self.model()} {Path(self.file).name}"
 
 
-def _line(operator: Operator, wanted: WantedLine) -> OperatorLine:
-    centre = wanted.v_offset / wanted.v_max
-    factor = wanted.factor_at(centre) / wanted.factor_at(operator.centre)
+def _at(operator: Operator, wanted: WantedLine) -> tuple[Operator, float]:
+    """The operator at this rate, and the factor of its loops at this offset."""
+    factor = wanted.factor_at(wanted.v_offset / wanted.v_max) / wanted.factor_at(operator.centre)
     operator = replace(operator, creep=operator.creep.down_to(wanted.rate_hz))
     if wanted.rate_gain is not None:  # (23) says what the rate does to the size; creep then only bends the line
         reference = operator.creep.reference_hz
         factor *= wanted.rate_gain(wanted.rate_hz) / wanted.rate_gain(reference)
         operator = replace(operator, creep=replace(operator.creep, reference_hz=wanted.rate_hz))
+    return operator, factor
+
+
+def _line(operator: Operator, wanted: WantedLine) -> OperatorLine:
+    centre = wanted.v_offset / wanted.v_max
+    operator, factor = _at(operator, wanted)
     at_offset = wanted.factor_at(centre)
 
     def with_mean(mean: float) -> float:
@@ -152,7 +178,7 @@ def _line(operator: Operator, wanted: WantedLine) -> OperatorLine:
     found = find_waveform(operator, line, start, through, None if response is None else dynamics)
     factor *= with_mean(found.mean)
     between = _BEND_UNKNOWN * found.grown
-    _check_reach(operator, found, wanted.v_max)
+    _check_reach(operator, found.stroke, found.centre, wanted.v_max)
     late = replace(operator, creep=operator.creep.down_to(_SLOWEST_HZ))  # for all that a few frames may last
     # w = 0 and 1 are the ends of the laws' amplitude everywhere else.
     scale = found.v_amplitude * wanted.v_max / wanted.v_amplitude
@@ -173,20 +199,20 @@ def _line(operator: Operator, wanted: WantedLine) -> OperatorLine:
     )
 
 
-def _check_reach(operator: Operator, found: Found, v_max: float) -> None:
+def _check_reach(operator: Operator, stroke: float, centre: float, v_max: float) -> None:
     """Refuse what is far from everything that was measured."""
     largest = max(line.stroke for line in operator.lines)
-    if found.stroke > largest + STROKE_REACH:
+    if stroke > largest + STROKE_REACH:
         raise Unphysical(
             f"measured up to {largest * v_max:.4g} V, which serves scans up to "
-            f"{(largest + STROKE_REACH) * v_max:.4g} V; this one takes {found.stroke * v_max:.4g} V; "
+            f"{(largest + STROKE_REACH) * v_max:.4g} V; this one takes {stroke * v_max:.4g} V; "
             "measure a larger trace"
         )
-    nearest = min((abs(line.centre - found.centre), line.centre) for line in operator.lines)
+    nearest = min((abs(line.centre - centre), line.centre) for line in operator.lines)
     if nearest[0] > CENTRE_REACH:
         raise Unphysical(
             f"measured at an offset of {nearest[1] * v_max:.4g} V, which serves {CENTRE_REACH * v_max:.4g} V to either "
-            f"side; this scan is at {found.centre * v_max:.4g} V; measure a trace there"
+            f"side; this scan is at {centre * v_max:.4g} V; measure a trace there"
         )
 
 

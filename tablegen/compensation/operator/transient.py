@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tablegen.compensation.operator.loop import POINTS, Loop
-from tablegen.compensation.operator.operator import SMALL_STROKE, Operator, extent_of
+from tablegen.compensation.operator.operator import SMALL_STROKE, Operator
 from tablegen.compensation.transient import OFFSET_CHANGE, SIZE_CHANGE, Late, Transient
 from tablegen.numerics.arrays import tree_sum
 from tablegen.numerics.elementary import exp
@@ -94,12 +94,12 @@ def _loop(operator: Operator, low: float, high: float) -> Loop:
         return operator.loop(low, high, _at_rest(operator, centre))
     except Unphysical:
         straight = np.arange(POINTS) / (POINTS - 1)
-        return Loop(low, high, straight, straight, extent_of(operator.family, stroke, centre))
+        return Loop(low, high, straight, straight, operator.family.extent(stroke, centre))
 
 
 def _at_rest(operator: Operator, centre: float) -> float:
     """The factor with which ``Operator.loop`` has the extents of the family itself, whose sensitivity never changes."""
-    return extent_of(operator.family, SMALL_STROKE, operator.centre) / extent_of(operator.family, SMALL_STROKE, centre)
+    return operator.family.extent(SMALL_STROKE, operator.centre) / operator.family.extent(SMALL_STROKE, centre)
 
 
 def _late_state(line: LineOf, tau_s: float) -> float:
