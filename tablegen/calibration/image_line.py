@@ -27,11 +27,14 @@ _WHOLE = 0.02  # of the sweep: how much of it a window may leave out and still s
 _HOPELESS, _AS_GOOD = 300.0, 60.0  # by how much Akaike's criterion may be worse
 _NEIGHBOURS = 3  # degrees: which other fits say how much their number matters
 _UNSEEN_GAP = 5e-4  # of the line: what is open at the turns where no retrace shows it
-_RIPPLES_OF_A_WINDOW = 3  # where the turns are not in the image: more than that would say nothing of them
+_RIPPLES_OF_A_WINDOW = 8  # where the turns are not in the image, and higher degrees would go anywhere
+_UNSEEN_TURNS = 0.02  # of what a window leaves out of the sweep: how far its ends are told by what is seen
 _MIN_EXPLAINED = 0.03  # share of an image's variance
 _MISFIT_SIGNIFICANCE = 1e-3  # probability that noise alone is taken for misfit
 _MIN_OPENING = 0.004  # of the line: what is a loop, and has a sign
-_LARGEST_GAP, _GAP_ERRORS = 0.01, 4.0  # of the line, and in standard errors
+_LARGEST_GAP, _GAP_ERRORS = 0.005, 4.0  # of the line, and in standard errors
+_LARGEST_CROP, _CROP_ERRORS, _CROP_RIPPLES = 0.015, 6.0, 6  # of the line; what few periods cannot tell is not
+_NEAR_TURN, _LEAST_WIDTH = (0.1, 0.9), 1e-3  # of the line
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,12 +215,21 @@ def _check(model: PeriodicModel, state: FitState) -> None:
         raise Unphysical(f"the line has {periods:.2g} periods; at least {MIN_PERIODS:g} are needed: scan more of them")
     places = [model.columns(state.parameters, forward).x for forward, _ in model.images]
     if any(np.min(np.diff(x)) <= 0.0 for x in places):
-        raise Unphysical("a sweep would run backwards; is the image one of a triangle's scan, and of one sample?")
-    opening = float(np.mean(places[1] - places[0])) if len(places) == 2 else 0.0
+        raise Unphysical(
+            "a sweep would run backwards; if columns were cropped, or kept of a part of each sweep, give --window; was "
+            "the drive a triangle, and are both images of one scan?"
+        )
+    opening = float(np.mean(_opening(model, state))) if len(places) == 2 else 0.0
     if opening < -_MIN_OPENING:
         raise Unphysical(
             f"both sweeps lead the drive; trace and retrace are exchanged, or both mirrored{ALIASING_HINT}"
         )
+
+
+def _opening(model: PeriodicModel, state: FitState) -> Floats:
+    """How far the retrace is to the right of the trace at each column, of the line."""
+    found: Floats = model.columns(state.parameters, False).x - model.columns(state.parameters, True).x
+    return found
 
 
 def _gap(fit: _Degree) -> tuple[Floats, Floats]:
@@ -240,7 +252,13 @@ def _gap(fit: _Degree) -> tuple[Floats, Floats]:
     errors = covariance(wider, found, loose, watched, 1.0, list(found.left))[0]
     gap, error = found.parameters[-2:], np.sqrt(np.diag(errors)[-2:])
     worst = int(np.argmax(np.abs(gap)))
-    if abs(gap[worst]) > max(_LARGEST_GAP, _GAP_ERRORS * error[worst]):
+    # A narrow loop is as little open where much is cropped: how much, its width a tenth of the line further says.
+    width = abs(float(np.interp(_NEAR_TURN, geometry.place, _opening(model, state))[worst]))
+    cropped = abs(gap[worst]) / max(width, _LEAST_WIDTH) * _NEAR_TURN[0]
+    told = abs(gap[worst]) / error[worst]
+    if (abs(gap[worst]) > _LARGEST_GAP and told > _GAP_ERRORS) or (
+        cropped > _LARGEST_CROP and told > _CROP_ERRORS and count >= _CROP_RIPPLES
+    ):
         raise Unphysical(
             f"trace and retrace are {100.0 * abs(gap[worst]):.2g} % of the line apart at its "
             f"{('left', 'right')[worst]} end, where the drive turns and they meet; if columns were cropped, or kept of "
@@ -292,6 +310,9 @@ def _of_the_form(best: _Degree, fits: list[_Degree], gap: Floats) -> Floats:
     if moved:
         whole[:end, :end] = np.mean([np.outer(one, one) for one in moved], axis=0)
     open_by = 0.5 * float(np.nanmean(np.abs(gap))) if np.isfinite(gap).any() else _UNSEEN_GAP
+    if not shows_turns(best.model.geometry):
+        low, high = best.model.geometry.window
+        open_by = _UNSEEN_TURNS * (low + 1.0 - high)
     step = best.model.order + 1
     longer = np.zeros(len(best.free))
     longer[BASES:end:step] = open_by * best.state.parameters[BASES:end:step]

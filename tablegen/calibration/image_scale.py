@@ -11,11 +11,12 @@ wave, of a grating, gives L = q pitch / cos(angle); the angle comes from the row
 from dataclasses import dataclass
 from itertools import product
 from math import atan, cos, hypot, log, nan, radians, sin, sqrt, tan
+from typing import Protocol
 
 import numpy as np
 
-from tablegen.calibration.estimate import Estimate
-from tablegen.calibration.image_line import ImageLine
+from tablegen.calibration.estimate import Estimate, LineSize
+from tablegen.calibration.periodic import FitState, Geometry, PeriodicModel
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 
@@ -67,22 +68,37 @@ class Grating:
     angle_deg: Estimate | None = None
 
 
-@dataclass(frozen=True)
-class LineSize:
-    """From turn to turn, in nm, with the error of this image; ``shared`` is the relative error of all such images.
+class ImagedWaves(Protocol):
+    """A fitted image of a periodic sample, as far as a size needs it; see ``ImageLine``."""
 
-    ``angle_deg`` is that of the first wave, or the cell's first side, from the fast axis; ``aspect`` the frame's height
-    over the line's length as a lattice shows it, and ``drift`` along x in the frame, of the line; nan of a grating.
-    """
+    @property
+    def geometry(self) -> Geometry:
+        """How it was taken."""
 
-    nm: Estimate
-    shared: float
-    angle_deg: float
-    aspect: float
-    drift: float
+    @property
+    def model(self) -> PeriodicModel:
+        """The waves that were fitted."""
+
+    @property
+    def state(self) -> FitState:
+        """At these parameters."""
+
+    @property
+    def waves(self) -> Floats:
+        """(bases, 2): periods in the line and in the frame of each base wave."""
+
+    @property
+    def waves_covariance(self) -> Floats:
+        """Of q_1, s_1, q_2, s_2."""
+
+    @property
+    def amplitudes(self) -> Floats:
+        """(spots,)."""
 
 
-def size_of_line(line: ImageLine, cell: Cell | None, grating: Grating | None, aspect: float | None = None) -> LineSize:
+def size_of_line(
+    line: ImagedWaves, cell: Cell | None, grating: Grating | None, aspect: float | None = None
+) -> LineSize:
     """The size by what the image shows: two base waves are the lattice, one is the grating.
 
     ``aspect`` is the frame's height over the line's length, by default of square pixels: its standard error is 10 %.
@@ -179,7 +195,7 @@ def _turned(angle_deg: float, cell: Cell) -> float:
     return (angle_deg + 0.5 * same) % same - 0.5 * same
 
 
-def _check_whole_period(line: ImageLine) -> None:
+def _check_whole_period(line: ImagedWaves) -> None:
     """Whether the wave is the grating's first."""
     for part in _SUPERCELLS:
         strongest = _strongest_part(line, part)
@@ -190,7 +206,7 @@ def _check_whole_period(line: ImageLine) -> None:
             )
 
 
-def _primitive(line: ImageLine, waves: Floats, covariance: Floats) -> tuple[Floats, Floats]:
+def _primitive(line: ImagedWaves, waves: Floats, covariance: Floats) -> tuple[Floats, Floats]:
     """Base waves of all waves that are seen, where halves or thirds of the fitted ones are among them."""
     for part in _SUPERCELLS:
         between = _strongest_part(line, part)
@@ -209,7 +225,7 @@ def _primitive(line: ImageLine, waves: Floats, covariance: Floats) -> tuple[Floa
     return waves, covariance
 
 
-def _strongest_part(line: ImageLine, part: int) -> tuple[int, ...] | None:
+def _strongest_part(line: ImagedWaves, part: int) -> tuple[int, ...] | None:
     """The strongest wave between those of whole numbers, in parts of the base waves; None where none counts."""
     model, state = line.model, line.state
     span = line.geometry.window[1] - line.geometry.window[0]

@@ -127,9 +127,37 @@ def operator(
 
         kind: Any = common.plot.suffix[1:]
         written(common.plot.parent, {common.plot.name: draw_operator(fit, lines, further, v_max, kind)})
+    if common.report is not None:
+        written(common.report.parent, {common.report.name: _page(fit, lines, further, common.axis, v_max, sources)})
     if common.write:
         _write(common, fit, sources, v_max, delay)
     return ExitStatus.OK
+
+
+def _page(
+    fit: "OperatorFit",
+    lines: "Sequence[PeriodicLine]",
+    further: "NextTrace",
+    axis: str,
+    v_max: float,
+    sources: "Sequence[MeasuredTable | ScanImage]",
+) -> bytes:
+    """The same as a page."""
+    from tablegen.report.fitted import operator_page
+
+    traces = [
+        (
+            line.name,
+            (
+                *(line.stroke * v_max, line.centre * v_max, line.rate_hz, left.rms, left.scaling, left.mismatch),
+                *(out.rms, out.scaling, out.mismatch, out.size),
+            ),
+        )
+        for line, left, out in zip(lines, fit.left, fit.left_out, strict=True)
+    ]
+    advice = f"a trace of {further.size_v:.3g} V at {further.offset_v:.3g} V would help most"
+    files = list(dict.fromkeys(one.source for one in sources))
+    return operator_page(axis, fit.family, [*fit.candidates.items()], traces, advice, files)
 
 
 def _imaged(

@@ -70,6 +70,8 @@ def report(
     library is missing.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    if output.suffix == ".toml":
+        raise click.UsageError(f"-o {output}: the page would replace a scan or a scanner file; give a name in .html")
     if figures and not (svg or png or pdf):
         raise click.UsageError("--figure needs --svg, --png or --pdf")
     if png or pdf:

@@ -71,7 +71,11 @@ class Measured:
     phase_turns: Floats
 
     def inverse(self, f_hz: Floats) -> tuple[Floats, Floats]:
-        """Real and imaginary part of 1 / H(f); gain and phase linear between the points, constant below the first."""
+        """Real and imaginary part of 1 / H(f); gain and phase linear between the points.
+
+        Below the first the gain is that of it, and the phase goes straight to 0 at 0 Hz, as that of a dead time, or to
+        the half turn that is nearest where the response is inverted.
+        """
         f = np.maximum(f_hz, self.f_hz[0])
         if f.size and float(np.max(f)) > self.f_hz[-1]:
             top = float(self.f_hz[-1])
@@ -80,7 +84,11 @@ class Measured:
         left = right - 1
         share = (f - self.f_hz[left]) / (self.f_hz[right] - self.f_hz[left])
         gain = self.gain[left] + share * (self.gain[right] - self.gain[left])
-        s, c = sine_and_cosine(self.phase_turns[left] + share * (self.phase_turns[right] - self.phase_turns[left]))
+        phase = self.phase_turns[left] + share * (self.phase_turns[right] - self.phase_turns[left])
+        first = float(self.phase_turns[0])
+        at_rest = round(2.0 * first) / 2.0
+        below = at_rest + np.minimum(f_hz / self.f_hz[0], 1.0) * (first - at_rest)
+        s, c = sine_and_cosine(np.where(f_hz < self.f_hz[0], below, phase))
         return c / gain, -s / gain
 
     @property

@@ -86,6 +86,13 @@ class Refinement(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         ]
         | None
     ) = None
+    before_of: (
+        Annotated[
+            Literal["line", "mismatch"],
+            Meta(description="residual of the line, or only what trace and retrace differ by; default: line"),
+        ]
+        | None
+    ) = None
 
 
 class FastAxis(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -4,7 +4,7 @@ from tablegen.certificate.summary import rate
 from tablegen.manifest.fields import ManifestSequence
 from tablegen.planning.line_plan import LinePlan
 from tablegen.planning.settling import settling, settling_text
-from tablegen.report.blocks import Bullets, Cell, Grid, Paragraph, Section, row
+from tablegen.report.blocks import Bullets, Grid, Paragraph, Section, TableCell, row
 from tablegen.report.subject import Subject
 
 
@@ -62,7 +62,7 @@ def _codes(subject: Subject, axis: str) -> str:
     return f"{found.lowest_code}..{found.highest_code}, {share:.3g} % of the converter's {output.dac_bits} bits"
 
 
-def _settles(line: LinePlan, subject: Subject) -> list[tuple[Cell, ...]]:
+def _settles(line: LinePlan, subject: Subject) -> list[tuple[TableCell, ...]]:
     planned = subject.planned
     settles = None if planned is None else settling(line.axis, line.drive, planned.plan.schedule)
     return [] if settles is None else [row(f"{line.axis} settles", "", "; ".join(settling_text(settles)))]
@@ -81,9 +81,9 @@ def verification(subject: Subject) -> Section:
         which = Paragraph(f"\u2717 The record {why}: it tells nothing of this one. Verify again.", "bad")
     rows = []
     for check in record.checks:
-        said = Cell("\u2713 passed", "good") if check.exercised else Cell("not exercised", "quiet")
+        said = TableCell("\u2713 passed", "good") if check.exercised else TableCell("not exercised", "quiet")
         if check.failure:
-            said = Cell(f"\u2717 {check.failure}", "bad")
+            said = TableCell(f"\u2717 {check.failure}", "bad")
         rows.append(row(check.name, said))
     failed = sum(bool(check.failure) for check in record.checks)
     caption = f"{len(rows)} checks, {failed or 'none'} failed"
@@ -96,20 +96,20 @@ def files(subject: Subject) -> Section:
     rows = [
         row(
             state.name,
-            Cell(state.sha256, "quiet"),
-            Cell(f"\u2717 {state.wrong}", "bad") if state.wrong else Cell("", ""),
+            TableCell(state.sha256, "quiet"),
+            TableCell(f"\u2717 {state.wrong}", "bad") if state.wrong else TableCell("", ""),
         )
         for state in subject.files
     ]
     what = Bullets(
         (
-            Cell(f"plan {manifest.hash}"),
-            Cell(f"made by tablegen {manifest.tablegen}; formats {', '.join(manifest.formats) or 'c, verilog'}"),
+            TableCell(f"plan {manifest.hash}"),
+            TableCell(f"made by tablegen {manifest.tablegen}; formats {', '.join(manifest.formats) or 'c, verilog'}"),
         )
     )
     wrong = any(state.wrong for state in subject.files)
     models = [
-        row(f"{axis}: {name}", Cell(digest, "quiet"), "")
+        row(f"{axis}: {name}", TableCell(digest, "quiet"), "")
         for axis, entry in subject.axes
         for name, digest in (entry.drive.model_files or {}).items()
     ]

@@ -12,7 +12,7 @@ from tablegen.config.load import Setup
 from tablegen.planning.line_plan import LinePlan
 from tablegen.problems import Document, shortened
 from tablegen.reading import CONFIGURATION, read_text
-from tablegen.report.blocks import Cell, Grid, Paragraph, Section, Tone, row
+from tablegen.report.blocks import Grid, Paragraph, Section, TableCell, Tone, row
 from tablegen.report.subject import PlannedScan
 
 _MARK = re.compile(r"# (calibrate|refine) (.*?): (.*)$")
@@ -32,9 +32,9 @@ def basis(planned: PlannedScan) -> Section:
             key = f"{axis}.{kind}"
             if getattr(tables, kind, None) is None:
                 tone: Tone = "quiet" if kind in ("frequency", "resonance") else "warn"
-                rows.append(row(key, Cell("not in the scanner file: not corrected", tone), "-"))
+                rows.append(row(key, TableCell("not in the scanner file: not corrected", tone), "-"))
             elif key not in known:
-                rows.append(row(key, Cell("no comment of `tablegen calibrate`: origin not known", "quiet"), "-"))
+                rows.append(row(key, TableCell("no comment of `tablegen calibrate`: origin not known", "quiet"), "-"))
     blocks: list[Grid | Paragraph] = [
         Grid("Where it is from", ("", "fit", "measurements, with the beginning of their SHA-256"), tuple(rows)),
     ]
@@ -43,7 +43,7 @@ def basis(planned: PlannedScan) -> Section:
     blocks.append(
         Paragraph(
             "The scanner file keeps how many points a fit had, what they leave, and which files they were. Standard "
-            "errors and outliers are what `tablegen calibrate` prints, and `--json` keeps.",
+            "errors and outliers are what `tablegen calibrate` prints, and `--report` shows.",
             "quiet",
         )
     )

@@ -9,7 +9,7 @@ Tone = Literal["", "good", "warn", "bad", "quiet"]
 
 
 @dataclass(frozen=True)
-class Cell:
+class TableCell:
     """A cell of a table; ``tone`` adds colour to what its text says already."""
 
     text: str
@@ -29,7 +29,7 @@ class Paragraph:
 class Bullets:
     """A list of short texts."""
 
-    items: tuple[Cell, ...]
+    items: tuple[TableCell, ...]
     kind: Literal["bullets"] = "bullets"
 
 
@@ -39,7 +39,7 @@ class Grid:
 
     caption: str
     head: tuple[str, ...]
-    rows: tuple[tuple[Cell, ...], ...]
+    rows: tuple[tuple[TableCell, ...], ...]
     folded: bool = False
     kind: Literal["table"] = "table"
 
@@ -84,6 +84,6 @@ class Section:
     lead: str = ""
 
 
-def row(name: str, *cells: Cell | str) -> tuple[Cell, ...]:
+def row(name: str, *cells: TableCell | str) -> tuple[TableCell, ...]:
     """A row of a table; texts become cells without a tone."""
-    return (Cell(name), *(cell if isinstance(cell, Cell) else Cell(cell) for cell in cells))
+    return (TableCell(name), *(cell if isinstance(cell, TableCell) else TableCell(cell) for cell in cells))

@@ -4,7 +4,7 @@ import numpy as np
 
 from tablegen.manifest.fields import ManifestAxis
 from tablegen.planning.line_plan import LinePlan
-from tablegen.report.blocks import Cell, Charts, Grid, Section, row
+from tablegen.report.blocks import Charts, Grid, Section, TableCell, row
 from tablegen.report.chart import Band, Chart, DrawnCurve, Mark
 from tablegen.report.subject import Subject
 from tablegen.report.words import hertz
@@ -23,7 +23,7 @@ def corrections(subject: Subject) -> Section:
     return Section("corrections", "The corrections, step by step", (*tables, Charts(tuple(charts))))
 
 
-def _steps(entry: ManifestAxis, line: LinePlan | None) -> list[tuple[Cell, ...]]:
+def _steps(entry: ManifestAxis, line: LinePlan | None) -> list[tuple[TableCell, ...]]:
     drive, fourier, rows = entry.drive, entry.fourier, []
     if line is not None:
         share = drive.size_nm / line.drive.size_law.size_nm(1e-6) * 1e-6 * line.drive.v_max

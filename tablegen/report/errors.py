@@ -4,7 +4,7 @@ import numpy as np
 
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan
-from tablegen.report.blocks import Cell, Charts, Grid, Paragraph, Section, row
+from tablegen.report.blocks import Charts, Grid, Paragraph, Section, TableCell, row
 from tablegen.report.chart import Band, Chart, DrawnCurve, Mark, Role
 from tablegen.report.playing import PlayedAxis, PlayedCorrection
 from tablegen.report.subject import PlannedScan
@@ -49,7 +49,7 @@ def errors(planned: PlannedScan, axes: tuple[PlayedAxis, PlayedAxis]) -> Section
     )
 
 
-def _row(axis: str, correction: PlayedCorrection) -> tuple[Cell, ...]:
+def _row(axis: str, correction: PlayedCorrection) -> tuple[TableCell, ...]:
     rms, scaling, mismatch, size = measured(correction.run)
     apart = "-" if np.isnan(mismatch) else f"{mismatch:.3g}"
     return row(f"{axis} {correction.title}", f"{rms:.3g}", f"{scaling:.3g}", apart, f"{size:+.3g}")

@@ -1,30 +1,22 @@
-"""The page: its sections in order, and the one template that makes HTML of them."""
+"""The page of a scan or a build: its sections in order, and the verdict above them."""
 
-from base64 import b64encode
 from collections.abc import Callable
-from functools import cache
-from hashlib import sha256
-from importlib.resources import files as resources
-from typing import Any
-
-from markupsafe import Markup
 
 from tablegen.report.asked import asked, files, verification
 from tablegen.report.basis import basis
-from tablegen.report.blocks import Charts, Section
+from tablegen.report.blocks import Charts, Section, TableCell
 from tablegen.report.chart import Chart
 from tablegen.report.corrections import corrections
+from tablegen.report.document import document
 from tablegen.report.errors import errors
 from tablegen.report.lattice import lattice
 from tablegen.report.lines import lines
 from tablegen.report.playing import played_axes
 from tablegen.report.promises import certificate
-from tablegen.report.ranking import ranked
+from tablegen.report.ranking import Finding, ranked
 from tablegen.report.spectrum import quantisation, spectrum
 from tablegen.report.subject import Subject
-from tablegen.report.svg import svg, swatch
 from tablegen.report.usable import usable
-from tablegen.report.words import coded, visible
 
 Tell = Callable[[str], None]
 
@@ -62,43 +54,30 @@ def charts_of(found: list[Section]) -> dict[str, Chart]:
 
 
 def page(subject: Subject, found: list[Section]) -> bytes:
-    """The page as UTF-8. The same subject gives the same bytes: no date, and no folder of this machine."""
-    manifest = subject.manifest
-    planned = subject.planned
-    scanner = "" if planned is None else planned.setup.scanner.name
-    script = _resource("page.js")
+    """The page of a scan. The same subject gives the same bytes: no date, and no folder of this machine."""
+    manifest, planned = subject.manifest, subject.planned
     findings = ranked(subject)
-    broken = sum(one.weight == "limit" for one in findings)
-    context = {
-        "title": visible(f"{manifest.name} on {scanner}" if scanner else manifest.name),
-        "hash": manifest.hash,
-        "version": manifest.tablegen,
-        "findings": findings,
-        "broken": broken,
-        "spoils": sum(one.weight == "spoils" for one in findings),
-        "from_directory": planned is None,
-        "sections": found,
-        "style": Markup(_resource("page.css")),
-        "script": Markup(script),
-        "script_hash": b64encode(sha256(script.encode()).digest()).decode("ascii"),
-        "limited": planned is not None and planned.limited,
-        "coded": coded,
-        "svg": svg,
-        "swatch": swatch,
-    }
-    text: str = _template().render(context)
-    return text.encode("utf-8")
+    notice = ""
+    if planned is None:
+        notice = (
+            "This page is made of a build alone. Give `tablegen report` the scan file to see limits, errors on the "
+            "scanner, the usable area and the calibration as well."
+        )
+    title = manifest.name if planned is None else f"{manifest.name} on {planned.setup.scanner.name}"
+    foot = f"Plan {manifest.hash}, tablegen {manifest.tablegen}. All is worked out from the scan; nothing is measured."
+    return document(title, _verdict(subject, findings), findings, found, notice, foot)
 
 
-def _resource(name: str) -> str:
-    return (resources("tablegen.report") / name).read_text("utf-8")
-
-
-@cache
-def _template() -> Any:
-    from jinja2 import Environment, StrictUndefined
-
-    environment = Environment(
-        undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True, autoescape=True
-    )
-    return environment.from_string(_resource("page.html.j2"))
+def _verdict(subject: Subject, findings: list[Finding]) -> TableCell:
+    """All of the page in a sentence."""
+    broken, spoils = (sum(one.weight == weight for one in findings) for weight in ("limit", "spoils"))
+    if broken:
+        which = "the first point below is" if broken == 1 else f"the first {broken} points below are"
+        return TableCell(f"\u2717 Do not use it before {which} mended.", "bad")
+    if spoils:
+        what = "one thing spoils" if spoils == 1 else f"{spoils} things spoil"
+        return TableCell(f"! It can be played, but {what} the image.", "warn")
+    if subject.planned is None:
+        return TableCell("\u2713 No warning.", "good")
+    limits = "within all limits of the scan file" if subject.planned.limited else "the scan file sets no limits"
+    return TableCell(f"\u2713 No warning; {limits}.", "good")

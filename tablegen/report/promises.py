@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from tablegen.certificate.excess import LARGEST_PERCENT
 from tablegen.config.schema import Limits
 from tablegen.manifest.fields import ManifestAxis, ManifestCertificate, ManifestFigure
-from tablegen.report.blocks import Cell, Grid, Paragraph, Section, row
+from tablegen.report.blocks import Grid, Paragraph, Section, TableCell, row
 from tablegen.report.subject import Subject
 from tablegen.report.words import figure
 
@@ -23,9 +23,9 @@ def certificate(subject: Subject) -> Section:
     ]
     tables.append(_parts(subject))
     tables += [
-        Grid(f"{axis} axis, to expect on the scanner", ("", "figure", "uncertain by", ""), rows)
+        Grid(f"{axis} axis, to expect on the scanner", ("", "figure", "uncertain by, or limit", ""), rows)
         for axis, entry in subject.axes
-        if (rows := _expected(entry.certificate))
+        if (rows := _expected(entry.certificate, limits.max_scaling_error_percent))
     ]
     lead = "Limits in the third column are those of the scan file, of the converter and of the amplifier."
     if planned is None:
@@ -38,7 +38,7 @@ def certificate(subject: Subject) -> Section:
     )
 
 
-def _rows(entry: ManifestAxis, limits: Limits, slew: float | None) -> list[tuple[Cell, ...]]:
+def _rows(entry: ManifestAxis, limits: Limits, slew: float | None) -> list[tuple[TableCell, ...]]:
     found, output = entry.certificate, entry.output
     rows = [_bounded("largest error of a code", found.max_error_lsb, limits.max_error_lsb, "LSB")]
     if found.rms_error_lsb is not None:
@@ -58,7 +58,7 @@ def _rows(entry: ManifestAxis, limits: Limits, slew: float | None) -> list[tuple
     for name, room in (("below", found.headroom_low), ("above", found.headroom_high)):
         if room is not None:
             tone, sign = ("good", "\u2713 within") if room >= 0 else ("bad", "\u2717 outside")
-            rows.append(row(f"room {name}", f"{room} codes", "0", Cell(sign, tone)))  # type: ignore[arg-type]
+            rows.append(row(f"room {name}", f"{room} codes", "0", TableCell(sign, tone)))  # type: ignore[arg-type]
     if found.beyond_cutoff_db is not None:
         rows.append(row("power beyond the cutoff", f"{found.beyond_cutoff_db:.1f} dB", "", ""))
     if found.at_resonance_db is not None:
@@ -81,19 +81,19 @@ def _parts(subject: Subject) -> Grid:
 
 def _bounded(
     name: str, value: float, limit: float | None, unit: str, advice: float | None = None, signed: bool = False
-) -> tuple[Cell, ...]:
+) -> tuple[TableCell, ...]:
     """A figure beside its limit; without one, above the figure of ``advice``, it is marked too."""
     shown = f"{figure(value, 4, signed)} {unit}"
     if limit is not None:
         good = abs(value) <= limit
-        said = Cell("\u2713 within", "good") if good else Cell("\u2717 exceeded", "bad")
+        said = TableCell("\u2713 within", "good") if good else TableCell("\u2717 exceeded", "bad")
         return row(name, shown, f"{figure(limit, 6)} {unit}", said)
     if advice is not None and abs(value) > advice:
-        return row(name, shown, "none", Cell(f"! above {advice:g} {unit}", "warn"))
+        return row(name, shown, "none", TableCell(f"! above {advice:g} {unit}", "warn"))
     return row(name, shown, "none" if advice is not None else "", "")
 
 
-def _expected(found: ManifestCertificate) -> tuple[tuple[Cell, ...], ...]:
+def _expected(found: ManifestCertificate, most: float | None) -> tuple[tuple[TableCell, ...], ...]:
     expected = found.expected
     if expected is None:
         return ()
@@ -105,6 +105,11 @@ def _expected(found: ManifestCertificate) -> tuple[tuple[Cell, ...], ...]:
     )
     for name, figures in sides:
         rows += [_figure(f"{name} {side}", one, basis) for side, one in figures.items()]
+    own = found.scaling_error_percent or {}
+    for side, one in expected.scaling_percent.items():
+        parts = own.get(side, {})
+        both = one.value + max(parts.get("total", 0.0), parts.get("band_limit", 0.0))
+        rows.append(_bounded(f"with the waveform's, {side}", both, most, "%", LARGEST_PERCENT))
     if expected.mismatch_percent is not None:
         rows.append(_figure("trace to retrace", expected.mismatch_percent, basis))
     if expected.size_percent is not None:
@@ -115,7 +120,7 @@ def _expected(found: ManifestCertificate) -> tuple[tuple[Cell, ...], ...]:
     return tuple(rows)
 
 
-def _figure(name: str, found: ManifestFigure, basis: str, signed: bool = False) -> tuple[Cell, ...]:
+def _figure(name: str, found: ManifestFigure, basis: str, signed: bool = False) -> tuple[TableCell, ...]:
     shown = f"{figure(found.value, 3, signed)} %"
     by = "not known" if found.uncertainty is None else f"\u00b1 {found.uncertainty:.2g} %"
-    return row(name, shown, by, Cell(basis, "quiet"))
+    return row(name, shown, by, TableCell(basis, "quiet"))

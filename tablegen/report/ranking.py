@@ -33,11 +33,15 @@ _TYPICAL_PERCENT = 10.0  # of a piezo whose hysteresis is not compensated: 10 to
 
 @dataclass(frozen=True)
 class Finding:
-    """A sentence, how much it weighs, and by what percentage of the line within that."""
+    """A sentence, how much it weighs, and by what percentage of the line within that.
+
+    ``called`` replaces the words for its weight.
+    """
 
     weight: Weight
     percent: float
     text: str
+    called: str = ""
 
     @property
     def tone(self) -> Tone:
@@ -47,7 +51,7 @@ class Finding:
     @property
     def sign(self) -> str:
         """Its weight in words, for eyes that see no colour."""
-        return _SIGNS[self.weight]
+        return self.called or _SIGNS[self.weight]
 
 
 def ranked(subject: Subject) -> list[Finding]:
@@ -114,11 +118,18 @@ def _verified(record: VerifyRecord | None, subject: Subject) -> Iterator[Finding
 
 def weighed(plan: Plan, certificates: Mapping[str, Certificate], warnings: list[Problem]) -> list[tuple[float, str]]:
     """The warnings of a scan, each with the percentage of the error that it tells of, and without folders."""
-    every = [excess(certificates[line.axis].scaling) for line in plan.lines]
-    percents = [abs(one.percent) for one in every if one is not None]
-    percents += [one.percent for line in plan.lines for one in doubts(line, certificates[line.axis])]
-    percents += [apart_percent(plan)] * (len(warnings) - len(percents))
-    return [(percent, placed(problem)) for percent, problem in zip(percents, warnings, strict=True)]
+    known = []
+    for line in plan.lines:
+        found = excess(certificates[line.axis].scaling)
+        known += [] if found is None else [(found.text(line.axis), abs(found.percent))]
+        known += [(doubt.text, doubt.percent) for doubt in doubts(line, certificates[line.axis])]
+    return [
+        (
+            next((percent for text, percent in known if problem.why.startswith(text)), apart_percent(plan)),
+            placed(problem),
+        )
+        for problem in warnings
+    ]
 
 
 def placed(problem: Problem) -> str:

@@ -19,6 +19,7 @@ from tablegen.virtual.simulation import SettledAxis
 _TICKS = 16384  # ticks per line
 _STEEPNESS = 2.5  # steepness of the flanks of a bar, rounded as by a tip
 _DUTY = 0.3
+_ROUGH_WAVES = 40
 _FRAME_TICKS = 1 << 16  # ticks of a frame at which the slow axis is looked at
 
 Position = Callable[[Floats], Floats]  # where an axis is, in nm, at times in its periods
@@ -46,6 +47,21 @@ def hexagonal(constant_nm: float, angle_deg: float = 7.0) -> Surface:
         for turned, size in ((0.0, 1.0), (60.0, 0.9), (120.0, 0.8)):
             a = np.radians(angle_deg + turned)
             total = total + size * np.cos(2.0 * np.pi * (x * np.cos(a) + y * np.sin(a)) / pitch + turned)
+        return total
+
+    return height
+
+
+def rough(grain_nm: float, seed: int = 0) -> Surface:
+    """A surface without a period: waves of random directions and phases, none shorter than ``grain_nm``."""
+    random = np.random.default_rng(seed)
+    length = grain_nm * 8.0 ** random.random(_ROUGH_WAVES)
+    angle, phase = 2.0 * np.pi * random.random((2, _ROUGH_WAVES))
+
+    def height(x: Floats, y: Floats) -> Floats:
+        total = np.zeros(np.broadcast(x, y).shape)
+        for one, a, p in zip(length, angle, phase, strict=True):
+            total = total + np.sqrt(one) * np.cos(2.0 * np.pi * (x * np.cos(a) + y * np.sin(a)) / one + p)
         return total
 
     return height
@@ -112,13 +128,15 @@ class Conditions:
 
     ``noise`` is rms, of the heights' peak to peak. ``drift`` along x and y is a share of what the frame shows, over the
     frame, faster as it goes on. ``tilt`` along x and y is the rise of a plane over the frame, of the heights' peak to
-    peak. Columns show the sample ``late`` pixels late, as of a feedback.
+    peak. Columns show the sample ``late`` pixels late, as of a feedback. ``frame`` counts frames, from 0: drift goes on
+    from one to the next.
     """
 
     noise: float = 0.05
     drift: tuple[float, float] = (0.0, 0.0)
     tilt: tuple[float, float] = (0.0, 0.0)
     late: float = 0.0
+    frame: int = 0
     seed: int = 0
 
 
@@ -228,7 +246,7 @@ def _frame(
         seen = column.times - conditions.late * column.lasts
         frame = (numbers[:, None] + column.times) / lines
         x, y = np.broadcast_arrays(positions[0](seen % 1.0), positions[1](frame % 1.0))
-        gone = (frame - frame[0, 0]) / (len(numbers) / lines)
+        gone = (frame - numbers[0] / lines + conditions.frame) / (len(numbers) / lines)
         drift = [share * float(np.ptp(moved)) * gone**2 for share, moved in zip(conditions.drift, (x, y), strict=True)]
         heights = surface(x + drift[0], y + drift[1])
         contrast = float(np.ptp(heights))

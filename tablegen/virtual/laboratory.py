@@ -15,6 +15,8 @@ import numpy as np
 from tablegen.calibration.estimate import Fit
 from tablegen.calibration.frequency import fit_frequency
 from tablegen.calibration.hysteresis import HysteresisFit, Trace, fit_hysteresis
+from tablegen.calibration.image_scale import Cell, Grating
+from tablegen.calibration.image_sizes import ImageSizes, KnownSample, SampleImage, Taking, apparent_of, sizes_of
 from tablegen.calibration.images import Pair, fit_images
 from tablegen.calibration.offset_sizes import fit_offset_sizes
 from tablegen.calibration.resonance import ResonanceFit, fit_resonance
@@ -27,7 +29,7 @@ from tablegen.config.scanner import Frequency, Offset, Resonance, ScannerAxis, S
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 from tablegen.virtual.experiments import actual_sizes, apparent_sizes, frequency_response, sensor_trace
-from tablegen.virtual.imaging import grating, hexagonal, image_pair
+from tablegen.virtual.imaging import Surface, grating, hexagonal, image_pair
 from tablegen.virtual.scanner import VirtualAxis, VirtualScanner
 from tablegen.virtual.sensor import Sensor
 
@@ -42,6 +44,9 @@ OFFSET_ROOM = 0.97  # of the offsets at which a scan of such a size fits, those 
 SIZES = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 AMPLITUDES = (0.2, 0.4, 0.6, 0.8, 1.0)
 SMALL_IMAGE, LATTICE_NM, GRATING_NM = 0.2, 17.7, 50.0
+SAMPLES_SEEN = KnownSample(Cell.hexagonal(LATTICE_NM), Grating(GRATING_NM))
+IMAGED_SIZES = SIZES[1:]  # shares of v_max: below, a lattice has too few periods
+IMAGE_DRIFT, IMAGE_SLOPE = 0.02, 2e-3  # drift along x in a frame, of the line, at most; heights per nm
 PERIODS, SAMPLES = 4, 1000  # periods per trace, samples per period
 
 
@@ -62,19 +67,22 @@ def calibrate(
     points: bool = True,
     images: bool = False,
     offset_sizes: Sequence[float] = (),
+    sizes_from_images: bool = False,
 ) -> Calibration:
     """Measure both axes with a sensor and fit what a scanner file holds; its base size, references and boost are kept.
 
     ``noise`` is relative, rms, of every reading; ``amplitudes`` of the traces are shares of v_max. Hysteresis is taken
     as measured at each amplitude, or by (22) with one u_peak where ``points`` is false; with ``images`` not from a
     sensor, but from trace and retrace of a lattice and a grating, 256 x 256 with 5 % noise. ``offset_sizes`` are the
-    scan voltages, shares of v_max, of the images that give m; none stands for ``OFFSET_SIZE``. Raises ``Unphysical``.
+    scan voltages, shares of v_max, of the images that give m; none stands for ``OFFSET_SIZE``. With
+    ``sizes_from_images`` size and offset are fitted to such images too, drifting and tilted, and not to sizes with
+    ``noise``. Raises ``Unphysical``.
     """
     axes: dict[str, ScannerAxis] = {}
     fits: dict[str, dict[str, Fit]] = {}
     for number, name in enumerate(_AXES):
         axis: VirtualAxis = getattr(scanner, name)
-        day = _Day(setup, name, axis, noise, 1000 * (2 * seed + number))
+        day = _Day(setup, name, axis, noise, 1000 * (2 * seed + number), sizes_from_images)
         fits[name] = day.fits(amplitudes, images, offset_sizes)
         axes[name] = day.scanner_axis(fits[name], points)
     scan = msgspec.structs.replace(  # what was learnt over another model does not fit to this one
@@ -88,7 +96,10 @@ def calibrate(
 class _Day:
     """One axis on the bench. Every measurement has noise of its own."""
 
-    def __init__(self, setup: Setup, name: Literal["x", "y"], axis: VirtualAxis, noise: float, seed: int) -> None:
+    def __init__(
+        self, setup: Setup, name: Literal["x", "y"], axis: VirtualAxis, noise: float, seed: int, imaged: bool
+    ) -> None:
+        self._imaged = imaged
         self._axis, self._noise, self._seed = axis, noise, seed
         self._before: ScannerAxis = getattr(setup.scanner, name)
         self._v_max = setup.scanner.v_max
@@ -146,22 +157,40 @@ class _Day:
 
     def _offset(self, size: SizeFit, sizes: Sequence[float]) -> Fit:
         """From images of one object, at five offsets each; of a large scan closer to the middle, so that it fits."""
+        k, beta, threshold = size.k_nm_per_v.value, size.beta.value, size.v_threshold.value
+        law = SizeLaw.calibrated(k, self._v_max, beta, size.base_nm, threshold)
         found = []
         for share in sizes:
             room = min(1.0, OFFSET_ROOM * (1.0 - share) / (OFFSETS[-1] - OFFSETS[0])) if len(sizes) > 1 else 1.0
             volts = [self._v_max * (0.5 + room * (offset - 0.5)) for offset in OFFSETS]
             size_v = share * self._v_max
+            if self._imaged:
+                taken = self._images([(size_v, offset) for offset in volts])
+                nm, errors = apparent_of(taken, law, self._v_max, SAMPLES_SEEN)
+                found.append((np.array(volts), nm, np.full(len(volts), size_v), errors))
+                continue
             seen = apparent_sizes(
                 self._axis, volts, size_v, self._reference_hz, noise=self._noise, seed=self._next(), turn=self._turn
             )
-            found.append((seen["offset_v"], seen["apparent_nm"], np.full(len(volts), size_v)))
-        k, beta, threshold = size.k_nm_per_v.value, size.beta.value, size.v_threshold.value
-        law = SizeLaw.calibrated(k, self._v_max, beta, size.base_nm, threshold)
-        offset_v, apparent_nm, size_v_each = (np.concatenate(column) for column in zip(*found, strict=True))
-        return fit_offset_sizes(offset_v, apparent_nm, size_v_each, self._v_max, law)
+            unknown = np.zeros(len(volts))
+            found.append((seen["offset_v"], seen["apparent_nm"], np.full(len(volts), size_v), unknown))
+        offset_v, apparent_nm, size_v_each, errors = (np.concatenate(column) for column in zip(*found, strict=True))
+        known = errors if self._imaged else None
+        return fit_offset_sizes(offset_v, apparent_nm, size_v_each, self._v_max, law, known)
 
     def _size(self) -> SizeFit:
         size = self._before.size
+        if self._imaged:
+            drives = [share * self._v_max for share in IMAGED_SIZES]
+            taken = self._images([(volts, 0.5 * self._v_max) for volts in drives])
+            return fit_size(
+                np.array(drives),
+                taken.nm,
+                self._v_max,
+                size.base_nm,
+                errors_nm=taken.errors_nm,
+                shared=taken.shared,
+            )
         nominal = [share * self._v_max * size.k_nm_per_v for share in SIZES]
         found = actual_sizes(
             self._axis,
@@ -175,6 +204,30 @@ class _Day:
         return fit_size(
             found["nominal_nm"] / size.k_nm_per_v, found["actual_nm"], self._v_max, size.base_nm, None, "relative"
         )
+
+    def _images(self, scans: Sequence[tuple[float, float]]) -> ImageSizes:
+        """Images at scan voltages and offsets, of a lattice where the line is short and of a grating where it is long.
+
+        The sample drifts by a share of the line and lies on a slope.
+        """
+        taken = []
+        for volts, offset in scans:
+            sample = hexagonal(LATTICE_NM) if volts <= SMALL_IMAGE * self._v_max else grating(GRATING_NM)
+            random = np.random.default_rng(self._next())
+            slope, drift = random.uniform(-IMAGE_SLOPE, IMAGE_SLOPE, 2), float(random.uniform(-1.0, 1.0)) * IMAGE_DRIFT
+            tilted = _tilted(sample, slope)
+            trace, retrace = image_pair(
+                self._axis,
+                tilted,
+                volts,
+                offset,
+                self._reference_hz,
+                turn=self._turn,
+                drift=drift,
+                seed=self._next(),
+            )
+            taken.append(SampleImage(f"{volts:g} V at {offset:g} V", volts, offset, trace, retrace))
+        return sizes_of(taken, self._v_max, SAMPLES_SEEN, Taking(turn=self._turn))
 
     def _traces(self, amplitudes: Sequence[float]) -> list[Trace]:
         traces = []
@@ -219,6 +272,11 @@ class _Day:
     def _next(self) -> int:
         self._seed += 1
         return self._seed
+
+
+def _tilted(sample: Surface, slope: Floats) -> Surface:
+    """The sample on a plane."""
+    return lambda x, y: sample(x, y) + slope[0] * x + slope[1] * y
 
 
 def _as(kind: type[T], values: Any) -> T:

@@ -64,6 +64,7 @@ def test_what_is_no_pair_is_said(lab: Path) -> None:
         (("a.ibw", "--channel", "Deflection"), "is the trace by the file; the retrace is needed here"),
         (("a.asd", "--channel", "TP", "--retrace-channel", "ER"), "is a movie of 2 frames; choose one with --frame, 0"),
         (("a.asd", "--channel", "TP", "--frame", "2"), "has no frame 2; the last one is 1"),
+        (("a.sxm", "--pair", "50", "t.npy"), "t.npy: channel 0 ('') has no retrace in this file; give it too"),
         (("t.npy",), "t.npy: channel 0 ('') has no retrace in this file; give it too"),
     ):  # fmt: skip
         outcome = one(*words)

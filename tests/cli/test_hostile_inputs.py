@@ -194,7 +194,7 @@ DAMAGED: dict[str, tuple[str, Callable[[], bytes], str]] = {
     ),
     "header without end": (
         "a.spm",
-        lambda: b"\\*File list\r\n" + b"\\*Ciao image list\r\n" * (4 << 20),
+        lambda: b"\\*File list\r\n" + b"\\*Ciao image list\r\n" * (1 << 20),
         "has no end of its header",
     ),
     "a million tags": (

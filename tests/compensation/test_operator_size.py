@@ -56,8 +56,8 @@ def test_piezos_of_four_kinds_grow_about_as_their_bend_says(core: Core | str) ->
 
 def test_m_goes_with_the_mean_and_the_family_with_the_turns() -> None:
     """Nothing but a reversible bend: where m of (1) is flat, a sensitivity with the mean makes up for it."""
-    plays = Plays(np.array([0.1]), np.zeros((1, 1)), np.array([1000.0, 200.0]), np.zeros((1, 4)))
-    operator = Operator(Family(plays), NOTHING, NO_SIZES, NO_CREEP, 0.5, ())
+    family = Family(Plays(np.array([0.1]), np.zeros((1, 1)), np.array([1000.0, 200.0]), np.zeros((1, 4))))
+    operator = Operator(family, NOTHING, NO_SIZES, NO_CREEP, 0.5, ())
     stroke, way = 0.8, 0.03
     low, high = 0.5 + way - 0.5 * stroke, 0.5 + way + 0.5 * stroke
     even, uneven = operator.loop(0.1, 0.9), operator.loop(low, high, 1.0, 0.5)

@@ -2,14 +2,16 @@
 
 import contextlib
 import io
+import json
 import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 from building import REPOSITORY
-from editing import run
-from instrument_files import asd, ibw
+from calibrating import Scanner, grating
+from editing import run, write_pair
+from instrument_files import asd, ibw, sxm
 
 from tablegen.calibration.image_files import _READERS, MODULES
 from tablegen.calibration.image_formats import channel, igor, nanonis, nanoscope
@@ -43,6 +45,31 @@ def test_every_format_is_in_the_table() -> None:
 def test_the_list_of_channels_is_what_the_command_prints(files: Path) -> None:
     (shown,) = re.findall(r"```text\n\$ tablegen channels (.*?)\n(.*?)```", PAGE, re.DOTALL)
     assert run("channels", *shown[0].split()).out == shown[1]
+
+
+@pytest.mark.common
+def test_every_command_runs(files: Path) -> None:
+    write_pair(files)
+    sample = grating(16.0, pixels=128, lines=96)
+    for volts in (30, 60):
+        pair = Scanner().images(float(volts), sample, 0.05, np.random.default_rng(8))
+        scale = 15.0 / np.max(np.abs([pair.trace, pair.retrace]))
+        trace, retrace = pair.trace * scale, pair.retrace * scale
+        (files / f"{volts}v.ibw").write_bytes(
+            ibw({"HeightTrace": trace, "HeightRetrace": retrace, "Phase": trace}, NOTE)
+        )
+        if volts == 30:
+            for name in ("t", "r"):
+                (files / f"30v_{name}.sxm").write_bytes(sxm({"Z": (trace, retrace)}))
+            for name, image in (("a", trace), ("b", retrace)):
+                (files / f"{name}.asd").write_bytes(asd({"TP": np.stack([image[::-1]] * 7 + [image])}))
+    (block,) = re.findall(r"```sh\n(.*?)```", PAGE, re.DOTALL)
+    assert len(block.splitlines()) == 3
+    for line in block.splitlines():
+        outcome = run(*line.split()[1:], "--json")
+        assert (outcome.status, outcome.err) == (0, ""), line
+        beta = json.loads(outcome.out)["branches"][0]["traces"][0]["forward"]["beta"]
+        assert beta["value"] == pytest.approx(0.0264, abs=2e-3), line  # of the scanner, at 30 V
 
 
 def test_the_python_runs(files: Path) -> None:

@@ -14,6 +14,9 @@ import numpy as np
 from tablegen.calibration.estimate import Estimate
 from tablegen.calibration.frequency import fit_frequency
 from tablegen.calibration.hysteresis import HysteresisFit, Trace, fit_hysteresis
+from tablegen.calibration.image_scale import Cell, Grating
+from tablegen.calibration.image_sizes import ImageSizes, SampleImage, Taking, sizes_of
+from tablegen.calibration.image_sizes import KnownSample as Known
 from tablegen.calibration.images import Pair, fit_images
 from tablegen.calibration.offset import fit_offset
 from tablegen.calibration.resonance import fit_resonance
@@ -27,6 +30,9 @@ DRIVES = np.array([5.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0, 10
 FREQUENCIES = np.geomspace(1.0, 3000.0, 15)
 RESPONSE = np.concatenate([np.geomspace(100.0, 36e3, 20), np.linspace(36.5e3, 44e3, 30), np.geomspace(45e3, 60e3, 8)])
 AMPLITUDES = (30.0, 60.0, 100.0)
+IMAGED_DRIVES = np.array([10.0, 25.0, 40.0, 60.0, 80.0, 100.0])
+IMAGED_OFFSETS = np.array([10.0, 30.0, 50.0, 70.0, 90.0])
+LATTICE_NM, PITCH_NM = 17.7, 50.0
 
 Found = dict[str, tuple[Estimate, float]]  # each parameter with its truth
 Case = Callable[[np.random.Generator, float], Found]
@@ -210,6 +216,45 @@ def images_case(random: np.random.Generator, noise: float) -> Found:
     return _branches(scanner, fit_images(pairs, V_MAX))
 
 
+def scan_of(
+    nm: float, v: float, random: np.random.Generator, noise: float, pixels: int = 160, offset_v: float | None = None
+) -> SampleImage:
+    """Trace and retrace of a line so long: of a lattice in any direction, or from 300 nm on of a grating; drifting."""
+    drift = random.uniform(-0.02, 0.02)
+    if nm < 300.0:
+        periods, angle, shape = nm / (LATTICE_NM * 3.0**0.5 / 2.0), random.uniform(-90.0, 90.0), lattice
+    else:
+        periods, angle, shape = nm / PITCH_NM, random.uniform(-6.0, 6.0), grating
+    sample = shape(periods * V_MAX / v, angle, pixels=pixels, lines=pixels, drift=drift * V_MAX / v)
+    shown = Scanner().images(v, sample, noise, random)
+    return SampleImage(f"{v:g} V", v, offset_v, shown.trace, shown.retrace)
+
+
+def measured(images: list[SampleImage]) -> ImageSizes:
+    """What such images say."""
+    return sizes_of(images, V_MAX, Known(Cell.hexagonal(LATTICE_NM), Grating(PITCH_NM)), Taking())
+
+
+def size_of_images_case(random: np.random.Generator, noise: float) -> Found:
+    """Sizes from images, with noise of 5 % where a table has 0.2 %."""
+    nm = actual(IMAGED_DRIVES, 10.0, 0.53, 0.5, 200.0)
+    pairs = zip(nm.tolist(), IMAGED_DRIVES.tolist(), strict=True)
+    found = measured([scan_of(one, v, random, 25.0 * noise) for one, v in pairs])
+    fit = fit_size(IMAGED_DRIVES, found.nm, V_MAX, errors_nm=found.errors_nm, shared=found.shared)
+    truth = {"k_nm_per_v": 10.0, "beta": 0.53, "v_threshold": 0.5}
+    return {name: (getattr(fit, name), value) for name, value in truth.items()}
+
+
+def offset_of_images_case(random: np.random.Generator, noise: float) -> Found:
+    """One scan voltage at several offsets, as images show a lattice."""
+    looks = apparent(IMAGED_OFFSETS, 0.92, 1.25, 1.0)
+    pairs = zip((130.0 / looks).tolist(), IMAGED_OFFSETS.tolist(), strict=True)
+    found = measured([scan_of(nm, 13.0, random, 25.0 * noise, 128, at) for nm, at in pairs])
+    sizes = LATTICE_NM * 130.0 / found.nm
+    fit = fit_offset(IMAGED_OFFSETS, sizes, V_MAX, errors_nm=sizes * found.errors_nm / found.nm)
+    return {"m_minus": (fit.m_minus, 0.92), "m_plus": (fit.m_plus, 1.25)}
+
+
 CASES: dict[str, Case] = {
     "offset": offset_case,
     "size": size_case,
@@ -220,11 +265,18 @@ CASES: dict[str, Case] = {
 }
 
 
+# Some seconds a trial, so that there are fewer of them.
+IMAGED_CASES: dict[str, Case] = {
+    "offset --image": offset_of_images_case,
+    "size --image": size_of_images_case,
+}
+
+
 def trials(kind: str, count: int, noise: float = NOISE, seed: int = 20) -> Iterator[Found]:
     """So many fits, each of its own noise."""
     random = np.random.default_rng(seed)
     for _ in range(count):
-        yield CASES[kind](random, noise)
+        yield (CASES | IMAGED_CASES)[kind](random, noise)
 
 
 def distances(kind: str, count: int, seed: int = 20) -> dict[str, Floats]:

@@ -43,7 +43,9 @@ class Page(HTMLParser):
             self.faults.append(f"</{tag}> at {self.getpos()}")
 
     def handle_data(self, data: str) -> None:
-        (self.scripts if self.open and self.open[-1] == "script" else self.texts).append(data)
+        inside = self.open[-1] if self.open else ""
+        if inside != "style":
+            (self.scripts if inside == "script" else self.texts).append(data)
 
     def _look(self, tag: str, attributes: dict[str, str | None]) -> None:
         if "id" in attributes:

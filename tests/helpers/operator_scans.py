@@ -41,13 +41,12 @@ def foreign_traces(plant: ForeignPlant) -> list[Trace]:
     return [Trace(f"{stroke:g}", *record(plant, at, stroke, seed=k)) for k, (at, stroke) in enumerate(SIX)]
 
 
-def virtual_traces(axis: VirtualAxis, rate_hz: float = 100.0) -> list[Trace]:
+def virtual_traces(axis: VirtualAxis, rate_hz: float = 100.0, turn: float = 0.5) -> list[Trace]:
     """The same sizes on a virtual scanner, whose sensor has 0.2 nm of noise."""
     found = []
     for k, (at, stroke) in enumerate(SIX):
-        columns = sensor_trace(
-            axis, V_MAX * stroke, V_MAX * at, rate_hz, periods=5, sensor=Sensor(noise_nm=0.2, seed=k)
-        )
+        sensor = Sensor(noise_nm=0.2, seed=k)
+        columns = sensor_trace(axis, V_MAX * stroke, V_MAX * at, rate_hz, periods=5, turn=turn, sensor=sensor)
         found.append(Trace(f"{stroke:g}", columns["time_s"], columns["drive_v"], columns["displacement_nm"]))
     return found
 

@@ -224,6 +224,8 @@ def test_wrong_input(tmp_path: Path) -> None:
     assert "dac.bits: 30 is above 24" in run("report", path, "-o", tmp_path / "r.html").err
     assert not (tmp_path / "r.html").exists()
     fine = write_pair(tmp_path)
+    assert "would replace a scan" in run("report", fine, "-o", fine).err
+    assert fine.read_text("utf-8") == SCAN
     assert "--figure needs" in run("report", fine, "--figure", "drive-x").err
     assert "no such chart" in run("report", fine, "--svg", tmp_path, "--figure", "none").err
 

@@ -77,7 +77,13 @@ def test_noise_drift_and_tilt_are_as_asked(plan: Plan) -> None:
     assert np.array_equal(drifted.heights, drifted.x_nm + drifted.drift_nm[0])
     assert drifted.drift_nm[0][-1, -1] == pytest.approx(0.02 * np.ptp(drifted.x_nm), rel=0.03)
     assert drifted.drift_nm[1][-1, -1] == pytest.approx(0.03 * np.ptp(drifted.y_nm), rel=0.03)
-    assert drifted.drift_nm[0][0, 0] == 0.0
+    assert drifted.drift_nm[0][0, 0] == pytest.approx(0.0, abs=1e-4 * float(np.ptp(drifted.x_nm)))
+    following = frame(plan, Conditions(noise=0.0, drift=(0.02, 0.03), frame=1)).trace
+    frames = LINES / plan.schedule.up.count  # a frame in units of what it shows
+    expected = (
+        0.03 * np.ptp(following.y_nm) * (np.sqrt(drifted.drift_nm[1] / (0.03 * np.ptp(drifted.y_nm))) + frames) ** 2
+    )
+    assert following.drift_nm[1] == pytest.approx(expected, rel=1e-9)
     clean = frame(plan).trace.heights
     noise = frame(plan, Conditions(noise=0.05, seed=4)).trace.heights - clean
     assert np.std(noise) == pytest.approx(0.05 * np.ptp(clean), rel=0.03)

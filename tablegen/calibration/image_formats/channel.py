@@ -41,7 +41,7 @@ class Channel:
     width_nm: float | None = None  # of the line, all pixels
     height_nm: float | None = None
     line_rate_hz: float | None = None  # lines in one direction per second
-    first_row: FirstRow | None = None  # where row 0 is in the picture; None where the file does not say
+    first_row: FirstRow | None = None  # where row 0 is in the picture; None where that is not known
     frames: int = 1
 
 

@@ -49,9 +49,9 @@ def ibw_channels(content: bytes, _: str) -> list[Channel]:
     labels_at = texts + formula + note_bytes + sum(lengths[:7])
     if labels_at + lengths[7] > len(content) or note_bytes > _MAX_NOTE:
         raise ValueError("ends in the middle of its images or texts; copy it again")
-    note = _note(content[texts + formula :][:note_bytes])
+    note = _note(content[texts + formula : texts + formula + note_bytes])
     labels = _labels(content[labels_at : labels_at + lengths[7]], layers)
-    unit = content[64 + 148 : 64 + 152].split(b"\0")[0].decode("latin-1")
+    unit = content[64 + 148 : 64 + 152].split(b"\0")[0].decode("latin-1") if layers == 1 else ""
     down = note.get("ScanDown")
     first: FirstRow = "top" if down == "1" else "bottom"
     channels = []
@@ -66,11 +66,11 @@ def ibw_channels(content: bytes, _: str) -> list[Channel]:
                 load,
                 signal,
                 direction,
-                unit or next((unit for names, unit in _UNITS if re.fullmatch(names, signal)), ""),
+                next((by_name for names, by_name in _UNITS if re.fullmatch(names, signal)), unit),
                 positive(note.get("FastScanSize"), 1e9),
                 positive(note.get("SlowScanSize"), 1e9),
                 positive(note.get("ScanRate"), 1.0),
-                first if down in ("0", "1") else None,
+                first,
             )
         )
     return channels

@@ -65,8 +65,9 @@ def _scale(own: TiffTags) -> tuple[float, float, str]:
         unit = own.get(_UNIT + at)
         named = unit if isinstance(unit, str) else ""
         factor, offset = own.get(_FACTOR + at), own.get(_OFFSET + at)
-        if own.get(_SCALING + at) == "NullScaling":
+        scaling = own.get(_SCALING + at)
+        if scaling == "NullScaling":
             return 1.0, 0.0, named
-        if isinstance(factor, float) and isinstance(offset, float) and isfinite(factor) and isfinite(offset):
-            return factor or 1.0, offset, named
+        if scaling == "LinearScaling" and isinstance(factor, float) and isinstance(offset, float):
+            return (factor or 1.0, offset, named) if isfinite(factor) and isfinite(offset) else (1.0, 0.0, "LSB")
     return 1.0, 0.0, "LSB"

@@ -14,7 +14,7 @@ from tablegen.calibration.image_formats.channel import Channel, Direction, First
 _END = b"\\*File list end"
 _MAX_HEADER = 4 << 20  # bytes; files have some hundred thousand at most
 _MAX_IMAGES = 1000
-_IMAGES = "*Ciao image list"
+_IMAGES, _SCAN = "*Ciao image list", "*Ciao scan list"
 _SCALED = re.compile(r"\w+\s+(?:\[(?P<by>[^\]]*)\]\s*)?(?:\([^)]*\)\s*)?(?P<value>[-+.\deE]+)\s*(?P<unit>\S*)")
 _NAMED = re.compile(r'\w+\s*(?:\[(?P<internal>[^\]]*)\]\s*)?(?:"(?P<name>[^"]*)")?')
 _NM = {"nm": 1.0, "pm": 1e-3, "~m": 1e3, "um": 1e3, "µm": 1e3, "mm": 1e6}
@@ -33,10 +33,15 @@ def spm_channels(content: bytes, _: str) -> list[Channel]:
         raise ValueError("has no end of its header; copy it again")
     lists = _lists(content[:end].decode("cp1252", "replace"))
     images = [one for name, one in lists if name == _IMAGES]
-    others = {key: value for name, one in lists if name != _IMAGES for key, value in one.items()}
+    others: _List = {}  # the first of a key; sensitivities stand with the scanner, or with the scan
+    for _, one in lists:
+        for key, value in one.items():
+            others.setdefault(key, value)
+    rate = next((one.get("scan rate", "") for name, one in lists if name == _SCAN), "")
     if len(images) > _MAX_IMAGES:
         raise ValueError(f"has {len(images)} images; at most {_MAX_IMAGES} are read")
-    return [_channel(content, number, one, others) for number, one in enumerate(images)]
+    line_rate = positive(rate.partition(" ")[0])
+    return [_channel(content, number, one, others, line_rate) for number, one in enumerate(images)]
 
 
 def _lists(header: str) -> list[tuple[str, _List]]:
@@ -53,7 +58,7 @@ def _lists(header: str) -> list[tuple[str, _List]]:
     return lists
 
 
-def _channel(content: bytes, number: int, image: _List, others: _List) -> Channel:
+def _channel(content: bytes, number: int, image: _List, others: _List, line_rate: float | None) -> Channel:
     columns, rows = _whole(number, image, "samps/line"), _whole(number, image, "number of lines")
     start, size = _whole(number, image, "data offset"), _whole(number, image, "data length")
     count = columns * rows
@@ -79,8 +84,8 @@ def _channel(content: bytes, number: int, image: _List, others: _List) -> Channe
         unit,
         width,
         height,
-        positive(others.get("scan rate", "").split(" ")[0]),
-        first if down in ("up", "down") else None,
+        line_rate,
+        first,
     )
 
 

@@ -2,20 +2,23 @@
 
 import numpy as np
 
-from tablegen.calibration.image_line import fit_line, shows_turns
-from tablegen.calibration.image_scale import LineSize, size_of_line
-from tablegen.calibration.image_sizes import Sample, SampleImage, Taking
+from tablegen.calibration.estimate import LineSize
+from tablegen.calibration.image_line import fit_line
+from tablegen.calibration.image_scale import size_of_line
+from tablegen.calibration.image_sizes import KnownSample, SampleImage, Taking
 from tablegen.calibration.operator.periodic_line import PHASES, PeriodicLine
 from tablegen.problems import Unphysical
 
+_SPANNED = (0.05, 0.95)  # of each sweep: the rest is extrapolated, to 0.4 % of the line on the plants of the tests
+
 
 def imaged_line(
-    image: SampleImage, rate_hz: float, v_max: float, sample: Sample, taking: Taking
+    image: SampleImage, rate_hz: float, v_max: float, sample: KnownSample, taking: Taking
 ) -> tuple[PeriodicLine, LineSize]:
     """The line of a triangle of ``v_scan`` about ``v_offset``, at ``rate_hz``, and its size.
 
     ``noise_nm`` is the rms standard error of the position; that of the size is beside it. The columns have to show
-    both sweeps from turn to turn. Raises ``Unphysical``, without the image's name.
+    both sweeps almost from turn to turn. Raises ``Unphysical``, without the image's name.
     """
     if image.retrace is None:
         raise Unphysical("the retrace is missing: an operator needs both directions")
@@ -27,8 +30,11 @@ def imaged_line(
     line = fit_line(
         image.trace, image.retrace, taking.turn, taking.window, taking.retrace_mirrored, taking.delay_pixels
     )
-    if not shows_turns(line.geometry):
-        raise Unphysical("the turns are not in the images; save both sweeps from turn to turn, without overscan")
+    if not _SPANNED[0] >= taking.window[0] or not taking.window[1] >= _SPANNED[1]:
+        raise Unphysical(
+            f"the turns are too far outside the images; they have to span {_SPANNED[0]:g} to {_SPANNED[1]:g} of each "
+            f"sweep, or more: save lines without overscan"
+        )
     size = size_of_line(line, sample.cell, sample.grating, taking.aspect or image.aspect)
     time = np.arange(PHASES) / PHASES
     rising = time < taking.turn

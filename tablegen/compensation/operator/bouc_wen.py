@@ -47,17 +47,6 @@ class BoucWen:
         h = self._rising.along(v - first + rise) if rising else self._falling.along(v - last + fall)
         return -self.depth * h
 
-    def first_branch(self, u: Floats, low: float, before: tuple[float, float]) -> Floats:
-        """The same on the first way up from the drive ``low``, after a settled line between two others."""
-        first, last, begin = (float(bent(at, *self.bend)) for at in (*before, low))
-        up, down = self._rising, self._falling
-        at = self._ends(last - first)[0]  # on the rising curve, at the lower turn of the line before
-        if begin >= first:
-            at += begin - first
-        else:
-            at = up.where(down.at(down.where(up.at(at)) + begin - first))
-        return -self.depth * up.along(bent(u, *self.bend) - begin + at)
-
     def _ends(self, stroke: float) -> tuple[float, float]:
         """Where a settled line begins on the rising curve, and where its top is on the falling one."""
         up, down = self._rising, self._falling
