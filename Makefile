@@ -21,7 +21,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 
 # What the sets of tests compile, simulate, prove and synthesise with; tests/README.md tells the sets.
 CHECK_TOOLS := gcc iverilog
-COMMON_TOOLS := $(CHECK_TOOLS) make g++ clang libclang-rt-dev cmake ninja-build srecord
+COMMON_TOOLS := $(CHECK_TOOLS) make g++ clang libclang-rt-dev cmake ninja-build srecord chromium
 HDL_TOOLS := make g++ iverilog yosys nextpnr-ice40 z3
 FIRMWARE_TOOLS := gcc-arm-none-eabi qemu-system-arm gcc-avr avr-libc simavr gcc-riscv64-unknown-elf gcc-mips-linux-gnu \
     libc6-dev-mips-cross qemu-user \
@@ -100,6 +100,9 @@ figures: $(VENV)/installed-plot
 	$(BIN)/python docs/figures/make_figures.py
 	$(BIN)/python docs/figures/make_virtual.py
 	$(BIN)/python docs/figures/make_operator.py
+	$(BIN)/python docs/figures/make_correct.py
+	@.ci/system-packages chromium
+	$(BIN)/python docs/figures/make_report.py
 
 paper: $(VENV)/installed-plot
 	$(BIN)/python docs/make_paper.py
@@ -115,7 +118,7 @@ $(VENV)/installed-test: $(VENV)/installed
 	@touch $@
 
 $(VENV)/installed-plot: $(VENV)/installed
-	$(PIP) install --editable '.[calibrate,plot]'
+	$(PIP) install --editable '.[images,plot]'
 	@touch $@
 
 # The Pythons that the package supports. `make test` runs the wheel under each further one that this machine has.

@@ -14,15 +14,23 @@ PAGE = ROOT / "docs" / "refine.md"
 sys.path.insert(0, str(ROOT / "tests" / "helpers"))
 
 from refining import (  # noqa: E402
+    GRATING,
+    LATTICE,
+    ROUGH,
     ROUNDS,
     SCANS,
+    SLOPING,
     Step,
     calibrated,
     elsewhere,
+    image_rounds,
+    imaged_scan,
     rounds,
 )
 
 from tablegen.virtual.parameters import BUILT_IN  # noqa: E402
+
+SAMPLES = (LATTICE, GRATING)
 
 
 def reached(plant: str) -> str:
@@ -34,6 +42,28 @@ def reached(plant: str) -> str:
     for scan in SCANS:
         for count, step in enumerate(rounds(calibrated(scan, plant), scan.axis, ROUNDS, plant=plant)):
             rows.append(f"| {scan.name if count == 0 else ''} | {count} | {_figures(step)} |")
+    return "\n".join(rows) + "\n"
+
+
+IMAGED = (
+    *((f"x, {volts:g} V, {sample.name}", "x", volts, sample) for volts in (30.0, 60.0, 95.0) for sample in SAMPLES),
+    ("x, 60 V, no period", "x", 60.0, ROUGH),
+    *((f"y, 60 V, {sample.name}", "y", 60.0, sample) for sample in (LATTICE, SLOPING)),
+)
+IMAGE_ROUNDS = 3
+
+
+def from_images(plant: str) -> str:
+    """A row a round of every scan that is refined from images."""
+    rows = [
+        "| scan, sample | rounds | residual forward | backward | scaling forward | backward |",
+        "|---|---|---|---|---|---|",
+    ]
+    for name, axis, volts, sample in IMAGED:
+        setup = calibrated(imaged_scan(axis, volts), plant)
+        for count, step in enumerate(image_rounds(setup, axis, IMAGE_ROUNDS, sample, plant)):
+            cells = _figures(step).split(" | ")[:4]
+            rows.append(f"| {name if count == 0 else ''} | {count} | {' | '.join(cells)} |")
     return "\n".join(rows) + "\n"
 
 
@@ -57,14 +87,16 @@ def _short(step: Step) -> str:
     return f"{step.true.rms_percent:.3f} rms, {max(step.true.scaling_percent.values()):.1f} % scaling error"
 
 
-TABLES = (("reached", reached), ("elsewhere", served))
+TABLES = (("reached", reached), ("images", from_images), ("elsewhere", served))
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--write", action="store_true", help=f"put the tables into {PAGE.name}")
+    parser.add_argument("--only", choices=[mark for mark, _ in TABLES], help="make one kind of table")
     given = parser.parse_args()
-    tables = [(f"{mark} {plant}", make(plant)) for plant in BUILT_IN for mark, make in TABLES]
+    chosen = [(mark, make) for mark, make in TABLES if given.only in (None, mark)]
+    tables = [(f"{mark} {plant}", make(plant)) for plant in BUILT_IN for mark, make in chosen]
     for mark, text in tables:
         print(text)
         if given.write:

@@ -31,8 +31,9 @@ MEASUREMENT = Kind("a CSV file of measurements", 512 << 20)
 IMAGE = Kind("an image", 256 << 20)
 MANIFEST = Kind("a manifest", 8 << 20)
 BUILD_FILE = Kind("a file of a build", 512 << 20)
+RECORD = Kind("a record of verify", 16 << 20)
 KEY = Kind("a key file", 4 << 10)
-KINDS = (CONFIGURATION, RESPONSE, MEASUREMENT, IMAGE, MANIFEST, BUILD_FILE, KEY)
+KINDS = (CONFIGURATION, RESPONSE, MEASUREMENT, IMAGE, MANIFEST, BUILD_FILE, RECORD, KEY)
 
 _OTHERS = (
     (stat.S_ISDIR, "a directory"),

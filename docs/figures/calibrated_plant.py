@@ -14,7 +14,9 @@ from foreign_plants import SIX, V_MAX, ForeignPlant, record, triangle  # noqa: E
 
 import tablegen  # noqa: E402
 from tablegen.cli import cli  # noqa: E402
+from tablegen.config.load import load  # noqa: E402
 from tablegen.numerics.arrays import Bools, Floats  # noqa: E402
+from tablegen.refinement.round import Options, refine  # noqa: E402
 
 WINDOW = (0.1, 0.9)
 CHORD = 0.05  # of the line
@@ -140,7 +142,8 @@ def calibrated(plant: ForeignPlant, folder: Path, protocol: tuple[tuple[float, f
     operator = folder / "operator.toml"
     operator.write_bytes(laws.read_bytes())
     everything = [path for _, path in traces]
-    return command("calibrate", "operator", *everything, "--axis", "x", "--scanner", str(operator), "--write")
+    shared = ("--axis", "x", "--scanner", str(operator), "--write", "--plot", str(folder / "fit.png"))
+    return command("calibrate", "operator", *everything, *shared)
 
 
 def scanned(
@@ -154,15 +157,38 @@ def scanned(
         other = (folder / scanner).read_text("utf-8").replace('model = "harmonic"', f'model = "{model}"')
         (folder / "other.toml").write_text(other, "utf-8")
         path.write_text(text.replace("scanner.toml", "other.toml"), "utf-8")
+    return played(plant, tablegen.build(path).x.volts, rate_hz, size_nm)
+
+
+def refined(plant: ForeignPlant, folder: Path, size_nm: float, offset_v: float, rate_hz: float) -> Line:
+    """The same on the operator after one round of refining, by a sensor with 0.2 % of noise."""
+    path = folder / "scan.toml"
+    text = SCAN.format(size_nm=size_nm, offset_v=offset_v, rate_hz=rate_hz, pixels=100)
+    path.write_text(text.replace("scanner.toml", "operator.toml"), "utf-8")
     volts = tablegen.build(path).x.volts
-    count = len(volts)
-    moved = plant.settled(volts, rate_hz)
-    f = rate_hz * np.arange(count // 2 + 1)
-    held = np.sinc(f * TICK_S) * np.exp(-1j * np.pi * f * TICK_S)  # a code is held for a tick
-    moved = np.fft.irfft(np.fft.rfft(moved) * held, count)
-    t = np.arange(count) / count
+    turns = 0.37 + np.arange(11 * len(volts)) / len(volts)
+    position = moved(plant, volts, rate_hz, 0.5)
+    middles = (np.arange(len(volts)) + 0.5) / len(volts)
+    noise = 0.002 * size_nm * np.random.default_rng(1).standard_normal(len(turns))
+    reading = np.interp(turns, middles, position, period=1.0) + noise
+    drive = np.interp(turns, middles, volts, period=1.0)
+    layered = refine(load(path), "x", turns / rate_hz, reading, drive, Options()).setup
+    return played(plant, tablegen.build(layered).x.volts, rate_hz, size_nm)
+
+
+def moved(plant: ForeignPlant, volts: Floats, rate_hz: float, at: float) -> Floats:
+    """Positions in nm, settled, of codes that are each held for a tick; ``at`` 0 begin and 1 end of each."""
+    f = rate_hz * np.arange(len(volts) // 2 + 1)
+    held = np.sinc(f * TICK_S) * np.exp(2j * np.pi * f * TICK_S * (at - 0.5))
+    return np.fft.irfft(np.fft.rfft(plant.settled(volts, rate_hz)) * held, len(volts))
+
+
+def played(plant: ForeignPlant, volts: Floats, rate_hz: float, size_nm: float) -> Line:
+    """Codes on the plant."""
+    position = moved(plant, volts, rate_hz, 0.0)
+    t = np.arange(len(volts)) / len(volts)
     x = np.where(t <= 0.5, 2.0 * t, 2.0 - 2.0 * t)
     inside = (x >= WINDOW[0]) & (x <= WINDOW[1])
-    slope, offset = np.polyfit(x[inside], moved[inside], 1)
-    error = 100.0 * ((moved - offset) / slope - x)
+    slope, offset = np.polyfit(x[inside], position[inside], 1)
+    error = 100.0 * ((position - offset) / slope - x)
     return Line(x, t <= 0.5, error, 100.0 * (float(slope) / size_nm - 1.0))

@@ -1,4 +1,4 @@
-"""Draw the picture of docs/operator.md and write its table of scans: a simulation. Usage: make figures"""
+"""Draw the pictures of docs/operator.md and write its table of scans: a simulation. Usage: make figures"""
 
 import os
 from collections.abc import Sequence
@@ -10,12 +10,12 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
-from calibrated_plant import Line, calibrated, scanned
+from calibrated_plant import Line, calibrated, refined, scanned
 from foreign_plants import SIX, TEN, BoucWen, ForeignPlant, ManyPlays
 
 FOLDER = Path(__file__).parent
 PAGE = FOLDER.parent / "operator.md"
-GREY, RED, BLUE = "#777777", "#c23b22", "#1f5fa8"
+GREY, RED, BLUE, GREEN = "#777777", "#c23b22", "#1f5fa8", "#2e7d32"
 PLANTS = {"many plays": ManyPlays, "Bouc-Wen": BoucWen}
 RATES_HZ = (100.0, 1000.0)
 SCANS = {  # offset in V: sizes in nm that no trace had
@@ -37,6 +37,8 @@ WORSE = (
     "| piezo | scan | laws: rms, scaling, trace-retrace [%] | operator, six traces | operator, ten traces |",
     "|---|---|---|---|---|",
 )
+REFINED = "refined once"
+CUT = ", "  # before the number of traces
 DRAWN = (("many plays", 50.0, 500.0), ("Bouc-Wen", 70.0, 300.0))
 
 
@@ -80,29 +82,34 @@ def table(folder: Path) -> tuple[list[str], list[str], dict[tuple[str, str], Lin
                     found[name].append(line)
                     if (plant_name, offset_v, size_nm) in DRAWN and rate_hz == RATES_HZ[0]:
                         drawn[plant_name, name] = line
+                if (plant_name, offset_v, size_nm) in DRAWN and rate_hz == RATES_HZ[0]:
+                    drawn[plant_name, REFINED] = refined(plant, folders[SIX], size_nm, offset_v, rate_hz)
+            (FOLDER / "operator_fit.png").write_bytes((folders[TEN] / "fit.png").read_bytes())
             rows += [row(plant_name, offsets, name, lines) for name, lines in found.items()]
     return rows, worst, drawn
 
 
 def draw(drawn: dict[tuple[str, str], Line]) -> None:
-    """The residual before, with the laws, and with the operator."""
-    figure, panels = plt.subplots(2, 2, figsize=(11, 6.2), layout="constrained")
-    for (plant, offset_v, size_nm), (before, after) in zip(DRAWN, panels, strict=True):
+    """The residual before, with the laws, with the operator, and refined."""
+    figure, panels = plt.subplots(2, 3, figsize=(14, 6.2), layout="constrained")
+    for (plant, offset_v, size_nm), (before, after, last) in zip(DRAWN, panels, strict=True):
         for axes, name, colour in (
             (before, "triangle", GREY),
             (after, "laws", RED),
             (after, "operator, six traces", BLUE),
+            (last, "operator, six traces", BLUE),
+            (last, REFINED, GREEN),
         ):
             for forward in (True, False):
                 x, error = drawn[plant, name].side(forward)
-                label = f"{name}, {'forward' if forward else 'backward'}"
+                label = f"{name.split(CUT)[0]}, {'forward' if forward else 'backward'}"
                 axes.plot(x, error, "-" if forward else "--", color=colour, lw=1.6, label=label)
-        for axes, most in ((before, 7.0), (after, 1.0)):
+        for axes, most in ((before, 7.0), (after, 1.0), (last, 0.1)):
             axes.axhline(0.0, color="#bbbbbb", lw=0.6)
             axes.set(xlim=(0.1, 0.9), ylabel="residual [% of the line]", xlabel="position in the line")
             axes.legend(frameon=False, fontsize=8, ncols=2, loc="upper center")
             axes.set_ylim(-most, 1.4 * most)
-        for axes, what in ((before, "a triangle"), (after, "compensated")):
+        for axes, what in ((before, "a triangle"), (after, "compensated"), (last, "ten times finer")):
             axes.set_title(f"{plant}: {size_nm:g} nm at {offset_v:g} V, {what}")
     figure.savefig(FOLDER / "operator.png", dpi=100, metadata={"Software": None})
 

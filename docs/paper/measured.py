@@ -9,7 +9,7 @@ import msgspec
 import numpy as np
 
 from tablegen.calibration.hysteresis import HysteresisFit, Trace, fit_hysteresis
-from tablegen.calibration.operator.fit import fit_operator
+from tablegen.calibration.operator.fit import OperatorFit, fit_operator
 from tablegen.calibration.operator.periodic_line import periodic_line
 from tablegen.calibration.operator.record import operator_file
 from tablegen.compensation.branch import Branch
@@ -80,21 +80,34 @@ def optimised() -> tuple[float, float]:
 
 
 @cache
-def by_operator() -> LineError:
-    """The same line by ``tablegen calibrate operator`` on settled triangles, without noise.
-
-    Its turnarounds are rounded; so the errors are about the best line through both windows.
-    """
+def operator() -> OperatorFit:
+    """``tablegen calibrate operator`` on settled triangles, without noise."""
     time = np.arange(2 * TICKS) / (TICKS * RATE_HZ)
     lines = []
     for v in OPERATOR_V:
         volts = MIDDLE_V + v * (ideal_triangle(TICKS, 0.5) - 0.5)
         moved = axis().settled(volts, 1.0 / (RATE_HZ * TICKS))
         lines.append(periodic_line(Trace(f"{v:g} V", time, np.tile(volts, 2), np.tile(moved, 2)), V_MAX))
+    return fit_operator(lines, None, lambda _: 1.0)
+
+
+def sizes_by_operator(sizes_v: Floats) -> Floats:
+    """Nanometres between the turns of triangles, as the operator has them."""
+    low, high = (MIDDLE_V + sign * 0.5 * sizes_v for sign in (-1.0, 1.0))
+    loops = [operator().operator.loop(*ends) for ends in zip(low / V_MAX, high / V_MAX, strict=True)]
+    return np.array([loop.extent_nm for loop in loops])
+
+
+@cache
+def by_operator() -> LineError:
+    """The same line on the operator.
+
+    Its turnarounds are rounded; so the errors are about the best line through both windows.
+    """
     setup = load(SCAN)
     with TemporaryDirectory() as folder:
         path = Path(folder) / "operator.toml"
-        path.write_bytes(operator_file(fit_operator(lines, None, lambda _: 1.0), "x", V_MAX))
+        path.write_bytes(operator_file(operator(), "x", V_MAX))
         x = msgspec.structs.replace(setup.scanner.x, hysteresis=OperatorModel(file=str(path)))
         drive = played(make_plan(replace(setup, scanner=msgspec.structs.replace(setup.scanner, x=x))).x)
     return about_window_line(line_error(axis().settled(drive.volts, drive.tick_s), 0.5, first=0.5))

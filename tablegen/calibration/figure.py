@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from tablegen.calibration.estimate import Curve
 
-_METADATA_WITHOUT_DATE: dict[str, dict[str, Any]] = {"png": {}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
+METADATA_WITHOUT_DATE: dict[str, dict[str, Any]] = {"png": {}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
 
 
 def draw(curves: Sequence[Curve], kind: Literal["png", "svg", "pdf"]) -> bytes:
@@ -27,7 +27,7 @@ def draw(curves: Sequence[Curve], kind: Literal["png", "svg", "pdf"]) -> bytes:
         axes.set_visible(False)
     out = BytesIO()
     with rc_context({"svg.hashsalt": "tablegen"}):  # names inside the file are otherwise drawn by lot
-        figure.savefig(out, format=kind, dpi=130, metadata=_METADATA_WITHOUT_DATE[kind])
+        figure.savefig(out, format=kind, dpi=130, metadata=METADATA_WITHOUT_DATE[kind])
     return out.getvalue()
 
 

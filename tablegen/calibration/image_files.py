@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 
-from tablegen.calibration.gwyddion import gwy_channels
 from tablegen.calibration.image_formats.asd import asd_channels
 from tablegen.calibration.image_formats.channel import (
     MAX_PIXELS,
@@ -24,14 +23,15 @@ from tablegen.calibration.image_formats.channel import (
     partner,
     quoted,
 )
+from tablegen.calibration.image_formats.gwyddion import gwy_channels
 from tablegen.calibration.image_formats.igor import ibw_channels
 from tablegen.calibration.image_formats.jpk import jpk_channels
 from tablegen.calibration.image_formats.matrix import npy_channels, text_channels
 from tablegen.calibration.image_formats.nanonis import sxm_channels
 from tablegen.calibration.image_formats.nanoscope import spm_channels
 from tablegen.calibration.image_formats.picture import png_channels
+from tablegen.calibration.image_formats.tiff import tiff_channels
 from tablegen.calibration.table import Source, file_content
-from tablegen.calibration.tiff import tiff_channels
 from tablegen.figures import shown_path
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Problem, Rejected, shortened

@@ -62,7 +62,7 @@ def fit_pair(
     )
     spot, bends = begin(geometry, heights, retrace_mirrored)
     model, state, free = grown(geometry, heights, spot, bends)
-    _check(model, state, free)
+    check_fit(model, state, free)
     return _result(model, state, free, v_scan)
 
 
@@ -72,7 +72,7 @@ def _carrying(model: PeriodicModel, state: FitState) -> float:
     return float(along[np.argmax(along * np.abs(state.amplitudes))])
 
 
-def _check(model: PeriodicModel, state: FitState, free: Bools) -> None:
+def check_fit(model: PeriodicModel, state: FitState, free: Bools) -> None:
     """Whether it is a fit at all."""
     shares = [1.0 - float(np.mean(left**2)) / float(np.mean(image**2)) for (_, image), left in _both(model, state)]
     if min(shares) < _MIN_EXPLAINED_VARIANCE:

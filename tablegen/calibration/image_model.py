@@ -84,6 +84,11 @@ def check_signs(forward: float, backward: float, least: float, advice: str) -> N
         raise Unphysical("the trace bends the wrong way; is it mirrored? The left end must be where the trace begins")
 
 
+def row_order() -> int:
+    """The order of the polynomial over rows."""
+    return _ROW_POLYNOMIAL_ORDER
+
+
 def grown(
     geometry: Geometry, heights: list[Floats], spot: Spot, bends: tuple[Bend, ...]
 ) -> tuple[PeriodicModel, FitState, Bools]:
@@ -111,6 +116,17 @@ def grown(
             start[:4] = settle(
                 PeriodicModel(geometry, [images[i]], [(1,)], _ROW_POLYNOMIAL_ORDER, off), start, alone
             ).parameters[:4]
+    return described(geometry, images, start, free, off)
+
+
+def described(
+    geometry: Geometry, images: list[tuple[bool, Floats]], start: Floats, free: Bools, off: tuple[Floats, Floats]
+) -> tuple[PeriodicModel, FitState, Bools]:
+    """The fit from the parameters of one base vector: with another one if there is one, and all spots seen.
+
+    ``start`` has a polynomial of ``row_order()`` in the rows.
+    """
+    nowhere = np.zeros(geometry.columns)
     model = PeriodicModel(geometry, images, [(1,)], _ROW_POLYNOMIAL_ORDER, off)
     state = settle(model, start, free)
     model = _with_spots(model, state)

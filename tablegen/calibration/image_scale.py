@@ -11,11 +11,12 @@ wave, of a grating, gives L = q pitch / cos(angle); the angle comes from the row
 from dataclasses import dataclass, replace
 from itertools import product
 from math import atan, cos, hypot, isnan, log, nan, radians, sin, sqrt, tan
+from typing import Protocol
 
 import numpy as np
 
 from tablegen.calibration.estimate import Estimate
-from tablegen.calibration.image_line import ImageLine
+from tablegen.calibration.periodic import FitState, Geometry, PeriodicModel
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 
@@ -82,7 +83,37 @@ class LineSize:
     drift: float
 
 
-def size_of_line(line: ImageLine, cell: Cell | None, grating: Grating | None, aspect: float | None = None) -> LineSize:
+class ImagedWaves(Protocol):
+    """A fitted image of a periodic sample, as far as a size needs it; see ``ImageLine``."""
+
+    @property
+    def geometry(self) -> Geometry:
+        """How it was taken."""
+
+    @property
+    def model(self) -> PeriodicModel:
+        """The waves that were fitted."""
+
+    @property
+    def state(self) -> FitState:
+        """At these parameters."""
+
+    @property
+    def waves(self) -> Floats:
+        """(bases, 2): periods in the line and in the frame of each base wave."""
+
+    @property
+    def waves_covariance(self) -> Floats:
+        """Of q_1, s_1, q_2, s_2."""
+
+    @property
+    def amplitudes(self) -> Floats:
+        """(spots,)."""
+
+
+def size_of_line(
+    line: ImagedWaves, cell: Cell | None, grating: Grating | None, aspect: float | None = None
+) -> LineSize:
     """The size by what the image shows: two base waves are the lattice, one is the grating.
 
     ``aspect`` is the frame's height over the line's length: its standard error is 10 %. It decides between readings of
@@ -108,7 +139,7 @@ def size_of_line(line: ImageLine, cell: Cell | None, grating: Grating | None, as
     return replace(found, shared=hypot(found.shared, differs if isnan(found.aspect) else 0.0))
 
 
-def _size(line: ImageLine, cell: Cell | None, grating: Grating | None, expected: float) -> LineSize:
+def _size(line: ImagedWaves, cell: Cell | None, grating: Grating | None, expected: float) -> LineSize:
     waves, covariance = line.waves, line.waves_covariance
     if len(waves) == 2:
         if cell is None:
@@ -197,7 +228,7 @@ def _turned(angle_deg: float, cell: Cell) -> float:
     return (angle_deg + 0.5 * same) % same - 0.5 * same
 
 
-def _check_whole_period(line: ImageLine) -> None:
+def _check_whole_period(line: ImagedWaves) -> None:
     """Whether the wave is the grating's first."""
     for part in _SUPERCELLS:
         strongest = _strongest_part(line, part)
@@ -208,7 +239,7 @@ def _check_whole_period(line: ImageLine) -> None:
             )
 
 
-def _primitive(line: ImageLine, waves: Floats, covariance: Floats) -> tuple[Floats, Floats]:
+def _primitive(line: ImagedWaves, waves: Floats, covariance: Floats) -> tuple[Floats, Floats]:
     """Base waves of all waves that are seen, where halves or thirds of the fitted ones are among them."""
     for part in _SUPERCELLS:
         between = _strongest_part(line, part)
@@ -227,7 +258,7 @@ def _primitive(line: ImageLine, waves: Floats, covariance: Floats) -> tuple[Floa
     return waves, covariance
 
 
-def _strongest_part(line: ImageLine, part: int) -> tuple[int, ...] | None:
+def _strongest_part(line: ImagedWaves, part: int) -> tuple[int, ...] | None:
     """The strongest wave between those of whole numbers, in parts of the base waves; None where none counts."""
     model, state = line.model, line.state
     span = line.geometry.window[1] - line.geometry.window[0]

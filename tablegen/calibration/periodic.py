@@ -114,10 +114,11 @@ class PeriodicModel:
     """Levelled images, forward or backward each, and the spots: rows of whole numbers, one a base vector.
 
     ``order`` is that of the polynomial in y; ``off`` what is added to x, forward and backward: where it is known that
-    the branches are not (17), so that phases stay within a small part of a period. Parameters are the
-    coordinates of the branch forward, then backward, the lag of y within the line (1 where y is a ramp, 0 where it
-    steps), then of each base vector q and s_1, s_2, ..., then how much of each of ``ripples`` is added to x, forward
-    and backward: rows of (count, columns) each, for branches that are not (17).
+    the branches are not (17), so that phases stay within a small part of a period. ``row_off``, (bases, rows), is what
+    is added to the polynomials, in periods. Parameters are the coordinates of the branch forward, then backward, the
+    lag of y within the line (1 where y is a ramp, 0 where it steps), then of each base vector q and s_1, s_2, ...,
+    then how much of each of ``ripples`` is added to x, forward and backward: rows of (count, columns) each, for
+    branches that are not (17).
     """
 
     def __init__(
@@ -128,6 +129,7 @@ class PeriodicModel:
         order: int,
         off: tuple[Floats, Floats],
         ripples: tuple[Floats, Floats] | None = None,
+        row_off: Floats | None = None,
     ) -> None:
         self.geometry, self.order, self.off = geometry, order, off
         nothing = np.zeros((0, geometry.columns))
@@ -135,6 +137,7 @@ class PeriodicModel:
         self.images = tuple(images)
         self.spots: Ints = np.array(spots, dtype=np.int64)
         self.bases = self.spots.shape[1]
+        self.row_off = np.zeros((self.bases, geometry.rows)) if row_off is None else row_off
         self.y_powers = geometry.y ** np.arange(order + 1)[:, None]
         self.rippled_from = BASES + self.bases * (order + 1)  # the first parameter of the ripples
 
@@ -191,7 +194,34 @@ class PeriodicModel:
 
     def with_spots(self, spots: Sequence[tuple[int, ...]]) -> "PeriodicModel":
         """The same of other spots."""
-        return PeriodicModel(self.geometry, self.images, spots, self.order, self.off, self.ripples)
+        return PeriodicModel(self.geometry, self.images, spots, self.order, self.off, self.ripples, self.row_off)
+
+    def with_offsets(self, off: tuple[Floats, Floats], row_off: Floats) -> "PeriodicModel":
+        """The same with other ``off`` and ``row_off``."""
+        spots = [tuple(spot) for spot in self.spots.tolist()]
+        return PeriodicModel(self.geometry, self.images, spots, self.order, off, self.ripples, row_off)
+
+    def row_waves(self, state: FitState) -> Complexes:
+        """Each base vector's wave as each row of both images has it; its phase is what the polynomials miss.
+
+        Of shape (bases, rows).
+        """
+        other = self.with_spots([tuple(one) for one in np.eye(self.bases, dtype=np.int64).tolist()])
+        row = np.conj(other._rows(state.parameters)[0])
+        found = np.zeros((self.bases, self.geometry.rows), dtype=np.complex128)
+        for forward, heights in self.images:
+            found += row * (np.conj(other._columns(state.parameters, forward)[0]) @ heights.T)
+        return found
+
+    def phase_slopes(self, state: FitState) -> list[Floats]:
+        """Of each image what more phase of each base vector does, in heights a period: (bases, rows, columns)."""
+        rows = self._rows(state.parameters)[0]
+        found = []
+        for forward, _ in self.images:
+            column = self._columns(state.parameters, forward)[0]
+            waves = 2j * pi * state.amplitudes[:, None] * self.spots
+            found.append(np.stack([np.real((rows.T * wave) @ column) for wave in waves.T]))
+        return found
 
     def divided(self, state: FitState, part: int) -> "tuple[PeriodicModel, FitState]":
         """The same with base waves of one ``part`` of these."""
@@ -213,7 +243,7 @@ class PeriodicModel:
 
     def _rows(self, parameters: Floats) -> Complexes:
         """(order + 1, spots, rows): each spot's row part, times the powers of y."""
-        phase = self.spots @ (self.s(parameters) @ self.y_powers[1:])
+        phase = self.spots @ (self.s(parameters) @ self.y_powers[1:] + self.row_off)
         rows: Complexes = self.y_powers[:, None, :] * np.exp(2j * pi * phase)
         return rows
 

@@ -6,7 +6,7 @@ from math import log10, sqrt
 
 import numpy as np
 
-from tablegen.certificate.expected import expected_of
+from tablegen.certificate.expected import certified_expectation
 from tablegen.certificate.line_errors import (
     EmittedPeriod,
     Refined,
@@ -48,12 +48,25 @@ class Certificate:
     @property
     def scaling_error_percent(self) -> float:
         """The worst of both directions; ripple shorter than a chord counts in full."""
-        return max(max(error.total, error.band_limit) for error in self.scaling.values())
+        return max(self._own(side) for side in self.scaling)
 
     @property
     def size_error_percent(self) -> float:
         """The worst of both directions, with its sign."""
         return max((error.size for error in self.scaling.values()), key=abs)
+
+    @property
+    def scaling_on_scanner(self) -> tuple[str, float, float] | None:
+        """The worse direction, what is expected of it on the scanner and what the waveform has, in percent.
+
+        None where nothing is expected. The errors may add up.
+        """
+        figures = {} if self.expected is None else self.expected.scaling
+        both = [(side, figure.value, self._own(side)) for side, figure in figures.items()]
+        return max(both, key=lambda one: one[1] + one[2], default=None)
+
+    def _own(self, side: str) -> float:
+        return max(self.scaling[side].total, self.scaling[side].band_limit)
 
 
 def certify(plan: Plan) -> dict[str, Certificate]:
@@ -93,7 +106,34 @@ def broken_limits(
             remedy = _remedy(plan.x if axis == "x" else plan.y, parts)
             why = "; ".join(filter(None, (f"the {axis} axis has a {what}, above {limit:g} %", remedy, advise(axis))))
             problems.append(file.problem("limits.max_scaling_error_percent", why))
+        elif foreseen := _foreseen(certificate, limit):
+            why = f"on the scanner the {axis} axis is expected to have a {foreseen}"
+            why = "; ".join(filter(None, (why, advise(axis))))
+            problems.append(file.problem("limits.max_scaling_error_percent", why))
     return problems
+
+
+def _foreseen(certificate: Certificate, limit: float) -> str:
+    """What the waveform and what a model expects of the scanner exceed together, and which part is whose; or nothing.
+
+    The uncertainty is not counted: no change of the scan makes it smaller.
+    """
+    both, expected = certificate.scaling_on_scanner, certificate.expected
+    if both is not None and both[1] + both[2] > limit:
+        side, on_scanner, own = both
+        return (
+            f"scaling error of {on_scanner + own:.4g} % {side}, above {limit:g} %: {on_scanner:.3g} % since these "
+            f"harmonics do not make the waveform that its operator needs over the window, {own:.3g} % of the emitted "
+            "waveform"
+        )
+    if expected is not None and expected.size is not None:
+        on_scanner, own = expected.size.value, certificate.size_error_percent
+        if abs(on_scanner + own) > limit:
+            return (
+                f"size error of {on_scanner + own:+.4g} %, above {limit:g} %: {on_scanner:+.3g} % by its operator, "
+                f"{own:+.3g} % of the emitted waveform"
+            )
+    return ""
 
 
 def _remedy(line: LinePlan, parts: ScalingError) -> str:
@@ -133,7 +173,7 @@ def _certify(line: LinePlan) -> Certificate:
         refinement=None
         if line.layer is None
         else {side: refined(line, side, branch) for side, branch in _directions(line).items()},
-        expected=expected_of(line),
+        expected=certified_expectation(line, played),
     )
 
 

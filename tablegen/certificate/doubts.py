@@ -23,36 +23,28 @@ class Doubt:
     limit: float
 
 
-def largest_expected(certificate: Certificate) -> tuple[str, float] | None:
-    """The direction with the largest scaling error that is expected, and that in percent; None where none is."""
-    expected = certificate.expected
-    if expected is None or not expected.scaling:
-        return None
-    return max(((side, figure.value) for side, figure in expected.scaling.items()), key=lambda one: one[1])
-
-
-def doubts(line: LinePlan, certificate: Certificate, most: float | None) -> list[Doubt]:
-    """What should be said of the expectation of an axis; ``most`` is ``limits.max_scaling_error_percent``.
+def doubts(line: LinePlan, certificate: Certificate) -> list[Doubt]:
+    """What should be said of the expectation of an axis.
 
     The uncertainty is not counted: it stands beside the figure, and no change of the scan makes it smaller.
     """
-    found, axis = [], line.axis
-    worst = largest_expected(certificate)
-    limit = LARGEST_PERCENT if most is None else min(LARGEST_PERCENT, most)
-    if worst is not None and worst[1] > limit:
+    found, axis, expected = [], line.axis, certificate.expected
+    figures = {} if expected is None else expected.scaling
+    side = max(figures, key=lambda one: figures[one].value, default="")
+    if side and figures[side].value > LARGEST_PERCENT:
         text = (
-            f"on the scanner the {axis} axis is expected to have a scaling error of {worst[1]:.3g} % {worst[0]}, above "
-            f"{limit:g} %, since these harmonics do not make the waveform that its operator needs over the window"
+            f"on the scanner the {axis} axis is expected to have a scaling error of {figures[side].value:.3g} % "
+            f"{side}, above {LARGEST_PERCENT:g} %, since these harmonics do not make the waveform that its operator "
+            "needs over the window"
         )
-        found.append(Doubt("scaling error", text, worst[1], limit))
-    expected = certificate.expected
+        found.append(Doubt("scaling error", text, figures[side].value, LARGEST_PERCENT))
     if expected is not None and expected.distance is not None and expected.distance > FAR_PERCENT:
         w = line.drive_series.on_grid(_GRID * line.drive_series.harmonics)
         stroke = line.drive.v_amplitude * float(np.max(w) - np.min(w))
         here = f"{stroke:.3g} V about {line.drive.v_offset:.3g} V"
         text = (
             f"the {axis} axis moves by {here}, {expected.distance:.2g} % of v_max from the nearest trace of its "
-            f"operator, so that less is known than its uncertainty says; record a trace of {here}, and give it to "
+            f"operator, so that little is known there; record a trace of {here}, and give it to "
             "`tablegen calibrate operator` with the others"
         )
         found.append(Doubt("distance", text, expected.distance, FAR_PERCENT))

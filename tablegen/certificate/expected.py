@@ -6,8 +6,12 @@ earlier: at a stroke of V_scan (w_max - w_min). The piezo's loop is that of this
 the branches that were applied.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
+from tablegen.certificate.converter_errors import converter_errors
+from tablegen.certificate.line_errors import EmittedPeriod
 from tablegen.compensation.expectation import Expectation, Figure
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan
@@ -29,6 +33,27 @@ def expected_of(line: LinePlan) -> Expectation | None:
         return known if both else known.forward_only
     mismatch = rounding_mismatch(line) if both else None
     return None if mismatch is None else Expectation("laws", mismatch=Figure(mismatch))
+
+
+def certified_expectation(line: LinePlan, played: EmittedPeriod) -> Expectation | None:
+    """The same of the emitted integers: what the converter's steps leave is uncertain too.
+
+    It is added to the uncertainties: nobody knows how steps and departures of the piezo fall together.
+    """
+    expected = expected_of(line)
+    if expected is None or expected.basis != "traces":
+        return expected
+    steps = converter_errors(line, played)
+    return replace(
+        expected,
+        rms={side: _less_certain(figure, steps.rms[side]) for side, figure in expected.rms.items()},
+        scaling={side: _less_certain(figure, steps.scaling[side]) for side, figure in expected.scaling.items()},
+        mismatch=None if expected.mismatch is None else _less_certain(expected.mismatch, steps.mismatch),
+    )
+
+
+def _less_certain(figure: Figure, by: float) -> Figure:
+    return figure if figure.uncertainty is None else replace(figure, uncertainty=figure.uncertainty + by)
 
 
 def rounding_mismatch(line: LinePlan) -> float | None:

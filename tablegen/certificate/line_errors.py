@@ -77,7 +77,7 @@ class EmittedPeriod:
             t = t - np.clip(step, -1.0 / points, 1.0 / points)
         ticks = self._line.program.ticks
         before = np.floor(t * ticks).astype(np.int64)
-        return np.unique(np.concatenate([before, before + 1]) % ticks)
+        return merged(before % ticks, (before + 1) % ticks)
 
     def _asked(self, k: Ints) -> Floats:
         codes = np.empty(len(k))

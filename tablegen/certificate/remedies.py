@@ -62,15 +62,22 @@ def tried(setup: Setup, plan: Plan, line: LinePlan, found: Excess, most: float |
     return _tried(_WAYS[found.cause](setup, plan, line, found), lambda change: _trial(setup, plan, line, change, most))
 
 
-def tried_on_operator(setup: Setup, plan: Plan, line: LinePlan, most: float) -> list[Remedy]:
-    """The same for the scaling error that the operator of an axis expects of its waveform: at most ``most`` percent."""
+def tried_on_operator(setup: Setup, plan: Plan, line: LinePlan, most: float, own: bool) -> list[Remedy]:
+    """The same for the scaling error that the operator of an axis expects of its waveform: at most ``most`` percent.
+
+    With ``own`` the errors of the emitted waveform count as well.
+    """
 
     def trial(change: Change) -> Remedy | None:
         other = _planned(setup, change)
-        expected = other and expected_of(other.x if line.axis == "x" else other.y)
-        if other is None or not expected:
+        if other is None:
             return None
-        left = max(figure.value for figure in expected.scaling.values())
+        changed_line = other.x if line.axis == "x" else other.y
+        expected = expected_of(changed_line)
+        if expected is None or not expected.scaling:
+            return None
+        more = {side: max(one.total, one.band_limit) for side, one in scaling_errors(changed_line).items() if own}
+        left = max(figure.value + more.get(side, 0.0) for side, figure in expected.scaling.items())
         return Remedy(_text(change), left, left <= most, _keeps_the_error(plan, other))
 
     return _tried(_other_bands(setup, plan, line), trial)

@@ -37,7 +37,10 @@ def scan_warnings(setup: Setup, plan: Plan, certificates: Mapping[str, Certifica
     for line, doubt in _doubts(plan, certificates):
         key, advice = _size_key(setup, line), ""
         if doubt.kind == "scaling error":
-            key, advice = _band_key(setup, line), "; " + _advice_on_operator(setup, plan, line, doubt)
+            from tablegen.certificate.remedies import tried_on_operator
+
+            tried = tried_on_operator(setup, plan, line, doubt.limit, own=False)
+            key, advice = _band_key(setup, line), "; " + _in_words(tried, doubt.percent)
         warnings.append(setup.scan_file.problem(key, doubt.text + advice))
     if apart := apart_warning(plan):
         given = setup.scan.timing.ticks_per_line is not None
@@ -50,19 +53,20 @@ def limit_advice(setup: Setup, plan: Plan, certificates: Mapping[str, Certificat
     line = plan.x if axis == "x" else plan.y
     most = plan.limits.max_scaling_error_percent
     found = excess(certificates[axis].scaling, most)
-    return "" if found is None else _advice(setup, plan, line, found, most)
+    if found is not None:
+        return _advice(setup, plan, line, found, most)
+    both = certificates[axis].scaling_on_scanner
+    if both is None or most is None or both[1] + both[2] <= most:
+        return ""
+    from tablegen.certificate.remedies import tried_on_operator
+
+    return _in_words(tried_on_operator(setup, plan, line, most, own=True), both[1] + both[2])
 
 
 def _advice(setup: Setup, plan: Plan, line: LinePlan, found: Excess, most: float | None = None) -> str:
     from tablegen.certificate.remedies import tried  # only a scan that needs them pays for them
 
     return _in_words(tried(setup, plan, line, found, most), abs(found.percent))
-
-
-def _advice_on_operator(setup: Setup, plan: Plan, line: LinePlan, doubt: Doubt) -> str:
-    from tablegen.certificate.remedies import tried_on_operator
-
-    return _in_words(tried_on_operator(setup, plan, line, doubt.limit), doubt.percent)
 
 
 def _in_words(remedies: "list[Remedy]", percent: float) -> str:
@@ -81,8 +85,7 @@ def _found(plan: Plan, certificates: Mapping[str, Certificate]) -> list[tuple[Li
 
 
 def _doubts(plan: Plan, certificates: Mapping[str, Certificate]) -> list[tuple[LinePlan, Doubt]]:
-    most = plan.limits.max_scaling_error_percent
-    return [(line, doubt) for line in plan.lines for doubt in doubts(line, certificates[line.axis], most)]
+    return [(line, doubt) for line in plan.lines for doubt in doubts(line, certificates[line.axis])]
 
 
 def _share(line: LinePlan, found: Excess, certificate: Certificate) -> str:

@@ -197,11 +197,13 @@ def summary(plan: Plan, certificates: dict[str, Certificate]) -> list[str]:
         f"{rate(schedule.line_rate)} lines, {rate(schedule.frame_rate)} frames, {schedule.pixels} pixels",
         *_windows(plan),
     ]
+    settles = {line.axis: settling(line.axis, line.drive, schedule) for line in plan.lines}
     for line in plan.lines:
         lines += ["", f"{line.axis} drive"]
         lines += [f"  {label:<18}{value}" for label, value in drive_lines(line)]
-        settles = settling(line.axis, line.drive, schedule)
-        for i, text in enumerate([] if settles is None else settling_text(settles)):
+        one = settles[line.axis]
+        texts = [f"not known: there is no operator of {line.axis}"] if any(settles.values()) else []
+        for i, text in enumerate(texts if one is None else settling_text(one)):
             lines.append(f"  {'' if i else 'settles':<18}{text}")
         lines += [f"{line.axis} certificate"]
         lines += [f"  {label:<18}{value}" for label, value in certificate_lines(certificates[line.axis])]

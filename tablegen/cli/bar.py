@@ -1,4 +1,4 @@
-"""How far an upload is, on a terminal."""
+"""How far an upload, or a batch of images, is, on a terminal."""
 
 import sys
 import time
@@ -14,11 +14,11 @@ _REDRAW_S = 0.1
 class Bar:
     """A line on stderr with rate and time left; nothing where stderr is no terminal.
 
-    Call it with the bytes that are done and with all.
+    Call it with the bytes that are done and with all; or with images, or whatever ``unit`` says.
     """
 
-    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        self._clock = clock
+    def __init__(self, clock: Callable[[], float] = time.monotonic, unit: str = "bytes") -> None:
+        self._clock, self._unit = clock, unit
         self._shows = sys.stderr is not None and sys.stderr.isatty()
         self._start: tuple[float, int] | None = None
         self._shown_at = 0.0
@@ -35,6 +35,12 @@ class Bar:
         self._shown_at = now
         redraw(f"{self._text(now, done, total):<{_WIDTH}}")
 
+    def hide(self) -> None:
+        """Take the line away until the next call, for a message."""
+        if self._start is not None:
+            erase(_WIDTH)
+            self._shown_at = 0.0
+
     def close(self) -> None:
         """Take the line away again."""
         if self._start is not None:
@@ -44,7 +50,10 @@ class Bar:
     def _text(self, now: float, done: int, total: int) -> str:
         assert self._start is not None
         full = _BAR_WIDTH * done // total
-        text = f"[{'#' * full}{'.' * (_BAR_WIDTH - full)}] {done}/{total} bytes"
+        text = f"[{'#' * full}{'.' * (_BAR_WIDTH - full)}] {done}/{total} {self._unit}"
+        if self._unit != "bytes":
+            seconds, first = now - self._start[0], self._start[1]
+            return f"{text}  {seconds / (done - first) * (total - done):.0f} s left" if done > first else text
         if done == total:
             return f"{text}  checked, then waiting for a line"
         seconds, first = now - self._start[0], self._start[1]

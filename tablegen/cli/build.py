@@ -124,7 +124,7 @@ def build(
     for name in kept:
         click.echo(f"note: {_leftover(output / name)}", err=True)
     if not quiet:
-        from tablegen.cli.report import certificate_table
+        from tablegen.cli.tables import certificate_table
 
         click.echo("\n".join(certificate_table(built.plan, built.certificates)))
         click.echo(f"\n{output}: {_state(built, changed)}")

@@ -2,12 +2,13 @@
 
 import json
 from collections.abc import Sequence
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from tablegen.cli.calibration_run import Common, full_scale, read_columns, scanner_axis, shared_options
+from tablegen.cli.calibration_run import Common, full_scale, in_file, read_columns, scanner_axis, shared_options
 from tablegen.cli.common import fail, written
 from tablegen.cli.exit_status import ExitStatus
 from tablegen.cli.image_samples import (
@@ -20,9 +21,11 @@ from tablegen.cli.image_samples import (
     sample_options,
     taking_of,
 )
+from tablegen.cli.sensor_delay import delay_of, delay_option
 from tablegen.reading import CONFIGURATION, read_text
 
 if TYPE_CHECKING:
+    from tablegen.calibration.estimate import Estimate
     from tablegen.calibration.image_files import ScanImage
     from tablegen.calibration.image_sizes import SampleImage
     from tablegen.calibration.operator.advice import NextTrace
@@ -37,6 +40,7 @@ _MEASURES = "    rms   scaling  mismatch"
 @click.command(cls=CommandOfOperatorPairs, short_help="Identify an operator of the piezo from sensor traces or images.")
 @shared_options
 @click.argument("data", type=click.Path(path_type=Path), metavar="[DATA.CSV]...", nargs=-1)
+@delay_option
 @image_option(
     "VOLTS OFFSET_V RATE_HZ",
     3,
@@ -48,6 +52,7 @@ _MEASURES = "    rms   scaling  mismatch"
 def operator(
     common: Common,
     data: tuple[Path, ...],
+    delay_s: str,
     images: tuple[tuple[float, float, float, Path, Path], ...],
     **given: Any,
 ) -> int:
@@ -67,23 +72,28 @@ def operator(
     In place of a trace, or beside traces, a pair of images of a lattice or a grating of known constant does, from turn
     to turn of a triangle: --pair.
 
-    Calibrate `resonance` and `offset` first: their parts of the scanner file are used.
+    Calibrate `resonance` and `offset` first: their parts of the scanner file are used. `--delay-s fit` needs drives
+    with sharp turns, as triangles have.
 
     \b
     Examples:
       tablegen calibrate operator --axis x 10v.csv 25v.csv 50v.csv 75v.csv 97v.csv --scanner scanner.toml --write
     """
     from tablegen.calibration.columns import DISPLACEMENT, DRIVE, TIME, TRACE
+    from tablegen.calibration.estimate import Estimate
     from tablegen.calibration.operator.advice import next_trace
+    from tablegen.calibration.operator.delay import fit_delay
     from tablegen.calibration.operator.fit import fit_operator
     from tablegen.calibration.operator.periodic_line import periodic_line
+    from tablegen.calibration.operator.units import check_size
     from tablegen.calibration.traces import split_traces
     from tablegen.problems import Unphysical
 
-    if common.plot is not None:
-        raise click.UsageError("--plot is not available for operator")
+    wanted_delay = delay_of(delay_s)
     if not data and not images:
         raise click.UsageError("give traces, DATA.CSV..., or images with --pair VOLTS OFFSET_V RATE_HZ TRACE RETRACE")
+    if not data and wanted_delay is None:
+        raise click.UsageError("--delay-s fit is for traces of a sensor; images have --delay-pixels")
     if not images:
         refuse_sample(given)
     tables = [read_columns(path, [TIME, DRIVE, DISPLACEMENT], [TRACE]) for path in data]
@@ -97,20 +107,57 @@ def operator(
                 lines.append(periodic_line(trace, v_max))
             except Unphysical as reason:
                 fail([f"{table.file}: {trace.name}: {reason}"], ExitStatus.WRONG_INPUT)
-    lines += _imaged(images, pairs, v_max, given)
     sources: list[MeasuredTable | ScanImage] = [*tables, *(one for _, files in pairs for one in files)]
     try:
+        delay = fit_delay(lines, response) if wanted_delay is None else Estimate(wanted_delay)
+        lines = [line.earlier(delay.value) for line in lines]
+        lines += _imaged(images, pairs, v_max, given)
+        if (k := in_file(common, "size", "k_nm_per_v")) is not None:
+            check_size(lines, k * v_max, f"k_nm_per_v = {k:g} of {common.scanner}")
         fit = fit_operator(lines, response, lambda centre: offset_law.factor(2.0 * centre - 1.0))
     except Unphysical as reason:
         fail([f"{', '.join(table.file for table in sources)}: {reason}"], ExitStatus.WRONG_INPUT)
     further = next_trace(fit, lines, v_max)
     if common.as_json:
-        click.echo(json.dumps(_record(fit, lines, further, common.axis, sources), indent=2, allow_nan=False))
+        click.echo(json.dumps(_record(fit, lines, further, common.axis, sources, delay), indent=2, allow_nan=False))
     else:
-        click.echo("\n".join(_text(fit, lines, further, common.axis, v_max)))
+        click.echo("\n".join(_text(fit, lines, further, common.axis, v_max, delay)))
+    if common.plot is not None:
+        from tablegen.calibration.operator.figure import draw_operator
+
+        kind: Any = common.plot.suffix[1:]
+        written(common.plot.parent, {common.plot.name: draw_operator(fit, lines, further, v_max, kind)})
+    if common.report is not None:
+        written(common.report.parent, {common.report.name: _page(fit, lines, further, common.axis, v_max, sources)})
     if common.write:
-        _write(common, fit, sources, v_max)
+        _write(common, fit, sources, v_max, delay)
     return ExitStatus.OK
+
+
+def _page(
+    fit: "OperatorFit",
+    lines: "Sequence[PeriodicLine]",
+    further: "NextTrace",
+    axis: str,
+    v_max: float,
+    sources: "Sequence[MeasuredTable | ScanImage]",
+) -> bytes:
+    """The same as a page."""
+    from tablegen.report.fitted import operator_page
+
+    traces = [
+        (
+            line.name,
+            (
+                *(line.stroke * v_max, line.centre * v_max, line.rate_hz, left.rms, left.scaling, left.mismatch),
+                *(out.rms, out.scaling, out.mismatch, out.size),
+            ),
+        )
+        for line, left, out in zip(lines, fit.left, fit.left_out, strict=True)
+    ]
+    advice = f"a trace of {further.size_v:.3g} V at {further.offset_v:.3g} V would help most"
+    files = list(dict.fromkeys(one.source for one in sources))
+    return operator_page(axis, fit.family, [*fit.candidates.items()], traces, advice, files)
 
 
 def _imaged(
@@ -136,7 +183,12 @@ def _imaged(
 
 
 def _text(
-    fit: "OperatorFit", lines: "Sequence[PeriodicLine]", further: "NextTrace", axis: str, v_max: float
+    fit: "OperatorFit",
+    lines: "Sequence[PeriodicLine]",
+    further: "NextTrace",
+    axis: str,
+    v_max: float,
+    delay: "Estimate",
 ) -> list[str]:
     """What was found, what it leaves of every trace, and what to measure next."""
     creep = fit.operator.creep
@@ -146,6 +198,7 @@ def _text(
         "",
         f"family   {fit.family}  (mean rms of a trace left out: {tried})",
         f"creep    {100.0 * creep.loss_per_decade:.2g} % a decade",
+        *_delay_text(delay),
         "",
         f"{'':41}  {'in the fit':<23}   left out",
         f"size [V]  offset [V]  rate [Hz]  noise [%]{_MEASURES}  {_MEASURES}  size [%]  trace",
@@ -167,12 +220,20 @@ def _text(
     return out
 
 
+def _delay_text(delay: "Estimate") -> list[str]:
+    """Nothing where there is none."""
+    if isfinite(delay.standard_error):
+        return [f"delay    {1e6 * delay.value:.3g} us of the sensor, fitted, +- {1e6 * delay.standard_error:.2g} us"]
+    return [f"delay    {1e6 * delay.value:.3g} us of the sensor, as given"] if delay.value else []
+
+
 def _record(
     fit: "OperatorFit",
     lines: "Sequence[PeriodicLine]",
     further: "NextTrace",
     axis: str,
     tables: "Sequence[MeasuredTable | ScanImage]",
+    delay: "Estimate",
 ) -> dict[str, Any]:
     """The same for programs."""
     from tablegen.compensation.models.operator import OperatorModel
@@ -199,13 +260,23 @@ def _record(
         "family": fit.family,
         "candidates_percent": dict(fit.candidates),
         "creep_loss_per_decade": fit.operator.creep.loss_per_decade,
+        "delay_s": {
+            "value": delay.value,
+            "standard_error": delay.standard_error if isfinite(delay.standard_error) else None,
+        },
         "traces": traces,
         "next_trace": {"size_v": further.size_v, "offset_v": further.offset_v, "rate_hz": further.rate_hz},
         "sources": [{"file": table.source.name, "sha256": table.source.sha256} for table in tables],
     }
 
 
-def _write(common: Common, fit: "OperatorFit", tables: "Sequence[MeasuredTable | ScanImage]", v_max: float) -> None:
+def _write(
+    common: Common,
+    fit: "OperatorFit",
+    tables: "Sequence[MeasuredTable | ScanImage]",
+    v_max: float,
+    delay: "Estimate",
+) -> None:
     """The operator's file, then the scanner file that names it."""
     from tablegen.calibration.operator.record import operator_file
     from tablegen.calibration.scanner_file import Change, new_file, updated
@@ -216,6 +287,7 @@ def _write(common: Common, fit: "OperatorFit", tables: "Sequence[MeasuredTable |
     name = str(common.scanner)
     beside = common.scanner.with_name(f"{common.scanner.stem}_{common.axis}_operator.toml")
     sources = list(dict.fromkeys(f"from {t.source.name}, sha256 {t.source.sha256}" for t in tables))
+    sources += [f"delay of the sensor: {delay.value:.6g} s"] if delay.value else []
     content = operator_file(fit, common.axis, v_max, sources)
     try:
         path = common.scanner.resolve()

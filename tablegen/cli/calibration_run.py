@@ -39,6 +39,7 @@ class Common:
     write: bool
     force: bool
     plot: Path | None
+    report: Path | None
     as_json: bool
 
 
@@ -70,6 +71,12 @@ def shared_options(command: F) -> F:
             metavar="FILE",
             help="Plot the data and the fit to FILE: .png, .svg or .pdf.",
         ),
+        click.option(
+            "--report",
+            type=OutputFile(),
+            metavar="FILE",
+            help="Write parameters, standard errors, outliers and plots to FILE as an HTML page.",
+        ),
         click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text."),
     ]
 
@@ -80,6 +87,7 @@ def shared_options(command: F) -> F:
         write: bool,
         force: bool,
         plot: Path | None,
+        report: Path | None,
         as_json: bool,
         **rest: Any,
     ) -> Any:
@@ -93,7 +101,7 @@ def shared_options(command: F) -> F:
             if plot.suffix not in (".png", ".svg", ".pdf"):
                 raise click.UsageError(f"--plot {plot}: the name has to end in .png, .svg or .pdf")
             require("matplotlib", extra="plot")
-        return command(common=Common(axis, scanner, v_max, write, force, plot, as_json), **rest)
+        return command(common=Common(axis, scanner, v_max, write, force, plot, report, as_json), **rest)
 
     run.__doc__, run.__name__ = command.__doc__, command.__name__
     for option in reversed(options):
@@ -240,6 +248,11 @@ def finish(
 
         kind: Any = common.plot.suffix[1:]
         written(common.plot.parent, {common.plot.name: draw(fit.curves, kind)})
+    if common.report is not None:
+        from tablegen.report.fitted import fit_page
+
+        places = [_place(tables[0], at) for at in fit.outliers]
+        written(common.report.parent, {common.report.name: fit_page(fit, common.axis, sources, places, points)})
     if common.write:
         meaningless = doubts(fit, points)
         if meaningless and not common.force:
@@ -248,6 +261,14 @@ def finish(
             fail([*(f"{where}: {doubt}" for doubt in meaningless), f"{where}: {advice}"], ExitStatus.WRONG_INPUT)
         _write(common, fit, tables, points, bool(meaningless))
     return ExitStatus.OK
+
+
+def _place(table: "MeasuredTable | ScanImage", at: int) -> str:
+    """File and line of a point."""
+    from tablegen.calibration.table import MeasuredTable
+
+    name = table.source.name
+    return f"{name}:{table.lines[at]}" if isinstance(table, MeasuredTable) else name
 
 
 def _write(

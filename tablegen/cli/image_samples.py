@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 F = TypeVar("F", bound=Callable[..., Any])
 IMAGE_NAMES = ("--image", "--images")
 PAIR_NAME = "--pair"
-_NO_RETRACE = Path()  # where RETRACE was left out
+NO_RETRACE = Path()  # where RETRACE was left out
 _POSITIVE = click.FloatRange(min=0.0, min_open=True)
 
 
@@ -43,7 +43,7 @@ class CommandOfImages(click.Command):
             words.append(word)
             ends = at + 1 == len(args) or args[at + 1].startswith("--")
             if ends and any(at > volts and args[at - volts - 1] == name for name, volts in self.images):
-                words.append(str(_NO_RETRACE))
+                words.append(str(NO_RETRACE))
         return super().parse_args(ctx, words)
 
 
@@ -53,44 +53,62 @@ class CommandOfOperatorPairs(CommandOfImages):
     images = ((PAIR_NAME, 3),)
 
 
+class CommandOfRunningImages(CommandOfImages):
+    """``--images`` without a voltage: the scan file has it."""
+
+    images = (("--images", 0),)
+
+
 class CommandOfOffsetImages(CommandOfImages):
     """The same with a scan voltage and an offset before the files."""
 
     images = (*((name, 2) for name in IMAGE_NAMES),)
 
 
+_CONSTANTS = [
+    click.option(
+        "--lattice-nm", type=_POSITIVE, metavar="NM", help="Lattice constant of the sample in the images, in nm."
+    ),
+    click.option(
+        "--lattice",
+        type=click.Choice(("hexagonal", "square")),
+        default="hexagonal",
+        show_default=True,
+        help="Kind of the lattice of --lattice-nm.",
+    ),
+    click.option(
+        "--cell",
+        type=(_POSITIVE, _POSITIVE, click.FloatRange(20.0, 160.0)),
+        metavar="A B GAMMA",
+        help="Any other lattice: the sides of its cell in nm, and the angle between them in degrees.",
+    ),
+    click.option(
+        "--pitch-nm",
+        type=_POSITIVE,
+        metavar="NM",
+        help="Pitch of a grating, in nm. With --lattice-nm, images may be of either.",
+    ),
+    click.option(
+        "--angle-deg",
+        type=(float, click.FloatRange(min=0.0)),
+        metavar="DEG ERROR",
+        help="Angle between the fast axis and the normal of a grating's bars, and its standard error, in degrees.  "
+        "[default: that of the rows]",
+    ),
+]
+
+
+def constant_options(command: F) -> F:
+    """Add what says of the sample alone; ``sample_of`` reads it."""
+    for option in reversed(_CONSTANTS):
+        command = option(command)
+    return command
+
+
 def sample_options(command: F) -> F:
     """Add what says of the sample and of the images; ``sample_of`` and ``taking_of`` read it."""
     options = [
-        click.option(
-            "--lattice-nm", type=_POSITIVE, metavar="NM", help="Lattice constant of the sample in the images, in nm."
-        ),
-        click.option(
-            "--lattice",
-            type=click.Choice(("hexagonal", "square")),
-            default="hexagonal",
-            show_default=True,
-            help="Kind of the lattice of --lattice-nm.",
-        ),
-        click.option(
-            "--cell",
-            type=(_POSITIVE, _POSITIVE, click.FloatRange(20.0, 160.0)),
-            metavar="A B GAMMA",
-            help="Any other lattice: the sides of its cell in nm, and the angle between them in degrees.",
-        ),
-        click.option(
-            "--pitch-nm",
-            type=_POSITIVE,
-            metavar="NM",
-            help="Pitch of a grating, in nm. With --lattice-nm, images may be of either.",
-        ),
-        click.option(
-            "--angle-deg",
-            type=(float, click.FloatRange(min=0.0)),
-            metavar="DEG ERROR",
-            help="Angle between the fast axis and the normal of a grating's bars, and its standard error, in degrees.  "
-            "[default: that of the rows]",
-        ),
+        *_CONSTANTS,
         click.option(
             "--aspect",
             type=click.FloatRange(0.02, 50.0),
@@ -155,12 +173,12 @@ def read_sample_image(
     from tablegen.problems import Rejected
 
     channel, retrace_channel, frame = (given[name] for name in ("channel", "retrace_channel", "frame"))
-    require_readers({trace} if retrace == _NO_RETRACE else {trace, retrace})
+    require_readers({trace} if retrace == NO_RETRACE else {trace, retrace})
     try:
-        if retrace == _NO_RETRACE and retrace_channel is None and not _has_retrace(trace, channel):
+        if retrace == NO_RETRACE and retrace_channel is None and not _has_retrace(trace, channel):
             read = [read_image(trace, channel, "trace", frame)]
         else:
-            second = None if retrace == _NO_RETRACE else retrace
+            second = None if retrace == NO_RETRACE else retrace
             read = list(read_pair(trace, second, channel, retrace_channel, frame))
     except Rejected as rejected:
         fail(rejected.problems, ExitStatus.WRONG_INPUT)

@@ -1,4 +1,4 @@
-"""``tablegen refine``: a trace of the running scan to a layer over the model, by iterative learning."""
+"""``tablegen refine``: a trace or images of the running scan to a layer over the model, by iterative learning."""
 
 import json
 import os
@@ -9,6 +9,8 @@ import click
 
 from tablegen.cli.common import OutputFile, fail, finite, require, scan_argument, written
 from tablegen.cli.exit_status import ExitStatus
+from tablegen.cli.image_samples import CommandOfRunningImages
+from tablegen.cli.refine_images import ImageArguments, image_options
 from tablegen.reading import CONFIGURATION, read_text
 
 if TYPE_CHECKING:
@@ -19,17 +21,20 @@ _FORMATS = (".png", ".svg", ".pdf")
 
 
 @click.command(
-    short_help="Correct remaining scan errors from a sensor trace.",
+    cls=CommandOfRunningImages,
+    short_help="Correct remaining scan errors from a sensor trace or images.",
     epilog="""\b
 Examples:
   tablegen refine scan.toml trace.csv --axis x            print the errors; write nothing
   tablegen refine scan.toml trace.csv --axis x --write    write the correction to scan.toml
+  tablegen refine scan.toml --images t.gwy r.gwy --axis x --write
 
 Exit status: 0 done, 2 wrong input, 4 cannot write, 6 a library is missing.""",
 )
 @scan_argument
-@click.argument("trace", type=click.Path(path_type=Path), metavar="TRACE.CSV")
+@click.argument("trace", type=click.Path(path_type=Path), metavar="[TRACE.CSV]", required=False)
 @click.option("--axis", type=click.Choice(("x", "y")), required=True, help="The axis that was measured.")
+@image_options
 @click.option("--write", is_flag=True, help="Write the correction to SCAN.TOML.")
 @click.option(
     "--gain",
@@ -89,11 +94,13 @@ Exit status: 0 done, 2 wrong input, 4 cannot write, 6 a library is missing.""",
     metavar="FILE",
     help="Plot the errors to FILE: .png, .svg or .pdf.",
 )
+@click.option("--report", type=OutputFile(), metavar="FILE", help="Write the round to FILE as an HTML page.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")
 def refine(
     scan: Path,
-    trace: Path,
+    trace: Path | None,
     axis: Literal["x", "y"],
+    images: "ImageArguments",
     write: bool,
     gain: float,
     harmonics: int | None,
@@ -104,16 +111,30 @@ def refine(
     drift: int | None,
     force: bool,
     plot: Path | None,
+    report: Path | None,
     as_json: bool,
 ) -> int:
-    """Correct the scan errors that the scanner model leaves, by iterative learning from a displacement sensor.
+    """Correct the scan errors that the scanner model leaves, by iterative learning from the running scan.
 
     \b
-    1. Record several periods of the running scan in TRACE.CSV.
+    1. Record several periods of the running scan with a displacement sensor in TRACE.CSV.
        Columns: time_s, displacement_nm, drive_v.
+       Or take trace and retrace of a grating or a lattice: --images.
     2. Run this command with --write. It writes the correction to [AXIS.refinement] of SCAN.TOML.
     3. Build, upload, and record again. Two or three rounds are usually enough.
     """
+    of_traces = [
+        name
+        for name, given in (
+            ("--triggered", triggered),
+            ("--period-s", period_s),
+            ("--delay-s", delay_s),
+            ("--settle", settle is not None),
+            ("--drift", drift is not None),
+        )
+        if given
+    ]
+    images.check(trace, of_traces)
     if period_s is not None and not triggered:
         raise click.UsageError("--period-s is for --triggered; otherwise drive_v has the period")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -125,30 +146,41 @@ def refine(
     from tablegen.refinement.round import Options
 
     options = Options(gain, harmonics, period_s, delay_s, settle, drift)
-    found, source, text = _learn(scan, trace, axis, triggered, options)
+    if trace is None:
+        found, sources, text = images.learn(scan, axis, options)
+        files = images.names
+    else:
+        found, sources, text = _learn(scan, trace, axis, triggered, options)
+        files = str(trace)
     from tablegen.cli.refine_text import refine_record, refine_text
 
     name = found.setup.scan.name
     if as_json:
-        click.echo(json.dumps(refine_record(found, name, source), indent=2, allow_nan=False))
+        click.echo(json.dumps(refine_record(found, name, sources), indent=2, allow_nan=False))
     else:
-        click.echo("\n".join(refine_text(found, name, source)))
+        click.echo("\n".join(refine_text(found, name, sources)))
     if plot is not None:
         from tablegen.calibration.figure import draw
 
         kind: Any = plot.suffix[1:]
         written(plot.parent, {plot.name: draw(found.curves, kind)})
-    refused = found.worse or _learnt_before(scan, axis, found, source, text)
+    refused = found.worse or _learnt_before(scan, axis, found, sources, text)
+    if report is not None:
+        from tablegen.refinement.scan_file import rounds_of
+        from tablegen.report.learnt import round_page
+
+        earlier = rounds_of(text, str(scan), axis) if found.line.layer is not None else []
+        written(report.parent, {report.name: round_page(found, name, sources, earlier, refused)})
     if refused and not force:
-        fail([f"{trace}: {refused}"], ExitStatus.WRONG_INPUT)
+        fail([f"{files}: {refused}"], ExitStatus.WRONG_INPUT)
     if write:
-        _write(scan, axis, found, source, text, as_json)
+        _write(scan, axis, found, sources, text, as_json)
     return ExitStatus.OK
 
 
 def _learn(
     scan: Path, trace: Path, axis: Literal["x", "y"], triggered: bool, options: "Options"
-) -> "tuple[Round, Source, str]":
+) -> "tuple[Round, list[Source], str]":
     """The round, where the trace came from, and the text of the scan file that was planned."""
     from tablegen.config.load import load
     from tablegen.problems import Rejected, Unphysical
@@ -168,16 +200,20 @@ def _learn(
         fail([f"{trace}: {reason}"], ExitStatus.WRONG_INPUT)
     except OSError as error:
         fail([f"{scan}: {error.strerror or error}"], ExitStatus.WRONG_INPUT)
-    return found, table.source, text
+    return found, [table.source], text
 
 
-def _learnt_before(scan: Path, axis: str, found: "Round", source: "Source", text: str) -> str:
-    """Whether the layer of the file rests on this very trace: it was then recorded without what was learnt from it."""
+def _learnt_before(scan: Path, axis: str, found: "Round", sources: "list[Source]", text: str) -> str:
+    """Whether the layer of the file rests on these very files: they were recorded without what was learnt from them."""
     from tablegen.refinement.scan_file import rounds_of
 
-    if found.line.layer is None or not any(source.sha256 in row for row in rounds_of(text, str(scan), axis)):
+    if found.line.layer is None:
         return ""
-    return f"[{axis}.refinement] was already learnt from this trace; build, upload and record again"
+    rows = rounds_of(text, str(scan), axis)
+    if not any(source.sha256 in row for row in rows for source in sources):
+        return ""
+    what = "this trace" if len(sources) == 1 else "these images"
+    return f"[{axis}.refinement] was already learnt from {what}; build, upload and record again"
 
 
 def _read(trace: Path, triggered: bool) -> "MeasuredTable":
@@ -192,7 +228,7 @@ def _read(trace: Path, triggered: bool) -> "MeasuredTable":
     return table
 
 
-def _write(scan: Path, axis: str, found: "Round", source: "Source", text: str, quiet: bool) -> None:
+def _write(scan: Path, axis: str, found: "Round", sources: "list[Source]", text: str, quiet: bool) -> None:
     import msgspec
 
     from tablegen.cli.refine_text import provenance
@@ -202,10 +238,11 @@ def _write(scan: Path, axis: str, found: "Round", source: "Source", text: str, q
     if found.refinement is None or not found.lesson.harmonics:
         click.echo(f"{scan}: not changed", err=quiet)
         return
-    values = msgspec.json.decode(msgspec.json.encode(found.refinement))  # as a file has it
+    plain = msgspec.json.decode(msgspec.json.encode(found.refinement))
+    values = {key: value for key, value in plain.items() if value is not None}  # as a file has it
     try:
         path = scan.resolve()
-        content = with_layer(text, str(scan), axis, values, provenance(found, source)).encode("utf-8")
+        content = with_layer(text, str(scan), axis, values, provenance(found, sources)).encode("utf-8")
     except Rejected as rejected:
         fail(rejected.problems, ExitStatus.WRONG_INPUT)
     written(path.parent, {path.name: content})

@@ -1,5 +1,6 @@
 """A round of refinement for the terminal, and as plain data."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -7,15 +8,15 @@ import numpy as np
 from tablegen.calibration.table import Source
 from tablegen.cli.scatter import scatter
 from tablegen.refinement.departure import Departure
-from tablegen.refinement.round import Round
+from tablegen.refinement.image_round import ImageRound, MismatchRound
+from tablegen.refinement.round import Round, TraceRound
 
 
-def refine_text(found: Round, name: str, source: Source) -> list[str]:
+def refine_text(found: Round, name: str, sources: Sequence[Source]) -> list[str]:
     """Lines of text."""
-    line, measured, lesson = found.line, found.displacement, found.lesson
+    lesson = found.lesson
     lines = [
-        f"{name}, {line.axis}: {measured.periods:.4g} periods of {found.phase.period_s:.6g} s, "
-        f"{measured.samples} samples of {source.name}",
+        f"{name}, {found.line.axis}: {_what(found, sources)}",
         "",
         "                        residual [% of the line]   scaling error",
         "direction                    rms      largest      [% peak to peak]",
@@ -27,6 +28,7 @@ def refine_text(found: Round, name: str, source: Source) -> list[str]:
     lines += [
         f"its noise{'':<14}{lesson.noise_percent:8.4f}{'':<20}{lesson.chord_noise_percent:8.3f} rms of a chord",
         "",
+        *_size(found),
         *_learnt(found),
         *_bound(found),
         "",
@@ -34,6 +36,24 @@ def refine_text(found: Round, name: str, source: Source) -> list[str]:
     for curve in found.curves:
         lines += [*scatter(curve), ""]
     return lines + [f"note: {remark}" for remark in found.remarks]
+
+
+def _what(found: Round, sources: Sequence[Source]) -> str:
+    """What was measured."""
+    names = " and ".join(source.name for source in sources[:2]) + (" and others" if len(sources) > 2 else "")
+    return f"{found.recorded}{'' if isinstance(found, TraceRound) else ','} of {names}"
+
+
+def _size(found: Round) -> list[str]:
+    """The length of x's line by the constant of the sample."""
+    if not isinstance(found, ImageRound) or found.size is None:
+        return []
+    size, asked = found.size.nm, found.asked_nm
+    by = 100.0 * (size.value / asked - 1.0)
+    return [
+        f"size of x: {size.value:.5g} +- {size.standard_error:.2g} nm from turn to turn, asked {asked:.5g} nm: "
+        f"{by:+.3g} +- {100.0 * size.standard_error / asked:.2g} %"
+    ]
 
 
 def _learnt(found: Round) -> list[str]:
@@ -64,9 +84,9 @@ def _bound(found: Round) -> list[str]:
     return lines
 
 
-def refine_record(found: Round, name: str, source: Source) -> dict[str, Any]:
+def refine_record(found: Round, name: str, sources: Sequence[Source]) -> dict[str, Any]:
     """The same as plain data, for JSON."""
-    line, measured, lesson, b = found.line, found.displacement, found.lesson, found.bound
+    line, lesson, b = found.line, found.lesson, found.bound
 
     def errors(departure: Departure) -> dict[str, Any]:
         sides = departure.residual_percent
@@ -85,15 +105,7 @@ def refine_record(found: Round, name: str, source: Source) -> dict[str, Any]:
     return {
         "scan": name,
         "axis": line.axis,
-        "source": {"name": source.name, "sha256": source.sha256},
-        "period_s": found.phase.period_s,
-        "periods": measured.periods,
-        "samples": measured.samples,
-        "left_out": measured.left_out,
-        "size_nm": abs(lesson.before.size_nm),
-        "asked_nm": line.drive.size_nm,
-        "noise": {"reading_nm": measured.noise_nm, "position_percent": lesson.noise_percent},
-        "drift_nm": measured.drift_nm,
+        **_measurement(found, sources),
         "measured": errors(lesson.before),
         "predicted": errors(lesson.after),
         "harmonics": lesson.harmonics,
@@ -113,15 +125,66 @@ def refine_record(found: Round, name: str, source: Source) -> dict[str, Any]:
     }
 
 
-def provenance(found: Round, source: Source) -> str:
+def _measurement(found: Round, sources: Sequence[Source]) -> dict[str, Any]:
+    """What differs between a trace and images."""
+    plain = [{"name": source.name, "sha256": source.sha256} for source in sources]
+    line, lesson = found.line, found.lesson
+    if isinstance(found, TraceRound):
+        measured = found.displacement
+        return {
+            "source": plain[0],
+            "period_s": found.phase.period_s,
+            "periods": measured.periods,
+            "samples": measured.samples,
+            "left_out": measured.left_out,
+            "size_nm": abs(lesson.before.size_nm),
+            "asked_nm": line.drive.size_nm,
+            "noise": {"reading_nm": measured.noise_nm, "position_percent": lesson.noise_percent},
+            "drift_nm": measured.drift_nm,
+        }
+    if isinstance(found, ImageRound | MismatchRound):
+        geometry = found.frames[0].geometry
+        shared = {
+            "images": [{"trace": trace, "retrace": retrace} for trace, retrace in zip(*[iter(plain)] * 2, strict=True)],
+            "rows": geometry.rows,
+            "columns": geometry.columns,
+            "noise": {"position_percent": lesson.noise_percent},
+        }
+    if isinstance(found, MismatchRound):
+        return {**shared, "mismatch": True, "match": min(frame.match for frame in found.frames)}
+    if isinstance(found, ImageRound):
+        first = found.frames[0]
+        return {
+            **shared,
+            "mismatch": False,
+            "periods_of_the_sample": found.periods,
+            "waves": len(first.fit.state.q),
+            "periodic_share": min(first.fit.explained),
+            "asked_nm": found.asked_nm,
+            "size_nm": None if found.size is None else found.size.nm.value,
+            "size_standard_error_nm": None if found.size is None else found.size.nm.standard_error,
+        }
+    raise TypeError(type(found).__name__)
+
+
+def provenance(found: Round, sources: Sequence[Source]) -> str:
     """The line of the comment that says what a round rests on; no date."""
-    measured, lesson = found.displacement, found.lesson
-    name = source.name if source.name.isprintable() else ascii(source.name)
-    said = [
-        f"{name}, sha256 {source.sha256}",
-        f"{measured.periods:.4g} periods",
-        f"residual {lesson.before.rms_percent:.3g} % rms",
-        f"harmonics to {lesson.harmonics}",
-        f"gain {found.bound.gain:g}",
-    ]
-    return ", ".join(said)
+    lesson = found.lesson
+    said = []
+    for source in sources:
+        name = source.name if source.name.isprintable() else ascii(source.name)
+        said.append(f"{name}, sha256 {source.sha256}")
+    if isinstance(found, TraceRound):
+        said.append(f"{found.displacement.periods:.4g} periods")
+    if isinstance(found, ImageRound):
+        said.append(f"{found.periods:.4g} periods in the line")
+    if isinstance(found, MismatchRound):
+        said.append("trace against retrace")
+    return ", ".join(
+        [
+            *said,
+            f"residual {lesson.before.rms_percent:.3g} % rms",
+            f"harmonics to {lesson.harmonics}",
+            f"gain {found.bound.gain:g}",
+        ]
+    )

@@ -1,117 +1,143 @@
-"""Tables and plots for the terminal."""
+"""``tablegen report``: a scan or a build as one page to look at and to pass on."""
 
-from collections.abc import Iterator, Sequence
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
 
-import numpy as np
+import click
 
-from tablegen.certificate.certificate import Certificate
-from tablegen.certificate.summary import expected_lines, rate
-from tablegen.numerics.arrays import Floats
-from tablegen.planning.line_plan import LinePlan, Plan
+from tablegen.cli.common import OutputFile, OutputFolder, fail, require, written
+from tablegen.cli.exit_status import ExitStatus
+from tablegen.cli.progress import Progress
 
-_WIDTH, _HEIGHT = 64, 8  # characters; a braille character is 2 by 4 dots
-_BRAILLE = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))
-
-
-def certificate_table(plan: Plan, certificates: dict[str, Certificate]) -> list[str]:
-    """The certificate of both axes, a line an axis."""
-    schedule = plan.schedule
-    lines = [
-        f"{plan.name} on {plan.scanner!r}: {rate(schedule.line_rate)} lines of {schedule.ticks} ticks, "
-        f"{schedule.lines} lines a frame, {rate(schedule.frame_rate)} frames",
-        "",
-        "                      error [LSB]   scaling error in the window [%, peak to peak]",
-        "axis  drive [V p-p]    max    rms   direction  uncompensated  emitted  band limit  size   step/limit",
-    ]
-    for line in plan.lines:
-        certificate = certificates[line.axis]
-        for i, (side, error) in enumerate(certificate.scaling.items()):
-            start = f"{line.axis:<4}  {line.drive.v_amplitude:13.4f}  {certificate.max_error_lsb:5.3f}  "
-            start += f"{certificate.rms_error_lsb:5.3f}"
-            step = f"{certificate.largest_step}/{certificate.max_step}"
-            if i:
-                start, step = " " * len(start), ""
-            lines.append(
-                f"{start}   {side:<9}  {error.uncompensated:13.2f}  {error.total:7.3f}  {error.band_limit:10.4f}  "
-                f"{error.size:+.3f}  {step}".rstrip()
-            )
-    for line in plan.lines:
-        for side, moved in (certificates[line.axis].refinement or {}).items():
-            lines.append(
-                f"{line.axis:<4}  refinement, {side}: moves up to {moved.position:.3g} % of the line and takes away "
-                f"{moved.scaling:.3g} % of scaling error, peak to peak"
-            )
-        expected = certificates[line.axis].expected
-        if expected is not None and expected.basis == "traces":
-            told = expected_lines(expected)
-            lines += [
-                f"{line.axis if i == 0 else '':<4}  {'' if i else 'on the scanner':<14}  {text}"
-                for i, text in enumerate(told)
-            ]
-    return lines
+if TYPE_CHECKING:
+    from tablegen.report.chart import Chart
+    from tablegen.report.record import VerifyRecord
+    from tablegen.report.subject import Subject
 
 
-def plots(line: LinePlan, unicode: bool) -> list[str]:
-    """The drive of one period, and what the compensation adds to the uncompensated line."""
-    count = 4 * _WIDTH
-    t = np.arange(count) / count
-    w = line.series.value(t)
-    volts = line.drive.v_offset + line.drive.v_amplitude * (w - 0.5)
-    turn = line.drive.turn
-    triangle = np.where(t <= turn, t / turn, (1.0 - t) / (1.0 - turn))
-    marks = _window_marks(line)
-    imaged = np.array([mark != "-" for mark in marks]).repeat(count // _WIDTH)
-    if not imaged.any():  # a window narrower than a column
-        imaged[:] = True
-    added = np.where(imaged, 100.0 * (w - triangle), np.nan)
-    return [
-        f"{line.axis} drive [V]",
-        *_plot(volts, marks, unicode),
-        f"{line.axis} drive less the uncompensated line, where it images [% of the scan]",
-        *_plot(added, marks, unicode),
-    ]
+@click.command(short_help="Write an HTML page of a scan: errors, charts, certificate.")
+@click.argument("source", type=click.Path(path_type=Path), metavar="SCAN.TOML|DIR")
+@click.option(
+    "-o",
+    "--output",
+    type=OutputFile(),
+    default=Path("report.html"),
+    show_default=True,
+    metavar="FILE",
+    help="The page.",
+)
+@click.option(
+    "--verified",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Also show what `tablegen verify DIR --junit FILE` found.",
+)
+@click.option("--svg", type=OutputFolder(), metavar="DIR", help="Also write every chart as SVG into DIR.")
+@click.option("--png", type=OutputFolder(), metavar="DIR", help="The same as PNG; needs matplotlib.")
+@click.option("--pdf", type=OutputFolder(), metavar="DIR", help="The same as PDF; needs matplotlib.")
+@click.option(
+    "--figure",
+    "figures",
+    multiple=True,
+    metavar="NAME",
+    help="Write only this chart with --svg, --png, --pdf; repeat the option for several, such as drive-x.",
+)
+def report(
+    source: Path,
+    output: Path,
+    verified: Path | None,
+    svg: Path | None,
+    png: Path | None,
+    pdf: Path | None,
+    figures: tuple[str, ...],
+) -> int:
+    """Write one HTML file that shows a scan: what spoils the image first, the certificate with its limits, drive and
+    position, errors before and after, spectrum, corrections, usable sizes, calibration, and the files.
+
+    The file needs no network and no other file. Given a directory of `tablegen build`, the page shows what the
+    directory has: not the limits, not the errors on the scanner, not the calibration.
+
+    The page is written even if the certificate exceeds a limit, since it shows why.
+
+    \b
+    Examples:
+      tablegen report annexin_200nm.toml -o annexin.html
+      tablegen report build --verified verify.xml
+      tablegen report annexin_200nm.toml --svg charts --figure drive-x
+
+    Exit status: 0 written, 2 wrong input, 3 written, but a limit of the certificate is exceeded, 4 cannot write, 6 a
+    library is missing.
+    """
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    if output.suffix == ".toml":
+        raise click.UsageError(f"-o {output}: the page would replace a scan or a scanner file; give a name in .html")
+    if figures and not (svg or png or pdf):
+        raise click.UsageError("--figure needs --svg, --png or --pdf")
+    if png or pdf:
+        require("matplotlib", extra="plot", otherwise="; or write --svg, which needs nothing")
+    from tablegen.report.page import charts_of, page, sections
+
+    with Progress() as progress:
+        record = None if verified is None else _record(verified)
+        subject = _of_directory(source, record) if source.is_dir() else _of_scan(source, record, progress)
+        found = sections(subject, progress.now)
+        content = page(subject, found)
+        charts = _chosen(charts_of(found), figures)
+    written(output.parent, {output.name: content})
+    _write_charts(charts, svg, png, pdf)
+    click.echo(f"{output}: {len(content) / 1000:.0f} kB")
+    if subject.planned is not None and subject.planned.broken:
+        lines = [f"{output}: the certificate exceeds a limit", *subject.planned.broken]
+        fail(lines, ExitStatus.BROKEN_LIMIT)
+    return ExitStatus.OK
 
 
-def _window_marks(line: LinePlan) -> str:
-    """A character for each column: where the image is taken."""
-    low, high = line.band_limit.window
-    turn, marks = line.drive.turn, []
-    for column in range(_WIDTH):
-        t = (column + 0.5) / _WIDTH
-        forward = t <= turn
-        position = t / turn if forward else (1.0 - t) / (1.0 - turn)
-        images = low <= position <= high and (forward or line.band_limit.directions == "both")
-        marks.append((">" if forward else "<") if images else "-")
-    return "".join(marks)
+def _record(path: Path) -> "VerifyRecord":
+    from tablegen.report.record import read_record
+
+    try:
+        return read_record(path)
+    except OSError as error:
+        fail([f"{path}: cannot be read: {error.strerror or error}"], ExitStatus.WRONG_INPUT)
+    except ValueError as error:
+        fail([f"{path}: {error}"], ExitStatus.WRONG_INPUT)
 
 
-def _plot(values: Floats, marks: str, unicode: bool) -> list[str]:
-    low, high = float(np.nanmin(values)), float(np.nanmax(values))
-    span = high - low or 1.0
-    rows = _dots(values, low, span) if unicode else _stars(values, low, span)
-    labels = {0: f"{high:10.4g}", _HEIGHT - 1: f"{low:10.4g}"}
-    lines = [f"{labels.get(i, ''):>10} |{row}".rstrip() for i, row in enumerate(rows)]
-    return [*lines, " " * 11 + "+" + marks]
+def _of_directory(folder: Path, record: "VerifyRecord | None") -> "Subject":
+    from tablegen.manifest.read import NotABuild
+    from tablegen.report.subject import of_directory
+
+    try:
+        return of_directory(folder, record)
+    except NotABuild as error:
+        fail([error], ExitStatus.WRONG_INPUT)
 
 
-def _levels(values: Floats, low: float, span: float, height: int) -> Iterator[tuple[int, int]]:
-    """Index and row, from the top, of every value that is a number."""
-    for i, value in enumerate(values.tolist()):
-        if value == value:
-            yield i, round((1.0 - (value - low) / span) * (height - 1))
+def _of_scan(scan: Path, record: "VerifyRecord | None", progress: Progress) -> "Subject":
+    from tablegen.problems import Rejected
+    from tablegen.report.planned import planned_scan
+
+    try:
+        return planned_scan(scan, record, progress.now)
+    except Rejected as rejected:
+        fail(rejected.problems, ExitStatus.WRONG_INPUT)
 
 
-def _dots(values: Floats, low: float, span: float) -> Sequence[str]:
-    cells = np.zeros((_HEIGHT, _WIDTH), dtype=np.int64)
-    tall, wide = 4 * _HEIGHT, 2 * _WIDTH
-    for i, level in _levels(values, low, span, tall):
-        column = i * wide // len(values)
-        cells[level // 4, column // 2] |= _BRAILLE[level % 4][column % 2]
-    return ["".join(chr(0x2800 + cell) if cell else " " for cell in row) for row in cells]
+def _chosen(charts: "dict[str, Chart]", wanted: tuple[str, ...]) -> "dict[str, Chart]":
+    unknown = [name for name in wanted if name not in charts]
+    if unknown:
+        raise click.UsageError(f"--figure {unknown[0]}: the page has no such chart; it has {', '.join(charts)}")
+    return {name: charts[name] for name in wanted} if wanted else charts
 
 
-def _stars(values: Floats, low: float, span: float) -> Sequence[str]:
-    grid = [[" "] * _WIDTH for _ in range(_HEIGHT)]
-    for i, level in _levels(values, low, span, _HEIGHT):
-        grid[level][i * _WIDTH // len(values)] = "*"
-    return ["".join(row) for row in grid]
+def _write_charts(charts: "dict[str, Chart]", svg: Path | None, png: Path | None, pdf: Path | None) -> None:
+    if svg is not None:
+        from tablegen.report.svg import standalone
+
+        written(svg, {f"{name}.svg": standalone(chart).encode("utf-8") for name, chart in charts.items()})
+    for folder, kind in ((png, "png"), (pdf, "pdf")):
+        if folder is not None:
+            from tablegen.report.figures import drawn
+
+            written(folder, {f"{name}.{kind}": drawn(chart, kind) for name, chart in charts.items()})

@@ -30,7 +30,7 @@ def show(scan: Path, as_json: bool, formats: tuple[str, ...], plot: bool) -> Non
     if as_json:
         click.echo(rendered(built)["manifest.json"], nl=False)
         return
-    from tablegen.cli.report import plots
+    from tablegen.cli.tables import plots
 
     plan = built.plan
     tell(f"{plan.name} on {plan.scanner!r}", bold=True)

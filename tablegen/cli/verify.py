@@ -142,6 +142,7 @@ def verify(
     from tablegen.verification.run import verify as verify_build
     from tablegen.verification.simulate import ToolMissing
 
+    digest = _digest(folder)  # before it is played: whoever changes it meanwhile has verified nothing
     try:
         if fourier and target_name in (None, "verilog") and (simulator or "icarus") == "icarus":
             _say_how_long(folder, axis or "pipelined")
@@ -168,7 +169,7 @@ def verify(
         tell(line, bold=line.endswith(_FAILED))
     for note in report.notes:
         click.echo(f"note: {note}")
-    written = junit is None or _write(junit, report)
+    written = junit is None or _write(junit, report, digest)
     if report.failures:
         lines = ["", *report.failures]
         if report.difference is not None:
@@ -213,12 +214,23 @@ def _terminated_as_interrupted() -> Iterator[None]:
         signal.signal(signal.SIGTERM, before)
 
 
-def _write(path: Path, report: "Report") -> bool:
+def _digest(folder: Path) -> str:
+    """The SHA-256 of the manifest; empty where it cannot be read, which is reported elsewhere."""
+    from tablegen.manifest.format import MANIFEST
+    from tablegen.reading import file_sha256
+
+    try:
+        return file_sha256(folder / MANIFEST)
+    except OSError:
+        return ""
+
+
+def _write(path: Path, report: "Report", digest: str) -> bool:
     from tablegen.verification.junit import junit
 
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(junit(report.name, report.checks, report.seconds), "utf-8")
+        path.write_text(junit(report.name, report.checks, report.seconds, digest), "utf-8")
     except OSError as error:
         click.echo(f"{path}: {error.strerror or error}", err=True)
         return False

@@ -1,7 +1,7 @@
 """Linear dynamics of the scanner, and their inverse for each harmonic of the scan."""
 
 from dataclasses import dataclass
-from math import sqrt
+from math import inf, sqrt
 from typing import Protocol
 
 import numpy as np
@@ -25,6 +25,10 @@ class Response(Protocol):
     @property
     def half_width_hz(self) -> float:
         """Half the width of the resonance."""
+
+    @property
+    def highest_hz(self) -> float:
+        """Up to which it is known; ``inverse`` refuses what is above."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +56,11 @@ class SecondOrder:
         """Half the width at half the power."""
         return self.frequency_hz / (2.0 * self.quality)
 
+    @property
+    def highest_hz(self) -> float:
+        """All frequencies."""
+        return inf
+
 
 @dataclass(frozen=True)
 class Measured:
@@ -62,7 +71,11 @@ class Measured:
     phase_turns: Floats
 
     def inverse(self, f_hz: Floats) -> tuple[Floats, Floats]:
-        """Real and imaginary part of 1 / H(f); gain and phase linear between the points, constant below the first."""
+        """Real and imaginary part of 1 / H(f); gain and phase linear between the points.
+
+        Below the first the gain is that of it, and the phase goes straight to 0 at 0 Hz, as that of a dead time, or to
+        the half turn that is nearest where the response is inverted.
+        """
         f = np.maximum(f_hz, self.f_hz[0])
         if f.size and float(np.max(f)) > self.f_hz[-1]:
             top = float(self.f_hz[-1])
@@ -71,7 +84,11 @@ class Measured:
         left = right - 1
         share = (f - self.f_hz[left]) / (self.f_hz[right] - self.f_hz[left])
         gain = self.gain[left] + share * (self.gain[right] - self.gain[left])
-        s, c = sine_and_cosine(self.phase_turns[left] + share * (self.phase_turns[right] - self.phase_turns[left]))
+        phase = self.phase_turns[left] + share * (self.phase_turns[right] - self.phase_turns[left])
+        first = float(self.phase_turns[0])
+        at_rest = round(2.0 * first) / 2.0
+        below = at_rest + np.minimum(f_hz / self.f_hz[0], 1.0) * (first - at_rest)
+        s, c = sine_and_cosine(np.where(f_hz < self.f_hz[0], below, phase))
         return c / gain, -s / gain
 
     @property
@@ -84,6 +101,11 @@ class Measured:
         """Half the range over which the gain is above its maximum / sqrt(2)."""
         high = self.f_hz[self.gain >= float(np.max(self.gain)) / sqrt(2.0)]
         return max(float(high[-1] - high[0]) / 2.0, float(np.min(np.diff(self.f_hz))))
+
+    @property
+    def highest_hz(self) -> float:
+        """That of the last point."""
+        return float(self.f_hz[-1])
 
 
 def capped_inverse(response: Response, f_hz: Floats, max_boost_db: float) -> tuple[Floats, Floats, Bools]:

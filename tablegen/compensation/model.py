@@ -8,9 +8,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
+import numpy as np
 from msgspec import Struct
 
 from tablegen.compensation.line import LineShape, WantedLine
+from tablegen.compensation.operator.creep import NO_CREEP, LogarithmicCreep
+from tablegen.compensation.operator.loop import POINTS, Loop
 from tablegen.reading import file_sha256
 
 
@@ -61,6 +64,19 @@ class Hysteresis(Parameters, frozen=True, tag_field="model"):
     def line(self, wanted: WantedLine) -> LineShape | None:
         """The line of one axis; None where ``wanted.problems`` grew."""
         raise NotImplementedError(type(self))
+
+    def loop(self, wanted: WantedLine, low: float, high: float) -> tuple[Loop, LogarithmicCreep] | None:
+        """What a settled drive between two shares of v_max does, and the creep behind it; its mean is the offset.
+
+        The loop is ``wanted.size_nm`` long. None where ``wanted.problems`` grew. By default it is that of the line's
+        sweeps, without creep.
+        """
+        line = self.line(wanted)
+        if line is None:
+            return None
+        u = np.arange(POINTS) / (POINTS - 1)
+        rising, falling = line.forward.inverse(u), 1.0 - line.backward.inverse(1.0 - u)
+        return Loop(low, high, rising, falling, wanted.size_nm), NO_CREEP
 
     def described(self, line: LineShape) -> str:
         """What is applied, in a line of text."""

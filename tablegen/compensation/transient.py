@@ -2,6 +2,9 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from tablegen.numerics.arrays import Floats, freeze
 from tablegen.numerics.elementary import exp
 
 OFFSET_CHANGE = 0.1  # of v_max: the change of offset that drift is stated for, from the middle's side
@@ -9,31 +12,75 @@ SIZE_CHANGE = 0.5  # of the size: the smaller scan before
 
 
 @dataclass(frozen=True, slots=True)
-class Transient:
-    """``late`` has what is to come of every term of creep, in nm, and its time constant in s.
+class Late:
+    """A term of creep: ``nm`` are still to come at the change, ``after_nm`` at the end of the first sweep.
 
-    ``memory_nm`` is the largest distance of the first forward sweep from settled ones.
+    Either falls by exp(-t / ``tau_s``); in the second is what the memory of hysteresis has brought meanwhile.
     """
 
-    late: tuple[tuple[float, float], ...]
-    memory_nm: float
+    nm: float
+    after_nm: float
+    tau_s: float
 
-    def drift_nm(self, line_s: float, first: int, count: int) -> float:
-        """How far the mean position of a line moves from line ``first`` after the change on, over ``count`` lines."""
-        total = 0.0
-        for nm, tau_s in self.late:
-            share = line_s / tau_s
-            of_line = (1.0 - exp(-share)) / share if share > 1e-9 else 1.0
-            total += nm * of_line * exp(-first * share) * (1.0 - exp(-count * share))
-        return abs(total)
+
+@dataclass(frozen=True, eq=False)
+class Transient:
+    """What is late after a change, and how far hysteresis is from its settled loop in the first sweep forward.
+
+    ``memory_nm`` has the first sweep less settled ones, at ``memory_s`` after its beginning, both (n,). Creep with time
+    constants above ``measured_s`` was not measured but goes on as before.
+    """
+
+    late: tuple[Late, ...]
+    measured_s: float
+    memory_s: Floats
+    memory_nm: Floats
+
+    def __post_init__(self) -> None:
+        freeze(self.memory_s, self.memory_nm)
+
+    @property
+    def most_memory_nm(self) -> float:
+        """The largest distance of the first sweep from settled ones."""
+        return float(np.max(np.abs(self.memory_nm)))
+
+    def drift_nm(self, line_s: float, first: int, count: int, slower_than_s: float = 0.0) -> float:
+        """How far the mean position of a line moves from line ``first`` after the change on, over ``count`` lines.
+
+        With ``slower_than_s`` only what terms of creep with longer time constants bring.
+        """
+        off = self._off_nm(line_s, first + count + 1, slower_than_s)
+        return float(abs(off[first + count] - off[first]))
 
     def lines(self, line_s: float, count: int, bound_nm: float, most: int) -> int:
-        """After how many lines the next ``count`` drift by no more than a bound; ``most`` + 1 where that is later."""
-        low, high = 0, most + 1
-        while low < high:  # the drift falls from line to line
-            middle = (low + high) // 2
-            if self.drift_nm(line_s, middle, count) <= bound_nm:
-                high = middle
-            else:
-                low = middle + 1
-        return low
+        """After how many lines no ``count`` lines drift by more than a bound; ``most`` + 1 where that is later."""
+        off = self._off_nm(line_s, most + 1 + count, 0.0)
+        beyond = np.flatnonzero(np.abs(off[count:] - off[: most + 1]) > bound_nm)
+        return int(beyond[-1]) + 1 if len(beyond) else 0
+
+    def _off_nm(self, line_s: float, lines: int, slower_than_s: float) -> Floats:
+        """How far the mean of each of the first lines is from the settled one; of short memory only without a limit."""
+        sweep_s = float(self.memory_s[-1])
+        within = min(-int(-sweep_s // line_s), lines)  # lines that begin before the first sweep ends
+        off = np.zeros(lines)
+        for term in self.late:
+            if term.tau_s > slower_than_s:
+                share = line_s / term.tau_s
+                of_line = (1.0 - exp(-share)) / share if share > 1e-9 else 1.0
+                decay = np.full(lines, exp(-share))
+                decay[0] = term.nm
+                decay[within : within + 1] = term.after_nm * exp(-(within * line_s - sweep_s) / term.tau_s)
+                off[:within] -= of_line * np.multiply.accumulate(decay[:within])
+                off[within:] -= of_line * np.multiply.accumulate(decay[within:])
+        return off if slower_than_s > 0.0 else off + self._memory(line_s, lines)
+
+    def _memory(self, line_s: float, lines: int) -> Floats:
+        """The mean over each line of what the first sweep is off."""
+        steps = np.diff(self.memory_s)
+        whole = np.concatenate([[0.0], np.add.accumulate(0.5 * steps * (self.memory_nm[1:] + self.memory_nm[:-1]))])
+        at = np.minimum(np.arange(lines + 1.0) * line_s, self.memory_s[-1])
+        left = np.clip(np.searchsorted(self.memory_s, at, side="right") - 1, 0, len(steps) - 1)
+        into = at - self.memory_s[left]
+        slope = (self.memory_nm[left + 1] - self.memory_nm[left]) / steps[left]
+        until = whole[left] + into * (self.memory_nm[left] + 0.5 * slope * into)
+        return np.asarray(np.diff(until) / line_s, dtype=np.float64)

@@ -74,7 +74,7 @@ def load(path: str | Path) -> Setup:
         scanner_values, scanner_file = read_toml(scanner_path, str(scanner_path))
     except Rejected as rejected:
         raise Rejected(problems.found + rejected.problems) from None
-    if "dac" in scanner_values and "v_max" not in scanner_values:
+    if _is_scan(scanner_values):
         problems.add(scan_file, "scanner", f"{shown_path(scanner_path)} is a scan file, not a scanner file")
         raise Rejected(problems.found)
     scanner = decode(Scanner, scanner_values, scanner_file, problems, partial(_check, scanner_file, problems))
@@ -82,6 +82,22 @@ def load(path: str | Path) -> Setup:
     assert scan is not None
     assert scanner is not None
     return Setup(scan, scanner, scan_file, scanner_file, scanner_path.parent)
+
+
+def load_scanner(path: str | Path) -> tuple[Scanner, Document]:
+    """A scanner file alone, and where its keys stand. Raises ``Rejected`` with every fault."""
+    values, file = read_toml(Path(path), str(path))
+    if _is_scan(values):
+        raise Rejected([file.problem("", "this is a scan file; give the scanner file that it names")])
+    problems = Problems()
+    scanner = decode(Scanner, values, file, problems, partial(_check, file, problems))
+    problems.stop_if_any()
+    assert scanner is not None
+    return scanner, file
+
+
+def _is_scan(values: Mapping[str, Any]) -> bool:
+    return "dac" in values and "v_max" not in values
 
 
 def from_values(scan: Mapping[str, Any], scanner: Mapping[str, Any], folder: str | Path = ".") -> Setup:

@@ -86,6 +86,13 @@ class Refinement(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         ]
         | None
     ) = None
+    before_of: (
+        Annotated[
+            Literal["line", "mismatch"],
+            Meta(description="residual of the line, or only what trace and retrace differ by; default: line"),
+        ]
+        | None
+    ) = None
 
 
 class FastAxis(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -163,7 +170,9 @@ class Timing(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     ) = None
     settle_lines: Annotated[
         Annotated[int, Meta(ge=0, le=255)] | Literal["auto"],
-        Meta(description="lines after a change during which valid is low; auto: by the operators of x and y"),
+        Meta(
+            description="lines after a change during which valid is low; auto: by the operators of x, of y or of both"
+        ),
     ] = 2
 
 
@@ -176,7 +185,10 @@ class Limits(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     max_scaling_error_percent: (
         Annotated[
             Percent,
-            Meta(description="largest scaling error, peak to peak, and largest size error, both of the imaging window"),
+            Meta(
+                description="largest scaling error, peak to peak, and largest size error, both of the imaging window, "
+                "with what an operator expects on the scanner"
+            ),
         ]
         | None
     ) = None

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from tablegen.compensation.transient import OFFSET_CHANGE, Transient
+from tablegen.compensation.transient import OFFSET_CHANGE
 from tablegen.config.load import Setup
 from tablegen.device.schedule import Schedule
 from tablegen.planning.drive import Drive
@@ -18,8 +18,10 @@ class Settling:
     """Of one axis, after a change of offset by ``offset_v`` and after a smaller scan.
 
     ``lines`` are enough for the image to drift by no more than ``bound_nm`` in the next frame after either, or
-    ``MOST_LINES`` + 1. ``drift_nm`` is that of a frame without them from its second line on, after the change of
-    offset, and ``size_drift_nm`` after that of the size. ``memory_nm`` is by how much the first period is off.
+    ``MOST_LINES`` + 1. ``drift_nm`` is that of a frame without them, after the change of offset, ``size_drift_nm``
+    after that of the size, and ``late_nm`` that of the frame after ``lines``, the larger of both. Of that
+    ``extrapolated_nm`` come of creep slower than a period of the slowest trace, ``slowest_s``. ``memory_nm`` is by how
+    much hysteresis bends the first period.
     """
 
     lines: int
@@ -27,6 +29,9 @@ class Settling:
     bound_nm: float
     drift_nm: float
     size_drift_nm: float
+    late_nm: float
+    extrapolated_nm: float
+    slowest_s: float
     memory_nm: float
 
 
@@ -35,42 +40,50 @@ def settling(axis: str, drive: Drive, schedule: Schedule) -> Settling | None:
     transients = drive.shape.transients
     if transients is None:
         return None
-    after_offset, after_size = transients
     line_s = 1.0 / float(schedule.line_rate)
     pixels = schedule.pixels if axis == "x" else max(schedule.up.count, 1)
     bound = max(BOUND * drive.size_nm, drive.window_nm / pixels)
 
-    def lines_of(after: Transient) -> int:
-        return after.lines(line_s, schedule.lines, bound, MOST_LINES)
+    def drifts(first: int, slower_than_s: float = 0.0) -> list[float]:
+        return [after.drift_nm(line_s, first, schedule.lines, slower_than_s) for after in transients]
 
-    lines = max(lines_of(after_offset), lines_of(after_size))
-    if axis == "x":  # hysteresis forgets what was before in a period, which of y is a frame
+    lines = max(after.lines(line_s, schedule.lines, bound, MOST_LINES) for after in transients)
+    if axis == "x":  # the first bends, whatever the bound
         lines = max(lines, 1)
+    shown = min(lines, MOST_LINES)
+    late, of = max((nm, which) for which, nm in enumerate(drifts(shown)))
+    after_offset, after_size = drifts(0)
+    slowest_s = transients[0].measured_s
     return Settling(
         lines,
         OFFSET_CHANGE * drive.v_max,
         bound,
-        after_offset.drift_nm(line_s, 1, schedule.lines),
-        after_size.drift_nm(line_s, 1, schedule.lines),
-        max(after_offset.memory_nm, after_size.memory_nm),
+        after_offset,
+        after_size,
+        late,
+        drifts(shown, slowest_s)[of],
+        slowest_s,
+        max(after.most_memory_nm for after in transients),
     )
 
 
 def settle_lines(setup: Setup, drives: dict[str, Drive], schedule: Schedule, problems: Problems) -> int:
-    """As the scan file has them, or as many as the slower of both axes needs, at most ``MOST_LINES``."""
+    """As the scan file has them, or as many as the slower axis needs, at most ``MOST_LINES``.
+
+    An axis without an operator is not known, and does not count.
+    """
     asked = setup.scan.timing.settle_lines
     if asked != "auto":
         return asked
-    found = {axis: settling(axis, drive, schedule) for axis, drive in drives.items()}
-    without = " and ".join(axis for axis, one in found.items() if one is None)
-    if without:
+    found = [one for axis, drive in drives.items() if (one := settling(axis, drive, schedule)) is not None]
+    if not found:
         problems.add(
             setup.scan_file,
             "timing.settle_lines",
-            f"'auto' needs an operator of both axes, and there is none of {without}; "
-            "run `tablegen calibrate operator`, or give a number of lines",
+            "'auto' needs an operator of x or of y, and there is none; run `tablegen calibrate operator`, or give a "
+            "number of lines",
         )
-    return min(max((one.lines for one in found.values() if one is not None), default=0), MOST_LINES)
+    return min(max((one.lines for one in found), default=0), MOST_LINES)
 
 
 def settling_text(found: Settling) -> list[str]:
@@ -82,5 +95,11 @@ def settling_text(found: Settling) -> list[str]:
     if found.size_drift_nm >= _SHOWN_NM:
         out.append(f"drifts {found.size_drift_nm:.3g} nm after half the size")
     if found.memory_nm >= _SHOWN_NM:
-        out.append(f"the hysteresis bends the first period by up to {found.memory_nm:.3g} nm")
+        out.append(f"hysteresis bends the first sweep by up to {found.memory_nm:.3g} nm")
+    if found.extrapolated_nm >= _SHOWN_NM:
+        share = 100.0 * found.extrapolated_nm / found.late_nm
+        out.append(
+            f"after {min(found.lines, MOST_LINES)} lines drifts {found.late_nm:.3g} nm, {share:.2g} % of it slower "
+            f"than the slowest trace, {found.slowest_s:.3g} s: extrapolated"
+        )
     return out

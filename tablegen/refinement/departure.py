@@ -12,7 +12,7 @@ from tablegen.certificate.line_errors import CHORD
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan
 from tablegen.problems import Unphysical
-from tablegen.refinement.displacement import Displacement
+from tablegen.refinement.measured import LineMeasurement
 
 _WINDOW_POINTS = 801  # points over the window of a direction
 _MAX_DEPARTURE = 0.1  # share of the line; more means another scan or another phase
@@ -98,13 +98,13 @@ class Departure:
         return _straightened(self.points, self.points.asked + self.error + by / self.points.steepness, self.size_nm)
 
 
-def departure(line: LinePlan, measured: Displacement, share: Floats | None = None) -> Departure:
+def departure(line: LinePlan, measured: LineMeasurement, share: Floats | None = None) -> Departure:
     """Compare a measured period with what the plan asks for, at shares of the window or evenly over it.
 
     Raises ``Unphysical`` where the two have nothing to do with each other.
     """
     points = imaged(line, np.linspace(0.0, 1.0, _WINDOW_POINTS) if share is None else share)
-    found = _straightened(points, measured.series.value(points.times), 1.0)
+    found = _straightened(points, measured.value(points.times), 1.0)
     if not abs(found.size_nm) > 0.0 or found.rms_percent > 100.0 * _MAX_DEPARTURE:
         raise Unphysical(
             f"the displacement is {found.rms_percent:.3g} % of the line away from this scan; is it another axis, "

@@ -1,5 +1,6 @@
 """Samples of a displacement, each at its own phase -> one period as a Fourier series, with its covariance."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import pi
 
@@ -12,6 +13,7 @@ from tablegen.waveform.series import FourierSeries
 
 _CHUNK_SAMPLES = 1 << 12  # samples that are worked out at a time
 _OUTLIER_SIGMAS = 7.0  # standard deviations
+_GRID = 1024  # points of a period at which the asked position is taken
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +34,39 @@ class Displacement:
     samples: int
     left_out: int
     stray: int | None = None
+
+    @property
+    def detail(self) -> int:
+        """The highest harmonic."""
+        return self.series.harmonics
+
+    def value(self, times: Floats) -> Floats:
+        """Displacement in nm at times in periods."""
+        return self.series.value(times)
+
+    def basis(self, times: Floats) -> Floats:
+        """(times, coefficients): from (a0, a, b) to the displacement."""
+        return harmonic_basis(times, self.series.harmonics)
+
+    def error(self, asked: Callable[[Floats], Floats], size_nm: float) -> Floats:
+        """The coefficients of the displacement less what was asked for, in nm; ``asked`` takes times to the line."""
+        times = (np.arange(_GRID) + 0.5) / _GRID
+        series = np.concatenate([[0.0], self.series.a, self.series.b])
+        found: Floats = series - size_nm * (2.0 / _GRID) * (self.basis(times).T @ asked(times))
+        return found
+
+    @property
+    def groups(self) -> list[list[int]]:
+        """Coefficients that are noise or not together: cosine and sine of a harmonic."""
+        count = self.series.harmonics
+        return [[n, count + n] for n in range(1, count + 1)]
+
+
+def harmonic_basis(times: Floats, harmonics: int) -> Floats:
+    """(times, 2 harmonics + 1): 1, cosines, sines."""
+    angle = 2.0 * pi * np.outer(times, np.arange(1, harmonics + 1))
+    basis: Floats = np.column_stack([np.ones(len(times)), np.cos(angle), np.sin(angle)])
+    return basis
 
 
 def fit_displacement(

@@ -1,6 +1,7 @@
 """One round of iterative learning: a measured period -> the correction of the layer, by the slope of the model."""
 
 from dataclasses import dataclass
+from functools import partial
 from math import pi
 
 import numpy as np
@@ -9,7 +10,8 @@ from tablegen.certificate.line_errors import CHORD
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan
 from tablegen.refinement.departure import Departure, asked_position, departure, straight_line
-from tablegen.refinement.displacement import Displacement
+from tablegen.refinement.displacement import harmonic_basis
+from tablegen.refinement.measured import LineMeasurement
 from tablegen.waveform.series import FourierSeries
 from tablegen.waveform.window_fit import normal_equations
 
@@ -18,8 +20,6 @@ DEFAULT_HARMONICS = 16
 DIGITS = 8  # digits of a coefficient in the scan file: a 24-bit converter has 7
 # Weight of the mean square acceleration: it decides what the windows leave open, and costs nothing inside them.
 _SMOOTHNESS = 1e-9
-_NOISE_CHI = 2.0  # chi squared of the two numbers of a harmonic that are nothing but noise, on average
-_GRID = 1024  # points of a period at which the asked position is taken
 _AKAIKE_COST = 4.0  # cost of the two numbers of a harmonic, after Akaike: the noise that learning it adds
 
 
@@ -41,7 +41,7 @@ class Lesson:
     chord_noise_percent: float
 
 
-def learn(line: LinePlan, measured: Displacement, gain: float, harmonics: int) -> Lesson:
+def learn(line: LinePlan, measured: LineMeasurement, gain: float, harmonics: int) -> Lesson:
     """Learn harmonics 1..``harmonics`` at most from a period of the running scan, at a gain in (0, 2).
 
     The position error in the imaged windows, times the slope of the model's branch there, is what the drive lacks. It
@@ -49,12 +49,12 @@ def learn(line: LinePlan, measured: Displacement, gain: float, harmonics: int) -
     taken off. Raises ``Unphysical`` where the displacement is not that of the scan.
     """
     before = departure(line, measured)
-    nodes = 4 * max(harmonics, measured.series.harmonics) + 32
+    nodes = 4 * max(harmonics, measured.detail) + 32
     share = 0.5 - 0.5 * np.cos((np.arange(nodes) + 0.5) * pi / nodes)
     seen = departure(line, measured, share)
     points = seen.points
     # From coefficients of the displacement to the drive that is lacking, for the covariance.
-    basis = _basis(points.times, measured.series.harmonics)
+    basis = measured.basis(points.times)
     line_of = np.column_stack([np.ones_like(points.asked), points.asked])
     errors: Floats = (basis - line_of @ (straight_line(points.asked) @ basis)) / seen.size_nm
     noisy = -gain * points.steepness * seen.error
@@ -77,11 +77,11 @@ def learn(line: LinePlan, measured: Displacement, gain: float, harmonics: int) -
     return Lesson(layer, change, kept, before, after, 100.0 * float(noise), 100.0 * float(chord_noise))
 
 
-def _chords(line: LinePlan, seen: Departure, measured: Displacement) -> Floats:
+def _chords(line: LinePlan, seen: Departure, measured: LineMeasurement) -> Floats:
     """From coefficients of the displacement to slopes over chords, in nm a line, at some places of the forward line."""
     x = seen.points.by_side(seen.points.position)["forward"]
     middle = np.linspace(float(x[0]) + 0.5 * CHORD, float(x[-1]) - 0.5 * CHORD, 41)
-    ends = [_basis(line.drive.turn * (middle + by), measured.series.harmonics) for by in (-0.5 * CHORD, 0.5 * CHORD)]
+    ends = [measured.basis(line.drive.turn * (middle + by)) for by in (-0.5 * CHORD, 0.5 * CHORD)]
     found: Floats = (ends[1] - ends[0]) / CHORD
     return found
 
@@ -100,38 +100,28 @@ def _stands_out(coefficients: list[Floats], covariances: list[Floats]) -> bool:
     return bool(np.min(cost) < 0.0)
 
 
-def _noise_share(line: LinePlan, measured: Displacement, size_nm: float) -> Floats:
+def _noise_share(line: LinePlan, measured: LineMeasurement, size_nm: float) -> Floats:
     """What of the coefficients of the displacement less what was asked, in nm, its noise explains.
 
     The error of a harmonic is taken for Gaussian, with a variance of its own. The likeliest variance is what chi
     squared of cosine and sine exceeds 2 by, which noise alone has on average; the mean of the error is then
-    max(0, 1 - 2 / chi squared) of what was measured (empirical Bayes, as James and Stein). The rest is noise.
+    max(0, 1 - 2 / chi squared) of what was measured (empirical Bayes, as James and Stein). The rest is noise. The same
+    goes for any group of n coefficients, with n for 2.
     """
-    count = measured.series.harmonics
-    times = (np.arange(_GRID) + 0.5) / _GRID
-    asked = asked_position(line, times)
-    series = np.concatenate([[0.0], measured.series.a, measured.series.b])
-    error = series - size_nm * (2.0 / _GRID) * (_basis(times, count).T @ asked)
-    share = np.zeros(2 * count + 1)
-    for n in range(1, count + 1):
-        pair = [n, count + n]
-        explained = float(error[pair] @ np.linalg.solve(measured.covariance[np.ix_(pair, pair)], error[pair]))
-        share[pair] = min(_NOISE_CHI / explained, 1.0) if explained > 0.0 else 1.0
+    error = measured.error(partial(asked_position, line), size_nm)
+    share = np.zeros(len(error))
+    for group in measured.groups:
+        explained = float(error[group] @ np.linalg.solve(measured.covariance[np.ix_(group, group)], error[group]))
+        share[group] = min(len(group) / explained, 1.0) if explained > 0.0 else 1.0
     found: Floats = share * error
     return found
-
-
-def _basis(times: Floats, harmonics: int) -> Floats:
-    angle = 2.0 * pi * np.outer(times, np.arange(1, harmonics + 1))
-    basis: Floats = np.column_stack([np.ones(len(times)), np.cos(angle), np.sin(angle)])
-    return basis
 
 
 def _fits(times: Floats, harmonics: int) -> list[Floats]:
     """For 1, 2, ... harmonics the matrix from values at the times to the coefficients of their gentlest fit."""
     none, ones = np.zeros(len(times)), np.ones(len(times))
     normal, _ = normal_equations(times, none, none, ones, none, harmonics, _SMOOTHNESS)
-    basis = _basis(times, harmonics)
+    basis = harmonic_basis(times, harmonics)
     found = []
     for count in range(1, harmonics + 1):
         first = np.r_[0 : count + 1, harmonics + 1 : harmonics + 1 + count]

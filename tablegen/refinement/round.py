@@ -34,19 +34,22 @@ class Options:
     drift_order: int | None = None
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Round:
-    """What one trace says. ``worse`` is why it must not be learnt from, if so; ``setup`` has the new layer in it."""
+    """What a measurement says. ``worse`` is why it must not be learnt from, if so; ``setup`` has the new layer."""
 
     line: LinePlan
-    phase: Phase
-    displacement: Displacement
     bound: Bound
     lesson: Lesson
     refinement: Refinement | None
     setup: Setup
     worse: str
     remarks: tuple[str, ...]
+
+    @property
+    def recorded(self) -> str:
+        """How much was recorded, in words."""
+        raise NotImplementedError
 
     @property
     def curves(self) -> list[Curve]:
@@ -61,6 +64,20 @@ class Round:
         return curves
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TraceRound(Round):
+    """What the trace of a sensor says."""
+
+    phase: Phase
+    displacement: Displacement
+
+    @property
+    def recorded(self) -> str:
+        """Periods and samples."""
+        found = self.displacement
+        return f"{found.periods:.4g} periods of {self.phase.period_s:.6g} s, {found.samples} samples"
+
+
 def refine(
     setup: Setup,
     axis: Literal["x", "y"],
@@ -68,14 +85,14 @@ def refine(
     displacement_nm: Floats,
     drive_v: Floats | None,
     options: Options,
-) -> Round:
+) -> TraceRound:
     """Learn from a trace of the running scan: times ascending (s), displacement (nm), the drive at the piezo (V).
 
     Without a drive time 0 is a line start, of y a frame start. Raises ``Rejected`` where the scan, or the scan with the
     new layer, cannot be planned, and ``Unphysical`` for a trace that is not of this scan or that bounds forbid.
     """
     line: LinePlan = getattr(make_plan(setup), axis)
-    limits = _allowed(line, options)
+    limits = allowed(line, options)
     if drive_v is None:
         phase = phase_by_trigger(line, time_s, options.period_s, options.delay_s)
     else:
@@ -84,13 +101,33 @@ def refine(
         phase.turns, displacement_nm, line.target.harmonics, options.settle_periods, options.drift_order
     )
     lesson = learn(line, measured, options.gain, min(limits.used, measured.series.harmonics))
-    refinement, changed = None, setup
-    if lesson.layer.harmonics:
-        refinement = _refinement(setup, line, lesson)
-        changed = with_refinement(setup, axis, refinement)
-        make_plan(changed)  # what is written can be built
-    worse, remarks = _worse(setup, axis, lesson), _remarks(line, measured, lesson, phase, time_s)
-    return Round(line, phase, measured, limits, lesson, refinement, changed, worse, remarks)
+    refinement, changed = with_lesson(setup, line, lesson)
+    return TraceRound(
+        line=line,
+        bound=limits,
+        lesson=lesson,
+        refinement=refinement,
+        setup=changed,
+        worse=why_worse(setup, axis, lesson),
+        remarks=_remarks(line, measured, lesson, phase, time_s),
+        phase=phase,
+        displacement=measured,
+    )
+
+
+BeforeOf = Literal["line", "mismatch"]
+
+
+def with_lesson(
+    setup: Setup, line: LinePlan, lesson: Lesson, before_of: BeforeOf | None = None
+) -> tuple[Refinement | None, Setup]:
+    """The new layer, if there is one, and the scan with it. Raises ``Rejected`` where that cannot be built."""
+    if not lesson.layer.harmonics:
+        return None, setup
+    refinement = msgspec.structs.replace(_refinement(setup, line, lesson), before_of=before_of)
+    changed = with_refinement(setup, line.axis, refinement)
+    make_plan(changed)  # what is written can be built
+    return refinement, changed
 
 
 def _refinement(setup: Setup, line: LinePlan, lesson: Lesson) -> Refinement:
@@ -115,7 +152,8 @@ def with_refinement(setup: Setup, axis: str, refinement: Refinement | None) -> S
     return replace(setup, scan=msgspec.structs.replace(setup.scan, **{axis: changed}))
 
 
-def _allowed(line: LinePlan, options: Options) -> Bound:
+def allowed(line: LinePlan, options: Options) -> Bound:
+    """The bound for what was asked for. Raises ``Unphysical`` where that might not converge."""
     asked = options.harmonics
     limits = bound(line, options.gain, min(DEFAULT_HARMONICS, line.target.harmonics) if asked is None else asked)
     if asked is not None and asked > line.target.harmonics:
@@ -129,10 +167,13 @@ def _allowed(line: LinePlan, options: Options) -> Bound:
     return limits
 
 
-def _worse(setup: Setup, axis: str, lesson: Lesson) -> str:
-    """Whether the layer that was played made things worse, against the trace before it."""
+def why_worse(setup: Setup, axis: str, lesson: Lesson, before_of: BeforeOf | None = None) -> str:
+    """Whether the layer that was played made things worse, against the measurement before it; empty where not.
+
+    Only measurements of the same are compared.
+    """
     played: Refinement | None = getattr(setup.scan, axis).refinement
-    if played is None or played.before_percent is None:
+    if played is None or played.before_percent is None or played.before_of != before_of:
         return ""
     before, now = played.before_percent, lesson.before.rms_percent
     if np.hypot(1.05 * before, 3.0 * lesson.noise_percent) >= now:
@@ -162,7 +203,7 @@ def _remarks(line: LinePlan, measured: Displacement, lesson: Lesson, phase: Phas
         found.append(f"the reading at {at:.9g} s is far off the others; it adds noise")
     if lesson.harmonics == 0:
         found.append("the error is within the noise of the sensor: there is nothing more to learn from this trace")
-    elif lesson.after.rms_percent > _FINISHED_RATIO * lesson.before.rms_percent:
+    elif finished(lesson):
         found.append("most of the remaining error is noise: record more periods, or stop refining")
     if measured.correlated > 3.0:
         found.append(
@@ -174,6 +215,11 @@ def _remarks(line: LinePlan, measured: Displacement, lesson: Lesson, phase: Phas
     if phase.drive is None:
         found.append("without drive_v it is not checked that the trace belongs to this build")
     return tuple(found)
+
+
+def finished(lesson: Lesson) -> bool:
+    """Whether most of what is left is noise."""
+    return lesson.after.rms_percent > _FINISHED_RATIO * lesson.before.rms_percent
 
 
 def _short(value: float) -> float:

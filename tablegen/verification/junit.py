@@ -9,8 +9,11 @@ from tablegen.verification.checks import Check
 _NOT_XML = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
-def junit(name: str, checks: Sequence[Check], seconds: float = 0.0) -> str:
-    """One test case a check; the message of a failure is its first line, the text all of it."""
+def junit(name: str, checks: Sequence[Check], seconds: float = 0.0, manifest_sha256: str = "") -> str:
+    """One test case a check; the message of a failure is its first line, the text all of it.
+
+    With the digest of the manifest, which says which build was verified.
+    """
     failures = sum(check.failure is not None for check in checks)
     skipped = sum(check.failure is None and not check.exercised for check in checks)
     suite = (
@@ -18,6 +21,9 @@ def junit(name: str, checks: Sequence[Check], seconds: float = 0.0) -> str:
         f'skipped="{skipped}" time="{seconds:.3f}"'
     )
     lines = ['<?xml version="1.0" encoding="UTF-8"?>', "<testsuites>", f"  <testsuite {suite}>"]
+    if manifest_sha256:
+        entry = f'name="manifest_sha256" value={quoteattr(manifest_sha256)}'
+        lines.append(f"    <properties><property {entry}/></properties>")
     for check in checks:
         case = (
             f"classname={quoteattr(f'{name}.{check.subject}')} name={quoteattr(_plain(check.against))} "

@@ -1,20 +1,28 @@
-"""What the virtual scanner would image: trace and retrace of a grating or a lattice, scanned with a triangle.
+"""What the virtual scanner would image: trace and retrace of a grating or a lattice.
 
-The slow axis is ideal: a ramp through the frame, which is as high as the line is long. Noise comes from the seed alone.
+``image_pair`` scans x with a triangle; the slow axis is ideal: a ramp through the frame, which is as high as the line
+is long. ``running_frame`` plays the emitted integers of a build on both axes, ``triangle_frame`` triangles on both, as
+an old microscope did; they return beside the heights where each pixel was. Noise comes from the seed alone.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
 from tablegen.numerics.arrays import Floats
+from tablegen.planning.line_plan import LinePlan, Plan
 from tablegen.virtual.line_error import ideal_triangle
-from tablegen.virtual.scanner import VirtualAxis
+from tablegen.virtual.played import played
+from tablegen.virtual.simulation import SettledAxis
 
 _TICKS = 16384  # ticks per line
 _STEEPNESS = 2.5  # steepness of the flanks of a bar, rounded as by a tip
 _DUTY = 0.3
+_ROUGH_WAVES = 40
+_FRAME_TICKS = 1 << 16  # ticks of a frame at which the slow axis is looked at
 
+Position = Callable[[Floats], Floats]  # where an axis is, in nm, at times in its periods
 Surface = Callable[[Floats, Floats], Floats]  # height at x and y in nm
 
 
@@ -44,8 +52,23 @@ def hexagonal(constant_nm: float, angle_deg: float = 7.0) -> Surface:
     return height
 
 
+def rough(grain_nm: float, seed: int = 0) -> Surface:
+    """A surface without a period: waves of random directions and phases, none shorter than ``grain_nm``."""
+    random = np.random.default_rng(seed)
+    length = grain_nm * 8.0 ** random.random(_ROUGH_WAVES)
+    angle, phase = 2.0 * np.pi * random.random((2, _ROUGH_WAVES))
+
+    def height(x: Floats, y: Floats) -> Floats:
+        total = np.zeros(np.broadcast(x, y).shape)
+        for one, a, p in zip(length, angle, phase, strict=True):
+            total = total + np.sqrt(one) * np.cos(2.0 * np.pi * (x * np.cos(a) + y * np.sin(a)) / one + p)
+        return total
+
+    return height
+
+
 def image_pair(
-    axis: VirtualAxis,
+    axis: SettledAxis,
     surface: Surface,
     size_v: float,
     offset_v: float,
@@ -75,3 +98,160 @@ def image_pair(
         heights = surface(x + drift * size * frame**2, size * frame)
         shown.append(heights + noise * float(np.ptp(heights)) * random.standard_normal(heights.shape))
     return shown[0], shown[1]
+
+
+@dataclass(frozen=True, eq=False)
+class SweepImage:
+    """One direction of a frame, each array lines x pixels, left on the left, lines in the order of time.
+
+    ``x_nm`` and ``y_nm`` are where the scanner was in the middle of each pixel; ``drift_nm`` how far the sample had
+    gone the other way, along x and y: what was seen is ``surface(x_nm + drift_nm[0], y_nm + drift_nm[1])``.
+    """
+
+    heights: Floats
+    x_nm: Floats
+    y_nm: Floats
+    drift_nm: tuple[Floats, Floats]
+
+
+@dataclass(frozen=True, eq=False)
+class FrameImages:
+    """Both directions of a frame."""
+
+    trace: SweepImage
+    retrace: SweepImage
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """What disturbs a frame.
+
+    ``noise`` is rms, of the heights' peak to peak. ``drift`` along x and y is a share of what the frame shows, over the
+    frame, faster as it goes on. ``tilt`` along x and y is the rise of a plane over the frame, of the heights' peak to
+    peak. Columns show the sample ``late`` pixels late, as of a feedback. ``frame`` counts frames, from 0: drift goes on
+    from one to the next.
+    """
+
+    noise: float = 0.05
+    drift: tuple[float, float] = (0.0, 0.0)
+    tilt: tuple[float, float] = (0.0, 0.0)
+    late: float = 0.0
+    frame: int = 0
+    seed: int = 0
+
+
+def running_frame(
+    plan: Plan,
+    x: SettledAxis,
+    y: SettledAxis,
+    surface: Surface,
+    conditions: Conditions | None = None,
+    pixels: int | None = None,
+    down: bool = False,
+) -> FrameImages:
+    """A settled frame of the emitted integers of a build.
+
+    Columns are ``pixels`` (those of the scan file, if not given), evenly in time within x's imaging window of each
+    sweep. Lines are those of the frame that lie in y's imaging window on its way up, or on its way ``down``.
+    """
+    schedule = plan.schedule
+    part = schedule.down if down else schedule.up
+    if part.count == 0:
+        raise ValueError(f"y images nothing on its way {'down' if down else 'up'}")
+    return _frame(
+        (_playing(plan.x, x), _playing(plan.y, y)),
+        surface,
+        conditions or Conditions(),
+        columns=_columns(plan.x.drive.turn, plan.x.band_limit.window, pixels or schedule.pixels),
+        numbers=part.first + np.arange(part.count),
+        lines=schedule.lines,
+    )
+
+
+def triangle_frame(
+    x: SettledAxis,
+    y: SettledAxis,
+    surface: Surface,
+    size_v: tuple[float, float],
+    offset_v: tuple[float, float],
+    rate_hz: float,
+    conditions: Conditions | None = None,
+    pixels: int = 256,
+    lines: int = 256,
+    turn: tuple[float, float] = (0.5, 0.5),
+    window: tuple[float, float] = (0.0, 1.0),
+) -> FrameImages:
+    """A settled frame of a triangle on each axis, x then y, uncompensated: ``lines`` on y's way up.
+
+    Columns are ``pixels``, evenly in time within ``window`` of each sweep of x. A frame takes lines / turn[1] lines.
+    """
+    whole = round(lines / turn[1])
+    moves = []
+    for axis, size, offset, bend, hz in zip((x, y), size_v, offset_v, turn, (rate_hz, rate_hz / whole), strict=True):
+        volts = offset + size * (ideal_triangle(_TICKS, bend) - 0.5)
+        moves.append(_periodic(axis.settled(volts, 1.0 / (hz * _TICKS)), 0.0))
+    return _frame(
+        (moves[0], moves[1]),
+        surface,
+        conditions or Conditions(),
+        columns=_columns(turn[0], window, pixels),
+        numbers=np.arange(lines),
+        lines=whole,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Columns:
+    """Times of the columns of a direction in periods of x, left first, and how long a column takes."""
+
+    times: Floats
+    lasts: float
+
+
+def _columns(turn: float, window: tuple[float, float], pixels: int) -> tuple[_Columns, _Columns]:
+    """Trace and retrace."""
+    width = window[1] - window[0]
+    place = window[0] + width * (np.arange(pixels) + 0.5) / pixels
+    back = 1.0 - turn
+    return _Columns(turn * place, turn * width / pixels), _Columns(turn + back * (1.0 - place), back * width / pixels)
+
+
+def _playing(line: LinePlan, axis: SettledAxis) -> Position:
+    drive = played(line, _FRAME_TICKS)
+    return _periodic(axis.settled(drive.volts, drive.tick_s), 0.5)
+
+
+def _periodic(moved: Floats, middle: float) -> Position:
+    """Between values each ``middle`` of a tick after its beginning."""
+    turns = (np.arange(len(moved)) + middle) / len(moved)
+
+    def position(time: Floats) -> Floats:
+        return np.interp(time, turns, moved, period=1.0)
+
+    return position
+
+
+def _frame(
+    positions: tuple[Position, Position],
+    surface: Surface,
+    conditions: Conditions,
+    columns: tuple[_Columns, _Columns],
+    numbers: np.typing.NDArray[np.int64],
+    lines: int,
+) -> FrameImages:
+    """The lines of these numbers, of a frame of ``lines``."""
+    random = np.random.default_rng(conditions.seed)
+    shown = []
+    for column in columns:
+        seen = column.times - conditions.late * column.lasts
+        frame = (numbers[:, None] + column.times) / lines
+        x, y = np.broadcast_arrays(positions[0](seen % 1.0), positions[1](frame % 1.0))
+        gone = (frame - numbers[0] / lines + conditions.frame) / (len(numbers) / lines)
+        drift = [share * float(np.ptp(moved)) * gone**2 for share, moved in zip(conditions.drift, (x, y), strict=True)]
+        heights = surface(x + drift[0], y + drift[1])
+        contrast = float(np.ptp(heights))
+        across, along = (np.arange(n) / n for n in heights.shape)
+        heights = heights + contrast * (conditions.tilt[0] * along + conditions.tilt[1] * across[:, None])
+        heights = heights + conditions.noise * contrast * random.standard_normal(heights.shape)
+        shown.append(SweepImage(heights, x, y, (drift[0], drift[1])))
+    return FrameImages(shown[0], shown[1])

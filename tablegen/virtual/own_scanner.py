@@ -12,12 +12,14 @@ from tablegen.compensation.dynamics import Response
 from tablegen.compensation.models.operator import OperatorLine
 from tablegen.compensation.operator.field import Field, Lengths, covariance
 from tablegen.compensation.operator.operator import Operator
+from tablegen.compensation.operator.settled import settled
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan
 
 # Departures at two places are alike within this much of stroke and of centre, shares of v_max.
 _ALIKE = Lengths(0.2, 0.2, 1e-9)
-_WAVES = 8  # Chebyshev polynomials of a departure
+_WAVES = 8  # Chebyshev polynomials of a departure, at least
+_WAVES_PER_ROUGHNESS = 0.2  # the same for the ratio of scaling error and rms, both in percent: finer ones scale more
 _WINDOW = np.linspace(-0.8, 0.8, 161)  # x = 0.1..0.9, where the rms holds
 
 
@@ -66,20 +68,9 @@ class OwnAxis:
         Raises ``Unphysical`` where a departing branch would run backwards.
         """
         u = volts / self.v_max
-        bottom, top, count = int(np.argmin(u)), int(np.argmax(u)), len(u)
-        loop = self.operator.loop(float(u[bottom]), float(u[top]), self.factor)
-        rising = (np.arange(count) - bottom) % count < (top - bottom) % count
-        place = np.where(rising, loop.position(u, True), loop.position(u, False))
-        n = np.arange(1, min(self.harmonics, (count - 1) // 2) + 1)
-        f_hz = n / (count * tick_s)
-        real, imaginary = self.operator.creep.response(f_hz)
-        linear = real + 1j * imaginary
-        if self.response is not None:
-            real, imaginary = self.response.inverse(f_hz)
-            linear = linear / (real + 1j * imaginary)
-        spectrum = np.fft.rfft(place)
-        spectrum[n] *= linear
-        return loop.extent_nm * np.fft.irfft(spectrum, count)
+        loop = self.operator.loop(float(np.min(u)), float(np.max(u)), self.factor, float(np.mean(u)))
+        rate_hz = 1.0 / (len(u) * tick_s)
+        return settled(loop, u, rate_hz, self.operator.creep, self.response, self.harmonics)
 
 
 def operator_line(line: LinePlan) -> OperatorLine:
@@ -98,7 +89,9 @@ def departing(operator: Operator, seed: tuple[int, ...]) -> Operator:
     half = len(operator.residual.weights[0]) // 2
     missed_by = 0.01 * np.abs([line.left_out for line in operator.lines])
     rms, _, _, missed = np.maximum(missed_by, np.median(missed_by, axis=0)).T
-    bends = np.array([_bend(random, half) for _ in places]) * rms[:, None]
+    roughness = float(np.median([line.left_out[1] / max(line.left_out[0], 1e-9) for line in operator.lines]))
+    waves = int(np.clip(_WAVES_PER_ROUGHNESS * roughness, min(_WAVES, half - 2), max(half - 2, 1)))
+    bends = np.array([_bend(random, half, max(waves, 1)) for _ in places]) * rms[:, None]
     sizes = random.standard_normal((len(places), 1)) * missed[:, None]
     residual, size = (
         DepartingField(field.points, field.weights, field.lengths, field.straight, places=places, departures=rows)
@@ -107,9 +100,8 @@ def departing(operator: Operator, seed: tuple[int, ...]) -> Operator:
     return replace(operator, residual=residual, size=size)
 
 
-def _bend(random: np.random.Generator, count: int) -> Floats:
+def _bend(random: np.random.Generator, count: int, waves: int) -> Floats:
     """Coefficients of both branches, ``count`` each: 0 where the loop turns, of rms 1 inside the window."""
-    waves = max(min(_WAVES, count - 2), 1)
     fade = np.arange(1.0, waves + 1.0) ** -0.5
     turns = np.array([0.5, 0.0, -0.5])  # 1 - x^2
     drawn = [np.polynomial.chebyshev.chebmul(turns, fade * random.standard_normal(waves)) for _ in range(2)]

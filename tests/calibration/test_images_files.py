@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from image_writers import ascii_of, gwy, npy, png
 from PIL import Image as Pillow
 
-from tablegen.calibration.gwyddion import data_fields
 from tablegen.calibration.image_files import read_image
+from tablegen.calibration.image_formats.gwyddion import data_fields
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Rejected
 

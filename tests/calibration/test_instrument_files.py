@@ -147,6 +147,20 @@ def test_a_nanonis_file_of_one_direction_and_the_other_byte_order(tmp_path: Path
     assert np.array_equal(read_image(put(tmp_path, "b.sxm", turned)).heights, image.heights)
 
 
+def test_a_nanonis_scan_that_was_stopped_ends_with_its_last_whole_line(tmp_path: Path) -> None:
+    trace, retrace = T.copy(), R.copy()
+    trace[36:], retrace[35, :20], retrace[36:] = np.nan, np.nan, np.nan  # backward, the right end comes first
+    other = np.where(np.isnan(trace), np.nan, P)
+    images = read_pair(put(tmp_path, "a.sxm", sxm({"Z": (trace, retrace), "Current": (other, other)})), channel="Z")
+    for image, heights in zip(images, (T, R), strict=True):
+        assert np.max(np.abs(image.heights - heights[:35])) < 1e-5
+        assert image.height_nm == pytest.approx(250.0 * 35 / 40)
+    trace[10, 10] = np.nan
+    assert "pixels are not finite" in why(put(tmp_path, "b.sxm", sxm({"Z": (trace, retrace)})), "Z forward")
+    empty = put(tmp_path, "c.sxm", sxm({"Z": (T * np.nan, R * np.nan)}))
+    assert "1920 pixels are not finite" in why(empty, "Z forward")
+
+
 @pytest.mark.parametrize(
     ("title", "signal", "direction"),
     [
@@ -243,7 +257,10 @@ def test_damage_is_refused_or_read_and_never_worse(kind: str) -> None:
     content, reader = READERS[kind]
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        read = [read_or_refused(reader, damaged(content, random.Random(seed))) for seed in range(300)]
+        changed = [damaged(content, random.Random(seed)) for seed in range(300)]
+        if kind == "ibw":  # a checksum that is right, so that more is looked at
+            changed = [summed(one, "<i", 4, 320 + 96) if len(one) > 400 else one for one in changed]
+        read = [read_or_refused(reader, one) for one in changed]
     assert 0 < sum(read) < len(read)
 
 
@@ -251,6 +268,7 @@ WORLD = 2_000_000_000
 HUGE: dict[str, tuple[str, Callable[[bytes], bytes], str]] = {
     "sxm": ("sxm", lambda c: c.replace(b"       4       3\n", b" 999999 999999\n"), "ends in the middle of its images"),
     "sxm, digits": ("sxm", lambda c: c.replace(b"       4       3\n", b" 9" * 4000), "no two numbers as SCAN_PIXELS"),
+    "sxm, nothing": ("sxm", lambda c: c.replace(b"       4       3\n", b"  0  3\n"), "has an image of 0 x 3 pixels"),
     "sxm, rows": ("sxm", lambda c: re.sub(rb"(\t14.*\n)", rb"\1" * 2000, c), "has 4000 images; at most 1000 are read"),
     "sxm, no end": ("sxm", lambda c: c.replace(b":SCANIT_END:", b":COMMENT2:"), "has no end of its header"),
     "sxm, no mark": ("sxm", lambda c: c.replace(b"\x1a\x04", b"\x1a\x1a"), "no data after it"),
@@ -323,11 +341,38 @@ def test_scales_that_overflow_are_no_heights(tmp_path: Path) -> None:
     assert "pixels are not finite" in why(put(tmp_path, "b.spm", content), "Height trace")
 
 
+def test_what_stands_in_other_lists_of_a_nanoscope_file_is_not_of_the_scan() -> None:
+    """The list of force curves has a scan rate of its own; of sensitivities, the first is the scanner's."""
+    content = spm({"Height": (SMALL, SMALL)})
+    force = b"\\*Ciao force list\r\n\\Scan rate: 9.9\r\n\\@Sens. Zsens: V 7.0 m/V\r\n\\*Ciao image list"
+    longer = content.replace(b"\\*Ciao image list", force, 1).replace(bytes(len(force) - 17), b"", 1)
+    channel, _ = spm_channels(longer, "a")
+    assert (channel.line_rate_hz, channel.unit) == (2.5, "nm")
+    (channel, _) = spm_channels(content.replace(b"Scan Rate: 2.5", b"Scan Moth: 2.5"), "a")
+    assert channel.line_rate_hz is None
+
+
+def test_units_of_an_igor_file() -> None:
+    labels = ("HeightTrace", "PhaseTrace", "FrequencyRetrace", "UserIn0Trace")
+    channels = ibw_channels(ibw(dict.fromkeys(labels, SMALL), NOTE), "a")
+    assert [channel.unit for channel in channels] == ["m", "deg", "Hz", ""]
+    assert ibw_channels(ibw({"UserIn0Trace": SMALL}, NOTE), "a")[0].unit == "m"  # the wave's own
+
+
+def test_another_scaling_of_jpk_is_not_taken_for_a_line() -> None:
+    content = jpk({"height": (SMALL, SMALL)}).replace(b"LinearScaling", b"SquareScaling")
+    channel = jpk_channels(content, "a")[0]
+    assert channel.unit == "LSB"
+    assert channel.load(0) == pytest.approx(np.round((SMALL + 100.0) / 0.01))
+
+
 def test_an_image_says_what_it_has() -> None:
     """What a file does not say is None or empty, never a guess."""
     content = ibw({"HeightTrace": SMALL}, {})
     (channel,) = ibw_channels(content, "a")
-    assert (channel.width_nm, channel.height_nm, channel.line_rate_hz, channel.first_row) == (None, None, None, None)
+    assert (channel.width_nm, channel.height_nm, channel.line_rate_hz) == (None, None, None)
+    assert channel.first_row == "bottom"  # as the format stores it, whatever came first in time
+    assert sxm_channels(sxm({"Z": (SMALL, SMALL)}, scan_dir="?"), "a")[0].first_row is None
     (trace, _) = spm_channels(spm({"Height": (SMALL, SMALL)}), "a")
     assert (trace.width_nm, trace.height_nm) == (500.0, None)  # pixels that are not square: readers differ
     content = spm({"Height": (SMALL, SMALL)}).replace(b"@Sens. Zsens", b"@Sens. Other")

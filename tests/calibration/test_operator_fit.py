@@ -68,8 +68,19 @@ def test_the_family_and_the_creep_are_found() -> None:
     assert plays.family == "plays"
     assert plays.operator.creep.loss_per_decade == pytest.approx(0.026, abs=0.001)
     _, other = identified(BoucWen, SIX)
-    assert other.family == "none"
-    assert other.candidates["none"] < 0.3 * other.candidates["plays"]
+    assert other.family == "Bouc-Wen"
+    assert other.candidates["Bouc-Wen"] < other.candidates["none"] < 0.3 * other.candidates["plays"]
+    assert other.operator.creep.loss_per_decade == pytest.approx(0.026, abs=0.001)
+    # Its parameters, where h is that of the plant over a.
+    core, loop = BoucWen(), other.operator.family.bouc_wen
+    assert loop is not None
+    by = core.a ** (core.n - 1.0)
+    found = [loop.depth, loop.n, loop.beta, loop.gamma, loop.asymmetry]
+    assert found == pytest.approx(
+        [1250.0 * core.depth * core.a, core.n, core.beta * by, core.gamma * by, 0.5 * core.asymmetry],
+        rel=0.06,
+        abs=0.03,
+    )
     # Sizes hold at the rate of the traces, with creep or without it: (23) counts from there.
     assert [fit.operator.creep.reference_hz for fit in (plays, other)] == pytest.approx([100.0, 100.0], rel=1e-3)
 
@@ -194,5 +205,5 @@ def test_fitted_envelopes_are_those_of_the_plant() -> None:
     u = np.linspace(0.0, 1.0, 101)
     bow = u * (1.0 - u)
     true = np.sort([u + linear * bow + skew * bow * (u - 0.5) for linear, skew in plant.core.bends], axis=0)
-    (bend,) = fit.operator.family.bends
+    (bend,) = fit.operator.family.plays.bends
     assert np.stack(envelopes(u, bend)) == pytest.approx(true, abs=0.01)

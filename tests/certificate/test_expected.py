@@ -14,12 +14,17 @@ import pytest
 from building import REPOSITORY
 from editing import SCAN, SCANNER, edited, run, write_pair
 
-from tablegen.certificate.certificate import Certificate, certify
+from tablegen.certificate.certificate import Certificate, broken_limits, certify
+from tablegen.certificate.converter_errors import converter_errors
 from tablegen.certificate.expected import expected_of, rounding_mismatch
+from tablegen.certificate.line_errors import EmittedPeriod
 from tablegen.certificate.scan_warnings import brief_warnings, scan_warnings
 from tablegen.certificate.summary import certificate_lines, summary
+from tablegen.compensation.expectation import Figure
+from tablegen.compensation.models.operator import OperatorLine
 from tablegen.compensation.operator.file import (
     VERSION,
+    BoucWenTable,
     CreepTable,
     LengthsTable,
     LineTable,
@@ -67,6 +72,7 @@ def operator_bytes() -> bytes:
             scaling_percent=scaling,
             mismatch_percent=mismatch,
             size_percent=size,
+            in_fit_percent=list(LEFT_OUT),  # all that is left out is noise
         )
         for stroke in STROKES
     ]
@@ -82,6 +88,7 @@ def operator_bytes() -> bytes:
             reversible=list(REVERSIBLE),
             bends=FIXED_BENDS.tolist(),
         ),
+        bouc_wen=BoucWenTable(depth_nm=0.0, n=1.0, beta=0.0, gamma=0.0, asymmetry=0.0, bend=[0.0, 0.0]),
         lengths=LengthsTable(stroke=0.3, centre=0.5, noise=1e-6),
         lines=lines,
     )
@@ -135,6 +142,7 @@ def test_plays_that_are_stepped_do_with_the_codes_what_is_expected(tmp_path: Pat
     error = 100.0 * ((position - offset) / slope - x)
     grid = np.linspace(0.1, 0.9, 401)
     rms, scaling, sides = {}, {}, {}
+    steps = converter_errors(line, EmittedPeriod(line))
     for side, going in (("forward", t <= 0.5), ("backward", t > 0.5)):
         order = np.argsort(x[going])
         one = sides[side] = np.interp(grid, x[going][order], error[going][order])
@@ -142,19 +150,25 @@ def test_plays_that_are_stepped_do_with_the_codes_what_is_expected(tmp_path: Pat
     for side in sides:
         assert expected.rms[side].value == pytest.approx(rms[side], rel=0.05, abs=0.005)
         assert expected.scaling[side].value == pytest.approx(scaling[side], rel=0.1, abs=0.3)
-        assert expected.rms[side].uncertainty == LEFT_OUT[0]
-        assert expected.scaling[side].uncertainty == LEFT_OUT[1]
+        assert expected.rms[side].uncertainty == LEFT_OUT[0] + steps.rms[side]
+        assert expected.scaling[side].uncertainty == LEFT_OUT[1] + steps.scaling[side]
     assert expected.mismatch is not None
     apart = float(np.max(np.abs(sides["forward"] - sides["backward"])))
     assert expected.mismatch.value == pytest.approx(apart, rel=0.1, abs=0.02)
     assert expected.size is not None
     assert expected.size.value == pytest.approx(100.0 * (slope / line.drive.size_nm - 1.0), abs=0.03)
-    assert (expected.mismatch.uncertainty, expected.size.uncertainty) == (0.2, 0.1)
+    assert expected.mismatch.uncertainty == 0.2 + steps.mismatch
+    assert isinstance(line.drive.shape, OperatorLine)
+    assert expected.size.uncertainty == pytest.approx(np.hypot(0.1, 100.0 * line.drive.shape.between), rel=1e-12)
+    assert abs(line.drive.shape.between) < 5e-4
     assert (max(scaling.values()) > 10.0) == (harmonics == 6)  # it is the waveform that makes the difference
 
 
 def test_it_stands_in_the_summary_and_in_the_manifest_and_old_manifests_are_read(tmp_path: Path) -> None:
-    path, out = with_operator(tmp_path), tmp_path / "out"
+    path, out = (
+        with_operator(tmp_path, "dac.bits = 24", "x.table.bits = 24"),
+        tmp_path / "out",
+    )  # whose steps are nothing
     built = run("build", path, "-o", out)
     assert built.status == 0
     assert re.search(r"\nx +on the scanner +rms forward .*\n +scaling forward .*\n +mismatch .*\n +nearest ", built.out)
@@ -169,7 +183,7 @@ def test_it_stands_in_the_summary_and_in_the_manifest_and_old_manifests_are_read
     digest = hashlib.sha256((path.parent / name).read_bytes()).hexdigest()
     assert manifest["axes"]["x"]["drive"]["model_files"] == {name: digest}
     assert "model_files" not in manifest["axes"]["y"]["drive"]
-    expected = manifest["axes"]["x"]["certificate"]["expected"]
+    expected, plan = manifest["axes"]["x"]["certificate"]["expected"], make_plan(load(path))
     assert list(expected) == [
         "basis",
         "rms_percent",
@@ -178,7 +192,9 @@ def test_it_stands_in_the_summary_and_in_the_manifest_and_old_manifests_are_read
         "size_percent",
         "distance_percent",
     ]
-    assert expected["scaling_percent"]["backward"]["uncertainty"] == 1.5
+    steps = converter_errors(plan.x, EmittedPeriod(plan.x)).scaling["backward"]
+    assert expected["scaling_percent"]["backward"]["uncertainty"] == float(f"{1.5 + steps:.6g}")
+    assert steps < 0.01
     assert "expected" not in manifest["axes"]["y"]["certificate"]  # forward only, and no operator
     before = read_build(out)
     del manifest["axes"]["x"]["certificate"]["expected"]
@@ -258,12 +274,41 @@ def test_too_few_harmonics_are_said_with_a_remedy_that_holds(tmp_path: Path) -> 
     assert warned(with_operator(tmp_path, f"x.band_limit.harmonics = {tried[1]}")) == []
 
 
-def test_a_limit_makes_the_warning_earlier_and_stays_a_limit_of_the_waveform(tmp_path: Path) -> None:
-    path = with_operator(tmp_path, "+ [limits]\nmax_scaling_error_percent = 0.5", "x.band_limit.harmonics = 14")
-    text = run("check", path)
-    assert text.status == 0
-    assert "above 0.5 %" in text.err
-    assert "above 0.5 %" not in run("check", with_operator(tmp_path, "x.band_limit.harmonics = 14")).err
+def test_a_limit_counts_what_is_expected_and_says_which_part_is_whose(tmp_path: Path) -> None:
+    limit, few = "+ [limits]\nmax_scaling_error_percent = 0.5", "x.band_limit.harmonics = 14"
+    broken = run("check", with_operator(tmp_path, limit, few))
+    assert broken.status == 3
+    found = re.search(
+        r"scan\.toml:\d+: limits\.max_scaling_error_percent: on the scanner the x axis is expected to have a scaling "
+        r"error of ([\d.]+) % (\w+), above 0\.5 %: ([\d.]+) % since these harmonics do not make the waveform that its "
+        r"operator needs over the window, ([\d.]+) % of the emitted waveform; tried: x\.band_limit\.harmonics = (\d+) "
+        r"leaves ([\d.]+) %",
+        broken.err,
+    )
+    assert found, broken.err
+    _, _, certificates = planned(with_operator(tmp_path, few))
+    expected = certificates["x"].expected
+    assert expected is not None
+    value, own = expected.scaling[found[2]].value, certificates["x"].scaling[found[2]].total
+    assert [float(found[i]) for i in (1, 3, 4)] == pytest.approx([value + own, value, own], rel=1e-2)
+    assert own < 0.5 < value + own  # the waveform alone is within the limit
+    assert float(found[6]) <= 0.5
+    assert run("check", with_operator(tmp_path, limit, f"x.band_limit.harmonics = {found[5]}")).status == 0
+    assert run("check", with_operator(tmp_path, few)).status == 0
+    assert run("check", with_operator(tmp_path, limit.replace("0.5", "3"), few)).status == 0
+
+
+def test_a_limit_does_not_count_the_uncertainty_and_counts_the_size(tmp_path: Path) -> None:
+    setup, plan, certificates = planned(with_operator(tmp_path, "+ [limits]\nmax_scaling_error_percent = 0.8"))
+    expected = certificates["x"].expected
+    assert expected is not None
+    assert (expected.scaling["forward"].uncertainty or 0.0) > 0.8
+    assert broken_limits(plan, certificates, setup.scan_file) == []
+    off = replace(certificates["x"], expected=replace(expected, size=Figure(-0.9, 0.1)))
+    (problem,) = broken_limits(plan, {"x": off}, setup.scan_file)
+    assert re.search(
+        r"expected to have a size error of -0\.9 %, above 0\.8 %: -0\.9 % by its operator, [+-]0", str(problem)
+    )
 
 
 def law_loop(line: LinePlan, v: float) -> tuple[ModelBranch, ModelBranch]:

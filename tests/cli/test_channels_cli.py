@@ -64,6 +64,7 @@ def test_what_is_no_pair_is_said(lab: Path) -> None:
         (("a.ibw", "--channel", "Deflection"), "is the trace by the file; the retrace is needed here"),
         (("a.asd", "--channel", "TP", "--retrace-channel", "ER"), "is a movie of 2 frames; choose one with --frame, 0"),
         (("a.asd", "--channel", "TP", "--frame", "2"), "has no frame 2; the last one is 1"),
+        (("a.sxm", "--pair", "50", "t.npy"), "t.npy: channel 0 ('') has no retrace in this file; give it too"),
         (("t.npy",), "t.npy: channel 0 ('') has no retrace in this file; give it too"),
     ):  # fmt: skip
         outcome = one(*words)
@@ -118,3 +119,11 @@ def test_a_damaged_file_and_a_missing_library(lab: Path, monkeypatch: pytest.Mon
     assert outcome.status == 6
     assert outcome.err == "tifffile is missing; install it with: pip install 'piezo-tablegen[images]'\n"
     assert run("channels", "a.sxm").status == 0
+
+
+def test_a_title_does_not_steer_the_terminal(lab: Path) -> None:
+    evil = {"Height\x1b[2JTrace": np.eye(40)}
+    (lab / "evil.ibw").write_bytes(ibw(evil, NOTE))
+    outcome = run("channels", "evil.ibw")
+    assert "\x1b" not in outcome.out
+    assert "Height\\x1b[2JTrace  trace" in outcome.out

@@ -22,7 +22,7 @@ from limits import PATIENCE_S
 
 from tablegen import __version__
 
-COMMANDS = ("build", "check", "show", "verify", "init", "paths", "schema")
+COMMANDS = ("build", "check", "show", "report", "verify", "init", "paths", "schema")
 COMMANDS += ("upload", "status", "readback", "park", "trigger", "clear", "ports")
 OWN_FILES = [
     "annexin_200nm.c",
@@ -98,6 +98,7 @@ def test_help_names_every_command_and_every_exit_status() -> None:
         ("build", ("--depfile FILE", "--depfile-target NAME", "gcc -MD -MP", "[default: DIR/manifest.json]")),
         ("check", ("SCAN.TOML", "file:line: key: why")),
         ("show", ("SCAN.TOML", "--json", "--plot / --no-plot", "> and <")),
+        ("report", ("SCAN.TOML|DIR", "--output FILE", "[default: report.html]", "--verified FILE", "--svg DIR")),
         (
             "verify",
             (

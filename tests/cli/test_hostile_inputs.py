@@ -74,6 +74,7 @@ READING: dict[str, Callable[[Path], tuple[str | Path, ...]]] = {
     "table": lambda path: ("calibrate", "offset", path, "--axis", "x", "--v-max", "100"),
     "calibrated": lambda path: ("calibrate", "offset", "data.csv", "--axis", "x", "--scanner", path, "--write"),
     "image": lambda path: (*IMAGES, path, path),
+    "old image": lambda path: ("correct", path, "--fit"),
 }
 
 
@@ -82,7 +83,7 @@ def test_no_command_waits_at_a_pipe_or_reads_a_device(what: str, tmp_path: Path)
     write_pair(tmp_path)
     (tmp_path / "data.csv").write_text("offset_v,apparent_nm\n0,100\n50,120\n100,140\n")
     for other, path in other_files(tmp_path).items():
-        named = path.rename(path.with_suffix(".npy")) if what == "image" else path
+        named = path.rename(path.with_suffix(".npy")) if "image" in what else path
         said = refused(*READING[what](named), folder=tmp_path)
         assert str(named) in said
         assert other in said or "is not a file" in said
@@ -104,6 +105,7 @@ WRITING: dict[str, Callable[[Path], tuple[str | Path, ...]]] = {
     "simulated plot": lambda path: ("simulate", "scan.toml", "--plot", path),
     "csv": lambda path: ("simulate", "scan.toml", "--csv", path),
     "junit": lambda path: ("verify", "out", "--junit", path),
+    "report": lambda path: ("report", "scan.toml", "-o", path),
     "keep": lambda path: ("verify", "out", "--keep", path),
     "readback": lambda path: ("readback", "--port", "socket://127.0.0.1:9", "-o", path),
     "init": lambda path: ("init", path),
@@ -192,7 +194,7 @@ DAMAGED: dict[str, tuple[str, Callable[[], bytes], str]] = {
     ),
     "header without end": (
         "a.spm",
-        lambda: b"\\*File list\r\n" + b"\\*Ciao image list\r\n" * (4 << 20),
+        lambda: b"\\*File list\r\n" + b"\\*Ciao image list\r\n" * (1 << 20),
         "has no end of its header",
     ),
     "a million tags": (

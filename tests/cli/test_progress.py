@@ -8,6 +8,7 @@ import pytest
 from limits import PATIENCE_S
 
 from tablegen.cli import progress as module
+from tablegen.cli.bar import Bar
 from tablegen.cli.progress import Progress
 
 
@@ -81,4 +82,24 @@ def test_a_failure_takes_the_line_away_too(monkeypatch: pytest.MonkeyPatch) -> N
 
     with pytest.raises(KeyboardInterrupt):
         interrupted()
+    assert screen.getvalue().endswith("\r")
+
+
+def test_a_batch_has_a_bar_that_messages_interrupt(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of images: how many, and the seconds that are left by those that are done; hidden for a message."""
+    screen = Screen(terminal=True)
+    monkeypatch.setattr(sys, "stderr", screen)
+    clock = [0.0]
+    bar = Bar(lambda: clock[0], unit="images")
+    for done in range(3):
+        clock[0] = 2.0 * done
+        bar(done, 4)
+        bar.hide()
+    bar.close()
+    shown = [part.strip() for part in screen.getvalue().split("\r") if part.strip()]
+    assert shown == [
+        "[........................] 0/4 images",
+        "[######..................] 1/4 images  6 s left",
+        "[############............] 2/4 images  4 s left",
+    ]
     assert screen.getvalue().endswith("\r")

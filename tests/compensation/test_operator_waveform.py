@@ -9,6 +9,7 @@ from tablegen.compensation.dynamics import SecondOrder
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.compensation.line import LineShape
 from tablegen.compensation.operator.creep import NO_CREEP, LogarithmicCreep
+from tablegen.compensation.operator.family import Family
 from tablegen.compensation.operator.field import Field, Lengths
 from tablegen.compensation.operator.operator import Operator
 from tablegen.compensation.operator.plays import FIXED_BENDS, Plays, envelopes
@@ -27,7 +28,8 @@ WEIGHTS = np.stack([np.full(30, 12.0), np.full(30, 3.0), np.full(30, 5.0)])
 
 
 def operator(creep: LogarithmicCreep = NO_CREEP) -> Operator:
-    return Operator(Plays(THRESHOLDS, WEIGHTS, np.array([700.0, 60.0])), _NOTHING, _NO_SIZES, creep, 0.5, ())
+    family = Family(Plays(THRESHOLDS, WEIGHTS, np.array([700.0, 60.0])))
+    return Operator(family, _NOTHING, _NO_SIZES, creep, 0.5, ())
 
 
 def wanted(size_nm: float = 400.0, turn: float = 0.5, rate_hz: float = 500.0) -> Wanted:

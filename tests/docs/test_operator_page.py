@@ -10,7 +10,7 @@ import pytest
 from building import EXAMPLE, REPOSITORY
 from click.testing import CliRunner
 
-from tablegen.calibration.operator import branches, family, fit, periodic_line
+from tablegen.calibration.operator import branches, fit, periodic_line, plays_fit
 from tablegen.cli import cli
 from tablegen.compensation.models.operator import CENTRE_REACH, STROKE_REACH
 from tablegen.compensation.operator import operator as operators
@@ -56,8 +56,8 @@ def test_the_limits_are_those_of_the_code() -> None:
     assert f"more than {STROKE_REACH:g} v_max above the largest trace" in WORDS
     assert f"{CENTRE_REACH:g} v_max away from every trace" in WORDS
     assert f"at most {CONFIGURATION.most_bytes >> 20} MiB" in WORDS
-    assert f"{family.THRESHOLDS} thresholds up to {family._HIGHEST}" in WORDS
-    assert f"linear between {family.NODES} nodes" in WORDS
+    assert f"{plays_fit.THRESHOLDS} thresholds up to {plays_fit._HIGHEST}" in WORDS
+    assert f"linear between {plays_fit.NODES} nodes" in WORDS
     assert f"Chebyshev series of degree {branches.DEGREE}" in WORDS
     assert f"These {2 * branches.DEGREE + 2} numbers" in WORDS
     assert f"s0 is {operators.SMALL_STROKE}" in WORDS

@@ -3,6 +3,7 @@
 import re
 import struct
 import sys
+from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -72,12 +73,18 @@ def test_the_page_is_what_comes_out(written: Path) -> None:
 
 
 def test_the_operator_has_a_column(rows: dict[str, list[Row]]) -> None:
-    """Beside the harmonic model's residuals and scaling errors, which it makes smaller; no verdict counts it."""
+    """Wherever a row says what a correction leaves, which it makes smaller but for sizes; no verdict counts it."""
     found = [row for section in rows.values() for row in section if row.operator is not None]
-    assert [row.figure for row in found] == ["5i", "5i", "5j", "5j"]
+    figures = Counter(row.figure for row in found)
+    assert figures == {"abstract": 3, "3f": 1, "5d": 2, "5f": 2, "5i": 3, "5j": 2}
     for row in found:
         assert row.operator is not None
-        assert row.operator < 0.6 * row.ours
+        if row.what.startswith("residual, ratio"):
+            assert row.operator > row.ours / 0.6
+        elif row.printed.unit == "times":  # sizes, of which the virtual scanner was made to follow the laws
+            assert row.operator > 0.6 * row.ours
+        else:
+            assert row.operator < 0.6 * row.ours
         assert f"| {row.ours_text} | {row.operator_text} | {row.source} |" in PAGE.read_text(encoding="utf-8")
         assert replace(row, operator=None).verdict == row.verdict
 

@@ -1,10 +1,11 @@
-"""Piezos that the project does not contain, to identify operators on: generalised plays, and Bouc-Wen's equation.
+"""Piezos that the project does not contain, to identify operators on: plays, and Bouc-Wen's and Jiles-Atherton's.
 
-Written without the operator's code: plays are stepped sample by sample, Bouc-Wen's equation is integrated. Both lie
-before creep, two modes and dead time, and their sensitivity depends on the mean drive.
+Written without the operator's code: plays are stepped sample by sample, the equations are integrated. All lie before
+creep, two modes and dead time, and their sensitivity depends on the mean drive.
 """
 
 from dataclasses import dataclass, field
+from math import copysign, tanh
 from typing import Protocol
 
 import numpy as np
@@ -16,6 +17,8 @@ CREEP_PER_DECADE = 0.026
 BIAS = (0.12, 0.05)  # of the sensitivity: linear and quadratic in the mean drive from -1 to 1
 MODES = ((60e3, 14.0, 0.96), (31e3, 20.0, 0.04))  # Hz, quality, share
 DEAD_TIME_S = 2e-6
+_CLOSED = 1e-10  # of what h may differ by from period to period
+_MOST_PERIODS = 50
 
 
 class Core(Protocol):
@@ -54,9 +57,47 @@ class ManyPlays:
         return 1250.0 * (out + (1.0 - float(np.sum(self.weights))) * reversible / 1.17)
 
 
+class OneState:
+    """A core whose hysteresis has one state, stepped with the drive."""
+
+    def moved(self, state: float, u: float, by: float) -> float:
+        """The state after the drive went from ``u`` by so much."""
+        raise NotImplementedError
+
+    def nm(self, u: Floats, state: Floats) -> Floats:
+        """The displacement."""
+        raise NotImplementedError
+
+    def settled(self, u: Floats) -> Floats:
+        """The period that ends where it began: a small loop takes hundreds to get there by itself."""
+        drives = u.tolist()
+        start, (states, after) = 0.0, self.period(drives, 0.0)
+        for _ in range(_MOST_PERIODS):
+            if abs(after - start) < _CLOSED:
+                return self.nm(u, np.array(states))
+            # Secant of what a period moves the start by: exact where that is linear, and it hardly bends.
+            ahead = self.period(drives, after)[1]
+            moves, next_moves = after - start, ahead - after
+            start = after + next_moves * moves / (moves - next_moves)
+            states, after = self.period(drives, start)
+        raise ValueError(f"the loop of {self} did not close")
+
+    def period(self, drives: list[float], state: float) -> tuple[list[float], float]:
+        """The state at every drive of a period that begins with it, and at its end."""
+        before, out = drives[0], []
+        for drive in [*drives, drives[0]]:
+            state = self.moved(state, before, drive - before)
+            before = drive
+            out.append(state)
+        return out[:-1], out[-1]
+
+
 @dataclass
-class BoucWen:
-    """dh = du (A - |h|^n (beta sign(h du) (1 + asymmetry sign(h) / 2) + gamma)), less from a bent line."""
+class BoucWen(OneState):
+    """dh = du (A - |h|^n (beta sign(h du) (1 + asymmetry sign(h) / 2) + gamma)), less from a bent line.
+
+    With ``skew`` n is another one on either side, which no operator has.
+    """
 
     a: float = 0.35
     beta: float = 6.0
@@ -65,30 +106,53 @@ class BoucWen:
     depth: float = 0.6
     asymmetry: float = 0.5
     bend: float = 0.15
-    periods: int = 12
+    skew: float = 0.0
 
-    def settled(self, u: Floats) -> Floats:
-        """Periods until the loop has closed."""
-        h, before = 0.0, float(u[0])
-        out = np.empty(len(u))
-        for _ in range(self.periods):
-            start = h
-            for k, drive in enumerate(u.tolist()):
-                h = self._moved(h, drive - before)
-                before = drive
-                out[k] = drive * (1.0 + self.bend * drive) - self.depth * h
-            if abs(h - start) < 1e-9:
-                break
-        return 1250.0 * out
+    def nm(self, u: Floats, state: Floats) -> Floats:
+        return 1250.0 * (u * (1.0 + self.bend * u) - self.depth * state)
 
-    def _moved(self, h: float, by: float) -> float:
+    def moved(self, state: float, u: float, by: float) -> float:
         steps = int(abs(by) / 2e-3) + 1
         du = by / steps
         for _ in range(steps):
-            size = abs(h) ** self.n
-            against = self.beta * (1.0 + 0.5 * self.asymmetry * np.sign(h)) * np.sign(h * du) + self.gamma
-            h += du * (self.a - size * against)
-        return h
+            state += du * self._slope(state + 0.5 * du * self._slope(state, du), du)
+        return state
+
+    def _slope(self, h: float, du: float) -> float:
+        lag = self.beta * (1.0 + copysign(0.5, h) * self.asymmetry)
+        power = abs(h) ** (self.n * (1.0 + copysign(self.skew, h)) if self.skew else self.n)
+        return float(self.a - power * (copysign(lag, h * du) + self.gamma))
+
+
+@dataclass
+class JilesAtherton(OneState):
+    """Jiles and Atherton's equation over a bent line: of no family, since its slope goes with drive and state.
+
+    The irreversible part m follows the curve tanh(x) of x = (u - centre) / width + coupling m, where that is ahead of
+    it, the more readily the smaller ``pinning`` is.
+    """
+
+    centre: float = 0.35
+    width: float = 0.45
+    coupling: float = 0.15
+    pinning: float = 0.35
+    share: float = 0.35
+    bend: float = 0.1
+
+    def nm(self, u: Floats, state: Floats) -> Floats:
+        return 1250.0 * ((1.0 - self.share) * u * (1.0 + self.bend * u) + 0.5 * self.share * state)
+
+    def moved(self, state: float, u: float, by: float) -> float:
+        steps = int(abs(by) / 2e-3) + 1
+        du = by / steps
+        for k in range(steps):
+            middle = state + 0.5 * du * self._slope(state, u + k * du, du)
+            state += du * self._slope(middle, u + (k + 0.5) * du, du)
+        return state
+
+    def _slope(self, m: float, u: float, du: float) -> float:
+        ahead = copysign(1.0, du) * (tanh((u - self.centre) / self.width + self.coupling * m) - m)
+        return max(ahead, 0.0) / self.pinning
 
 
 @dataclass

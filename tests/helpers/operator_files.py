@@ -6,6 +6,7 @@ import numpy as np
 from editing import SCAN, SCANNER, edited
 
 from tablegen.compensation.operator.file import (
+    BoucWenTable,
     CreepTable,
     LengthsTable,
     LineTable,
@@ -39,6 +40,7 @@ def operator_file(
             scaling_percent=20.0 * rms,
             mismatch_percent=3.0 * rms,
             size_percent=size,
+            in_fit_percent=[rms, 20.0 * rms, 3.0 * rms, size],  # all that is left out is noise
         )
         for stroke in STROKES
     ]
@@ -54,6 +56,7 @@ def operator_file(
             bends=FIXED_BENDS.tolist(),
             reversible=list(REVERSIBLE),
         ),
+        bouc_wen=BoucWenTable(depth_nm=0.0, n=1.0, beta=0.0, gamma=0.0, asymmetry=0.0, bend=[0.0, 0.0]),
         lengths=LengthsTable(stroke=0.4, centre=0.6, noise=1e-5),
         lines=lines,
     )

@@ -16,7 +16,9 @@ from tablegen.config.scanner import Scanner
 from tablegen.planning.line_plan import LinePlan, make_plan
 from tablegen.refinement.departure import Departure, departure
 from tablegen.refinement.displacement import Displacement
+from tablegen.refinement.image_round import refine_images, refine_mismatch
 from tablegen.refinement.round import Options, Round, refine
+from tablegen.virtual.imaging import Conditions, Surface, grating, hexagonal, rough, running_frame
 from tablegen.virtual.laboratory import calibrate
 from tablegen.virtual.parameters import load_truth
 from tablegen.virtual.running import running_trace
@@ -131,6 +133,70 @@ def rounds(
             yield step
             return
         found = learnt(step, axis, seed, options)
+        yield replace(step, round=found)
+        setup = found.setup
+
+
+IMAGED = Conditions(noise=0.05, drift=(0.02, 0.01), tilt=(0.5, 0.3))
+
+
+@dataclass(frozen=True)
+class Sample:
+    """A sample of so many periods, or grains, in a line."""
+
+    name: str
+    periods: float
+    angle_deg: float = 7.0
+
+    def of(self, size_nm: float) -> Surface:
+        """On a line of this size."""
+        if self.name == "rough":
+            return rough(size_nm / self.periods)
+        kind = grating if self.name == "grating" else hexagonal
+        return kind(size_nm / self.periods, self.angle_deg)
+
+
+GRATING, LATTICE, ROUGH = Sample("grating", 15.0, 3.0), Sample("lattice", 17.0), Sample("rough", 30.0)
+SLOPING = Sample("grating", 20.0, 40.0)  # with periods along x and y
+
+
+def imaged_scan(axis: Literal["x", "y"], volts: float, lines: int = 200, pixels: int = 200) -> Scan:
+    """A square scan at 100 lines a second, both axes at so many volts."""
+    sizes = ("- x.size_nm", f"x.size_v = {volts}", "- y.size_nm", f"y.size_v = {volts}")
+    return Scan(f"{axis}, {volts:g} V", axis, (*sizes, f"timing.lines = {lines}", f"timing.pixels = {pixels}"))
+
+
+def frames_of(
+    setup: Setup, sample: Sample, count: int = 1, seed: int = 0, plant: str = "default", conditions: Conditions = IMAGED
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Trace and retrace of frames of the running scan that follow each other."""
+    plan, truth = make_plan(setup), scanner(plant)
+    surface, found = sample.of(plan.x.drive.size_nm), []
+    for number in range(count):
+        seen = replace(conditions, frame=number, seed=1000 * seed + number)
+        frame = running_frame(plan, truth.x, truth.y, surface, seen)
+        found.append((frame.trace.heights, frame.retrace.heights))
+    return found
+
+
+def image_rounds(
+    setup: Setup,
+    name: Literal["x", "y"],
+    count: int,
+    sample: Sample,
+    plant: str = "default",
+    frames: int | None = None,
+) -> Iterator[Step]:
+    """As ``rounds``, from images: by default one frame a round for x, two for y."""
+    axis: VirtualAxis = getattr(scanner(plant), name)
+    learn_from = refine_mismatch if sample.name == "rough" else refine_images
+    for seed in range(count + 1):
+        step = play(setup, name, axis)
+        if seed == count:
+            yield step
+            return
+        pairs = frames_of(setup, sample, frames or (1 if name == "x" else 2), seed, plant)
+        found = learn_from(setup, name, pairs, Options())
         yield replace(step, round=found)
         setup = found.setup
 

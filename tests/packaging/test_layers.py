@@ -29,6 +29,8 @@ LAYERS = (
     "calibration",
     "refinement",
     "virtual",
+    "correction",
+    "report",
     "api",
     "cli",
     "__main__",

@@ -35,6 +35,7 @@ ALLOWED = {
     ("verification/directory.py", "shutil.copyfile"): "files of a build, which read_build has found to be files",
     ("verification/verilog_target.py", "shutil.copyfile"): "as in directory.py",
     ("link/transport.py", "open"): "a serial port",
+    ("report/document.py", "read_text"): "its template, style and script, which ship with the package",
     ("calibration/csv_blocks.py", "np.loadtxt"): "bytes that were read already",
     ("calibration/image_formats/picture.py", "Pillow.open"): "bytes that were read already",
 }

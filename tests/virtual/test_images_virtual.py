@@ -27,6 +27,14 @@ def axis() -> VirtualAxis:
     return VirtualScanner.of(load_truth()).x
 
 
+class Linear:
+    """An axis that follows its drive, 10 nm a volt."""
+
+    def settled(self, volts: Floats, tick_s: float) -> Floats:
+        assert tick_s > 0.0
+        return 10.0 * volts
+
+
 def by_sensor(axis: VirtualAxis, v: float) -> AmplitudeFit:
     trace = sensor_trace(axis, v, OFFSET, RATE, periods=4, sensor=Sensor(noise_nm=0.02 * v, seed=1))
     return fit_trace(trace["time_s"], trace["drive_v"], trace["displacement_nm"])
@@ -91,12 +99,7 @@ def test_the_same_seed_is_the_same_image(axis: VirtualAxis) -> None:
 def test_a_pixel_is_the_middle_of_its_time() -> None:
     """On an axis that follows its drive, of a sample that rises with x: trace and retrace show the same."""
 
-    class Linear:
-        @staticmethod
-        def settled(volts: Floats, _tick_s: float) -> Floats:
-            return 10.0 * volts
-
-    trace, retrace = image_pair(Linear(), lambda x, y: x + 0.0 * y, 40.0, 50.0, RATE, pixels=50, lines=32, noise=0.0)  # type: ignore[arg-type]
+    trace, retrace = image_pair(Linear(), lambda x, y: x + 0.0 * y, 40.0, 50.0, RATE, pixels=50, lines=32, noise=0.0)
     expected = 300.0 + 400.0 * (np.arange(50) + 0.5) / 50
     assert trace == pytest.approx(np.tile(expected, (32, 1)), abs=0.05)
     assert retrace == pytest.approx(trace, abs=0.05)

@@ -4,41 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from editing import SCAN, SCANNER, edited, write_pair
-from foreign_plants import SIX, BoucWen, ForeignPlant, ManyPlays, record, triangle
+from foreign_plants import BoucWen, ForeignPlant, ManyPlays, triangle
+from operator_scans import Played, fitted, foreign_traces, scan_on
 
-from tablegen.calibration.hysteresis import Trace
-from tablegen.calibration.operator.fit import fit_operator
-from tablegen.calibration.operator.periodic_line import periodic_line
-from tablegen.calibration.operator.record import operator_file
-from tablegen.config.load import Setup, load
-from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import make_plan
 from tablegen.virtual.own_run import measured, simulate_own
 from tablegen.virtual.simulation import run_line
-
-SAMPLES = 2000  # of a period, on which the piezos are integrated
-
-
-class Played:
-    """A foreign piezo as an axis on which emitted integers are played."""
-
-    def __init__(self, plant: ForeignPlant) -> None:
-        self._plant = plant
-
-    def settled(self, volts: Floats, tick_s: float) -> Floats:
-        ticks = (np.arange(len(volts)) + 0.5) / len(volts)
-        at = (np.arange(SAMPLES) + 0.5) / SAMPLES
-        moved = self._plant.settled(np.interp(at, ticks, volts, period=1.0), 1.0 / (len(volts) * tick_s))
-        return np.interp(ticks, at, moved, period=1.0)
-
-
-def scan_of(folder: Path, size_nm: float, offset_v: float, *law: str) -> Setup:
-    scan = edited(SCAN, f"x.size_nm = {size_nm}", f"x.offset_v = {offset_v}", "timing.line_rate_hz = 100")
-    scanner = edited(
-        SCANNER, "x.hysteresis.model = 'operator'", "x.hysteresis.file = 'operator.toml'", "- [x.resonance]", *law
-    )
-    return load(write_pair(folder, edited(scan, "timing.lines = 20", "y.band_limit.harmonics = 16"), scanner))
 
 
 def offset_law(plant: ForeignPlant) -> tuple[str, str]:
@@ -55,12 +26,10 @@ def offset_law(plant: ForeignPlant) -> tuple[str, str]:
 def test_a_piezo_is_no_worse_than_the_worst_of_the_table(tmp_path: Path, kind: type) -> None:
     """At the measured offset; docs/virtual.md has these numbers."""
     plant = ForeignPlant(kind())
-    traces = [Trace(f"{s:g}", *record(plant, c, s, seed=seed)) for seed, (c, s) in enumerate(SIX)]
-    fit = fit_operator([periodic_line(trace, 100.0) for trace in traces], None, lambda _: 1.0)
-    (tmp_path / "operator.toml").write_bytes(operator_file(fit, "x", 100.0))
+    fit = fitted(foreign_traces(plant))
     law = offset_law(plant)
     for size_nm in (100.0, 200.0, 400.0, 800.0):
-        setup = scan_of(tmp_path, size_nm, 50.0, *law)
+        setup = scan_on(tmp_path, fit, size_nm, 50.0, *law)
         (run,) = simulate_own(setup, 0)
         table = run.rows[2].summary()
         real = measured(run_line(make_plan(setup).x, Played(plant)))
@@ -74,7 +43,7 @@ def test_a_piezo_is_no_worse_than_the_worst_of_the_table(tmp_path: Path, kind: t
         if size_nm > 500.0:
             assert rms < 10.0 * real[0]
     # Where no trace was measured more is left, and the output says that it is not known.
-    setup = scan_of(tmp_path, 100.0, 85.0)
+    setup = scan_on(tmp_path, fit, 100.0, 85.0)
     (run,) = simulate_own(setup, 0)
     assert run.distance == pytest.approx(0.35, abs=1e-3)
     real = measured(run_line(make_plan(setup).x, Played(plant)))

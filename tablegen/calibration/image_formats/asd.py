@@ -6,7 +6,7 @@ from math import isfinite, prod
 
 import numpy as np
 
-from tablegen.calibration.image_formats.channel import MAX_PIXELS, Channel, Matrix
+from tablegen.calibration.image_formats.channel import MAX_PIXELS, Channel, Matrix, positive
 
 _MAX_SIDE = 1 << 15  # pixels
 _RANGES = {  # code: full scale in V, and whether it goes below 0
@@ -56,7 +56,7 @@ def asd_channels(content: bytes, _: str) -> list[Channel]:
     if start + size * frames * len(titles) > len(content):
         there = max(0, len(content) - start) // (size * max(1, len(titles)))
         raise ValueError(f"has {frames} frames by its header and bytes for {there}; copy it again")
-    line_rate = _positive(1000.0 * rows / header["frame_ms"]) if header["frame_ms"] else None
+    line_rate = positive(1000.0 * rows / header["frame_ms"]) if header["frame_ms"] else None
     channels = []
     for number, title in enumerate(titles):
         first = start + number * size * frames + before
@@ -69,8 +69,8 @@ def asd_channels(content: bytes, _: str) -> list[Channel]:
                 partial(_load, content, first, size, (rows, columns), zero, step),
                 signal=title,
                 unit=unit,
-                width_nm=_positive(header["width"]),
-                height_nm=_positive(header["height"]),
+                width_nm=positive(header["width"]),
+                height_nm=positive(header["height"]),
                 line_rate_hz=line_rate,
                 frames=frames,
             )
@@ -104,10 +104,6 @@ def _take(content: bytes, at: int, fields: tuple[tuple[str, str], ...], found: d
         found.update(zip(names.split(), struct.unpack_from(f"<{layout}", content, at), strict=True))
         at += struct.calcsize(f"<{layout}")
     return at
-
-
-def _positive(value: float) -> float | None:
-    return value if isfinite(value) and value > 0.0 else None
 
 
 def _scale(title: str, header: _Header) -> tuple[float, float, str]:

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import isfinite
 from typing import Literal
 
 import numpy as np
@@ -40,7 +41,7 @@ class Channel:
     width_nm: float | None = None  # of the line, all pixels
     height_nm: float | None = None
     line_rate_hz: float | None = None  # lines in one direction per second
-    first_row: FirstRow | None = None  # where row 0 is in the picture; None where the file does not say
+    first_row: FirstRow | None = None  # where row 0 is in the picture; None where that is not known
     frames: int = 1
 
 
@@ -107,6 +108,15 @@ def listed(channels: Sequence[Channel]) -> str:
 def quoted(title: str) -> str:
     """A title for a message."""
     return f"'{shortened(title, _MAX_TITLE)}'"
+
+
+def positive(value: object, unit: float = 1.0) -> float | None:
+    """A number, or the text of one, in another unit; None for what is no positive number."""
+    try:
+        found = float(value) * unit  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        return None
+    return found if isfinite(found) and found > 0.0 else None
 
 
 def first_line(error: BaseException) -> str:

@@ -8,11 +8,11 @@ turned, if the note has ``ScanDown: 1``.
 import re
 import struct
 from functools import partial
-from math import isfinite, prod
+from math import prod
 
 import numpy as np
 
-from tablegen.calibration.image_formats.channel import Channel, FirstRow, Matrix, split_direction
+from tablegen.calibration.image_formats.channel import Channel, FirstRow, Matrix, positive, split_direction
 
 _VERSION = 5
 _HEADERS = 64 + 320  # bytes
@@ -49,9 +49,9 @@ def ibw_channels(content: bytes, _: str) -> list[Channel]:
     labels_at = texts + formula + note_bytes + sum(lengths[:7])
     if labels_at + lengths[7] > len(content) or note_bytes > _MAX_NOTE:
         raise ValueError("ends in the middle of its images or texts; copy it again")
-    note = _note(content[texts + formula :][:note_bytes])
+    note = _note(content[texts + formula : texts + formula + note_bytes])
     labels = _labels(content[labels_at : labels_at + lengths[7]], layers)
-    unit = content[64 + 148 : 64 + 152].split(b"\0")[0].decode("latin-1")
+    unit = content[64 + 148 : 64 + 152].split(b"\0")[0].decode("latin-1") if layers == 1 else ""
     down = note.get("ScanDown")
     first: FirstRow = "top" if down == "1" else "bottom"
     channels = []
@@ -66,11 +66,11 @@ def ibw_channels(content: bytes, _: str) -> list[Channel]:
                 load,
                 signal,
                 direction,
-                unit or next((unit for names, unit in _UNITS if re.fullmatch(names, signal)), ""),
-                _scaled(note, "FastScanSize", 1e9),
-                _scaled(note, "SlowScanSize", 1e9),
-                _scaled(note, "ScanRate", 1.0),
-                first if down in ("0", "1") else None,
+                next((by_name for names, by_name in _UNITS if re.fullmatch(names, signal)), unit),
+                positive(note.get("FastScanSize"), 1e9),
+                positive(note.get("SlowScanSize"), 1e9),
+                positive(note.get("ScanRate"), 1.0),
+                first,
             )
         )
     return channels
@@ -95,11 +95,3 @@ def _labels(text: bytes, layers: int) -> list[str]:
     """A label for each layer, after that of the dimension itself; empty where the file has none."""
     cells = [text[at : at + _LABEL].split(b"\0")[0].decode("latin-1") for at in range(_LABEL, len(text), _LABEL)]
     return [*cells, *[""] * layers][:layers]
-
-
-def _scaled(note: dict[str, str], key: str, unit: float) -> float | None:
-    try:
-        value = float(note.get(key, "")) * unit
-    except ValueError:
-        return None
-    return value if isfinite(value) and value > 0.0 else None

@@ -8,8 +8,8 @@ from math import isfinite
 
 import numpy as np
 
-from tablegen.calibration.image_formats.channel import Channel, Matrix
-from tablegen.calibration.tiff import TiffImage, TiffTags, tiff_pages, tiff_tags
+from tablegen.calibration.image_formats.channel import Channel, Direction, Matrix, positive
+from tablegen.calibration.image_formats.tiff import TiffImage, TiffTags, tiff_pages, tiff_tags
 
 _WIDTH, _HEIGHT, _REFLECTED, _LINE_RATE = 0x8042, 0x8043, 0x8045, 0x8049  # of the first page
 _NAME, _RETRACE, _SHOWN_AS = 0x8050, 0x8051, 0x8052
@@ -33,7 +33,7 @@ def jpk_channels(content: bytes, _: str) -> list[Channel]:
 
 def _channel(number: int, page: TiffImage, own: TiffTags, grid: TiffTags) -> Channel:
     signal = str(own.get(_NAME) or own.get(_SHOWN_AS))
-    direction = "retrace" if own.get(_RETRACE) else "trace"
+    direction: Direction = "retrace" if own.get(_RETRACE) else "trace"
     factor, offset, unit = _scale(own)
     return Channel(
         number,
@@ -41,11 +41,11 @@ def _channel(number: int, page: TiffImage, own: TiffTags, grid: TiffTags) -> Cha
         page.shape,
         partial(_load, page, factor, offset),
         signal,
-        "retrace" if own.get(_RETRACE) else "trace",
+        direction,
         unit,
-        _positive(grid.get(_WIDTH), 1e9),
-        _positive(grid.get(_HEIGHT), 1e9),
-        _positive(grid.get(_LINE_RATE), 1.0),
+        positive(grid.get(_WIDTH), 1e9),
+        positive(grid.get(_HEIGHT), 1e9),
+        positive(grid.get(_LINE_RATE), 1.0),
         "top" if grid.get(_REFLECTED) else "bottom",
     )
 
@@ -65,14 +65,9 @@ def _scale(own: TiffTags) -> tuple[float, float, str]:
         unit = own.get(_UNIT + at)
         named = unit if isinstance(unit, str) else ""
         factor, offset = own.get(_FACTOR + at), own.get(_OFFSET + at)
-        if own.get(_SCALING + at) == "NullScaling":
+        scaling = own.get(_SCALING + at)
+        if scaling == "NullScaling":
             return 1.0, 0.0, named
-        if isinstance(factor, float) and isinstance(offset, float) and isfinite(factor) and isfinite(offset):
-            return factor or 1.0, offset, named
+        if scaling == "LinearScaling" and isinstance(factor, float) and isinstance(offset, float):
+            return (factor or 1.0, offset, named) if isfinite(factor) and isfinite(offset) else (1.0, 0.0, "LSB")
     return 1.0, 0.0, "LSB"
-
-
-def _positive(value: int | float | str | None, unit: float) -> float | None:
-    if not isinstance(value, float) or not isfinite(value * unit) or not value > 0.0:
-        return None
-    return value * unit

@@ -1,14 +1,15 @@
 """Scans of Nanonis (.sxm): tags in colons with their lines, then blocks of numbers, forward and backward.
 
-Rows are in the order of time. Backward lines are too, from right to left, and are turned here.
+Rows are in the order of time. Backward lines are too, from right to left, and are turned here. A scan that was stopped
+has NaN in place of what is missing; it ends with its last whole line.
 """
 
 from functools import partial
-from math import isfinite, prod
+from math import prod
 
 import numpy as np
 
-from tablegen.calibration.image_formats.channel import Channel, Direction, FirstRow, Matrix, quoted
+from tablegen.calibration.image_formats.channel import Channel, Direction, FirstRow, Matrix, positive, quoted
 
 _MAGIC = b":NANONIS_VERSION:"
 _END, _DATA = b":SCANIT_END:", b"\x1a\x04"
@@ -41,28 +42,41 @@ def sxm_channels(content: bytes, _: str) -> list[Channel]:
     if _words(tags, "NANONIS_VERSION") == ["1"] and columns != rows:
         raise ValueError("is of version 1, which does not tell columns from rows; save it with a newer version")
     blocks = _blocks(tags)
+    if not blocks:
+        return []
     size = 4 * columns * rows
     if start + size * len(blocks) > len(content):
         least = f"{len(blocks)} images of {columns} x {rows} pixels"
         raise ValueError(f"ends in the middle of its images ({least} by its header); copy it again")
+    done = _lines_done(np.frombuffer(content, kind, len(blocks) * columns * rows, start).reshape(-1, rows, columns))
     width, height = _lengths(tags, "SCAN_RANGE", 1e9)
     times = _lengths(tags, "SCAN_TIME", 1.0)
     return [
         Channel(
             number,
             f"{signal} {_NAMES[direction]}",
-            (rows, columns),
-            partial(_load, content, kind, start + size * number, (rows, columns), direction),
+            (done, columns),
+            partial(_load, content, kind, start + size * number, (done, columns), direction),
             signal,
             direction,
             unit,
             width,
-            height,
+            None if height is None else height * done / rows,
             None if None in times else 1.0 / sum(filter(None, times)),
             _FIRST_ROW.get(" ".join(_words(tags, "SCAN_DIR"))),
         )
         for number, (signal, unit, direction) in enumerate(blocks)
     ]
+
+
+def _lines_done(values: Matrix) -> int:
+    """How many lines a scan has that was stopped, which ends in lines without a number; all, if that is not so."""
+    lines = values.shape[1]
+    finite = np.isfinite(values)
+    whole: list[bool] = np.all(finite, axis=(0, 2)).tolist()
+    some: list[bool] = np.any(finite, axis=(0, 2)).tolist()
+    done = whole.index(False) if False in whole else lines
+    return done if done and not any(some[done + 1 :]) else lines
 
 
 def _load(content: bytes, kind: str, start: int, shape: tuple[int, int], direction: Direction, _: int) -> Matrix:
@@ -92,19 +106,15 @@ def _whole(tags: dict[str, list[str]]) -> tuple[int, int]:
     if len(words) != 2 or not all(word.isdecimal() and len(word) < 7 for word in words):
         raise ValueError(f"has no two numbers as SCAN_PIXELS, but {quoted(' '.join(words))}")
     columns, rows = map(int, words)
+    if not columns * rows:
+        raise ValueError(f"has an image of {columns} x {rows} pixels; is it damaged?")
     return columns, rows
 
 
 def _lengths(tags: dict[str, list[str]], name: str, unit: float) -> tuple[float | None, float | None]:
     """Two positive numbers in units, each None where it is none."""
-    found: list[float | None] = []
-    for word in [*_words(tags, name), "", ""][:2]:
-        try:
-            value = float(word) * unit
-        except ValueError:
-            value = 0.0
-        found.append(value if isfinite(value) and value > 0.0 else None)
-    return found[0], found[1]
+    first, second = [*_words(tags, name), "", ""][:2]
+    return positive(first, unit), positive(second, unit)
 
 
 def _blocks(tags: dict[str, list[str]]) -> list[tuple[str, str, Direction]]:

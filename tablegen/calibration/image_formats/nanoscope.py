@@ -5,16 +5,16 @@ The first row is the bottom one; it is the last in time, and rows are turned, if
 
 import re
 from functools import partial
-from math import isfinite, prod
+from math import prod
 
 import numpy as np
 
-from tablegen.calibration.image_formats.channel import Channel, Direction, FirstRow, Matrix
+from tablegen.calibration.image_formats.channel import Channel, Direction, FirstRow, Matrix, positive
 
 _END = b"\\*File list end"
 _MAX_HEADER = 4 << 20  # bytes; files have some hundred thousand at most
 _MAX_IMAGES = 1000
-_IMAGES = "*Ciao image list"
+_IMAGES, _SCAN = "*Ciao image list", "*Ciao scan list"
 _SCALED = re.compile(r"\w+\s+(?:\[(?P<by>[^\]]*)\]\s*)?(?:\([^)]*\)\s*)?(?P<value>[-+.\deE]+)\s*(?P<unit>\S*)")
 _NAMED = re.compile(r'\w+\s*(?:\[(?P<internal>[^\]]*)\]\s*)?(?:"(?P<name>[^"]*)")?')
 _NM = {"nm": 1.0, "pm": 1e-3, "~m": 1e3, "um": 1e3, "µm": 1e3, "mm": 1e6}
@@ -33,10 +33,15 @@ def spm_channels(content: bytes, _: str) -> list[Channel]:
         raise ValueError("has no end of its header; copy it again")
     lists = _lists(content[:end].decode("cp1252", "replace"))
     images = [one for name, one in lists if name == _IMAGES]
-    others = {key: value for name, one in lists if name != _IMAGES for key, value in one.items()}
+    others: _List = {}  # the first of a key; sensitivities stand with the scanner, or with the scan
+    for _, one in lists:
+        for key, value in one.items():
+            others.setdefault(key, value)
+    rate = next((one.get("scan rate", "") for name, one in lists if name == _SCAN), "")
     if len(images) > _MAX_IMAGES:
         raise ValueError(f"has {len(images)} images; at most {_MAX_IMAGES} are read")
-    return [_channel(content, number, one, others) for number, one in enumerate(images)]
+    line_rate = positive(rate.partition(" ")[0])
+    return [_channel(content, number, one, others, line_rate) for number, one in enumerate(images)]
 
 
 def _lists(header: str) -> list[tuple[str, _List]]:
@@ -53,7 +58,7 @@ def _lists(header: str) -> list[tuple[str, _List]]:
     return lists
 
 
-def _channel(content: bytes, number: int, image: _List, others: _List) -> Channel:
+def _channel(content: bytes, number: int, image: _List, others: _List, line_rate: float | None) -> Channel:
     columns, rows = _whole(number, image, "samps/line"), _whole(number, image, "number of lines")
     start, size = _whole(number, image, "data offset"), _whole(number, image, "data length")
     count = columns * rows
@@ -79,8 +84,8 @@ def _channel(content: bytes, number: int, image: _List, others: _List) -> Channe
         unit,
         width,
         height,
-        _positive(others.get("scan rate", "").split(" ")[0]),
-        first if down in ("up", "down") else None,
+        line_rate,
+        first,
     )
 
 
@@ -98,23 +103,15 @@ def _whole(number: int, image: _List, key: str) -> int:
     return int(word)
 
 
-def _positive(text: str) -> float | None:
-    try:
-        value = float(text)
-    except ValueError:
-        return None
-    return value if isfinite(value) and value > 0.0 else None
-
-
 def _size(image: _List, columns: int, rows: int) -> tuple[float | None, float | None]:
     """Width and height in nm; no height where the pixels are not square by the aspect ratio, since readers differ."""
     words = image.get("scan size", "").split()
     nm = _NM.get(words[-1]) if words else None
-    width = _positive(words[0]) if nm else None
+    width = positive(words[0]) if nm else None
     if width is None or nm is None:
         return None, None
     across, _, along = image.get("aspect ratio", "").partition(":")
-    ratio = (_positive(across) or 0.0) / (_positive(along) or 1.0)
+    ratio = (positive(across) or 0.0) / (positive(along) or 1.0)
     square = not ratio or abs(ratio * rows / columns - 1.0) < 0.01
     return width * nm, width * nm * rows / columns if square else None
 
@@ -122,14 +119,14 @@ def _size(image: _List, columns: int, rows: int) -> tuple[float | None, float | 
 def _scale(text: str, others: _List, stored: int) -> tuple[float, str]:
     """The unit of the values, and how much of it is one step; steps where the file does not say."""
     found = _SCALED.match(text)
-    most = _positive(found["value"]) if found else None
+    most = positive(found["value"]) if found else None
     if found is None or most is None:
         return 1.0, "LSB"
     step = most / 256.0**stored
     if not found["by"]:
         return step, found["unit"]
     sensitivity = _SCALED.match(others.get(f"@{found['by'].lower()}", ""))
-    each = _positive(sensitivity["value"]) if sensitivity else None
+    each = positive(sensitivity["value"]) if sensitivity else None
     if sensitivity is None or each is None:
         return step, found["unit"]
     return step * each, sensitivity["unit"].removesuffix("/V") or found["unit"]

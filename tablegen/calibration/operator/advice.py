@@ -8,10 +8,12 @@ import numpy as np
 from tablegen.calibration.operator.fit import OperatorFit
 from tablegen.calibration.operator.periodic_line import PeriodicLine
 from tablegen.compensation.operator.field import covariance
+from tablegen.numerics.arrays import Floats
 
 _STROKES = np.arange(0.1, 1.0, 0.05)
 _CENTRES = np.arange(0.1, 0.91, 0.05)
 _JITTER = 1e-5  # what every trace leaves open, of all that there is to know
+_LEAST_RMS = 1e-4  # percent
 _DECADE = 8.0  # ratio of rates that tells creep from hysteresis
 
 
@@ -27,14 +29,35 @@ class NextTrace:
 
 def next_trace(fit: OperatorFit, lines: Sequence[PeriodicLine], v_max: float) -> NextTrace:
     """The trace that helps most; ``rate_hz`` is another rate than that of all traces, where they have but one."""
-    lengths = fit.operator.residual.lengths
-    points = fit.operator.residual.points
-    known = np.linalg.inv(covariance(points, points, lengths) + _JITTER * np.eye(len(points)))
     reach = [(s, c) for s in _STROKES for c in _CENTRES if 0.5 * s <= min(c, 1.0 - c) + 1e-9]
-    near = covariance(np.array(reach), points, lengths)
-    unknown = 1.0 - np.einsum("ij,jk,ik->i", near, known, near)
+    unknown = _unknown(fit, np.array(reach))
     best = int(np.argmax(unknown))
     rates = [line.rate_hz for line in lines]
     other = None if max(rates) > _DECADE * min(rates) else 10.0 * max(rates)
     stroke, centre = reach[best]
     return NextTrace(stroke * v_max, centre * v_max, float(max(unknown[best], 0.0)), other)
+
+
+def expected_rms(fit: OperatorFit, points: Floats) -> Floats:
+    """The rms residual to expect of lines at points (stroke, centre), (n, 2), in percent of the line: (n,).
+
+    Where all is known it is what the fit leaves; it grows with what the fields do not know there, as much as it does
+    for the lines that were left out.
+    """
+    inverse = _inverse(fit)
+    without = np.sqrt(1.0 / np.diag(inverse))  # of each line, by all others
+    scale = np.exp(np.mean([np.log(max(out.rms, _LEAST_RMS)) for out in fit.left_out] - np.log(without)))
+    least = float(np.median([left.rms for left in fit.left]))
+    return np.asarray(np.sqrt(least**2 + scale**2 * np.maximum(_unknown(fit, points), 0.0)), dtype=np.float64)
+
+
+def _inverse(fit: OperatorFit) -> Floats:
+    points = fit.operator.residual.points
+    known = covariance(points, points, fit.operator.residual.lengths)
+    return np.asarray(np.linalg.inv(known + _JITTER * np.eye(len(points))), dtype=np.float64)
+
+
+def _unknown(fit: OperatorFit, points: Floats) -> Floats:
+    """How little the fields know at points: 1 is nothing, 0 all."""
+    near = covariance(points, fit.operator.residual.points, fit.operator.residual.lengths)
+    return np.asarray(1.0 - np.einsum("ij,jk,ik->i", near, _inverse(fit), near), dtype=np.float64)

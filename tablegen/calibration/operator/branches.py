@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tablegen.calibration.operator.periodic_line import PeriodicLine
-from tablegen.compensation.operator.plays import Plays
+from tablegen.compensation.operator.family import Family
 from tablegen.numerics.arrays import Floats
 
 DEGREE = 20  # of each branch
@@ -25,7 +25,7 @@ class Left:
     variance: Floats
 
 
-def left_of(line: PeriodicLine, family: Plays) -> Left:
+def left_of(line: PeriodicLine, family: Family) -> Left:
     """Measured less family, both about from 0 to 1 between the turns: ``Operator.loop`` closes their sum."""
     u, rising = line.drive, line.rising
     low, high = line.low, line.high

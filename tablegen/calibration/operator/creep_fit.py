@@ -12,8 +12,8 @@ from tablegen.calibration.operator.branches import left_of
 from tablegen.calibration.operator.family import CreepOf
 from tablegen.calibration.operator.periodic_line import PeriodicLine
 from tablegen.compensation.operator.creep import LogarithmicCreep
+from tablegen.compensation.operator.family import Family
 from tablegen.compensation.operator.field import Lengths, covariance
-from tablegen.compensation.operator.plays import Plays
 from tablegen.numerics.arrays import Floats
 
 _LOSSES = tuple(0.004 * i for i in range(13))  # of creep, per decade
@@ -27,7 +27,7 @@ Factor = Callable[[float], float]
 
 
 def creep_of_fields(
-    lines: Sequence[PeriodicLine], family: Plays, factor: Factor, creep_of: CreepOf
+    lines: Sequence[PeriodicLine], family: Family, factor: Factor, creep_of: CreepOf
 ) -> LogarithmicCreep:
     """The loss per decade with which the fields over stroke and centre are the likeliest, whatever the hysteresis.
 
@@ -43,7 +43,7 @@ def creep_of_fields(
     def misfit(creep: LogarithmicCreep) -> float:
         left = [left_of(line.without(None, creep), family) for line in lines]
         if several:
-            sizes = [one.extent_nm * factor(line.centre) / line.stroke for one, line in zip(left, lines, strict=True)]
+            sizes = [one.extent_nm * factor(line.mean) / line.stroke for one, line in zip(left, lines, strict=True)]
             values = np.array(sizes)[:, None]
             return _unlikelihood(lines, values / np.mean(values) - 1.0, still=False)
         return _unlikelihood(lines, np.stack([one.coefficients for one in left]), still=True)

@@ -1,6 +1,6 @@
 """A predicted loop against a measured line, in the measures of the certificate: percent of the line over the window."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -16,12 +16,21 @@ _SMOOTHING = 12  # Chebyshev series over the window, which noise of single sampl
 
 @dataclass(frozen=True, slots=True)
 class LineErrors:
-    """Rms and largest scaling error of both directions, largest distance of trace and retrace, error of the size."""
+    """Rms and largest scaling error of both directions, largest distance of trace and retrace, error of the size.
+
+    ``sides`` has the residual, rising and falling, in percent at even positions over ``WINDOW``; None of no loop.
+    """
 
     rms: float
     scaling: float
     mismatch: float
     size: float
+    sides: Floats | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def figures(self) -> tuple[float, float, float, float]:
+        """The four numbers in their order."""
+        return self.rms, self.scaling, self.mismatch, self.size
 
 
 WORST = LineErrors(100.0, 100.0, 100.0, 100.0)  # of a loop that cannot be
@@ -39,9 +48,8 @@ def compare(line: PeriodicLine, loop: Loop) -> LineErrors:
     step = round(_CHORD / (x[1] - x[0]))
     scaling = max(float(np.ptp(one[step:] - one[:-step])) / (x[step] - x[0]) for one in sides)
     rms = float(np.sqrt(np.mean(np.square(sides))))
-    return LineErrors(
-        rms, scaling, float(np.max(np.abs(sides[0] - sides[1]))), 100.0 * (loop.extent_nm / float(scale) - 1.0)
-    )
+    mismatch = float(np.max(np.abs(sides[0] - sides[1])))
+    return LineErrors(rms, scaling, mismatch, 100.0 * (loop.extent_nm / float(scale) - 1.0), np.stack(sides))
 
 
 def _smooth(at: Floats, error: Floats, x: Floats) -> Floats:

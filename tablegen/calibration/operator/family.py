@@ -1,77 +1,50 @@
-"""The hysteresis family of settled lines: plays whose envelopes, weights, gains and creep are fitted together.
+"""A hysteresis family for settled lines: its shape, its weights, the gains of offsets and creep, fitted together.
 
-The weights follow from the rest by non-negative least squares, smooth in the threshold; the rest, some ten numbers, by
-Gauss-Newton steps of Levenberg and Marquardt on what the weights leave.
+The weights follow from the rest by non-negative least squares; the rest, some ten numbers, by steps of Levenberg and
+Marquardt on what the weights leave.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import ClassVar
 
 import numpy as np
 
 from tablegen.calibration.operator.nonnegative import nonnegative
 from tablegen.calibration.operator.periodic_line import PeriodicLine
 from tablegen.compensation.operator.creep import LogarithmicCreep
+from tablegen.compensation.operator.family import Family
 from tablegen.compensation.operator.field import SAME_CENTRE, distinct
-from tablegen.compensation.operator.plays import Plays, plays
 from tablegen.numerics.arrays import Floats
 
-NODES = 40  # of the density of plays, linear between them
-THRESHOLDS = 160
-_HIGHEST = 0.495  # of v_max; above it no play moves
-_SPACING = 1.5  # thresholds grow with this power of their number
 DEGREE = 4  # of the reversible polynomial
-_SMOOTHNESS = 3e-4  # weight of the differences of the density, against residuals that are shares of the stroke
-_RIDGE = 1e-5
-_STRIDE = 8  # every so many phases are fitted
-_MOST_BEND = 0.6  # an envelope still rises everywhere
+STRIDE = 8  # every so many phases are fitted
 _MOST_GAIN = 0.5  # by which the gain at another centre may differ from 1
 _MOST_LOSS = 0.06  # of creep, per decade
-_STEPS = (0.02, 0.02, 0.02, 0.02, 0.002)  # for the derivatives by the bends and by the creep
+_LOSS_STEP = 0.002  # for derivatives
 _GAIN_STEP = 1e-3
 _TRIALS = 4  # of a step, each shorter
 _CONVERGED = 1e-3  # of the cost
 _FIRST_ROUNDS = 4
-# Bends and creep to begin from: where both envelopes are the same, none of them can tell which way to part.
-STARTS = tuple(
-    np.array([*bends, 0.02])
-    for bends in ((-0.1, 0.0, 0.1, 0.0), (-0.3, 0.0, -0.1, 0.0), (0.1, 0.0, 0.3, 0.0), (0.0, -0.2, 0.0, 0.2))
-)
 
 CreepOf = Callable[[float], LogarithmicCreep]
 
 
 @dataclass(frozen=True, eq=False)
 class FamilyFit:
-    """The plays, and what they rest on: four bends, the creep's loss per decade, and the gain of every other centre."""
+    """The family, and what it rests on: its own numbers, creep's loss per decade, the gain of every other centre."""
 
-    plays: Plays
+    family: Family
+    loss_per_decade: float
     numbers: Floats
-
-    @property
-    def loss_per_decade(self) -> float:
-        """Of creep."""
-        return float(self.numbers[4])
 
 
 def groups_of(centres: Sequence[float]) -> list[int]:
     """Which lines share their centre: a number each, from 0 in the order of their first."""
     known = distinct(centres)
     return [next(i for i, one in enumerate(known) if abs(one - centre) < SAME_CENTRE) for centre in centres]
-
-
-def fit_family(
-    lines: Sequence[PeriodicLine], main: float, creep: CreepOf, start: Sequence[Floats], rounds: int
-) -> FamilyFit:
-    """Plays that describe all lines, each with the gain of its centre; that of the centre ``main`` is 1.
-
-    ``lines`` still have their creep. ``start`` are numbers to begin from, the best of which goes on; gains that they
-    lack are 1.
-    """
-    problem = _Problem(lines, main, creep)
-    found = [problem.settled(problem.left(problem.whole(one)), _FIRST_ROUNDS) for one in start]
-    best = problem.settled(min(found, key=lambda one: one.cost), rounds)
-    return FamilyFit(problem.plays(best), best.numbers)
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,55 +55,71 @@ class _Left:
     cost: float
 
 
-class _Problem:
-    """The lines, prepared once; see ``fit_family``."""
+class FamilyProblem(ABC):
+    """The lines, prepared once. ``shape_limits`` and ``shape_steps`` are those of the family's own numbers.
+
+    ``starts`` are shapes and creep to begin from; ``penalty`` are rows that a quadratic penalty on the weights has.
+    """
+
+    shape_limits: ClassVar[tuple[tuple[float, float], ...]]
+    shape_steps: ClassVar[tuple[float, ...]]
+    starts: ClassVar[tuple[Floats, ...]]
+    penalty: Floats
 
     def __init__(self, lines: Sequence[PeriodicLine], main: float, creep: CreepOf) -> None:
-        self._lines, self._creep = lines, creep
-        self._thresholds = _HIGHEST * (np.arange(1, THRESHOLDS + 1) / THRESHOLDS) ** _SPACING
-        self._spread = _spread(self._thresholds)
-        self._scale = max(float(np.ptp(line.displacement_nm)) / line.stroke for line in lines)
+        """``lines`` still have their creep; the gain of the centre ``main`` is 1."""
+        self.lines = lines
+        self.drives = [line.drive[::STRIDE] for line in lines]
+        self.scale = max(float(np.ptp(line.displacement_nm)) / line.stroke for line in lines)  # nm for all of v_max
+        self._shapes = len(self.shape_limits)
         groups = groups_of([line.centre for line in lines])
         nearest = groups[int(np.argmin([abs(line.centre - main) for line in lines]))]
         others = sorted(set(groups) - {nearest})
-        self._gain_of = [None if group == nearest else 5 + others.index(group) for group in groups]
-        self._count = 5 + len(others)
-        self._penalty = _penalty()
-        powers = [np.stack([line.drive[::_STRIDE] ** n for n in range(1, DEGREE + 1)]) for line in lines]
+        first = self._shapes + 1
+        self._gain_of = [None if group == nearest else first + others.index(group) for group in groups]
+        self._gains = len(others)
+        self._share = [1.0 / (line.stroke * np.sqrt(len(u))) for line, u in zip(lines, self.drives, strict=True)]
+        powers = [np.stack([u**n for n in range(1, DEGREE + 1)]) for u in self.drives]
         self._powers = [(part - part.mean(axis=1, keepdims=True)).T for part in powers]
+        self._moved = lru_cache(maxsize=4)(self._columns)
+        self._measured = lru_cache(maxsize=4)(lambda loss: self._values(creep(loss)))
 
-    def whole(self, numbers: Floats) -> Floats:
-        """With gains of 1 where there are none."""
-        return np.append(numbers, np.ones(self._count))[: self._count] if len(numbers) < self._count else numbers
+    @abstractmethod
+    def moved(self, shape: Floats) -> list[Floats]:
+        """What weights of 1 move each line by, for all of v_max 1: shape (phases, weights)."""
 
-    def limited(self, numbers: Floats) -> Floats:
-        """Inside what the numbers may be."""
-        low = [*[-_MOST_BEND] * 4, 0.0, *[1.0 - _MOST_GAIN] * (self._count - 5)]
-        high = [*[_MOST_BEND] * 4, _MOST_LOSS, *[1.0 + _MOST_GAIN] * (self._count - 5)]
-        return np.clip(numbers, low, high)
+    @abstractmethod
+    def family(self, shape: Floats, weights: Floats, reversible: Floats) -> Family:
+        """With weights of what ``moved``, and coefficients of u, u^2, ..., in nm."""
 
-    def left(self, numbers: Floats) -> "_Left":
+    def fit(self, near: Floats | None, rounds: int) -> FamilyFit:
+        """From the best of the starts, or from numbers that are near; at most so many rounds."""
+        if near is None:
+            found = [self.settled(self.left(self._whole(one)), _FIRST_ROUNDS) for one in self.starts]
+            best = self.settled(min(found, key=lambda one: one.cost), rounds)
+        else:
+            best = self.settled(self.left(self._whole(near)), rounds)
+        weights, shape = best.weights * self.scale, best.numbers[: self._shapes]
+        count = len(weights) - 2 * DEGREE
+        reversible = weights[count : count + DEGREE] - weights[count + DEGREE :]
+        return FamilyFit(
+            self.family(shape, weights[:count], reversible), float(best.numbers[self._shapes]), best.numbers
+        )
+
+    def left(self, numbers: Floats) -> _Left:
         """What the best weights leave."""
-        late = self._creep(float(numbers[4]))
-        columns, values = [], []
-        for line, powers, at in zip(self._lines, self._powers, self._gain_of, strict=True):
-            gain = 1.0 if at is None else float(numbers[at])
-            u, rising = line.drive[::_STRIDE], line.rising[::_STRIDE]
-            both = [
-                plays(u, line.low, line.high, going, self._thresholds, numbers[None, :4])[0] for going in (True, False)
-            ]
-            moved = np.where(rising, *both)
-            dense = (self._spread @ moved).T
-            part = np.hstack([dense - dense.mean(axis=0), powers, -powers])
-            columns.append(gain / (line.stroke * np.sqrt(len(u))) * part)
-            y = line.without(None, late).displacement_nm[::_STRIDE]
-            values.append((y - y.mean()) / (line.stroke * self._scale * np.sqrt(len(u))))
-        matrix, right = np.vstack(columns), np.concatenate(values)
-        weights = nonnegative(matrix.T @ matrix + self._penalty.T @ self._penalty, matrix.T @ right)
-        residual = np.concatenate([matrix @ weights - right, self._penalty @ weights])
+        parts, measured = (
+            self._moved(tuple(numbers[: self._shapes].tolist())),
+            self._measured(float(numbers[self._shapes])),
+        )
+        gains = [1.0 if at is None else float(numbers[at]) for at in self._gain_of]
+        matrix = np.vstack([gain * part for gain, part in zip(gains, parts, strict=True)])
+        normal = matrix.T @ matrix + self.penalty.T @ self.penalty
+        weights = nonnegative(normal, matrix.T @ measured)
+        residual = np.concatenate([matrix @ weights - measured, self.penalty @ weights])
         return _Left(numbers, weights, residual, float(residual @ residual))
 
-    def settled(self, best: "_Left", rounds: int) -> "_Left":
+    def settled(self, best: _Left, rounds: int) -> _Left:
         """So many steps on, or fewer where they no longer help."""
         damping = 1e-3
         for _ in range(rounds):
@@ -138,7 +127,7 @@ class _Problem:
             normal, slope = jacobian.T @ jacobian, jacobian.T @ best.residual
             for _ in range(_TRIALS):
                 by = np.linalg.solve(normal + damping * np.diag(np.diag(normal) + 1e-12), slope)
-                trial = self.left(self.limited(best.numbers - by))
+                trial = self.left(self._limited(best.numbers - by))
                 if trial.cost < best.cost:
                     best, damping = trial, damping * 0.2
                     break
@@ -150,34 +139,34 @@ class _Problem:
     def jacobian(self, at: _Left) -> Floats:
         """Of the residual by the numbers, with the weights that move along."""
         rows = []
-        steps = [*_STEPS, *[_GAIN_STEP] * (self._count - 5)]
-        for i, step in enumerate(steps):
+        for i, step in enumerate([*self.shape_steps, _LOSS_STEP, *[_GAIN_STEP] * self._gains]):
             moved = at.numbers.copy()
             moved[i] += step
-            low = self.left(moved)
-            rows.append((low.residual - at.residual) / step)
+            rows.append((self.left(moved).residual - at.residual) / step)
         return np.stack(rows, axis=1)
 
-    def plays(self, found: _Left) -> Plays:
-        """In nm."""
-        weights = found.weights * self._scale
-        reversible = weights[NODES : NODES + DEGREE] - weights[NODES + DEGREE :]
-        dense = weights[:NODES] @ self._spread
-        return Plays(self._thresholds, dense[None, :], reversible, found.numbers[None, :4].copy())
+    def _whole(self, numbers: Floats) -> Floats:
+        """With gains of 1 where there are none."""
+        count = self._shapes + 1 + self._gains
+        return np.append(numbers, np.ones(count))[:count] if len(numbers) < count else numbers
 
+    def _limited(self, numbers: Floats) -> Floats:
+        """Inside what the numbers may be."""
+        gain = (1.0 - _MOST_GAIN, 1.0 + _MOST_GAIN)
+        low, high = zip(*self.shape_limits, (0.0, _MOST_LOSS), *[gain] * self._gains, strict=True)
+        return np.clip(numbers, low, high)
 
-def _spread(thresholds: Floats) -> Floats:
-    """Weights of all thresholds for a density of 1 at one node and linear to its neighbours, a row a node."""
-    at = np.linspace(0.0, NODES - 1.0, len(thresholds))
-    hats = np.maximum(0.0, 1.0 - np.abs(at[None, :] - np.arange(NODES)[:, None]))
-    spread: Floats = hats * np.gradient(thresholds) * len(thresholds)
-    return spread / NODES
+    def _columns(self, shape: tuple[float, ...]) -> list[Floats]:
+        """All weights' columns of each line: the family's, and those of the polynomial, up and down."""
+        moved = self.moved(np.array(shape))
+        return [
+            share * np.hstack([part - part.mean(axis=0), powers, -powers])
+            for share, part, powers in zip(self._share, moved, self._powers, strict=True)
+        ]
 
-
-def _penalty() -> Floats:
-    """Differences of the density of neighbouring nodes, and a ridge."""
-    size = NODES + 2 * DEGREE
-    rows = np.zeros((NODES - 1, size))
-    for i in range(NODES - 1):
-        rows[i, i : i + 2] = (1.0, -1.0)
-    return np.vstack([_SMOOTHNESS * rows, _RIDGE * np.eye(size)])
+    def _values(self, creep: LogarithmicCreep) -> Floats:
+        """What was measured, before its creep."""
+        parts = [line.without(None, creep).displacement_nm[::STRIDE] for line in self.lines]
+        return np.concatenate(
+            [share / self.scale * (y - y.mean()) for share, y in zip(self._share, parts, strict=True)]
+        )

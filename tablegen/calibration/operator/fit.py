@@ -6,17 +6,21 @@ from itertools import combinations, product
 
 import numpy as np
 
+from tablegen.calibration.operator.bouc_wen_fit import BoucWenProblem
 from tablegen.calibration.operator.branches import Left, left_of
 from tablegen.calibration.operator.creep_fit import creep_of_fields
 from tablegen.calibration.operator.errors import WORST, LineErrors, compare
-from tablegen.calibration.operator.family import STARTS, CreepOf, fit_family, groups_of
+from tablegen.calibration.operator.family import CreepOf, FamilyProblem, groups_of
 from tablegen.calibration.operator.periodic_line import PeriodicLine
+from tablegen.calibration.operator.plays_fit import PlaysProblem
 from tablegen.calibration.operator.shrinkage import shrunk
+from tablegen.calibration.operator.units import check_units
 from tablegen.compensation.dynamics import Response
 from tablegen.compensation.operator.creep import NO_CREEP, LogarithmicCreep
+from tablegen.compensation.operator.family import Family
 from tablegen.compensation.operator.field import Field, Lengths, through
 from tablegen.compensation.operator.operator import MeasuredLine, Operator
-from tablegen.compensation.operator.plays import NO_PLAYS, Plays
+from tablegen.compensation.operator.plays import NO_PLAYS
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 
@@ -30,6 +34,11 @@ _ROUNDS_WITHOUT = 2
 _MIN_LINES = 3
 _MIN_SPREAD = 2.0  # of the largest stroke over the smallest
 _MAX_NOISE_PERCENT = 1.0
+_SHARES = (0.25, 0.5, 0.75)  # of the first family, where two are mixed
+_WORTH_MIXING = 3.0  # ratio of what two families miss lines by, up to which a mixture may be better than both
+_CLEARLY = 1.25  # by how much a mixture has to be better than each family alone, which has its own creep
+NONE = "none"
+FAMILIES: dict[str, type[FamilyProblem]] = {"plays": PlaysProblem, "Bouc-Wen": BoucWenProblem}
 _DECADES = 1.0  # by which creep is taken to go on beyond the frequencies that were measured
 
 Factor = Callable[[float], float]
@@ -60,8 +69,13 @@ def fit_operator(lines: Sequence[PeriodicLine], response: Response | None, facto
     _check(lines)
     still = [line.without(response, None) for line in lines]
     main = _main_centre(still)
-    found = [_fit_family(name, still, main, factor) for name in ("plays", "none")]
-    best = min(found, key=lambda one: one.candidates[one.family])
+    names = (*FAMILIES, NONE)
+    alone = [_candidate(name, still, main, factor) for name in names]
+    found = [_judged(one, still, factor) for one in alone]
+    scores = [one.candidates[one.family] for one in found[: len(FAMILIES)]]
+    if max(scores) < _WORTH_MIXING * min(scores):
+        found += [_judged(alone[0].weighted(share, alone[1]), still, factor) for share in _SHARES]
+    best = min(found, key=lambda one: one.candidates[one.family] * (1.0 if one.family in names else _CLEARLY))
     candidates = {name: value for one in found for name, value in one.candidates.items()}
     return replace(best, candidates=candidates)
 
@@ -69,6 +83,7 @@ def fit_operator(lines: Sequence[PeriodicLine], response: Response | None, facto
 def _check(lines: Sequence[PeriodicLine]) -> None:
     if len(lines) < _MIN_LINES:
         raise Unphysical(f"{len(lines)} traces are not enough for an operator; at least {_MIN_LINES} are needed")
+    check_units(lines)
     strokes = [line.stroke for line in lines]
     if max(strokes) < _MIN_SPREAD * min(strokes):
         low, high = (100.0 * share for share in (min(strokes), max(strokes)))
@@ -115,45 +130,73 @@ def _any_twins(lines: Sequence[PeriodicLine]) -> bool:
     )
 
 
-class _Family:
-    """A family, its creep, the lines before that creep and what it leaves of them."""
+class _Fitted:
+    """A family and its creep; the lines before that creep, and what the family leaves of them."""
 
     def __init__(
-        self, name: str, lines: Sequence[PeriodicLine], main: float, factor: Factor, near: "_Family | None" = None
+        self,
+        lines: Sequence[PeriodicLine],
+        main: float,
+        family: Family,
+        creep: LogarithmicCreep,
+        numbers: Floats | None = None,
     ) -> None:
-        """Of lines that still have their creep; ``near`` is one of almost the same lines."""
-        creep: CreepOf = _creep_of(lines) if near is None else near.creep_of
-        self.creep_of: CreepOf = creep
-        self.main = main
-        self.creep: LogarithmicCreep
-        self.numbers: Floats | None = None
-        if name == "none":
-            self.plays = _straight(lines)
-            self.creep = creep_of_fields(lines, self.plays, factor, creep) if near is None else near.creep
-        else:
-            start, rounds = (STARTS, _ROUNDS) if near is None else ([near.numbers], _ROUNDS_WITHOUT)
-            found = fit_family(lines, main, creep, [one for one in start if one is not None], rounds)
-            self.plays, self.creep, self.numbers = found.plays, creep(found.loss_per_decade), found.numbers
-        self.settled = [line.without(None, self.creep) for line in lines]
-        self.left = [left_of(line, self.plays) for line in self.settled]
+        """Of lines that still have their creep; ``numbers`` are those of ``FamilyFit``."""
+        self.lines, self.main = lines, main
+        self.family, self.creep, self.numbers = family, creep, numbers
+        self.settled = [line.without(None, creep) for line in lines]
+        self.left = [left_of(line, family) for line in self.settled]
 
     def operator(self, lengths: Lengths, factor: Factor) -> tuple[Operator, Floats, Floats]:
         """Both fields through what is left, and the rows and sizes that they go through."""
         points = np.array([(line.stroke, line.centre) for line in self.settled])
         rows = shrunk(points, self.left, lengths)
-        sizes = _sizes(self.plays, self.settled, self.left, self.main, factor)
         residual = through(points, rows, lengths, straight=True)
+        sizes = _sizes(self.family, residual, self.settled, self.left, self.main, factor)
         size = through(points, sizes[:, None], lengths)
-        return Operator(self.plays, residual, size, self.creep, self.main, ()), rows, sizes
+        return Operator(self.family, residual, size, self.creep, self.main, ()), rows, sizes
+
+    def weighted(self, share: float, other: "_Fitted") -> "_Fitted":
+        """A share of this family, and the rest of another one, for the same lines."""
+        loss = share * self.creep.loss_per_decade + (1.0 - share) * other.creep.loss_per_decade
+        creep = replace(self.creep, loss_per_decade=round(loss, 6))
+        return _Fitted(self.lines, self.main, self.family.weighted(share, other.family), creep)
 
 
-def _fit_family(name: str, lines: Sequence[PeriodicLine], main: float, factor: Factor) -> OperatorFit:
+@dataclass(frozen=True, eq=False)
+class _Candidate:
+    """A family of all lines, and of all but one; whatever is made of it, what it predicts of that one decides."""
+
+    name: str
+    whole: _Fitted
+    without: list[_Fitted]
+
+    def weighted(self, share: float, other: "_Candidate") -> "_Candidate":
+        """A share of this one, and the rest of another."""
+        name = f"{100.0 * share:.0f} % {self.name}, {100.0 * (1.0 - share):.0f} % {other.name}"
+        both = zip(self.without, other.without, strict=True)
+        return _Candidate(name, self.whole.weighted(share, other.whole), [a.weighted(share, b) for a, b in both])
+
+
+def _candidate(name: str, lines: Sequence[PeriodicLine], main: float, factor: Factor) -> _Candidate:
+    """One family, with the creep that goes with it."""
+    creep_of = _creep_of(lines)
+
+    def fitted(some: Sequence[PeriodicLine], near: _Fitted | None) -> _Fitted:
+        if name == NONE:
+            family = _straight(some)
+            return _Fitted(some, main, family, near.creep if near else creep_of_fields(some, family, factor, creep_of))
+        problem = FAMILIES[name](some, main, creep_of)
+        found = problem.fit(near.numbers, _ROUNDS_WITHOUT) if near else problem.fit(None, _ROUNDS)
+        return _Fitted(some, main, found.family, creep_of(found.loss_per_decade), found.numbers)
+
+    whole = fitted(lines, None)
+    return _Candidate(name, whole, [fitted([*lines[:i], *lines[i + 1 :]], whole) for i in range(len(lines))])
+
+
+def _judged(candidate: _Candidate, lines: Sequence[PeriodicLine], factor: Factor) -> OperatorFit:
     """The best lengths for one family, and the operator with them."""
-    whole = _Family(name, lines, main, factor)
-    without = [
-        _Family(name, [other for j, other in enumerate(lines) if j != i], main, factor, whole)
-        for i in range(len(lines))
-    ]
+    whole, without = candidate.whole, candidate.without
     alone = [line.without(None, one.creep) for line, one in zip(lines, without, strict=True)]
     several = max(groups_of([line.centre for line in lines])) > 0
     noise = _NOISE_OF_TWINS if _any_twins(lines) else _NOISE
@@ -166,37 +209,40 @@ def _fit_family(name: str, lines: Sequence[PeriodicLine], main: float, factor: F
         tried.append((float(np.exp(np.mean([np.log(errors.rms) for errors in out]))), lengths, out))
     score, lengths, out = min(tried, key=lambda one: one[0])
     operator, rows, sizes = whole.operator(lengths, factor)
+    inside = tuple(_errors(line, operator, factor) for line in whole.settled)
     measured = tuple(
-        MeasuredLine(
-            line.name,
-            line.stroke,
-            line.centre,
-            line.rate_hz,
-            (errors.rms, errors.scaling, errors.mismatch, errors.size),
-        )
-        for line, errors in zip(lines, out, strict=True)
+        MeasuredLine(line.name, line.stroke, line.centre, line.rate_hz, errors.figures, left.figures)
+        for line, errors, left in zip(lines, out, inside, strict=True)
     )
     operator = replace(operator, lines=measured)
-    inside = tuple(_errors(line, operator, factor) for line in whole.settled)
-    return OperatorFit(operator, name, rows, sizes, inside, tuple(out), {name: score})
+    return OperatorFit(operator, candidate.name, rows, sizes, inside, tuple(out), {candidate.name: score})
 
 
-def _straight(lines: Sequence[PeriodicLine]) -> Plays:
+def _straight(lines: Sequence[PeriodicLine]) -> Family:
     """No family: a straight line with the mean gain."""
     gain = float(np.mean([np.ptp(line.displacement_nm) / line.stroke for line in lines]))
-    return replace(NO_PLAYS, reversible=np.array([gain]))
+    return Family(NO_PLAYS).over(np.array([gain]))
 
 
-def _sizes(family: Plays, lines: Sequence[PeriodicLine], left: Sequence[Left], main: float, factor: Factor) -> Floats:
+def _sizes(
+    family: Family, residual: Field, lines: Sequence[PeriodicLine], left: Sequence[Left], main: float, factor: Factor
+) -> Floats:
     """Measured extents over expected ones, less 1."""
     nothing = Field(np.zeros((0, 2)), np.zeros((0, 1)), Lengths(1.0, 1.0, 1.0))
-    bare = Operator(family, nothing, nothing, NO_CREEP, main, ())
-    extents = [bare.expected_extent(line.stroke, line.centre, factor(line.centre) / factor(main)) for line in lines]
-    return np.array([one.extent_nm / extent - 1.0 for one, extent in zip(left, extents, strict=True)])
+    bare = Operator(family, residual, nothing, NO_CREEP, main, ())
+
+    def extent(line: PeriodicLine) -> float:
+        here = factor(line.mean) / factor(main)
+        try:
+            return bare.loop(line.low, line.high, here, line.mean).extent_nm
+        except Unphysical:  # where a line is left out; its errors are the worst then
+            return bare.expected_extent(line.stroke, line.mean, here)
+
+    return np.array([one.extent_nm / extent(line) - 1.0 for one, line in zip(left, lines, strict=True)])
 
 
 def _errors(line: PeriodicLine, operator: Operator, factor: Factor) -> LineErrors:
     try:
-        return compare(line, operator.loop(line.low, line.high, factor(line.centre) / factor(operator.centre)))
+        return compare(line, operator.loop(line.low, line.high, factor(line.mean) / factor(operator.centre), line.mean))
     except Unphysical:
         return WORST

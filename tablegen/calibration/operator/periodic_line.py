@@ -1,10 +1,11 @@
 """One trace to one settled period: drive and displacement on an even grid of phases, drift taken out."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tablegen.calibration.hysteresis import Trace
+from tablegen.calibration.operator.plausible import check_record, check_repeats
 from tablegen.compensation.dynamics import Response
 from tablegen.compensation.operator.creep import LogarithmicCreep
 from tablegen.numerics.arrays import Bools, Floats
@@ -55,9 +56,24 @@ class PeriodicLine:
         return 0.5 * (self.low + self.high)
 
     @property
+    def mean(self) -> float:
+        """The mean of the drive over the period, of v_max, with which the sensitivity goes."""
+        return float(np.mean(self.drive))
+
+    @property
     def rising(self) -> Bools:
         """Where the drive is on its way from its minimum to its maximum."""
         return np.arange(PHASES) < int(np.argmax(self.drive))
+
+    def highest_corrected_hz(self, response: Response) -> float:
+        """Up to which frequency dynamics are taken out."""
+        return _RESONANCE_SHARE * response.resonance_hz
+
+    def earlier(self, delay_s: float) -> "PeriodicLine":
+        """The same with the displacement of a sensor that is ``delay_s`` behind the drive."""
+        n = np.arange(PHASES // 2 + 1)
+        ahead = np.exp(2j * np.pi * (n * self.rate_hz * delay_s))
+        return replace(self, displacement_nm=np.fft.irfft(np.fft.rfft(self.displacement_nm) * ahead, PHASES))
 
     def without(self, response: Response | None, creep: LogarithmicCreep | None) -> "PeriodicLine":
         """The same with the displacement before the dynamics, which come behind the hysteresis."""
@@ -65,14 +81,14 @@ class PeriodicLine:
         spectrum = np.fft.rfft(self.displacement_nm)
         f_hz: Floats = n * self.rate_hz
         if response is not None:
-            inside = f_hz <= _RESONANCE_SHARE * response.resonance_hz
+            inside = f_hz <= self.highest_corrected_hz(response)
             real, imaginary = response.inverse(f_hz[inside])
             spectrum[inside] = spectrum[inside] * (real + 1j * imaginary)
         if creep is not None:
             real, imaginary = creep.response(f_hz[1:])
             spectrum[1:] = spectrum[1:] / (real + 1j * imaginary)
         values = np.fft.irfft(spectrum, PHASES)
-        return PeriodicLine(self.name, self.rate_hz, self.periods, self.drive, values, self.noise_nm, self.drift_nm)
+        return replace(self, displacement_nm=values)
 
 
 def periodic_line(trace: Trace, v_max: float) -> PeriodicLine:
@@ -80,11 +96,10 @@ def periodic_line(trace: Trace, v_max: float) -> PeriodicLine:
 
     The first of three periods or more is left out. Raises ``Unphysical``, without the trace's name.
     """
+    check_record(trace)
     time, drive = trace.time_s, trace.drive_v / v_max
     if len(time) < _MIN_SAMPLES or not np.all(np.diff(time) > 0.0):
         raise Unphysical(f"{len(time)} samples whose times ascend are needed, at least {_MIN_SAMPLES} a period")
-    if not (np.ptp(drive) > 0.0 and np.ptp(trace.displacement_nm) > 0.0):
-        raise Unphysical("the drive or the displacement does not move")
     if np.min(drive) < -0.02 or np.max(drive) > 1.02:
         low, high = float(np.min(trace.drive_v)), float(np.max(trace.drive_v))
         raise Unphysical(f"a drive of {low:.4g}..{high:.4g} V is outside the driver's 0..{v_max:g} V")
@@ -100,6 +115,7 @@ def periodic_line(trace: Trace, v_max: float) -> PeriodicLine:
     grid = start + period * (np.arange((periods - settle) * PHASES) / PHASES)
     rows = [np.interp(grid, time, values).reshape(-1, PHASES) for values in (drive, trace.displacement_nm)]
     kept = periods - settle
+    check_repeats(rows[0])
     centres = np.arange(kept) - 0.5 * (kept - 1)
     means = rows[1].mean(axis=1)
     order = min(kept - 1, _MAX_DRIFT_ORDER)

@@ -3,8 +3,10 @@
 from collections.abc import Sequence
 
 from tablegen.calibration.operator.fit import OperatorFit
+from tablegen.compensation.operator.bouc_wen import NO_BOUC_WEN
 from tablegen.compensation.operator.file import (
     VERSION,
+    BoucWenTable,
     CreepTable,
     LengthsTable,
     LineTable,
@@ -22,6 +24,7 @@ _HEAD = (
 def operator_file(fit: OperatorFit, axis: str, v_max: float, sources: Sequence[str] = ()) -> bytes:
     """The file's bytes; ``sources`` says where the traces came from, a line each."""
     operator, creep, lengths = fit.operator, fit.operator.creep, fit.operator.residual.lengths
+    plays, loop = operator.family.plays, operator.family.bouc_wen or NO_BOUC_WEN
     lines = []
     for i, line in enumerate(operator.lines):
         row = fit.rows[i]
@@ -40,6 +43,7 @@ def operator_file(fit: OperatorFit, axis: str, v_max: float, sources: Sequence[s
                 scaling_percent=scaling,
                 mismatch_percent=mismatch,
                 size_percent=size,
+                in_fit_percent=list(line.in_fit),
             )
         )
     file = OperatorFile(
@@ -54,10 +58,18 @@ def operator_file(fit: OperatorFit, axis: str, v_max: float, sources: Sequence[s
             reference_hz=creep.reference_hz,
         ),
         plays=PlaysTable(
-            thresholds=operator.family.thresholds.tolist(),
-            weights=operator.family.weights.tolist(),
-            bends=operator.family.bends.tolist(),
-            reversible=operator.family.reversible.tolist(),
+            thresholds=plays.thresholds.tolist(),
+            weights=plays.weights.tolist(),
+            bends=plays.bends.tolist(),
+            reversible=plays.reversible.tolist(),
+        ),
+        bouc_wen=BoucWenTable(
+            depth_nm=loop.depth,
+            n=loop.n,
+            beta=loop.beta,
+            gamma=loop.gamma,
+            asymmetry=loop.asymmetry,
+            bend=list(loop.bend),
         ),
         lengths=LengthsTable(stroke=lengths.stroke, centre=lengths.centre, noise=lengths.noise),
         lines=lines,

@@ -7,6 +7,7 @@ all of them it goes back to 0, that is to the hysteresis family over which it li
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from math import sqrt
 
 import numpy as np
@@ -46,6 +47,7 @@ def covariance(points: Floats, others: Floats, lengths: Lengths, straight: bool 
     return out
 
 
+@lru_cache(maxsize=1 << 14)  # an exact exp takes its time, and the same distances come again and again
 def _matern(distance: float) -> float:
     d = sqrt(5.0) * abs(distance)
     return (1.0 + d + d * d / 3.0) * exp(-d)

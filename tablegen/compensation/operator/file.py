@@ -9,7 +9,9 @@ from typing import Annotated, Literal
 import numpy as np
 from msgspec import Meta, Struct, ValidationError, convert
 
+from tablegen.compensation.operator.bouc_wen import BoucWen
 from tablegen.compensation.operator.creep import LogarithmicCreep
+from tablegen.compensation.operator.family import Family
 from tablegen.compensation.operator.field import Lengths, through
 from tablegen.compensation.operator.operator import MeasuredLine, Operator
 from tablegen.compensation.operator.plays import BENDS, Plays
@@ -47,6 +49,17 @@ class PlaysTable(_Table, frozen=True, kw_only=True):
     reversible: Annotated[list[_Number], Meta(min_length=1, max_length=16)]
 
 
+class BoucWenTable(_Table, frozen=True, kw_only=True):
+    """The other hysteresis family; see ``BoucWen``. ``depth_nm`` is 0 where there is none of it."""
+
+    depth_nm: Annotated[float, Meta(ge=0.0, le=1e9)]
+    n: Annotated[float, Meta(ge=1.0, le=4.0)]
+    beta: Annotated[float, Meta(ge=0.0, le=100.0)]
+    gamma: Annotated[float, Meta(ge=-100.0, le=100.0)]
+    asymmetry: Annotated[float, Meta(gt=-1.0, lt=1.0)]
+    bend: Annotated[list[_Bend], Meta(min_length=2, max_length=2)]
+
+
 class LengthsTable(_Table, frozen=True, kw_only=True):
     """Over which differences the fields change; see ``Lengths``."""
 
@@ -69,6 +82,7 @@ class LineTable(_Table, frozen=True, kw_only=True):
     scaling_percent: _Number
     mismatch_percent: _Number
     size_percent: _Number
+    in_fit_percent: Annotated[list[_Number], Meta(min_length=4, max_length=4)]
 
 
 class OperatorFile(_Table, frozen=True, kw_only=True):
@@ -80,6 +94,7 @@ class OperatorFile(_Table, frozen=True, kw_only=True):
     centre: _Share
     creep: CreepTable
     plays: PlaysTable
+    bouc_wen: BoucWenTable
     lengths: LengthsTable
     lines: Annotated[list[LineTable], Meta(min_length=1, max_length=1000)]
 
@@ -119,6 +134,8 @@ def _contradictions(file: OperatorFile) -> list[tuple[str, str]]:
         found.append(("plays.bends", "|l| + |s| / 2 above 1 would let an envelope run backwards"))
     if any(weight < 0.0 for row in plays.weights for weight in row):
         found.append(("plays.weights", "a weight below 0 would let a branch run backwards"))
+    if abs(file.bouc_wen.bend[0]) + 0.5 * abs(file.bouc_wen.bend[1]) > 1.0:
+        found.append(("bouc_wen.bend", "|l| + |s| / 2 above 1 would let the bent drive run backwards"))
     if file.creep.slowest_s < file.creep.fastest_s:
         found.append(("creep.slowest_s", "is below fastest_s"))
     if len({len(row) for line in file.lines for row in (line.rising, line.falling)}) > 1:
@@ -128,8 +145,13 @@ def _contradictions(file: OperatorFile) -> list[tuple[str, str]]:
 
 def _operator(file: OperatorFile) -> Operator:
     lengths = Lengths(file.lengths.stroke, file.lengths.centre, file.lengths.noise)
-    plays = file.plays
-    family = Plays(*(np.array(one) for one in (plays.thresholds, plays.weights, plays.reversible, plays.bends)))
+    plays, loop = file.plays, file.bouc_wen
+    family = Family(
+        Plays(*(np.array(one) for one in (plays.thresholds, plays.weights, plays.reversible, plays.bends))),
+        BoucWen(loop.depth_nm, loop.n, loop.beta, loop.gamma, loop.asymmetry, (loop.bend[0], loop.bend[1]))
+        if loop.depth_nm
+        else None,
+    )
     creep = LogarithmicCreep(
         file.creep.loss_per_decade, file.creep.fastest_s, file.creep.slowest_s, file.creep.reference_hz
     )
@@ -144,6 +166,7 @@ def _operator(file: OperatorFile) -> Operator:
             line.centre,
             line.rate_hz,
             (line.rms_percent, line.scaling_percent, line.mismatch_percent, line.size_percent),
+            (line.in_fit_percent[0], line.in_fit_percent[1], line.in_fit_percent[2], line.in_fit_percent[3]),
         )
         for line in file.lines
     )
@@ -167,7 +190,9 @@ def operator_text(file: OperatorFile, comments: Sequence[str]) -> str:
     ]
     out += [f"    {numbers(row)}," for row in file.plays.weights]
     out += ["]", "bends = [", *(f"    {numbers(row)}," for row in file.plays.bends)]
-    out += ["]", f"reversible = {numbers(file.plays.reversible)}", "", "[lengths]"]
+    out += ["]", f"reversible = {numbers(file.plays.reversible)}", "", "[bouc_wen]"]
+    out += [f"{name} = {_float(getattr(file.bouc_wen, name))}" for name in file.bouc_wen.__struct_fields__[:-1]]
+    out += [f"bend = {numbers(file.bouc_wen.bend)}", "", "[lengths]"]
     out += [f"{name} = {_float(getattr(file.lengths, name))}" for name in file.lengths.__struct_fields__]
     for line in file.lines:
         out += ["", "[[lines]]", f"name = {_text(line.name)}"]

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tablegen.numerics.arrays import Floats, FloatsLike, Ints
+from tablegen.numerics.arrays import Floats, FloatsLike, Ints, tree_sum
 
 POINTS = 1025  # points of a branch; linear between them
 
@@ -37,6 +37,19 @@ class Loop:
         left: Ints = np.clip(np.searchsorted(values, p, side="right") - 1, 0, POINTS - 2)
         v = left + (p - values[left]) / (values[left + 1] - values[left])
         return self.low + (self.high - self.low) / (POINTS - 1) * v
+
+    def grown(self, mean: float) -> float:
+        """By which share it is larger than a loop of its stroke about ``mean`` would be, to first order, by its bend.
+
+        Halfway between both branches there is little hysteresis. Where that curve is bent, the slope is another one at
+        other drives: with b P_2 of the curve, by 12 b for a way of the stroke.
+        """
+        x = 2.0 * np.arange(POINTS) / (POINTS - 1) - 1.0
+        weight = 0.5 * (3.0 * x * x - 1.0)
+        weight[[0, -1]] *= 0.5
+        middle = 0.5 * (self.rising + self.falling) - 0.5
+        bend = 2.5 * float(tree_sum(weight * middle)) * 2.0 / (POINTS - 1)
+        return 12.0 * bend * (0.5 * (self.low + self.high) - mean) / (self.high - self.low)
 
     @property
     def least_slope(self) -> float:

@@ -1,14 +1,14 @@
 """The operator: a hysteresis family, the measured residual over it, the size at every offset, and creep."""
 
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
 from tablegen.compensation.operator.creep import LogarithmicCreep
+from tablegen.compensation.operator.family import Family
 from tablegen.compensation.operator.field import Field
 from tablegen.compensation.operator.loop import POINTS, Loop
-from tablegen.compensation.operator.plays import Plays
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 
@@ -22,7 +22,8 @@ class MeasuredLine:
     """One trace that the operator rests on: where it was, and by how much it is missed when it is left out.
 
     Strokes and centres are shares of v_max. ``left_out`` is the rms residual, the scaling error and the mismatch of
-    trace and retrace inside the window, in percent, and the error of the size in percent.
+    trace and retrace inside the window, in percent, and the error of the size in percent; ``in_fit`` is what is left of
+    these where the trace is not left out, that is noise.
     """
 
     name: str
@@ -30,6 +31,7 @@ class MeasuredLine:
     centre: float
     rate_hz: float
     left_out: tuple[float, float, float, float]
+    in_fit: tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,28 +43,31 @@ class Operator:
     the one at which most lines were measured, of v_max.
     """
 
-    family: Plays
+    family: Family
     residual: Field
     size: Field
     creep: LogarithmicCreep
     centre: float
     lines: tuple[MeasuredLine, ...]
 
-    def loop(self, low: float, high: float, factor: float = 1.0) -> Loop:
-        """The settled loop between two normalised drives.
+    def loop(self, low: float, high: float, factor: float = 1.0, mean: float | None = None) -> Loop:
+        """The settled loop between two normalised drives, of a drive with a ``mean``; default: the middle of both.
 
-        ``factor`` is m of (1) at this offset over that at ``self.centre``. Raises ``Unphysical`` where a branch would
-        stand still or run backwards.
+        ``factor`` is m of (1) at the mean over that at ``self.centre``. The size is that of a triangle about the mean,
+        since (1) goes with it; where the middle between the turns is another one, the loop is as much larger as its own
+        bend says. Raises ``Unphysical`` where a branch would stand still or run backwards.
         """
         stroke, centre = high - low, 0.5 * (low + high)
-        rising, falling, _ = self._family(low, high)
+        rising, falling = _branches(self.family, low, high)
         row = self.residual.at(stroke, centre)
         half = len(row) // 2
-        x = 2.0 * self._grid - 1.0
+        x = 2.0 * _GRID - 1.0
         rising, falling = rising + chebyshev(row[:half], x), falling + chebyshev(row[half:], x)
-        extent = self.expected_extent(stroke, centre, factor) * (1.0 + float(self.size.at(stroke, centre)[0]))
         rising, falling = _closed(rising, falling)
+        mean = centre if mean is None else mean
+        extent = self.expected_extent(stroke, mean, factor) * (1.0 + float(self.size.at(stroke, mean)[0]))
         loop = Loop(low, high, _monotonic_ends(rising), _monotonic_ends(falling), extent)
+        loop = replace(loop, extent_nm=extent * (1.0 + loop.grown(mean)))
         if not loop.least_slope > 0.5 * _LEAST_SLOPE:
             raise Unphysical(
                 f"at a stroke of {stroke:.3g} and a centre of {centre:.3g} of v_max the operator's branches run "
@@ -75,8 +80,8 @@ class Operator:
 
         What the factor has beyond the family, at a small stroke, is taken for a sensitivity that depends on the offset.
         """
-        here = extent_of(self.family, stroke, centre)
-        small = extent_of(self.family, SMALL_STROKE, self.centre) / extent_of(self.family, SMALL_STROKE, centre)
+        here = self.family.extent(stroke, centre)
+        small = self.family.extent(SMALL_STROKE, self.centre) / self.family.extent(SMALL_STROKE, centre)
         return here * small / factor
 
     def distance(self, stroke: float, centre: float) -> float:
@@ -86,25 +91,19 @@ class Operator:
     @property
     def nm_per_drive(self) -> float:
         """About how far the axis moves for the whole of v_max: a first guess of amplitudes."""
-        return extent_of(self.family, SMALL_STROKE, self.centre) / SMALL_STROKE
-
-    @cached_property
-    def _grid(self) -> Floats:
-        return np.arange(POINTS) / (POINTS - 1)
-
-    def _family(self, low: float, high: float) -> tuple[Floats, Floats, float]:
-        """Both branches of the family from 0 to 1, and the extent in nm."""
-        u = low + (high - low) * self._grid
-        rising, falling = (self.family.branch(u, low, high, going) for going in (True, False))
-        extent = float(rising[-1] - rising[0])
-        return (rising - rising[0]) / extent, (falling - rising[0]) / extent, extent
+        return self.family.extent(SMALL_STROKE, self.centre) / SMALL_STROKE
 
 
-def extent_of(family: Plays, stroke: float, centre: float) -> float:
-    """nm between the turns of a settled line."""
-    low, high = centre - 0.5 * stroke, centre + 0.5 * stroke
-    ends = family.branch(np.array([low, high]), low, high, True)
-    return float(ends[1] - ends[0])
+_GRID = np.arange(POINTS) / (POINTS - 1)
+
+
+@lru_cache(maxsize=512)  # while lengths are chosen, the same loops come again and again
+def _branches(family: Family, low: float, high: float) -> tuple[Floats, Floats]:
+    """Both branches of the family from 0 to 1."""
+    u = low + (high - low) * _GRID
+    rising, falling = (family.branch(u, low, high, going) for going in (True, False))
+    extent = float(rising[-1] - rising[0])
+    return (rising - rising[0]) / extent, (falling - rising[0]) / extent
 
 
 def _closed(rising: Floats, falling: Floats) -> tuple[Floats, Floats]:

@@ -18,12 +18,16 @@ FIXED_BENDS = np.array([[0.0, 0.0, 0.0, 0.0], [-1.0, 0.0, -1.0, 0.0], [1.0, 0.0,
 
 def envelopes(u: FloatsLike, bend: Floats) -> tuple[Floats, Floats]:
     """The lower and the upper envelope of a row of four bends, at normalised drives, each of their shape."""
+    linear, cubic, other_linear, other_cubic = bend.tolist()
+    one, two = bent(u, linear, cubic), bent(u, other_linear, other_cubic)
+    return np.minimum(one, two), np.maximum(one, two)
+
+
+def bent(u: FloatsLike, linear: float, cubic: float) -> Floats:
+    """A bent drive."""
     u = np.asarray(u, dtype=np.float64)
     bow = u * (1.0 - u)
-    skew = bow * (u - 0.5)
-    linear, cubic, other_linear, other_cubic = bend.tolist()
-    one, two = u + linear * bow + cubic * skew, u + other_linear * bow + other_cubic * skew
-    return np.minimum(one, two), np.maximum(one, two)
+    return u + linear * bow + cubic * (bow * (u - 0.5))
 
 
 def plays(u: Floats, low: float, high: float, rising: bool, thresholds: Floats, bends: Floats) -> Floats:

@@ -31,6 +31,7 @@ _BEYOND = 0.01  # of v_max: what a round may leave the driver's range by
 _ROUNDING = 2.0**40  # coefficients are multiples of its inverse: the last bits of a round do not matter then
 
 Linear = Callable[[Floats], tuple[Floats, Floats]]  # real and imaginary part of a response at frequencies in Hz
+Factor = Callable[[float], float]
 ThroughInverse = Callable[[FourierSeries], FourierSeries]  # what has to arrive at the piezo for a target
 
 
@@ -38,7 +39,8 @@ ThroughInverse = Callable[[FourierSeries], FourierSeries]  # what has to arrive 
 class Wanted:
     """A line: ``size_nm`` from x = 0 to 1, turn in periods, imaged over ``window``, backward too if ``both``.
 
-    ``centre`` is the offset, of v_max; ``factor`` m of (1) there over that at the operator's centre.
+    ``centre`` is the offset, of v_max; ``factor`` m of (1) there over that at the operator's centre. ``with_mean`` is m
+    at a mean of the drive, of v_max, over that at the offset.
     """
 
     size_nm: float
@@ -48,6 +50,7 @@ class Wanted:
     rate_hz: float
     centre: float
     factor: float
+    with_mean: Factor = lambda mean: 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,13 +69,19 @@ class Expected:
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """The waveform, about 0..1, of which 1 is ``v_amplitude`` of v_max; what it leaves; and where it turned."""
+    """The waveform, about 0..1, of which 1 is ``v_amplitude`` of v_max; what it leaves; and where it turned.
+
+    ``mean`` is that of the drive over a period, of v_max; ``grown`` by which share the loop is larger since its turns
+    are not even about that.
+    """
 
     series: FourierSeries
     v_amplitude: float
     expected: Expected
     stroke: float
     centre: float
+    mean: float
+    grown: float
     rounds: int
 
 
@@ -96,7 +105,8 @@ def find_waveform(
         if before is not None and float(np.max(np.abs(inside - before))) < _CONVERGED * wanted.size_nm:
             at = 0.5 * (played.loop.low + played.loop.high)
             expected = learner.expected(played.position)
-            return Found(_rounded(series), amplitude, expected, played.loop.high - played.loop.low, at, turn)
+            stroke, mean = played.loop.high - played.loop.low, played.mean
+            return Found(_rounded(series), amplitude, expected, stroke, at, mean, played.loop.grown(mean), turn)
         before = inside
         amplitude *= wanted.size_nm / line[0]
         series = series.plus(learner.correction(played, amplitude, line))
@@ -108,9 +118,10 @@ def find_waveform(
 
 @dataclass(frozen=True, eq=False)
 class _Played:
-    """One round: the drive on the grid, of v_max; the loop; where it rises; the position in nm."""
+    """One round: the drive on the grid and its mean, of v_max; the loop; where it rises; the position in nm."""
 
     drive: Floats
+    mean: float
     loop: Loop
     rising: Bools
     position: Floats
@@ -180,14 +191,15 @@ class _Learner:
                 f"{wanted.size_nm:.6g} nm take {100.0 * (high - low):.3g} % of v_max by the operator; at this offset "
                 f"{100.0 * reach:.3g} % are left; lower the size, or move the offset to the middle"
             )
-        loop = self._operator.loop(low, high, wanted.factor)
+        mean = float(tree_sum(u)) / self._count
+        loop = self._operator.loop(low, high, wanted.factor * wanted.with_mean(mean), mean)
         bottom, top = int(np.argmin(u)), int(np.argmax(u))
         k = np.arange(self._count)
         rising = (k - bottom) % self._count < (top - bottom) % self._count
         place = np.where(rising, loop.position(u, True), loop.position(u, False))
         if self._late:
             place = place + self._analysed(place).times(self._real - 1.0, self._imaginary).on_grid(self._count)
-        return _Played(u, loop, rising, loop.extent_nm * place)
+        return _Played(u, mean, loop, rising, loop.extent_nm * place)
 
     def line_of(self, position: Floats) -> tuple[float, float]:
         """Slope in nm from x = 0 to 1, and position at x = 1/2, of the best common line through the windows."""

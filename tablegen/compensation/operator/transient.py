@@ -1,75 +1,116 @@
-"""What an axis does after a change of offset or size: the plays keep their memory for a period, creep for long.
+"""What an axis does after a change of offset or size: hysteresis keeps its memory for a period, creep for long.
 
-The plays forget all that the new line's turns pass within its first period. The mean position then has moved by a
-step, of which creep brings its share late: s a exp(-t / tau) / |C| is still to come of every term, after a step s.
+Where a settled loop turned last is all that hysteresis remembers (return-point memory), whatever its family. So the way
+from one line to another goes along loops that the operator knows: that of the line before, the branch that rises from
+0 V, where the axis has rested before, and the new line's. Of the change creep brings its share late, by exp(-t / tau)
+for each term.
 """
+
+from dataclasses import dataclass
 
 import numpy as np
 
-from tablegen.compensation.operator.operator import Operator, extent_of
-from tablegen.compensation.operator.plays import Plays, envelopes
-from tablegen.compensation.transient import OFFSET_CHANGE, SIZE_CHANGE, Transient
-from tablegen.numerics.arrays import Floats, tree_sum
+from tablegen.compensation.operator.loop import POINTS, Loop
+from tablegen.compensation.operator.operator import SMALL_STROKE, Operator
+from tablegen.compensation.transient import OFFSET_CHANGE, SIZE_CHANGE, Late, Transient
+from tablegen.numerics.arrays import tree_sum
+from tablegen.numerics.elementary import exp
+from tablegen.problems import Unphysical
 
-_POINTS = 257  # of a sweep
+_POINTS = 65  # of the first sweep
+_MANY_PERIODS = 1e3  # a time constant as long as that knows the mean of a line alone
 
 
-def after_offset(operator: Operator, stroke: float, centre: float, factor: float, turn: float) -> Transient:
+@dataclass(frozen=True, slots=True)
+class LineOf:
+    """A line between the normalised drives ``low`` and ``high``, straight, of this turn and ``period_s``."""
+
+    low: float
+    high: float
+    turn: float
+    period_s: float
+
+    @classmethod
+    def about(cls, stroke: float, centre: float, turn: float, period_s: float) -> "LineOf":
+        """Of a stroke about a centre, as much of it as 0..1 holds."""
+        stroke = min(stroke, 2.0 * centre, 2.0 - 2.0 * centre)
+        return cls(centre - 0.5 * stroke, centre + 0.5 * stroke, turn, period_s)
+
+
+def after_offset(
+    operator: Operator, stroke: float, centre: float, factor: float, turn: float, period_s: float
+) -> Transient:
     """After a line whose centre was ``OFFSET_CHANGE`` nearer to the middle of v_max, or beyond it."""
     before = centre - OFFSET_CHANGE if centre >= 0.5 else centre + OFFSET_CHANGE
-    return _after(operator, (min(stroke, 2.0 * before, 2.0 - 2.0 * before), before), (stroke, centre), factor, turn)
+    lines = [LineOf.about(stroke, at, turn, period_s) for at in (before, centre)]
+    return after(operator, lines[0], lines[1], factor)
 
 
-def after_size(operator: Operator, stroke: float, centre: float, factor: float, turn: float) -> Transient:
-    """After a line at the same centre of ``SIZE_CHANGE`` the stroke."""
-    return _after(operator, (SIZE_CHANGE * stroke, centre), (stroke, centre), factor, turn)
-
-
-def _after(
-    operator: Operator, before: tuple[float, float], now: tuple[float, float], factor: float, turn: float
+def after_size(
+    operator: Operator, stroke: float, centre: float, factor: float, turn: float, period_s: float
 ) -> Transient:
-    """From one settled line to another, (stroke, centre) each of v_max; sizes are those of the other."""
-    family = operator.family
-    memory = np.zeros(family.weights.shape)
-    for _ in range(2):
-        rising, falling, memory = _period(family, memory, *before)
-    earlier = _mean(rising, falling, turn)
-    first, _, memory = _period(family, memory, *now)
-    rising, falling, memory = _period(family, memory, *now)
-    # An offset moves the piezo as far as the largest line does, which is more than a small one where plays are missing.
-    largest = max(((line.stroke, line.centre) for line in operator.lines), default=now)
-    extent = operator.expected_extent(*largest, factor) * (1.0 + float(operator.size.at(*largest)[0]))
-    scale = extent / extent_of(family, *largest)
-    step = scale * (_mean(rising, falling, turn) - earlier)
-    return Transient(
-        tuple((step * share, tau_s) for share, tau_s in operator.creep.terms()),
-        scale * float(np.max(np.abs(first - rising))),
-    )
+    """After a line at the same centre of ``SIZE_CHANGE`` the stroke."""
+    lines = [LineOf.about(size, centre, turn, period_s) for size in (SIZE_CHANGE * stroke, stroke)]
+    return after(operator, lines[0], lines[1], factor)
 
 
-def _period(family: Plays, memory: Floats, stroke: float, centre: float) -> tuple[Floats, Floats, Floats]:
-    """A line from its lower turn on: positions rising and falling, at even drives from its low; and the plays then."""
-    low, high = centre - 0.5 * stroke, centre + 0.5 * stroke
-    u = low + (high - low) * (np.arange(_POINTS) / (_POINTS - 1))
-    r = family.thresholds[None, :, None]
-    both = np.stack([envelopes(u, bend) for bend in family.bends])
-    below, above = both[:, :1, :] - r, both[:, 1:, :] + r
-    begin = np.minimum(np.maximum(memory[:, :, None], below[:, :, :1]), above[:, :, :1])
-    rising = np.maximum(begin, below)
-    falling = np.minimum(rising[:, :, -1:], above)
-    along, power = np.zeros_like(u), np.ones_like(u)
-    for coefficient in family.reversible:
-        power = power * u
-        along = along + float(coefficient) * power
-    up, down = (
-        along + tree_sum((family.weights[:, :, None] * part).transpose(2, 0, 1).reshape(_POINTS, -1))
-        if family.thresholds.size
-        else along
-        for part in (rising, falling)
-    )
-    return up, down, falling[:, :, 0]
+def after(operator: Operator, before: LineOf, now: LineOf, factor: float) -> Transient:
+    """From one settled line to another that reaches further, either way; both begin at their lower turn.
+
+    ``factor`` is that of ``Operator.loop`` at the new line: what moves is as sensitive as there.
+    """
+    last, settled = (_loop(operator, line.low, line.high) for line in (before, now))
+    # Positions are counted from the upper turn of the line before.
+    u = now.low + (now.high - now.low) * (np.arange(_POINTS) / (_POINTS - 1))
+    along, memory = settled.position(u, True), np.zeros(_POINTS)
+    if now.high > before.high:
+        highest = max([now.high, *(line.centre + 0.5 * line.stroke for line in operator.lines)])
+        virgin = _loop(operator, 0.0, highest)
+        further = virgin.extent_nm * (virgin.position(u, True) - virgin.position(np.array([before.high]), True))
+        low = float(further[-1]) - settled.extent_nm
+        # Up to the turn of the line before the first sweep is a branch from the lower one of both lower turns.
+        back = last if before.low <= now.low else settled
+        until = back.extent_nm * (back.position(u, True) - back.position(np.array([before.high]), True))
+        memory = np.where(u < before.high, until, further) - (low + settled.extent_nm * along)
+    else:  # the lower turn of the first period wipes out what was before
+        low = -_loop(operator, now.low, before.high).extent_nm
+    scale = _at_rest(operator, 0.5 * (now.low + now.high)) / factor
+    sweep_s = now.turn * now.period_s
+    mean = scale * float(tree_sum(0.5 * np.diff(along) * (memory[1:] + memory[:-1])))  # of the first sweep, in time
+    late = []
+    for share, tau_s in operator.creep.terms():
+        step = low + settled.extent_nm * _late_state(now, tau_s) + last.extent_nm * (1.0 - _late_state(before, tau_s))
+        kept = exp(-sweep_s / tau_s)
+        nm = scale * share * step
+        late.append(Late(nm, kept * nm - (1.0 - kept) * share * mean, tau_s))
+    measured_s = max((1.0 / line.rate_hz for line in operator.lines), default=0.0)
+    return Transient(tuple(late), measured_s, sweep_s * along, scale * memory)
 
 
-def _mean(rising: Floats, falling: Floats, turn: float) -> float:
-    up, down = (float(tree_sum(values)) / _POINTS for values in (rising, falling))
-    return turn * up + (1.0 - turn) * down
+def _loop(operator: Operator, low: float, high: float) -> Loop:
+    """The settled loop, as sensitive as the family is there; a straight line where the operator's is not monotonic."""
+    centre, stroke = 0.5 * (low + high), high - low
+    try:
+        return operator.loop(low, high, _at_rest(operator, centre))
+    except Unphysical:
+        straight = np.arange(POINTS) / (POINTS - 1)
+        return Loop(low, high, straight, straight, operator.family.extent(stroke, centre))
+
+
+def _at_rest(operator: Operator, centre: float) -> float:
+    """The factor with which ``Operator.loop`` has the extents of the family itself, whose sensitivity never changes."""
+    return operator.family.extent(SMALL_STROKE, operator.centre) / operator.family.extent(SMALL_STROKE, centre)
+
+
+def _late_state(line: LineOf, tau_s: float) -> float:
+    """What a term of creep has of a settled straight line at its lower turn, from 0 at that turn to 1 at the other.
+
+    The steady state of tau s' = p - s for a triangle p: its mean where tau is long, its value where tau is short.
+    """
+    tau = tau_s / line.period_s
+    if tau > _MANY_PERIODS:
+        return 0.5
+    up, down = line.turn, 1.0 - line.turn
+    first, second = exp(-up / tau), exp(-down / tau)
+    bend = tau * (1.0 / up + 1.0 / down)
+    return bend * (1.0 - second) / (1.0 - first * second) - tau / up

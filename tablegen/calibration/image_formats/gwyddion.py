@@ -6,11 +6,11 @@ Nothing is read beyond the end of the object that holds it, so that a damaged fi
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from math import isfinite, prod
+from math import prod
 
 import numpy as np
 
-from tablegen.calibration.image_formats.channel import Channel, loaded
+from tablegen.calibration.image_formats.channel import Channel, loaded, positive
 from tablegen.numerics.arrays import Floats
 
 _MAGIC = b"GWYP"
@@ -78,10 +78,7 @@ def _field(content: bytes, at: int, end: int, number: int, title: str) -> DataFi
         raise ValueError(f"an object {name[:40]!r} has no data, xres or yres")
     if min(size.values()) < 1 or prod(size.values()) != len(values):
         raise ValueError(f"a data field of {size['xres']} x {size['yres']} has {len(values)} values")
-    lengths = [
-        side if units["si_unit_xy"] == "m" and isfinite(side) and side > 0.0 else None
-        for side in (sides.get("xreal", 0.0), sides.get("yreal", 0.0))
-    ]
+    lengths = [positive(sides.get(key)) if units["si_unit_xy"] == "m" else None for key in ("xreal", "yreal")]
     matrix = values.reshape(size["yres"], size["xres"])
     return DataField(number, title, matrix, lengths[0], lengths[1], units["si_unit_z"])
 

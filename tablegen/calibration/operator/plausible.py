@@ -1,0 +1,44 @@
+"""Records that say nothing of a settled line, refused with the reason: gaps, clipping, a drive that does not repeat."""
+
+import numpy as np
+
+from tablegen.calibration.hysteresis import Trace
+from tablegen.numerics.arrays import Floats
+from tablegen.problems import Unphysical
+
+_MOST_AT_REST = 0.04  # of a record at its largest or least value: coarse steps of a sine's turn are 0.03
+_FEW = 4  # samples at a turn that may be the same, where there are few of a period
+_SAME = 1e-9  # of the span
+_MOST_DIFFERENCE = 0.02  # of the drive's span, rms, from period to period
+
+
+def check_record(trace: Trace) -> None:
+    """Refuse a record that has no values, that does not move, or that was clipped. Raises ``Unphysical``."""
+    columns = (("time", trace.time_s), ("drive", trace.drive_v), ("displacement", trace.displacement_nm))
+    for name, values in columns:
+        missing = np.flatnonzero(~np.isfinite(values))
+        if len(missing):
+            raise Unphysical(f"the {name} of sample {missing[0] + 1} is {values[missing[0]]:g}; leave such samples out")
+    for name, values in columns[1:]:
+        span = float(np.ptp(values)) if len(values) else 0.0
+        if not span > 0.0:
+            raise Unphysical(f"the {name} does not move")
+        for end, at in (("largest", float(np.max(values))), ("least", float(np.min(values)))):
+            still = np.abs(values - at) <= _SAME * span
+            share, times = float(np.mean(still)), int(np.sum(np.diff(still, prepend=False) & still))
+            if share > _MOST_AT_REST and int(np.sum(still)) >= _FEW * times:
+                raise Unphysical(
+                    f"the {name} is at its {end} value, {at:.6g}, for {100.0 * share:.2g} % of the record; "
+                    "it was clipped, or stands still: record less of a stroke, or with more range"
+                )
+
+
+def check_repeats(drives: Floats) -> None:
+    """Refuse a drive, (periods, phases), that is not the same in every period. Raises ``Unphysical``."""
+    mean = drives.mean(axis=0)
+    difference = float(np.sqrt(np.mean((drives - mean) ** 2))) / float(np.ptp(mean))
+    if difference > _MOST_DIFFERENCE:
+        raise Unphysical(
+            f"the drive differs by {100.0 * difference:.2g} % of its span from period to period; a settled line needs "
+            "one that repeats"
+        )

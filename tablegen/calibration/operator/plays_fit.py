@@ -1,0 +1,80 @@
+"""Plays whose envelopes and weights describe settled lines; the weights are smooth in the threshold."""
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from tablegen.calibration.operator.family import DEGREE, STRIDE, CreepOf, FamilyProblem
+from tablegen.calibration.operator.periodic_line import PeriodicLine
+from tablegen.compensation.operator.family import Family
+from tablegen.compensation.operator.plays import Plays, plays
+from tablegen.numerics.arrays import Floats
+
+NODES = 40  # of the density of plays, linear between them
+THRESHOLDS = 160
+_HIGHEST = 0.495  # of v_max; above it no play moves
+_SPACING = 1.5  # thresholds grow with this power of their number
+# The density is a trend and scatter about it. Weights of the differences of the trend and of the scatter, against
+# residuals that are shares of the stroke, are in proportion to the noise of a line, as a share of it: as those of a
+# prior. Their floor is what the plays themselves miss.
+_TREND, _SCATTER = 1.25, 0.35
+_LEAST_NOISE, _MOST_NOISE, _UNKNOWN_NOISE = 8e-5, 1.2e-2, 4e-4  # unknown where no line has two periods
+_RIDGE = 1e-5
+_MOST_BEND = 0.6  # an envelope still rises everywhere
+
+
+class PlaysProblem(FamilyProblem):
+    """Its own numbers are the four bends."""
+
+    shape_limits = ((-_MOST_BEND, _MOST_BEND),) * 4
+    shape_steps = (0.02,) * 4
+    # Where both envelopes are the same, none of them can tell which way to part.
+    starts: ClassVar[tuple[Floats, ...]] = tuple(
+        np.array([*bends, 0.02])
+        for bends in ((-0.1, 0.0, 0.1, 0.0), (-0.3, 0.0, -0.1, 0.0), (0.1, 0.0, 0.3, 0.0), (0.0, -0.2, 0.0, 0.2))
+    )
+
+    def __init__(self, lines: Sequence[PeriodicLine], main: float, creep: CreepOf) -> None:
+        super().__init__(lines, main, creep)
+        self._thresholds = _HIGHEST * (np.arange(1, THRESHOLDS + 1) / THRESHOLDS) ** _SPACING
+        self._spread = _spread(self._thresholds)
+        self.penalty = _penalty(_noise(lines))
+
+    def moved(self, shape: Floats) -> list[Floats]:
+        """By plays of a density of 1 at a node."""
+        out = []
+        for line, u in zip(self.lines, self.drives, strict=True):
+            rising, falling = (
+                plays(u, line.low, line.high, going, self._thresholds, shape[None, :])[0] for going in (True, False)
+            )
+            out.append((self._spread @ np.where(line.rising[::STRIDE], rising, falling)).T)
+        return out
+
+    def family(self, shape: Floats, weights: Floats, reversible: Floats) -> Family:
+        """Of plays alone."""
+        return Family(Plays(self._thresholds, (weights @ self._spread)[None, :], reversible, shape[None, :].copy()))
+
+
+def _spread(thresholds: Floats) -> Floats:
+    """Weights of all thresholds for a density of 1 at one node and linear to its neighbours, a row a node."""
+    at = np.linspace(0.0, NODES - 1.0, len(thresholds))
+    hats = np.maximum(0.0, 1.0 - np.abs(at[None, :] - np.arange(NODES)[:, None]))
+    spread: Floats = hats * np.gradient(thresholds) * len(thresholds)
+    return spread / NODES
+
+
+def _noise(lines: Sequence[PeriodicLine]) -> float:
+    """Of a line, as a share of it."""
+    noise = [line.noise_nm / float(np.ptp(line.displacement_nm)) for line in lines if line.periods > 1]
+    return float(np.clip(np.median(noise), _LEAST_NOISE, _MOST_NOISE)) if noise else _UNKNOWN_NOISE
+
+
+def _penalty(noise: float) -> Floats:
+    """Rows for the density: of what covariance the prior has; and a ridge."""
+    step = _TREND * noise * np.diff(np.eye(NODES), axis=0)
+    trend = np.linalg.inv(step.T @ step + _RIDGE * _RIDGE * np.eye(NODES))
+    prior = trend + np.eye(NODES) / (_SCATTER * noise) ** 2
+    rows = _RIDGE * np.eye(NODES + 2 * DEGREE)
+    rows[:NODES, :NODES] = np.linalg.cholesky(np.linalg.inv(prior)).T
+    return rows

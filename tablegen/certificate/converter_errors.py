@@ -1,0 +1,66 @@
+"""What the emitted integers leave on the scanner by themselves: roundings, as the dynamics of the axis pass them on.
+
+The certificate's own figures are of the codes. A resonance makes more of their noise: with a line of some thousand
+codes at 1 kHz, several times as much.
+"""
+
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+
+from tablegen.certificate.line_errors import CHORD, EmittedPeriod
+from tablegen.compensation.line import Sweep
+from tablegen.numerics.arrays import Floats
+from tablegen.planning.line_plan import LinePlan
+
+_MOST_TICKS = 1 << 20  # of a period whose spectrum is taken; in a longer one a code is held for longer than it rings
+_POINTS = 801  # over the window
+
+
+@dataclass(frozen=True)
+class ConverterErrors:
+    """Percent of the line inside the window, as ``Expectation`` has them; ``rms`` and ``scaling`` by direction."""
+
+    rms: dict[str, float]
+    scaling: dict[str, float]
+    mismatch: float
+
+
+def converter_errors(line: LinePlan, played: EmittedPeriod) -> ConverterErrors:
+    """The errors of the integers of the directions that image, in a position, through the axis' dynamics."""
+    shape, ticks = line.drive.shape, line.program.ticks
+    sides: dict[str, Sweep] = {"forward": shape.forward}
+    if line.band_limit.directions == "both":
+        sides["backward"] = shape.backward
+    count = min(ticks, _MOST_TICKS)
+    at = (2 * np.arange(count, dtype=np.int64) + 1) * ticks // (2 * count)
+    moved = _moved(line, played.errors(at) / line.codes_per_unit, full=count == ticks)
+    position = np.linspace(*line.band_limit.window, _POINTS)
+    chord = round(CHORD / (position[1] - position[0]))
+    chord = max(1, min(chord, _POINTS - 1))
+    span = position[chord] - position[0]
+    rms, scaling, apart = {}, {}, []
+    for side, branch in sides.items():
+        here = np.interp(shape.times(side, position) * count - 0.5, np.arange(count), moved)
+        error = 100.0 * here / branch.slope(position if side == "forward" else 1.0 - position)
+        error -= float(np.mean(error))
+        rms[side] = sqrt(float(np.mean(error * error)))
+        scaling[side] = float(np.ptp(error[chord:] - error[:-chord]) / span)
+        apart.append(error)
+    mismatch = float(np.max(np.abs(apart[0] - apart[-1])))
+    return ConverterErrors(rms, scaling, mismatch)
+
+
+def _moved(line: LinePlan, error: Floats, full: bool) -> Floats:
+    """Errors of w, (n,), one a tick of a period, behind the dynamics."""
+    response = line.drive.response
+    if response is None or not full:
+        return error
+    f: Floats = float(line.rate) * np.arange(len(error) // 2 + 1, dtype=np.float64)
+    known = f <= response.highest_hz
+    real, imaginary = response.inverse(f[known])
+    spectrum = np.fft.rfft(error)
+    spectrum[known] /= real + 1j * imaginary
+    spectrum[~known] = 0.0
+    return np.fft.irfft(spectrum, len(error))

@@ -1,0 +1,44 @@
+"""The hysteresis family of an operator: plays over a polynomial, and Bouc and Wen's equation, each with its weight."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tablegen.compensation.operator.bouc_wen import BoucWen
+from tablegen.compensation.operator.plays import Plays
+from tablegen.numerics.arrays import Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Family:
+    """The sum of both."""
+
+    plays: Plays
+    bouc_wen: BoucWen | None = None
+
+    def branch(self, u: Floats, low: float, high: float, rising: bool) -> Floats:
+        """The displacement at drives ``u`` of a settled line between two drives; up to a constant of the line."""
+        moved = self.plays.branch(u, low, high, rising)
+        return moved if self.bouc_wen is None else moved + self.bouc_wen.branch(u, low, high, rising)
+
+    def extent(self, stroke: float, centre: float) -> float:
+        """nm between the turns of a settled line."""
+        low, high = centre - 0.5 * stroke, centre + 0.5 * stroke
+        ends = self.branch(np.array([low, high]), low, high, True)
+        return float(ends[1] - ends[0])
+
+    def over(self, reversible: Floats) -> "Family":
+        """Over another polynomial."""
+        return replace(self, plays=replace(self.plays, reversible=reversible))
+
+    def weighted(self, share: float, other: "Family") -> "Family":
+        """A share of this one, and the rest of another one, of which one at most has plays."""
+        mine, theirs = self.plays, other.plays
+        reversible = np.zeros(max(len(mine.reversible), len(theirs.reversible)))
+        reversible[: len(mine.reversible)] += share * mine.reversible
+        reversible[: len(theirs.reversible)] += (1.0 - share) * theirs.reversible
+        with_plays, part = (mine, share) if len(mine.thresholds) else (theirs, 1.0 - share)
+        plays = replace(with_plays, weights=part * with_plays.weights, reversible=reversible)
+        loops = [(one, by) for one, by in ((self.bouc_wen, share), (other.bouc_wen, 1.0 - share)) if one is not None]
+        ((loop, by),) = loops or ((None, 0.0),)
+        return Family(plays, None if loop is None else replace(loop, depth=by * loop.depth))

@@ -1,0 +1,87 @@
+"""How far an operator may be off: by what its traces are missed when they are left out, and the way from them.
+
+Departures of the piezo are a Gaussian process over stroke and centre. What a trace is missed by, less what the operator
+leaves of it in the fit (that is noise), over the standard deviation that the process has there without it, is how
+strong the departures are; times the standard deviation at the scan, it is what to be wrong by there. Noise remains.
+"""
+
+from collections.abc import Sequence
+from math import sqrt
+
+import numpy as np
+
+from tablegen.compensation.operator.field import Lengths, covariance
+from tablegen.compensation.operator.operator import MeasuredLine, chebyshev
+from tablegen.numerics.arrays import Floats, tree_sum
+from tablegen.numerics.linear import Cholesky
+
+LEVEL_PERCENT = 90  # of scans that leave less than what is expected and its uncertainty together
+_ALIKE = Lengths(0.6, 2.5, 1e-3)  # departures of lines; the noise is what rates and turns change
+_FEW = 3  # traces, below which all count
+_PLACES = 0.5  # share of what the family leaves that may be another one, for an offset that is v_max from all traces
+_WINDOW = 0.8  # of -1..1, where it counts; chords of a twentieth of the line
+_POINTS, _CHORD = 161, 10
+_FORMULAS = 0.15  # of what (1) and (23) say from the nearest trace to the scan, that may be wrong
+
+
+def departures(lines: Sequence[MeasuredLine], stroke: float, centre: float) -> tuple[float, float, float, float]:
+    """By how much rms, scaling error, mismatch and size may be off at a stroke and a centre, in percent."""
+    points = np.array([(line.stroke, line.centre) for line in lines])
+    missed, noise = np.array([line.left_out for line in lines]), np.array([line.in_fit for line in lines])
+    known = covariance(points, points, _ALIKE)
+    factor = Cholesky(known + _ALIKE.noise * np.diag(np.diag(known)))
+    without = [1.0 / float(factor.solve(row)[i]) for i, row in enumerate(np.eye(len(points)))]
+    near = covariance(np.array([[stroke, centre]]), points, _ALIKE)[0]
+    here = max(1.0 - _dot(near, factor.solve(near)), 0.0)
+    many = _deviations(0.5 * len(points))  # what neighbours are missed by goes together: half of it is independent
+    out = []
+    for by, left in zip(missed.T, noise.T, strict=True):
+        square, rest = (by * by).tolist(), (left * left).tolist()
+        strength = _variance([max(a - b, 0.0) / v for a, b, v in zip(square, rest, without, strict=True)])
+        out.append(sqrt(_mean(rest) + many * many * strength * here))
+    return out[0], out[1], out[2], out[3]
+
+
+def of_places(row: Floats, away: float) -> tuple[float, float, float]:
+    """By how much rms, scaling error and mismatch may be off since the shape of a stroke is that at other offsets.
+
+    ``row`` is what the family leaves of both branches there, as the residual of ``Operator`` has it; the nearest trace
+    has an offset that is ``away`` from this one, of v_max. Sensitivities change about as much.
+    """
+    x = _WINDOW * (2.0 * np.arange(_POINTS) / (_POINTS - 1) - 1.0)
+    half = len(row) // 2
+    there, back = chebyshev(row[:half], x), chebyshev(row[half:], x)
+    mean = 0.5 * (there + back)
+    level, slope = float(tree_sum(mean)) / _POINTS, float(tree_sum(mean * x)) / float(tree_sum(x * x))
+    sides = [one - level - slope * x for one in (there, back)]
+    square = sum(float(tree_sum(side * side)) for side in sides) / (2.0 * _POINTS)
+    chords = [(side[_CHORD:] - side[:-_CHORD]) / (0.5 * float(x[_CHORD] - x[0])) for side in sides]
+    scaling = max(float(np.max(one) - np.min(one)) for one in chords)
+    share = 100.0 * _PLACES * away
+    return share * sqrt(square), share * scaling, share * float(np.max(np.abs(there - back)))
+
+
+def of_formulas(steps: Sequence[float]) -> float:
+    """By how much the size may be off, in percent, for shares by which formulas change it from the nearest trace."""
+    return 100.0 * _FORMULAS * sqrt(sum(step * step for step in steps))
+
+
+def _deviations(freedom: float) -> float:
+    """Within which Student's t is at ``LEVEL_PERCENT``, to second order in the inverse of the degrees of freedom."""
+    return 1.645 + (1.524 + 1.42 / freedom) / freedom
+
+
+def _variance(squares: Sequence[float]) -> float:
+    """From squares of deviations, the largest of which does not count: a family often fails at the largest stroke."""
+    count = len(squares)
+    if count < _FEW:
+        return _mean(squares)
+    return _mean(sorted(squares)[:-1]) / (1.0 - 1.15 / sqrt(count))  # about what is left of a normal's, or less
+
+
+def _mean(values: Sequence[float]) -> float:
+    return float(sum(values)) / len(values)
+
+
+def _dot(one: Floats, other: Floats) -> float:
+    return float(sum(a * b for a, b in zip(one.tolist(), other.tolist(), strict=True)))

@@ -1,0 +1,189 @@
+"""Where a scan really was, by the scanner file: the drive of each axis, its settled loop, creep and dynamics."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from tablegen.compensation import models
+from tablegen.compensation.frequency import frequency_gain
+from tablegen.compensation.line import WantedLine
+from tablegen.compensation.offset import OffsetLaw, normalised_offset
+from tablegen.compensation.offset_sizes import OffsetSurface
+from tablegen.compensation.operator.settled import settled
+from tablegen.compensation.size import SizeLaw
+from tablegen.config.scanner import Scanner, ScannerAxis
+from tablegen.correction.distortion import Distortion, Sweep1D
+from tablegen.numerics.arrays import Floats
+from tablegen.planning.drive import dynamics_of, offset_surface, outside_driver, size_law_of
+from tablegen.problems import Document, Problems, Rejected, Unphysical
+
+_COUNT = 8192  # drives of a period
+_HARMONICS = 512  # on which creep and dynamics act
+_ROUNDS = 30  # of a contraction that leaves less than a tenth of an error
+_BEYOND = 1e-3  # of v_max: by how much a drive may leave the driver's range in its last digits
+
+Waveform = Callable[[Floats], Floats]  # of times in periods, 0 where the sweep there begins
+
+
+@dataclass(frozen=True, eq=False)
+class AxisScan:
+    """What was played on one axis: volts at the piezo against the time in periods, and which part was imaged.
+
+    ``turn`` is when the sweep back begins, in periods; ``window`` what the pixels span of each sweep.
+    """
+
+    volts: Waveform
+    rate_hz: float
+    turn: float
+    window: tuple[float, float] = (0.0, 1.0)
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.turn <= 1.0:
+            raise Unphysical(f"a turn of {self.turn:g} is outside 0..1")
+        low, high = self.window
+        if not (0.0 <= low < high <= 1.0 and high - low >= 0.01):
+            raise Unphysical(f"a window of {low:g}..{high:g} is no part of the sweep, 0..1")
+
+    def drive(self) -> Floats:
+        """V at even times of a period."""
+        return self.volts(np.arange(_COUNT) / _COUNT)
+
+
+def triangle(size_v: float, offset_v: float, turn: float) -> Waveform:
+    """What an instrument without correction plays; (14), with the turn at the end of a period for a saw."""
+
+    def volts(time: Floats) -> Floats:
+        back = (1.0 - time) / max(1.0 - turn, 1e-12)
+        return offset_v + size_v * (np.where(time <= turn, time / turn, back) - 0.5)
+
+    return volts
+
+
+@dataclass(frozen=True, eq=False)
+class ScannerModel:
+    """A scanner file, where its keys stand, and the folder of the files that it names."""
+
+    scanner: Scanner
+    file: Document
+    folder: Path
+
+    def moved(self, axis: Literal["x", "y"], scan: AxisScan) -> Floats:
+        """nm at even times of a period, above the lower turn or thereabouts.
+
+        Raises ``Rejected`` with the keys that do not serve, ``Unphysical`` for a drive that the driver cannot have.
+        """
+        its: ScannerAxis = getattr(self.scanner, axis)
+        v_max = self.scanner.v_max
+        drive = scan.drive()
+        low, high = float(np.min(drive)), float(np.max(drive))
+        for volts in (low, high):
+            if not -_BEYOND * v_max <= volts <= (1.0 + _BEYOND) * v_max:
+                raise Unphysical(f"{axis}: {outside_driver(volts, v_max)}")
+        problems = Problems()
+        size_law: SizeLaw | None = None
+        with problems.at(self.file, f"{axis}.size.base_nm"):
+            size_law = size_law_of(its.size, v_max)
+        surface = OffsetSurface.everywhere(OffsetLaw())
+        if its.offset is not None and size_law is not None:
+            with problems.at(self.file, f"{axis}.offset"):
+                surface = offset_surface(its.offset, v_max, size_law)
+        gain, law = 1.0, its.frequency
+        if law is not None:
+            with problems.at(self.file, f"{axis}.frequency.alpha"):
+                gain = frequency_gain(scan.rate_hz, law.alpha, law.reference_hz)
+        response = None
+        if its.resonance is not None:
+            with problems.at(self.file, f"{axis}.resonance"):
+                response = dynamics_of(its.resonance, self.folder)
+        problems.stop_if_any()
+        assert size_law is not None
+        amplitude, offset_v = (high - low) / v_max, float(np.mean(drive))
+        share = _scan_share(surface, normalised_offset(offset_v, v_max), gain, amplitude)
+        hysteresis = models.get(models.UNCOMPENSATED)() if its.hysteresis is None else its.hysteresis
+        wanted = WantedLine(
+            axis=axis,
+            turn=scan.turn,
+            v=share,
+            v_max=v_max,
+            v_amplitude=high - low,
+            v_offset=offset_v,
+            size_nm=size_law.size_nm(share),
+            rate_hz=scan.rate_hz,
+            harmonics=64,
+            window=scan.window,
+            both=True,
+            response=response,
+            max_boost_db=0.0 if its.resonance is None else its.resonance.max_boost_db,
+            factor_at=lambda v: surface.small.factor(normalised_offset(v * v_max, v_max)),
+            rate_gain=None if law is None else lambda hz: frequency_gain(hz, law.alpha, law.reference_hz),
+            folder=self.folder,
+            scan_file=Document("the image", None),
+            scanner_file=self.file,
+            problems=problems,
+        )
+        found = hysteresis.loop(wanted, low / v_max, high / v_max)
+        problems.stop_if_any()
+        if found is None:
+            raise Rejected(problems.found)
+        loop, creep = found
+        return settled(loop, drive / v_max, scan.rate_hz, creep, response, _HARMONICS)
+
+
+def _scan_share(surface: OffsetSurface, p: float, gain: float, amplitude: float) -> float:
+    """V_scan of v_max where m g V_scan is ``amplitude``, since m may depend on V_scan."""
+    share = amplitude
+    for _ in range(_ROUNDS):
+        share = amplitude / (surface.at(share).factor(p) * gain)
+    return min(share, 1.0)
+
+
+def scanner_distortion(
+    model: ScannerModel,
+    x: AxisScan,
+    y: AxisScan,
+    rows: int,
+    columns: int,
+    lines: int | None = None,
+    back: bool = False,
+    sides: tuple[bool, ...] = (True, False),
+    delay_pixels: float = 0.0,
+) -> Distortion:
+    """Where the pixels of a scan were, in nm, 0 at the left edge and at the first row.
+
+    Columns are evenly spread in time over the window of each sweep of ``x``; they show the sample ``delay_pixels``
+    late. Rows follow each other, ``lines`` in a period of ``y``, from where its window begins, on its way there, or
+    ``back``; see ``lines_of``. Raises ``Rejected`` and ``Unphysical``.
+    """
+    moved = model.moved("x", x)
+    low, high = x.window
+    place = low + (high - low) * (np.arange(columns) + 0.5) / columns
+    late = delay_pixels * (high - low) / columns
+    found: dict[bool, Sweep1D] = {}
+    for forward in sides:
+        way = (place if forward else 1.0 - place) - late
+        time = x.turn * way if forward else x.turn + (1.0 - x.turn) * way
+        found[forward] = Sweep1D(_at(moved, time), time)
+    begin = y.turn + (1.0 - y.turn) * (1.0 - y.window[1]) if back else y.turn * y.window[0]
+    frame = begin + np.arange(rows + 1) / (lines or lines_of(rows, y, back))
+    slow = _at(model.moved("y", y), frame) * (-1.0 if back else 1.0)
+    whole = Distortion(rows, columns, found.get(True), found.get(False), slow, np.zeros(rows + 1))
+    whole.check()
+    left, top = whole.x_range[0], whole.y_range[0]
+
+    def shifted(one: Sweep1D | None) -> Sweep1D | None:
+        return None if one is None else replace(one, x=one.x - left)
+
+    return replace(whole, forward=shifted(whole.forward), backward=shifted(whole.backward), y=whole.y - top)
+
+
+def lines_of(rows: int, y: AxisScan, back: bool = False) -> int:
+    """Lines in a period of the slow axis of which the window of one way has so many rows."""
+    return round(rows / ((1.0 - y.turn if back else y.turn) * (y.window[1] - y.window[0])))
+
+
+def _at(moved: Floats, time: Floats) -> Floats:
+    values: Floats = np.interp(time, np.arange(len(moved)) / len(moved), moved, period=1.0)
+    return values

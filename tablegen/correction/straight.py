@@ -1,0 +1,100 @@
+"""All channels of a scan put straight: what was taken, what came of it, and what was done, for the files."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from tablegen.correction.agreement import Agreement, agreement
+from tablegen.correction.distortion import Distortion, Resampler
+from tablegen.correction.residual_lattice import ResidualLattice, residual_lattice
+from tablegen.numerics.arrays import Floats
+from tablegen.version import __version__
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """One channel of one direction, rows x columns, rows in the order of time, left on the left.
+
+    ``bottom_first`` says that the first row in time is the lowest of the picture.
+    """
+
+    title: str
+    forward: bool
+    heights: Floats
+    unit: str = ""
+    bottom_first: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class StraightScan:
+    """Pictures put straight, NaN where nothing was imaged; their size in nm, or None; and what was done.
+
+    ``distortion`` is by what they were bent, ``agreement`` that of the channel that was judged, None without a retrace.
+    ``lattice`` is what is left of its bends, None without a period.
+    """
+
+    pictures: tuple[Picture, ...]
+    size_nm: tuple[float, float] | None
+    distortion: Distortion
+    agreement: Agreement | None
+    lattice: ResidualLattice | None
+    taken: tuple[Picture, ...]
+    judged: tuple[int, ...]
+    record: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def moved_pixels(self) -> tuple[float, float]:
+        """The largest displacement along x and y, the mean one aside."""
+        found = []
+        for axis in (0, 1):
+            parts = np.concatenate([self.distortion.moved(way)[axis].ravel() for way, _ in self.distortion.sides])
+            parts = parts[np.isfinite(parts)]
+            found.append(float(np.max(np.abs(parts - np.mean(parts)))))
+        return found[0], found[1]
+
+
+def put_straight(
+    taken: Sequence[Picture],
+    distortion: Distortion,
+    size_nm: tuple[float, float] | None,
+    judged: Sequence[int],
+    how: dict[str, Any],
+) -> StraightScan:
+    """Every picture resampled once; ``judged`` are the numbers of the trace and the retrace that are compared.
+
+    ``how`` is what was applied, for the record. All pictures have the rows and columns of the distortion.
+    """
+    ways = {way: Resampler.of(distortion, way) for way in {picture.forward for picture in taken}}
+    pictures = tuple(
+        Picture(one.title, one.forward, ways[one.forward](one.heights), one.unit, one.bottom_first) for one in taken
+    )
+    found = None
+    if len(judged) == 2:
+        first, second = judged
+        raw, straight = ((group[first].heights, group[second].heights) for group in (tuple(taken), pictures))
+        found = agreement(raw, straight, distortion)
+    before_and_after: dict[str, Any] = {}
+    if found is not None:
+        names = ("before", "after")
+        before_and_after["difference"] = dict(zip(names, (round(v, 6) for v in found.difference), strict=True))
+        if found.worst is not None:
+            before_and_after["apart_pixels"] = dict(zip(names, (round(v, 4) for v in found.worst), strict=True))
+    rows, columns = distortion.rows, distortion.columns
+    lattice = residual_lattice(pictures[judged[0]].heights)
+    record: dict[str, Any] = {
+        "program": f"tablegen {__version__}",
+        "command": "correct",
+        **how,
+        "interpolation": "cubic splines, once; nothing beyond the scan",
+        "pixels": [columns, rows],
+    }
+    if size_nm is not None:
+        record["size_nm"] = [round(value, 6) for value in size_nm]
+    if before_and_after:
+        record["trace_retrace"] = before_and_after
+    if lattice is not None:
+        off = (100.0 * worst / count for worst, count in zip(lattice.worst, (columns, rows), strict=True))
+        record["lattice_off_percent"] = [round(value, 4) for value in off]
+    return StraightScan(pictures, size_nm, distortion, found, lattice, tuple(taken), tuple(judged), record)

@@ -1,0 +1,253 @@
+"""A round from images of the running scan to what goes into the scan file, and whether it should."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from tablegen.calibration.estimate import Estimate
+from tablegen.calibration.image_checks import check_size
+from tablegen.calibration.image_scale import LineSize, size_of_line
+from tablegen.calibration.image_sizes import Sample
+from tablegen.config.load import Setup
+from tablegen.numerics.arrays import Floats
+from tablegen.planning.line_plan import LinePlan, Plan, make_plan
+from tablegen.problems import Unphysical
+from tablegen.refinement.lattice_line import ImageOptions, LatticeLine, lattice_line
+from tablegen.refinement.learning import Lesson, learn
+from tablegen.refinement.registration import SweepMismatch, mismatch
+from tablegen.refinement.round import Options, Round, allowed, finished, why_worse, with_lesson
+from tablegen.refinement.slow_line import slow_line
+from tablegen.refinement.window_line import WindowLine, averaged
+
+_MIN_EXPLAINED = 0.03  # share of the variance of an image
+_LITTLE_EXPLAINED = 0.5
+_SURE_LAG = 0.2  # standard error with which the order of time is told
+_FAR_APART = 0.35  # periods
+_SIZE_NOTE_LIMIT, _SIZE_NOTE_ERRORS = 0.002, 3.0  # of the line, and standard errors: what gets a remark
+_MIN_PIXELS_PER_PERIOD = 4.0
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ImageRound(Round):
+    """What trace and retrace say; ``size`` is x's, where the constant of the sample is known, and
+    ``asked_nm`` what x was to have."""
+
+    frames: tuple[LatticeLine, ...]
+    measured: WindowLine
+    size: LineSize | None
+    asked_nm: float
+
+    @property
+    def periods(self) -> float:
+        """In the whole line of x, of the wave that has most."""
+        return float(np.max(np.abs(self.frames[0].fit.state.q)))
+
+    @property
+    def recorded(self) -> str:
+        """Frames, pixels and periods."""
+        return f"{_pixels(self.frames)}, {self.periods:.4g} periods in the line"
+
+
+def refine_images(
+    setup: Setup,
+    axis: Literal["x", "y"],
+    pairs: Sequence[tuple[Floats, Floats]],
+    options: Options,
+    images: ImageOptions | None = None,
+    sample: Sample | None = None,
+) -> ImageRound:
+    """Learn from heights in any unit, rows x columns, of a grating or a lattice that the running scan images.
+
+    ``pairs`` are trace and retrace of frames that follow each other, one or more. Rows are in the order of time,
+    columns those of the scan's imaging window. With a ``sample`` of known constant the size of the line is compared as
+    well; it is not learnt. Raises ``Rejected`` where the scan, or
+    the scan with the new layer, cannot be planned, and ``Unphysical`` for images that are not of this scan, or that
+    bounds forbid.
+    """
+    plan = make_plan(setup)
+    line: LinePlan = getattr(plan, axis)
+    limits = allowed(line, options)
+    frames = tuple(_frame(plan, trace, retrace, images or ImageOptions()) for trace, retrace in pairs)
+    measured = averaged([frame.line for frame in frames]) if axis == "x" else slow_line(plan, frames)
+    size = None if sample is None else _size(plan, frames, sample)
+    lesson = learn(line, measured, options.gain, limits.used)
+    refinement, changed = with_lesson(setup, line, lesson)
+    return ImageRound(
+        line=line,
+        bound=limits,
+        lesson=lesson,
+        refinement=refinement,
+        setup=changed,
+        worse=why_worse(setup, axis, lesson),
+        remarks=(*_size_remarks(plan, size), *_remarks(line, frames, lesson)),
+        frames=frames,
+        measured=measured,
+        size=size,
+        asked_nm=plan.x.drive.size_nm,
+    )
+
+
+def _frame(plan: Plan, trace: Floats, retrace: Floats, images: ImageOptions) -> LatticeLine:
+    _check_shape(plan, trace)
+    found = lattice_line(plan, trace, retrace, images)
+    _check(found)
+    return found
+
+
+def _check_shape(plan: Plan, trace: Floats) -> None:
+    """A column is a pixel of the imaging window."""
+    if plan.x.band_limit.directions != "both":
+        raise Unphysical("this scan images forward only; a retrace image says nothing of it: image both directions")
+    columns, pixels = trace.shape[-1], plan.schedule.pixels
+    if columns != pixels:
+        raise Unphysical(
+            f"the images have {columns} columns, and this scan {pixels} pixels over its imaging window; do not crop or "
+            f"resample them, or set timing.pixels to what your instrument takes over that window"
+        )
+
+
+def _check(seen: LatticeLine) -> None:
+    fit = seen.fit
+    least = min(fit.explained)
+    if least < _MIN_EXPLAINED:
+        name = "trace" if fit.explained[0] < fit.explained[1] else "retrace"
+        raise Unphysical(
+            f"{100.0 * max(least, 0.0):.0f} % of the {name}'s contrast is a periodic sample; the rest is something "
+            f"else, or trace and retrace are not of one scan"
+        )
+    if len(fit.state.q) < 2 or not seen.rows_model.moves or max(error for _, error in fit.lags) > _SURE_LAG:
+        return
+    between, along = (lag < 0.0 for lag, _ in fit.lags)
+    if between or along:
+        what = {
+            (True, True): "the images are exchanged, or their rows upside down",
+            (False, True): "both images are mirrored",
+            (True, False): "the images are exchanged or upside down, and mirrored; or one of them is cropped",
+        }[between, along]
+        raise Unphysical(
+            f"the pattern goes on from trace to retrace against the order of time: {what}; the left end must be where "
+            f"the trace begins, and the first row the first in time"
+        )
+
+
+def _size(plan: Plan, frames: Sequence[LatticeLine], sample: Sample) -> LineSize:
+    """Of x, the mean of the frames. Raises ``Unphysical`` where the sample is another, or the size is."""
+    x, y = plan.x, plan.y
+    low, high = y.band_limit.window
+    aspect = y.drive.size_nm * (high - low) / x.drive.size_nm
+    found = [size_of_line(frame, sample.cell, sample.grating, aspect) for frame in frames]
+    value = float(np.mean([one.nm.value for one in found]))
+    error = float(np.sqrt(np.mean([one.nm.standard_error**2 for one in found]) / len(found)))
+    check_size(value, x.drive.size_nm, "the scan file")
+    return replace(found[0], nm=Estimate(value, float(np.hypot(error, found[0].shared * value))))
+
+
+def _size_remarks(plan: Plan, size: LineSize | None) -> list[str]:
+    if size is None:
+        return []
+    asked, found, error = plan.x.drive.size_nm, size.nm.value, size.nm.standard_error
+    if abs(found / asked - 1.0) < max(_SIZE_NOTE_LIMIT, _SIZE_NOTE_ERRORS * error / asked):
+        return []
+    return [
+        f"the line of x is {found:.5g} nm where the scan file asks for {asked:.5g} nm "
+        f"({100.0 * (found / asked - 1.0):+.2f} %); sizes are not learnt: tablegen calibrate size --images corrects it "
+        f"at every size, or ask for {asked * asked / found:.5g} nm to have {asked:.5g} nm here"
+    ]
+
+
+def _remarks(line: LinePlan, frames: Sequence[LatticeLine], lesson: Lesson) -> tuple[str, ...]:
+    found = [text for frame in frames[:1] for text in _remarks_of(frame)]
+    if line.axis == "y" and len(frames) == 1:
+        found.append(
+            "a drift that becomes faster or slower counts as an error of y; give two frames that follow each other, "
+            "which tell it"
+        )
+    return tuple(found + _learning_remarks(lesson))
+
+
+def _remarks_of(seen: LatticeLine) -> list[str]:
+    found, fit, geometry = [], seen.fit, seen.geometry
+    explained = min(fit.explained)
+    if explained < _LITTLE_EXPLAINED:
+        found.append(f"{100.0 * explained:.0f} % of the contrast is periodic, the rest noise, debris or defects")
+    span = (geometry.window[1] - geometry.window[0]) * float(np.max(np.abs(fit.state.q)))
+    if geometry.columns / span < _MIN_PIXELS_PER_PERIOD:
+        found.append(f"the shortest period has {geometry.columns / span:.2g} pixels; scan less, or take more pixels")
+    if seen.start.apart > _FAR_APART:
+        found.append(
+            f"trace and retrace are {seen.start.apart:.2g} periods apart, and beyond half a period they would be taken "
+            f"for the next one; calibrate first, or take a sample of a longer period"
+        )
+    if fit.loud:
+        shown = ", ".join(str(i + 1) for i in fit.loud[:5]) + (", ..." if len(fit.loud) > 5 else "")
+        found.append(f"{len(fit.loud)} rows differ from the others (row {shown}); they counted less")
+    return found
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class MismatchRound(Round):
+    """What trace and retrace of a sample without a period say: residuals are half of what the two differ by."""
+
+    frames: tuple[SweepMismatch, ...]
+    measured: WindowLine
+
+    @property
+    def recorded(self) -> str:
+        """Frames and pixels."""
+        return f"{_pixels(self.frames)}, trace against retrace"
+
+
+def refine_mismatch(
+    setup: Setup,
+    axis: Literal["x", "y"],
+    pairs: Sequence[tuple[Floats, Floats]],
+    options: Options,
+    images: ImageOptions | None = None,
+) -> MismatchRound:
+    """Learn from heights of any sample what trace and retrace differ by, half in each; see ``refine_images``.
+
+    What both directions share stays as it is: no sample without a period tells it.
+    """
+    plan = make_plan(setup)
+    if axis == "y":
+        raise Unphysical("trace and retrace say nothing of y; it needs a sample with a period")
+    limits = allowed(plan.x, options)
+    for trace, _ in pairs:
+        _check_shape(plan, trace)
+    frames = tuple(mismatch(plan, trace, retrace, images or ImageOptions()) for trace, retrace in pairs)
+    measured = averaged([frame.line for frame in frames])
+    lesson = learn(plan.x, measured, options.gain, limits.used)
+    refinement, changed = with_lesson(setup, plan.x, lesson, "mismatch")
+    remarks = [
+        "only what trace and retrace differ by was seen, and is corrected, half of it in each; an error that both "
+        "share stays, and is in none of these figures",
+        *_learning_remarks(lesson),
+    ]
+    return MismatchRound(
+        line=plan.x,
+        bound=limits,
+        lesson=lesson,
+        refinement=refinement,
+        setup=changed,
+        worse=why_worse(setup, axis, lesson, "mismatch"),
+        remarks=tuple(remarks),
+        frames=frames,
+        measured=measured,
+    )
+
+
+def _learning_remarks(lesson: Lesson) -> list[str]:
+    found = []
+    if lesson.harmonics == 0:
+        found.append("the error is within the noise of the images: there is nothing more to learn from them")
+    elif finished(lesson):
+        found.append("most of the remaining error is noise: give several frames, or stop refining")
+    return [*found, "images do not show that the build of this scan file was running"]
+
+
+def _pixels(frames: Sequence[LatticeLine] | Sequence[SweepMismatch]) -> str:
+    rows, columns = frames[0].geometry.rows, frames[0].geometry.columns
+    count = f"{len(frames)} frames of " if len(frames) > 1 else ""
+    return f"{count}{rows} x {columns} pixels"

@@ -1,0 +1,119 @@
+"""Trace and retrace of a periodic sample, taken of the running scan -> the line that was reached, with its errors."""
+
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from tablegen.calibration.image_checks import ALIASING_HINT, check_periods
+from tablegen.calibration.image_model import prepared
+from tablegen.calibration.periodic import FitState, Geometry, PeriodicModel
+from tablegen.numerics.arrays import Floats
+from tablegen.planning.line_plan import Plan
+from tablegen.problems import Unphysical
+from tablegen.refinement.departure import asked_position
+from tablegen.refinement.free_rows import ColumnModes, FreeRows, FreeRowsFit
+from tablegen.refinement.lattice_start import START_DEGREE, LatticeStart, lattice_start
+from tablegen.refinement.window_line import WindowLine, error_modes
+
+_DEGREES_A_PERIOD = 1.5  # of a grating, which tells the position where its bars have edges
+_MOST_DEGREES = 24  # harmonic 16 makes some six periods in a window
+_LEAST_DEGREES = 4
+_FAR_APART = 0.5  # periods
+
+
+@dataclass(frozen=True)
+class ImageOptions:
+    """How images were stored; see ``docs/refine.md``."""
+
+    retrace_mirrored: bool = False
+    delay_pixels: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class LatticeLine:
+    """What a pair of images says of x: the line, and the fit it rests on."""
+
+    geometry: Geometry
+    rows_model: FreeRows
+    fit: FreeRowsFit
+    line: WindowLine
+    start: LatticeStart
+
+    @property
+    def model(self) -> PeriodicModel:
+        """The waves that were found."""
+        return self.start.model
+
+    @property
+    def state(self) -> FitState:
+        """Of these waves."""
+        return self.start.fitted
+
+    @property
+    def amplitudes(self) -> Floats:
+        """(spots,), of unit variance of the heights."""
+        return np.abs(self.fit.state.amplitudes)
+
+    @property
+    def waves(self) -> Floats:
+        """(bases, 2): periods in the line from turn to turn, and in the rows, of each base wave."""
+        rows = np.polyfit(self.geometry.y, self.fit.phases.phase, 1)[0]
+        return np.stack([self.fit.state.q, rows], axis=1)
+
+    @property
+    def waves_covariance(self) -> Floats:
+        """Of q_1, s_1, q_2, s_2; that of rows by their scatter about a line, and drift is in that."""
+        count = len(self.fit.state.q)
+        phases, y = self.fit.phases.phase, self.geometry.y
+        left = phases - np.column_stack([y, np.ones_like(y)]) @ np.polyfit(y, phases, 1)
+        found = np.zeros((2 * count, 2 * count))
+        found[::2, ::2] = self.fit.covariance[-count:, -count:]
+        found[1::2, 1::2] = np.diag(np.mean(left**2, axis=0) / float(y @ y))
+        return found
+
+
+def lattice_line(plan: Plan, trace: Floats, retrace: Floats, options: ImageOptions) -> LatticeLine:
+    """x from heights, rows x columns, rows in the order of time, left on the left. Raises ``Unphysical``."""
+    line = plan.x
+    turn, window = line.drive.turn, line.band_limit.window
+    if options.retrace_mirrored:
+        retrace = np.ascontiguousarray(retrace[:, ::-1])
+    geometry, heights = prepared(trace, retrace, turn, window, options.delay_pixels)
+    moves = plan.y.program.hold == 1
+    modes = column_modes(plan, geometry, START_DEGREE)
+    advice = "leave --retrace-mirrored out" if options.retrace_mirrored else "it needs --retrace-mirrored"
+    start = lattice_start(geometry, heights, modes, moves, advice)
+    waves = len(start.state.q)
+    most = float(np.max(np.abs(start.state.q)))
+    check_periods(most, window[1] - window[0], geometry.columns)
+    if start.apart > _FAR_APART:
+        raise Unphysical(
+            f"trace and retrace are {start.apart:.2g} periods of the sample apart, and beyond half a period it is not "
+            f"known which belong together; if one was cropped, do not; else calibrate first, or take a sample of a "
+            f"longer period{ALIASING_HINT}"
+        )
+    span = (window[1] - window[0]) * most
+    degree = _MOST_DEGREES if waves > 1 else int(np.clip(_DEGREES_A_PERIOD * span, _LEAST_DEGREES, _MOST_DEGREES))
+    finer = column_modes(plan, geometry, degree)
+    error = np.asarray(np.linalg.lstsq(finer.values.T, modes.values.T @ start.state.modes, rcond=None)[0], np.float64)
+    model = FreeRows(geometry, heights, start.spots, finer, moves)
+    fit = model.fit(replace(start.state, modes=error))
+    count = len(finer.values)
+    asked = partial(asked_position, line)
+    found = WindowLine(
+        asked, line.drive.size_nm, turn, window, degree, "both", fit.state.modes, fit.covariance[:count, :count]
+    )
+    return LatticeLine(geometry, model, fit, found, start)
+
+
+def column_modes(plan: Plan, geometry: Geometry, degree: int) -> ColumnModes:
+    """At the middle of every column, trace then retrace."""
+    line = plan.x
+    turn = line.drive.turn
+    forward = np.repeat([True, False], geometry.columns)
+    sweep = np.concatenate([geometry.sweep(True), geometry.sweep(False)])
+    times = np.where(forward, turn * sweep, turn + (1.0 - turn) * sweep)
+    place = np.where(forward, sweep, 1.0 - sweep)
+    values = error_modes(place, forward, line.band_limit.window, degree, "both")
+    return ColumnModes(values, asked_position(line, times), times - 0.5)

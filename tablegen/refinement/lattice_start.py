@@ -1,0 +1,87 @@
+"""Trace and retrace of a nearly straight scan -> the waves of the sample, and roughly how far columns are off."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tablegen.calibration.image_model import described, row_order
+from tablegen.calibration.periodic import BASES, LAG, FitState, Geometry, PeriodicModel
+from tablegen.calibration.spots import Bend, bend_of, column_phase, row_polynomial, strongest
+from tablegen.compensation.hysteresis import BranchShape
+from tablegen.numerics.arrays import Floats, Ints
+from tablegen.problems import Unphysical
+from tablegen.refinement.free_rows import ColumnModes, FreeRowsState
+
+_MIN_TRACKED_PERIODS = 8.0  # periods in the line; with fewer a straight line is near enough to begin with
+START_DEGREE = 6  # of the error that the phase along the line says to begin with
+_NEAR_BEND = 0.0  # of a branch that is straight
+
+
+@dataclass(frozen=True, eq=False)
+class LatticeStart:
+    """``spots`` are rows of whole numbers, one a wave; ``apart`` how far trace and retrace are apart, in periods.
+
+    ``model`` and ``fitted`` are the fit with a polynomial in the rows, from which the state is.
+    """
+
+    spots: Ints
+    state: FreeRowsState
+    apart: float
+    model: PeriodicModel
+    fitted: FitState
+
+
+def lattice_start(
+    geometry: Geometry, heights: list[Floats], modes: ColumnModes, moves: bool, advice: str
+) -> LatticeStart:
+    """The waves of levelled images of unit variance. Raises ``Unphysical`` where there is no period, or not the same.
+
+    Trace and retrace are taken to be less than half a period apart, since a compensated scan is nearly straight.
+    """
+    spot = strongest(geometry, heights[0])
+    forward, backward, turned = (
+        bend_of(geometry, image, side, spot, _NEAR_BEND)
+        for image, side in ((heights[0], True), (heights[1], False), (heights[1][:, ::-1], False))
+    )
+    if turned.match > 1.5 * max(backward.match, 0.2 * forward.match):
+        raise Unphysical(f"the retrace shows the trace's pattern only when it is mirrored; {advice}")
+    if backward.match < 0.3 * forward.match:
+        raise Unphysical("the retrace does not show the trace's pattern; are they from one scan?")
+    straight = Bend(0.5 * (forward.q + backward.q), BranchShape(), forward.match)
+    polynomial = row_polynomial(geometry, heights[0], straight, spot, row_order())
+    q, error, apart = straight.q, np.zeros(len(modes.values)), 0.0
+    if q > _MIN_TRACKED_PERIODS:
+        q, error, apart = _tracked(geometry, heights, modes, straight, polynomial, moves)
+    off = np.split(modes.asked + error @ modes.values - np.tile(geometry.place, 2), 2)
+    start = np.zeros(BASES + 1 + row_order())
+    start[LAG] = 1.0 if moves else 0.0
+    start[BASES], start[BASES + 1 :] = q, polynomial
+    free = np.ones(len(start), bool)
+    free[: LAG + 1] = False
+    sides = list(zip((True, False), heights, strict=True))
+    model, state, _ = described(geometry, sides, start, free, (off[0], off[1]))
+    x = state.parameters
+    rows = model.q(x) * float(np.mean(modes.asked)) + (model.s(x) @ model.y_powers[1:]).T
+    begun = FreeRowsState(error, model.q(x).copy(), state.amplitudes, rows)
+    return LatticeStart(model.spots, begun, apart, model, state)
+
+
+def _tracked(
+    geometry: Geometry, heights: list[Floats], modes: ColumnModes, straight: Bend, polynomial: Floats, moves: bool
+) -> tuple[float, Floats, float]:
+    """q, the smoothest modes, and how far trace and retrace are apart, from the phase along each image."""
+    found = [
+        column_phase(geometry, image, side, straight, polynomial)
+        for image, side in zip(heights, (True, False), strict=True)
+    ]
+    phase, whole = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    if moves:
+        phase = phase - polynomial[0] / geometry.rows * modes.time
+    first, second = np.split(phase, 2)
+    inside = found[0][1] & found[1][1]
+    turns = round(float(np.median((first - second)[inside])))
+    second = second + turns
+    phase = np.concatenate([first, second])
+    columns = np.column_stack([np.ones_like(phase), modes.asked, straight.q * modes.values.T])[whole]
+    c = np.linalg.lstsq(columns, phase[whole], rcond=None)[0]
+    return float(c[1]), c[2:] * straight.q / float(c[1]), float(np.max(np.abs((first - second)[inside])))

@@ -1,0 +1,120 @@
+"""Trace and retrace of any sample -> how far they are apart along the line. What both share, they do not say.
+
+The sample is the same in both: T(x at column) = R(x at column). Both are laid on one grid of positions, each moved by
+half of what they are apart, and the polynomial by which they agree best is found by Gauss and Newton, from coarse to
+fine. Rows of the retrace are later, and the slow axis has gone on meanwhile: they are taken from between the rows.
+"""
+
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from scipy.ndimage import gaussian_filter, map_coordinates, spline_filter
+
+from tablegen.calibration.image_checks import check_mirrored
+from tablegen.calibration.image_model import prepared
+from tablegen.calibration.periodic import Geometry
+from tablegen.calibration.trace import correlation_length
+from tablegen.numerics.arrays import Floats
+from tablegen.planning.line_plan import Plan
+from tablegen.problems import Unphysical
+from tablegen.refinement.departure import asked_position
+from tablegen.refinement.lattice_line import ImageOptions, column_modes
+from tablegen.refinement.window_line import WindowLine
+
+_BLURS = (6.0, 3.0, 1.0)  # pixels, one after the other
+_DEGREES = (3, 6, 12)  # of the polynomial meanwhile
+_STEPS = 8
+_SETTLED = 1e-3  # pixels
+_EDGE = 1  # columns and rows at the edges that are not compared
+_LEAST_MATCH = 0.3  # correlation of what is compared
+_MOST_PIXELS = 12.0  # columns that trace and retrace may be apart
+
+
+@dataclass(frozen=True, eq=False)
+class SweepMismatch:
+    """``match`` is the correlation of trace and retrace once they lie on each other."""
+
+    geometry: Geometry
+    line: WindowLine
+    match: float
+
+
+def mismatch(plan: Plan, trace: Floats, retrace: Floats, options: ImageOptions) -> SweepMismatch:
+    """What trace and retrace of x differ by, half in each. Raises ``Unphysical`` where they are not of one scan."""
+    line = plan.x
+    window = line.band_limit.window
+    if options.retrace_mirrored:
+        retrace = np.ascontiguousarray(retrace[:, ::-1])
+    geometry, heights = prepared(trace, retrace, line.drive.turn, window, options.delay_pixels)
+    advice = "leave --retrace-mirrored out" if options.retrace_mirrored else "it needs --retrace-mirrored"
+    check_mirrored(heights[0], heights[1], advice)
+    modes = column_modes(plan, geometry, _DEGREES[-1])
+    times = np.split(modes.time, 2)
+    late = times[1] - times[0] if plan.y.program.hold == 1 else np.zeros(geometry.columns)
+    rows = np.arange(geometry.rows)[:, None]
+    across = np.broadcast_to(np.arange(geometry.columns), heights[0].shape)
+    images = [heights[0], map_coordinates(heights[1], [rows - late, across], order=3, mode="nearest")]
+    asked = np.split(modes.asked, 2)
+    # Even positions, and polynomials there: of the trace's half of the difference.
+    grid = np.linspace(max(a[0] for a in asked), min(a[-1] for a in asked), geometry.columns)
+    place = np.interp(grid, asked[0], geometry.place)
+    coefficients = np.zeros(_DEGREES[-1] + 1)
+    influence, match = np.zeros((1, 1)), 0.0
+    for blur, degree in zip(_BLURS, _DEGREES, strict=True):
+        count = degree + 1
+        at = 2.0 * (place - window[0]) / (window[1] - window[0]) - 1.0
+        polynomials = np.polynomial.legendre.legvander(at, degree)
+        smooth = [spline_filter(gaussian_filter(image, blur), order=3) for image in images]
+        for _ in range(_STEPS):
+            half = polynomials @ coefficients[:count]
+            found = [
+                _laid(image, np.interp(grid - sign * half, at_columns, np.arange(geometry.columns)))
+                for image, at_columns, sign in zip(smooth, asked, (1.0, -1.0), strict=True)
+            ]
+            apart, slope = found[0] - found[1], 0.5 * (found[0] + found[1])
+            steep = 2.0 * np.gradient(slope, grid, axis=1)[_EDGE:-_EDGE, _EDGE:-_EDGE]
+            inner = apart[_EDGE:-_EDGE, _EDGE:-_EDGE]
+            basis = polynomials[_EDGE:-_EDGE]
+            normal = np.einsum("ij,jm,jn->mn", steep**2, basis, basis, optimize=True)
+            scores = (steep * inner) @ basis
+            inverse = np.linalg.pinv(normal, rcond=1e-10, hermitian=True)
+            step = inverse @ np.sum(scores, axis=0)
+            coefficients[:count] += step
+            if float(np.max(np.abs(polynomials @ step))) * geometry.columns < _SETTLED:
+                break
+        influence = scores @ inverse
+        one, other = (image[_EDGE:-_EDGE, _EDGE:-_EDGE].ravel() for image in found)
+        match = float(np.corrcoef(one, other)[0, 1])
+    _check(geometry, polynomials @ coefficients, match, grid)
+    scale = np.maximum(np.sqrt(np.mean(influence**2, axis=0)), 1e-300)
+    spread = influence.T @ influence * correlation_length(influence / scale)
+    found_line = WindowLine(
+        partial(asked_position, line),
+        line.drive.size_nm,
+        line.drive.turn,
+        window,
+        _DEGREES[-1],
+        "difference",
+        coefficients,
+        np.asarray(spread, dtype=np.float64),
+    )
+    return SweepMismatch(geometry, found_line, match)
+
+
+def _laid(spline: Floats, columns: Floats) -> Floats:
+    """An image's rows at fractions of columns; it comes as coefficients of splines."""
+    rows = np.broadcast_to(np.arange(spline.shape[0])[:, None], (spline.shape[0], len(columns)))
+    found: Floats = map_coordinates(
+        spline, [rows, np.broadcast_to(columns, rows.shape)], order=3, mode="nearest", prefilter=False
+    )
+    return found
+
+
+def _check(geometry: Geometry, half: Floats, match: float, grid: Floats) -> None:
+    pixel = float(grid[-1] - grid[0]) / (len(grid) - 1)
+    apart = 2.0 * float(np.max(np.abs(half))) / pixel
+    if match < _LEAST_MATCH or apart > _MOST_PIXELS:
+        raise Unphysical(
+            "the retrace does not show what the trace shows; are they of one scan, with contrast along the lines?"
+        )

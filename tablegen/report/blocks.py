@@ -1,0 +1,89 @@
+"""What a page is made of: sections of texts, tables, charts and pictures, before any of it is HTML."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from tablegen.report.chart import Chart
+
+Tone = Literal["", "good", "warn", "bad", "quiet"]
+
+
+@dataclass(frozen=True)
+class TableCell:
+    """A cell of a table; ``tone`` adds colour to what its text says already."""
+
+    text: str
+    tone: Tone = ""
+
+
+@dataclass(frozen=True)
+class Paragraph:
+    """A paragraph of plain text."""
+
+    text: str
+    tone: Tone = ""
+    kind: Literal["paragraph"] = "paragraph"
+
+
+@dataclass(frozen=True)
+class Bullets:
+    """A list of short texts."""
+
+    items: tuple[TableCell, ...]
+    kind: Literal["bullets"] = "bullets"
+
+
+@dataclass(frozen=True)
+class Grid:
+    """A table: the first cell of each row is its name."""
+
+    caption: str
+    head: tuple[str, ...]
+    rows: tuple[tuple[TableCell, ...], ...]
+    folded: bool = False
+    kind: Literal["table"] = "table"
+
+
+@dataclass(frozen=True, eq=False)
+class Charts:
+    """Charts side by side where there is room."""
+
+    charts: tuple[Chart, ...]
+    kind: Literal["charts"] = "charts"
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture with places where its features should be, in shares of width and height from the upper left."""
+
+    title: str
+    address: str
+    alternative: str
+    sites: tuple[tuple[float, float], ...]
+    height: float = 1.0  # of the width
+
+
+@dataclass(frozen=True)
+class Pictures:
+    """Pictures side by side."""
+
+    pictures: tuple[Picture, ...]
+    kind: Literal["pictures"] = "pictures"
+
+
+Block = Paragraph | Bullets | Grid | Charts | Pictures
+
+
+@dataclass(frozen=True)
+class Section:
+    """A heading, and what is below it."""
+
+    key: str
+    title: str
+    blocks: tuple[Block, ...] = field(default_factory=tuple)
+    lead: str = ""
+
+
+def row(name: str, *cells: TableCell | str) -> tuple[TableCell, ...]:
+    """A row of a table; texts become cells without a tone."""
+    return (TableCell(name), *(cell if isinstance(cell, TableCell) else TableCell(cell) for cell in cells))

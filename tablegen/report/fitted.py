@@ -1,0 +1,175 @@
+"""A calibration as a page: parameters with standard errors, what they leave, outliers, and the data with the fit."""
+
+from collections.abc import Sequence
+from math import isfinite
+
+import numpy as np
+
+from tablegen.calibration.branch import AmplitudeFit
+from tablegen.calibration.doubts import doubts
+from tablegen.calibration.estimate import Curve, Estimate, Fit
+from tablegen.calibration.hysteresis import HysteresisFit
+from tablegen.calibration.summary import change, parameters
+from tablegen.calibration.table import Source
+from tablegen.numerics.arrays import Floats
+from tablegen.report.blocks import Block, Charts, Grid, Paragraph, Section, TableCell, row
+from tablegen.report.chart import Chart, DrawnCurve, Mark
+from tablegen.report.document import document
+from tablegen.report.ranking import Finding
+from tablegen.version import __version__
+
+_LOG_SPAN = 30.0  # of frequencies: above it they are drawn over their logarithm
+_BESIDE = 0.08  # of the distance of two traces
+_FEW = 60  # points that are drawn large
+_FOOT = f"Made by tablegen {__version__} from measurements whose SHA-256 are above."
+
+
+def fit_page(fit: Fit, axis: str, sources: Sequence[Source], places: Sequence[str], points: bool = False) -> bytes:
+    """The page of a fit. ``places`` are files and lines of its outliers, ``points`` what would be written."""
+    kind = change(fit, []).kind
+    meaningless = doubts(fit, points)
+    findings = [Finding("limit", 1.0, text, "\u2717 means nothing") for text in meaningless]
+    findings += [
+        Finding("spoils", 1.0, f"{place}: far from the other points, but used", "! outlier") for place in places
+    ]
+    findings += [Finding("note", 0.0, remark) for remark in fit.remarks]
+    verdict = TableCell("\u2713 Nothing speaks against this fit.", "good")
+    if meaningless:
+        verdict = TableCell("\u2717 This fit means nothing as it is; measure again.", "bad")
+    elif places:
+        many = "one outlier" if len(places) == 1 else f"{len(places)} outliers"
+        verdict = TableCell(f"! Look at {many} first.", "warn")
+    found = [_parameters(fit), Section("data", "Data and fit", (Charts(_charts(fit.curves)),)), _sources(sources)]
+    return document(f"{kind} of {axis}", verdict, findings, found, "", _FOOT)
+
+
+def _parameters(fit: Fit) -> Section:
+    rows = tuple(
+        row(key.strip("()"), f"{estimate.value:.6g}", _error(estimate), meaning)
+        for key, estimate, meaning in parameters(fit)
+    )
+    what = "position error, % of the scan" if isinstance(fit, HysteresisFit) else "scale error, %"
+    left = (
+        f"{what}: up to {fit.before_percent:.2f} without the correction; left {fit.rms_percent:.2g} rms, "
+        f"{fit.largest_percent:.2g} at most, of {fit.points} points"
+    )
+    blocks: list[Block] = [
+        Grid("", ("", "value", "standard error", "meaning"), rows),
+        Paragraph(left),
+        Paragraph("Twice the standard error covers the truth in 95 % of measurements.", "quiet"),
+    ]
+    if isinstance(fit, HysteresisFit):
+        blocks.append(_traces(fit))
+    return Section("parameters", "Parameters", tuple(blocks))
+
+
+def _error(estimate: Estimate) -> str:
+    return f"\u00b1 {estimate.standard_error:.2g}" if isfinite(estimate.standard_error) else "not known"
+
+
+def _traces(fit: HysteresisFit) -> Grid:
+    """What each trace, or pair of images, says by itself."""
+    rows = []
+    for branch in fit.branches:
+        for trace in branch.traces:
+            rows += [_trace(branch.turn.value, trace, i, side) for i, side in enumerate(("forward", "backward"))]
+    head = ("turn, direction", "V_scan", "noise [%]", "drift [%]", "beta", "u_peak", "left [%, peak to peak]")
+    return Grid("Each trace by itself", head, tuple(rows))
+
+
+def _trace(turn: float, trace: AmplitudeFit, at: int, side: str) -> tuple[TableCell, ...]:
+    measured = getattr(trace, side)
+    both = (f"{one.value:.4g} {_error(one)}" for one in (measured.beta, measured.u_peak))
+    quality = f"{trace.v_scan:.4g}", f"{trace.noise_percent:.2g}", f"{trace.drift_percent:.2g}"
+    return row(f"{turn:.3g} {side}", *quality, *both, f"{trace.scaling_percent[at]:.2g}")
+
+
+def _charts(curves: Sequence[Curve]) -> tuple[Chart, ...]:
+    return tuple(
+        Chart(
+            f"fit-{number}",
+            curve.title,
+            curve.x_label,
+            curve.y_label,
+            (
+                DrawnCurve("fit", "forward", *in_parts(*curve.fitted)),
+                DrawnCurve(
+                    "measured",
+                    "other" if len(curve.measured[0]) <= _FEW else "before",
+                    curve.measured[0],
+                    curve.measured[1],
+                    "points",
+                ),
+            ),
+            log_x=_over_decades(curve),
+        )
+        for number, curve in enumerate(curves, 1)
+    )
+
+
+def in_parts(x: Floats, y: Floats) -> tuple[Floats, Floats]:
+    """The fitted line, lifted where x turns back: forward and backward are two lines."""
+    steps = np.sign(np.diff(x))
+    turns = np.flatnonzero(steps[1:] * steps[:-1] < 0.0) + 2
+    return np.insert(x, turns, np.nan), np.insert(y, turns, np.nan)
+
+
+def _over_decades(curve: Curve) -> bool:
+    x = np.concatenate([curve.measured[0], curve.fitted[0]])
+    low, high = float(np.min(x)), float(np.max(x))
+    return "Hz" in curve.x_label and low > 0.0 and high / low > _LOG_SPAN
+
+
+def _sources(sources: Sequence[Source]) -> Section:
+    rows = tuple(row(source.name, TableCell(source.sha256, "quiet")) for source in sources)
+    return Section("sources", "Measurements", (Grid("", ("file", "beginning of its SHA-256"), rows),))
+
+
+def operator_page(
+    axis: str,
+    family: str,
+    candidates: Sequence[tuple[str, float]],
+    traces: Sequence[tuple[str, Sequence[float]]],
+    further: str,
+    sources: Sequence[Source],
+) -> bytes:
+    """The page of an operator.
+
+    ``traces`` have a name, size and offset in V, rate in Hz; rms, scaling error and mismatch in percent as they are in
+    the fit; and the same with the size where the trace is left out. ``further`` says what to measure next.
+    """
+    errors = (f"{name}, {where}" for where in ("fit", "out") for name in ("rms", "scaling", "mismatch"))
+    head = ("trace", "size [V]", "offset [V]", "rate [Hz]", *errors, "size, out")
+    rows = tuple(row(name, *(f"{value:.3g}" for value in figures)) for name, figures in traces)
+    caption = "Percent of the line over x = 0.1..0.9: in the fit, and out, where the operator is made without the trace"
+    tried = Grid("Families that were tried", ("", "mean rms of a trace left out [%]"), _candidates(candidates))
+    numbers = np.arange(1.0, len(traces) + 1.0)
+    inside, left_out = (np.array([figures[at] for _, figures in traces], dtype=np.float64) for at in (3, 6))
+    chart = Chart(
+        "left-out",
+        "rms residual of each trace",
+        "trace",
+        "rms residual [% of the line]",
+        (
+            DrawnCurve("in the fit", "forward", numbers - _BESIDE, inside, "points"),
+            DrawnCurve("left out", "backward", numbers + _BESIDE, left_out, "points"),
+        ),
+        marks=(Mark(0.0, "", "y"),),
+        x_range=(0.0, len(traces) + 1.0),
+    )
+    found = [
+        Section("traces", "Traces", (Grid(caption, head, rows), Charts((chart,)))),
+        Section("family", "Family", (Paragraph(f"Chosen: {family}."), tried)),
+        _sources(sources),
+    ]
+    worst = max(range(len(traces)), key=lambda at: left_out[at])
+    verdict = TableCell(
+        f"Left out, a trace is missed by {float(np.median(left_out)):.2g} % rms in the median.", "quiet"
+    )
+    note = f"the worst is {traces[worst][0]}, {left_out[worst]:.2g} % rms where it is left out"
+    findings = [Finding("expect", 1.0, note), Finding("note", 0.0, further)]
+    return document(f"operator of {axis}", verdict, findings, found, "", _FOOT)
+
+
+def _candidates(candidates: Sequence[tuple[str, float]]) -> tuple[tuple[TableCell, ...], ...]:
+    return tuple(row(name, f"{score:.3g}") for name, score in candidates)

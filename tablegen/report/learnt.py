@@ -1,0 +1,79 @@
+"""A round of `tablegen refine` as a page: what was measured, what is predicted and learnt, and the rounds before."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tablegen.calibration.table import Source
+from tablegen.refinement.round import Round
+from tablegen.report.blocks import Charts, Grid, Paragraph, Section, TableCell, row
+from tablegen.report.chart import Chart, DrawnCurve, Mark
+from tablegen.report.document import document
+from tablegen.report.errors import windows
+from tablegen.report.ranking import Finding
+from tablegen.version import __version__
+
+_TURNS = np.linspace(0.0, 1.0, 601)
+
+
+def round_page(found: Round, name: str, sources: Sequence[Source], earlier: Sequence[str], refused: str) -> bytes:
+    """The page of a round. ``earlier`` are the comments of rounds before, ``refused`` why it is not learnt from."""
+    axis, lesson = found.line.axis, found.lesson
+    findings = [Finding("note", 0.0, remark) for remark in found.remarks]
+    both = f"{lesson.before.rms_percent:.3g} % rms measured; {lesson.after.rms_percent:.2g} % predicted after it."
+    verdict = TableCell(f"\u2713 {both}", "good")
+    if refused:
+        findings.insert(0, Finding("limit", 1.0, refused, "\u2717 not used"))
+        verdict = TableCell("\u2717 This trace is not learnt from.", "bad")
+    elif not lesson.harmonics:
+        verdict = TableCell("Nothing was learnt: what is left is noise.", "quiet")
+    found_in = [_errors(found), _layer(found)]
+    if earlier:
+        rows = tuple(row(str(number), said) for number, said in enumerate(earlier, 1))
+        found_in.append(Section("rounds", "Rounds before", (Grid("", ("round", "learnt from"), rows),)))
+    files = ", ".join(f"{source.name}, sha256 {source.sha256}" for source in sources)
+    foot = f"From {files}; tablegen {__version__}."
+    return document(f"{name}: refinement of {axis}", verdict, findings, found_in, "", foot)
+
+
+def _errors(found: Round) -> Section:
+    lesson = found.lesson
+    rows = []
+    for label, departure in (("measured", lesson.before), ("predicted", lesson.after)):
+        for side, (rms, largest) in departure.residual_percent.items():
+            figures = (rms, largest, departure.scaling_percent[side])
+            rows.append(row(f"{side}, {label}", *(f"{value:.3g}" for value in figures)))
+    noise = f"{lesson.chord_noise_percent:.2g} rms of a chord"
+    rows.append(row("noise of it", f"{lesson.noise_percent:.2g}", "", noise))
+    head = ("", "rms residual [% of the line]", "largest [% of the line]", "scaling error [%, peak to peak]")
+    charts = []
+    points = lesson.before.points
+    for side, x in points.by_side(points.position).items():
+        before, after = (100.0 * one.points.by_side(one.error)[side] for one in (lesson.before, lesson.after))
+        curves = (DrawnCurve("measured", "before", x, before), DrawnCurve("predicted", "forward", x, after))
+        if side == "backward":
+            curves = (curves[0], DrawnCurve("predicted", "backward", x, after))
+        zero = (Mark(0.0, "", "y"),)
+        title = f"residual {side}"
+        charts.append(
+            Chart(f"residual-{side}", title, "position on the line", "residual [% of the line]", curves, marks=zero)
+        )
+    parts = (Grid("", head, tuple(rows)), Charts(tuple(charts)))
+    return Section("errors", "Measured and predicted", parts, f"{found.recorded}.")
+
+
+def _layer(found: Round) -> Section:
+    lesson, bound = found.lesson, found.bound
+    curves = (
+        DrawnCurve("this round", "other", _TURNS, 100.0 * lesson.change.value(_TURNS)),
+        DrawnCurve("the layer now", "forward", _TURNS, 100.0 * lesson.layer.value(_TURNS)),
+    )
+    text = (
+        f"Harmonics 1 to {lesson.harmonics} of {bound.used}, at a gain of {bound.gain:g}. It converges while the "
+        f"response of the scanner is below {bound.largest_gain:.3g} times the modelled one, or off by less than "
+        f"{bound.phase_deg:.3g} degrees."
+    )
+    chart = Chart(
+        "layer", "What is added to the drive", "time [periods]", "[% of V_scan]", curves, windows(found.line, 1.0)
+    )
+    return Section("layer", "What was learnt", (Paragraph(text), Charts((chart,))))

@@ -1,0 +1,126 @@
+"""The certificate with its limits: what a build promises of both axes, and what the scanner is expected to do."""
+
+from collections.abc import Mapping
+
+from tablegen.certificate.excess import LARGEST_PERCENT
+from tablegen.config.schema import Limits
+from tablegen.manifest.fields import ManifestAxis, ManifestCertificate, ManifestFigure
+from tablegen.report.blocks import Grid, Paragraph, Section, TableCell, row
+from tablegen.report.subject import Subject
+from tablegen.report.words import figure
+
+_HEAD = ("", "figure", "limit", "")
+
+
+def certificate(subject: Subject) -> Section:
+    """A table an axis."""
+    planned = subject.planned
+    limits = Limits() if planned is None else planned.plan.limits
+    slew = None if planned is None else planned.setup.scan.amplifier.max_slew_v_per_s
+    tables = [
+        Grid(f"{axis} axis, measured over all {entry.line.ticks} ticks", _HEAD, tuple(_rows(entry, limits, slew)))
+        for axis, entry in subject.axes
+    ]
+    tables.append(_parts(subject))
+    tables += [
+        Grid(f"{axis} axis, to expect on the scanner", ("", "figure", "uncertain by, or limit", ""), rows)
+        for axis, entry in subject.axes
+        if (rows := _expected(entry.certificate, limits.max_scaling_error_percent))
+    ]
+    lead = "Limits in the third column are those of the scan file, of the converter and of the amplifier."
+    if planned is None:
+        lead = "The limits of the scan file are not in a build; give the scan file to see them."
+    return Section(
+        "certificate",
+        "Certificate",
+        (*tables, Paragraph("Scaling errors without a limit of their own are marked above 1 %.", "quiet")),
+        lead,
+    )
+
+
+def _rows(entry: ManifestAxis, limits: Limits, slew: float | None) -> list[tuple[TableCell, ...]]:
+    found, output = entry.certificate, entry.output
+    rows = [_bounded("largest error of a code", found.max_error_lsb, limits.max_error_lsb, "LSB")]
+    if found.rms_error_lsb is not None:
+        rows.append(row("rms error of a code", f"{found.rms_error_lsb:.3f} LSB", "", ""))
+    for side, error in (found.scaling_error_percent or {}).items():
+        most = limits.max_scaling_error_percent
+        worst = max(error.get("total", 0.0), error.get("band_limit", 0.0))
+        rows.append(_bounded(f"scaling error {side}, peak to peak", worst, most, "%", LARGEST_PERCENT))
+        rows.append(_bounded(f"size error {side}", error.get("size", 0.0), most, "%", LARGEST_PERCENT, signed=True))
+    for side, moved in (found.refinement_percent or {}).items():
+        text = f"moves {moved.get('position', 0.0):.3g} % of the line, removes {moved.get('scaling', 0.0):.3g} %"
+        rows.append(row(f"refinement {side}", text, "", ""))
+    if found.largest_step is not None:
+        rows.append(_bounded("largest step", found.largest_step, output.max_step, "codes a tick"))
+    if found.peak_slew_v_per_s is not None:
+        rows.append(_bounded("steepest slope at the piezo", found.peak_slew_v_per_s, slew, "V/s"))
+    for name, room in (("below", found.headroom_low), ("above", found.headroom_high)):
+        if room is not None:
+            tone, sign = ("good", "\u2713 within") if room >= 0 else ("bad", "\u2717 outside")
+            rows.append(row(f"room {name}", f"{room} codes", "0", TableCell(sign, tone)))  # type: ignore[arg-type]
+    if found.beyond_cutoff_db is not None:
+        rows.append(row("power beyond the cutoff", f"{found.beyond_cutoff_db:.1f} dB", "", ""))
+    if found.at_resonance_db is not None:
+        rows.append(row("power at the resonance", f"{found.at_resonance_db:.1f} dB", "", ""))
+    return rows
+
+
+_PARTS = ("uncompensated", "total", "band_limit", "quantisation", "model")
+
+
+def _parts(subject: Subject) -> Grid:
+    """What the scaling errors are made of; peaks of the parts are at different places, and do not add up."""
+    rows = []
+    for axis, entry in subject.axes:
+        for side, error in (entry.certificate.scaling_error_percent or {}).items():
+            rows.append(row(f"{axis} {side}", *(figure(error.get(name, 0.0), 3) for name in _PARTS)))
+    head = ("", *(name.replace("_", " ") for name in _PARTS))
+    return Grid("Scaling errors and their parts taken alone [%, peak to peak]", head, tuple(rows))
+
+
+def _bounded(
+    name: str, value: float, limit: float | None, unit: str, advice: float | None = None, signed: bool = False
+) -> tuple[TableCell, ...]:
+    """A figure beside its limit; without one, above the figure of ``advice``, it is marked too."""
+    shown = f"{figure(value, 4, signed)} {unit}"
+    if limit is not None:
+        good = abs(value) <= limit
+        said = TableCell("\u2713 within", "good") if good else TableCell("\u2717 exceeded", "bad")
+        return row(name, shown, f"{figure(limit, 6)} {unit}", said)
+    if advice is not None and abs(value) > advice:
+        return row(name, shown, "none", TableCell(f"! above {advice:g} {unit}", "warn"))
+    return row(name, shown, "none" if advice is not None else "", "")
+
+
+def _expected(found: ManifestCertificate, most: float | None) -> tuple[tuple[TableCell, ...], ...]:
+    expected = found.expected
+    if expected is None:
+        return ()
+    basis = "by the operator" if expected.basis == "traces" else "by the laws"
+    rows = []
+    sides: tuple[tuple[str, Mapping[str, ManifestFigure]], ...] = (
+        ("rms residual", expected.rms_percent),
+        ("scaling error", expected.scaling_percent),
+    )
+    for name, figures in sides:
+        rows += [_figure(f"{name} {side}", one, basis) for side, one in figures.items()]
+    own = found.scaling_error_percent or {}
+    for side, one in expected.scaling_percent.items():
+        parts = own.get(side, {})
+        both = one.value + max(parts.get("total", 0.0), parts.get("band_limit", 0.0))
+        rows.append(_bounded(f"with the waveform's, {side}", both, most, "%", LARGEST_PERCENT))
+    if expected.mismatch_percent is not None:
+        rows.append(_figure("trace to retrace", expected.mismatch_percent, basis))
+    if expected.size_percent is not None:
+        rows.append(_figure("size error", expected.size_percent, basis, signed=True))
+    if expected.distance_percent is not None:
+        text = f"{expected.distance_percent:.2g} % of v_max"
+        rows.append(row("nearest measured line", text, "", basis))
+    return tuple(rows)
+
+
+def _figure(name: str, found: ManifestFigure, basis: str, signed: bool = False) -> tuple[TableCell, ...]:
+    shown = f"{figure(found.value, 3, signed)} %"
+    by = "not known" if found.uncertainty is None else f"\u00b1 {found.uncertainty:.2g} %"
+    return row(name, shown, by, TableCell(basis, "quiet"))

@@ -1,0 +1,115 @@
+"""Foreign piezos followed in time through a change of offset or size, line after line: hysteresis stepped, creep late.
+
+A scan that has lasted for ever is followed by another one that begins at its lower turn; the creep of the first one
+goes on in the second.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from foreign_plants import BoucWen, ManyPlays
+
+Floats = npt.NDArray[np.float64]
+Play = Callable[[list[Floats]], list[Floats]]  # nm of drives one after the other, from rest at 0 on
+
+_EARLIER = np.concatenate([np.linspace(0.0, 1.0, 60), np.linspace(1.0, 0.0, 60)])  # up and down, then up again
+_CLOSED = 12  # periods after which every core has closed its loop
+
+
+def sweep(low: float, high: float, turn: float, samples: int) -> Floats:
+    """A period of normalised drives from the lower turn on."""
+    t = np.arange(samples) / samples
+    return low + (high - low) * np.where(t < turn, t / turn, (1.0 - t) / (1.0 - turn))
+
+
+def plays_played(core: ManyPlays) -> Play:
+    """Plays that keep their state."""
+
+    def play(parts: list[Floats]) -> list[Floats]:
+        state, out = np.zeros(core.count), []
+        for u in parts:
+            bent = u * (1.0 - u)
+            one, other = (u + linear * bent + skew * bent * (u - 0.5) for linear, skew in core.bends)
+            moved = np.empty(len(u))
+            for k in range(len(u)):
+                low, high = min(one[k], other[k]) - core.thresholds, max(one[k], other[k]) + core.thresholds
+                state = np.minimum(np.maximum(state, low), high)
+                moved[k] = state @ core.weights
+            reversible = u + 0.12 * u**2 + 0.10 * u**3 - 0.05 * u**4
+            out.append(1250.0 * (moved + (1.0 - float(np.sum(core.weights))) * reversible / 1.17))
+        return out
+
+    return play
+
+
+def bouc_wen_played(core: BoucWen) -> Play:
+    """Bouc-Wen's equation, integrated from one drive to the next."""
+
+    def play(parts: list[Floats]) -> list[Floats]:
+        h, before, out = 0.0, 0.0, []
+        for u in parts:
+            moved = np.empty(len(u))
+            for k, drive in enumerate(u.tolist()):
+                h = core._moved(h, drive - before)
+                before = drive
+                moved[k] = drive * (1.0 + core.bend * drive) - core.depth * h
+            out.append(1250.0 * moved)
+        return out
+
+    return play
+
+
+@dataclass(frozen=True)
+class Followed:
+    """Distance of each line's mean from where the line is when all has settled, in nm; and of the first sweep."""
+
+    lines: Floats
+    first_sweep: Floats
+
+    def drift(self, first: int, count: int) -> float:
+        """By how much that changes from one line on over some."""
+        return float(abs(self.lines[first + count] - self.lines[first]))
+
+
+def followed(
+    play: Play,
+    creep: tuple[Floats, Floats],
+    before: tuple[float, float],
+    now: tuple[float, float],
+    turn: float,
+    period_s: float,
+    line_s: float,
+    lines: int,
+    samples: int,
+) -> Followed:
+    """From one line (low, high) to another; ``creep`` has shares of what a slow drive reaches, and times in s."""
+    rest = np.concatenate([_EARLIER, np.linspace(0.0, before[0], 20)])
+    old, new = sweep(*before, turn, samples), sweep(*now, turn, samples)
+    slew = np.linspace(before[0], now[0], 20)
+    played = play([rest, *[old] * _CLOSED, slew, *[new] * _CLOSED])
+    last, periods = played[_CLOSED], played[_CLOSED + 2 :]
+    settled = periods[-1]
+    shares, times = creep
+    dt = period_s / samples
+    decay = np.exp(-dt / times)[:, None]
+
+    def kept(period: Floats) -> Floats:
+        """Each term's state at the end of a period that has lasted for ever."""
+        powers = decay ** np.arange(samples - 1, -1, -1)
+        return np.asarray(((powers * (1.0 - decay)) @ period) / (1.0 - decay[:, 0] ** samples))
+
+    # What is linear is followed in what differs from the settled line: its late terms and its hysteresis.
+    state = kept(last) - kept(settled)
+    count = int(np.ceil(lines * line_s / period_s))
+    off = np.empty(count * samples)
+    for k in range(count):
+        period = periods[min(k, _CLOSED - 1)] - settled
+        for j in range(samples):
+            state = decay[:, 0] * state + (1.0 - decay[:, 0]) * period[j]
+            off[k * samples + j] = period[j] + float(shares @ state)
+    a_line = round(line_s / dt)
+    means = off[: lines * a_line].reshape(lines, a_line).mean(axis=1)
+    up = round(turn * samples)
+    return Followed(means, (periods[0] - settled)[:up])
