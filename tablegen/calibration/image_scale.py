@@ -15,7 +15,7 @@ from typing import Protocol
 
 import numpy as np
 
-from tablegen.calibration.estimate import Estimate
+from tablegen.calibration.estimate import Estimate, LineSize
 from tablegen.calibration.periodic import FitState, Geometry, PeriodicModel
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
@@ -66,21 +66,6 @@ class Grating:
 
     pitch_nm: float
     angle_deg: Estimate | None = None
-
-
-@dataclass(frozen=True)
-class LineSize:
-    """From turn to turn, in nm, with the error of this image; ``shared`` is the relative error of all such images.
-
-    ``angle_deg`` is that of the first wave, or the cell's first side, from the fast axis; ``aspect`` the frame's height
-    over the line's length as a lattice shows it, and ``drift`` along x in the frame, of the line; nan of a grating.
-    """
-
-    nm: Estimate
-    shared: float
-    angle_deg: float
-    aspect: float
-    drift: float
 
 
 class ImagedWaves(Protocol):
