@@ -2,12 +2,8 @@
 
 from dataclasses import dataclass
 from math import isfinite, nan
-from typing import TYPE_CHECKING
 
 from tablegen.numerics.arrays import Floats
-
-if TYPE_CHECKING:
-    from tablegen.calibration.image_sizes import ImageSize
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +38,37 @@ class Curve:
     fitted: tuple[Floats, Floats]
 
 
+@dataclass(frozen=True)
+class LineSize:
+    """From turn to turn, in nm, with the error of this image; ``shared`` is the relative error of all such images.
+
+    ``angle_deg`` is that of the first wave, or the cell's first side, from the fast axis; ``aspect`` the frame's height
+    over the line's length as a lattice shows it, and ``drift`` along x in the frame, of the line; nan of a grating.
+    """
+
+    nm: Estimate
+    shared: float
+    angle_deg: float
+    aspect: float
+    drift: float
+
+
+@dataclass(frozen=True)
+class ImageSize:
+    """What an image says: ``size``, the periods of its first wave, the noise in percent of the contrast.
+
+    ``open_percent`` is how far trace and retrace are apart at the turns, of the line; nan where nothing shows it.
+    """
+
+    name: str
+    v_scan: float
+    v_offset: float | None
+    size: LineSize
+    periods: float
+    noise_percent: float
+    open_percent: float
+
+
 @dataclass(frozen=True, kw_only=True)
 class Fit:
     """What all calibrations have in common.
@@ -58,7 +85,7 @@ class Fit:
     remarks: tuple[str, ...]
     outliers: tuple[int, ...]
     curves: tuple[Curve, ...]
-    images: "tuple[ImageSize, ...]" = ()
+    images: tuple[ImageSize, ...] = ()
 
     @property
     def rms_percent(self) -> float:

@@ -7,8 +7,9 @@ from math import isfinite
 
 import numpy as np
 
+from tablegen.calibration.estimate import ImageSize, LineSize
 from tablegen.calibration.image_line import ImageLine, fit_line, shows_turns
-from tablegen.calibration.image_scale import ASPECT_ERROR, DRIFT_ERROR, Cell, Grating, LineSize, size_of_line
+from tablegen.calibration.image_scale import ASPECT_ERROR, DRIFT_ERROR, Cell, Grating, size_of_line
 from tablegen.compensation.size import SizeLaw
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
@@ -34,7 +35,7 @@ class SampleImage:
 
 
 @dataclass(frozen=True)
-class Sample:
+class KnownSample:
     """What was imaged: a lattice, a grating, or both on one instrument; two waves in an image are the lattice."""
 
     cell: Cell | None = None
@@ -52,22 +53,6 @@ class Taking:
     aspect: float | None = None
 
 
-@dataclass(frozen=True)
-class ImageSize:
-    """What an image says: ``size``, the periods of its first wave, the noise in percent of the contrast.
-
-    ``open_percent`` is how far trace and retrace are apart at the turns, of the line; nan where nothing shows it.
-    """
-
-    name: str
-    v_scan: float
-    v_offset: float | None
-    size: LineSize
-    periods: float
-    noise_percent: float
-    open_percent: float
-
-
 @dataclass(frozen=True, eq=False)
 class ImageSizes:
     """All images, in the order in which they were given; ``shared`` is the relative error that they have together."""
@@ -79,7 +64,7 @@ class ImageSizes:
     remarks: tuple[str, ...]
 
 
-def sizes_of(images: Sequence[SampleImage], v_max: float, sample: Sample, taking: Taking) -> ImageSizes:
+def sizes_of(images: Sequence[SampleImage], v_max: float, sample: KnownSample, taking: Taking) -> ImageSizes:
     """Each image's line from turn to turn. Raises ``Unphysical``, with the image's name."""
     found: list[ImageSize] = []
     remarks: list[str] = []
@@ -126,7 +111,7 @@ def sizes_of(images: Sequence[SampleImage], v_max: float, sample: Sample, taking
     return ImageSizes(tuple(found), nm, errors, max(one.size.shared for one in found), tuple(remarks))
 
 
-def apparent_of(sizes: ImageSizes, law: SizeLaw, v_max: float, sample: Sample) -> tuple[Floats, Floats]:
+def apparent_of(sizes: ImageSizes, law: SizeLaw, v_max: float, sample: KnownSample) -> tuple[Floats, Floats]:
     """How large the sample's constant looks in nm, were each line as long as the size law has it; and the errors.
 
     With a law that is right it looks as large as it is at the offset at which the law was measured.

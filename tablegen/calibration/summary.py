@@ -6,11 +6,10 @@ from typing import Any
 
 from tablegen.calibration.branch import AmplitudeFit
 from tablegen.calibration.doubts import doubts
-from tablegen.calibration.estimate import Estimate, Fit
+from tablegen.calibration.estimate import Estimate, Fit, ImageSize
 from tablegen.calibration.frequency import FrequencyFit
 from tablegen.calibration.hysteresis import HysteresisFit, TurnFit
 from tablegen.calibration.image_fit import ImageFit
-from tablegen.calibration.image_sizes import ImageSize
 from tablegen.calibration.offset import OffsetFit
 from tablegen.calibration.offset_sizes import OffsetSizesFit
 from tablegen.calibration.points import measured_points

@@ -13,7 +13,7 @@ from tablegen.cli.image_pairs import channel_option, frame_option, require_reade
 
 if TYPE_CHECKING:
     from tablegen.calibration.image_files import ScanImage
-    from tablegen.calibration.image_sizes import Sample, SampleImage, Taking
+    from tablegen.calibration.image_sizes import KnownSample, SampleImage, Taking
 
 F = TypeVar("F", bound=Callable[..., Any])
 IMAGE_NAMES = ("--image", "--images")
@@ -129,11 +129,11 @@ def sample_options(command: F) -> F:
     return command
 
 
-def sample_of(given: dict[str, Any]) -> "Sample":
+def sample_of(given: dict[str, Any]) -> "KnownSample":
     """The sample of the options; none of them ends the command."""
     from tablegen.calibration.estimate import Estimate
     from tablegen.calibration.image_scale import Cell, Grating
-    from tablegen.calibration.image_sizes import Sample
+    from tablegen.calibration.image_sizes import KnownSample
 
     constant, cell, pitch, angle = (given[name] for name in ("lattice_nm", "cell", "pitch_nm", "angle_deg"))
     if constant is None and cell is None and pitch is None:
@@ -147,7 +147,7 @@ def sample_of(given: dict[str, Any]) -> "Sample":
         lattice = Cell(cell[0], cell[1], cell[2], "given")
     elif constant is not None:
         lattice = (Cell.square if given["lattice"] == "square" else Cell.hexagonal)(constant)
-    return Sample(lattice, None if pitch is None else Grating(pitch, None if angle is None else Estimate(*angle)))
+    return KnownSample(lattice, None if pitch is None else Grating(pitch, None if angle is None else Estimate(*angle)))
 
 
 def refuse_sample(given: dict[str, Any]) -> None:

@@ -6,10 +6,10 @@ from typing import Literal
 
 import numpy as np
 
-from tablegen.calibration.estimate import Estimate
+from tablegen.calibration.estimate import Estimate, LineSize
 from tablegen.calibration.image_checks import check_size
-from tablegen.calibration.image_scale import LineSize, size_of_line
-from tablegen.calibration.image_sizes import Sample
+from tablegen.calibration.image_scale import size_of_line
+from tablegen.calibration.image_sizes import KnownSample
 from tablegen.config.load import Setup
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, Plan, make_plan
@@ -56,7 +56,7 @@ def refine_images(
     pairs: Sequence[tuple[Floats, Floats]],
     options: Options,
     images: ImageOptions | None = None,
-    sample: Sample | None = None,
+    sample: KnownSample | None = None,
 ) -> ImageRound:
     """Learn from heights in any unit, rows x columns, of a grating or a lattice that the running scan images.
 
@@ -132,7 +132,7 @@ def _check(seen: LatticeLine) -> None:
         )
 
 
-def _size(plan: Plan, frames: Sequence[LatticeLine], sample: Sample) -> LineSize:
+def _size(plan: Plan, frames: Sequence[LatticeLine], sample: KnownSample) -> LineSize:
     """Of x, the mean of the frames. Raises ``Unphysical`` where the sample is another, or the size is."""
     x, y = plan.x, plan.y
     low, high = y.band_limit.window

@@ -16,7 +16,7 @@ from tablegen.calibration.estimate import Fit
 from tablegen.calibration.frequency import fit_frequency
 from tablegen.calibration.hysteresis import HysteresisFit, Trace, fit_hysteresis
 from tablegen.calibration.image_scale import Cell, Grating
-from tablegen.calibration.image_sizes import ImageSizes, Sample, SampleImage, Taking, apparent_of, sizes_of
+from tablegen.calibration.image_sizes import ImageSizes, KnownSample, SampleImage, Taking, apparent_of, sizes_of
 from tablegen.calibration.images import Pair, fit_images
 from tablegen.calibration.offset_sizes import fit_offset_sizes
 from tablegen.calibration.resonance import ResonanceFit, fit_resonance
@@ -44,7 +44,7 @@ OFFSET_ROOM = 0.97  # of the offsets at which a scan of such a size fits, those 
 SIZES = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 AMPLITUDES = (0.2, 0.4, 0.6, 0.8, 1.0)
 SMALL_IMAGE, LATTICE_NM, GRATING_NM = 0.2, 17.7, 50.0
-SAMPLES_SEEN = Sample(Cell.hexagonal(LATTICE_NM), Grating(GRATING_NM))
+SAMPLES_SEEN = KnownSample(Cell.hexagonal(LATTICE_NM), Grating(GRATING_NM))
 IMAGED_SIZES = SIZES[1:]  # shares of v_max: below, a lattice has too few periods
 IMAGE_DRIFT, IMAGE_SLOPE = 0.02, 2e-3  # drift along x in a frame, of the line, at most; heights per nm
 PERIODS, SAMPLES = 4, 1000  # periods per trace, samples per period

@@ -13,15 +13,15 @@ from hypothesis import strategies as st
 from tablegen.calibration.estimate import Estimate
 from tablegen.calibration.image_line import fit_line
 from tablegen.calibration.image_scale import Cell, Grating
-from tablegen.calibration.image_sizes import Sample, SampleImage, Taking, sizes_of
+from tablegen.calibration.image_sizes import KnownSample, SampleImage, Taking, sizes_of
 from tablegen.calibration.least_squares import Solution, solve, with_errors
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 
 pytestmark = pytest.mark.common
 
-HEXAGONAL = Sample(Cell.hexagonal(LATTICE_NM))
-BARS = Sample(None, Grating(PITCH_NM))
+HEXAGONAL = KnownSample(Cell.hexagonal(LATTICE_NM))
+BARS = KnownSample(None, Grating(PITCH_NM))
 FULL_NM = 1000.0  # the line of 100 V, in which samples count their periods
 
 
@@ -30,7 +30,7 @@ def shown(seen: Seen, noise: float = 0.0, seed: int = 0, alone: bool = False, v:
     return SampleImage("an image", v, None, both.trace, None if alone else both.retrace)
 
 
-def size(image: SampleImage, sample: Sample, **options: object) -> Estimate:
+def size(image: SampleImage, sample: KnownSample, **options: object) -> Estimate:
     return sizes_of([image], V_MAX, sample, Taking(**options)).images[0].size.nm  # type: ignore[arg-type]
 
 
@@ -64,7 +64,7 @@ def test_a_lattice_says_the_size_however_it_lies(
     )
     image = SampleImage("an image", 100.0, None, both.trace, None if alone else both.retrace)
     constant = FULL_NM / periods * 2.0 / sqrt(3.0)
-    found = size(image, Sample(Cell.hexagonal(constant)), turn=turn)
+    found = size(image, KnownSample(Cell.hexagonal(constant)), turn=turn)
     assert found.value == pytest.approx(FULL_NM, rel=6e-4)
     assert abs(found.value - FULL_NM) < 3.0 * found.standard_error + 1e-6
 
@@ -74,7 +74,7 @@ def test_a_lattice_says_the_size_however_it_lies(
 )
 def test_any_cell(a_nm: float, b_nm: float, gamma: float, angle: float) -> None:
     image = shown(cell(a_nm, b_nm, gamma, angle, pixels=160, lines=160))
-    found = size(image, Sample(Cell(a_nm, b_nm, gamma, "given")))
+    found = size(image, KnownSample(Cell(a_nm, b_nm, gamma, "given")))
     assert found.value == pytest.approx(FULL_NM, rel=5e-4)
 
 
@@ -82,23 +82,23 @@ def test_any_cell(a_nm: float, b_nm: float, gamma: float, angle: float) -> None:
 def test_bars_whose_harmonic_is_strongest(part: int) -> None:
     """The first wave has a third of the height of the second, or of the third."""
     weak = ((6.0, 3.0, 0.35, 0.1), (6.0 * part, 3.0, 1.0, 0.4), (6.0 * (part + 2), 3.0, 0.3, 0.2))
-    found = size(shown(Seen(weak)), Sample(None, Grating(FULL_NM / 6.0, Estimate(3.0, 0.1))))
+    found = size(shown(Seen(weak)), KnownSample(None, Grating(FULL_NM / 6.0, Estimate(3.0, 0.1))))
     assert found.value == pytest.approx(FULL_NM, rel=1e-3)
 
 
 def test_the_angle_of_bars_is_taken_from_the_rows_or_given() -> None:
     image = shown(grating(12.0, 8.0, drift=0.02, pixels=160, lines=160))
     pitch = FULL_NM / 12.0
-    rows = size(image, Sample(None, Grating(pitch)))
-    told = size(image, Sample(None, Grating(pitch, Estimate(8.0, 0.5))))
+    rows = size(image, KnownSample(None, Grating(pitch)))
+    told = size(image, KnownSample(None, Grating(pitch, Estimate(8.0, 0.5))))
     assert told.value == pytest.approx(FULL_NM, rel=2e-4)
     assert 1e-3 < abs(rows.value / FULL_NM - 1.0) < 4e-3, "what 2 % of drift does at 8 degrees"
     assert abs(rows.value - FULL_NM) < 2.0 * rows.standard_error
     # A frame of another height than its pixels say.
-    low = sizes_of([image], V_MAX, Sample(None, Grating(pitch)), Taking(aspect=0.8)).images[0].size
+    low = sizes_of([image], V_MAX, KnownSample(None, Grating(pitch)), Taking(aspect=0.8)).images[0].size
     assert abs(low.nm.value - FULL_NM) < 2.0 * np.hypot(low.nm.standard_error, 2.0 * low.shared * FULL_NM)
     with pytest.raises(Unphysical, match=r"the rows show bars under 9.* degrees, and 25 were given"):
-        size(image, Sample(None, Grating(pitch, Estimate(25.0, 0.5))))
+        size(image, KnownSample(None, Grating(pitch, Estimate(25.0, 0.5))))
 
 
 def test_errors_hold_with_noise() -> None:
@@ -147,7 +147,7 @@ def test_known_errors_are_weights_and_a_law_that_is_missed_adds_scatter() -> Non
 # what is refused
 
 
-def refused(image: SampleImage, sample: Sample = BARS, **options: object) -> str:
+def refused(image: SampleImage, sample: KnownSample = BARS, **options: object) -> str:
     with pytest.raises(Unphysical) as caught:
         size(image, sample, **options)
     assert str(caught.value).startswith("an image: ")
@@ -184,7 +184,7 @@ def test_another_sample_than_said_is_refused() -> None:
     bars, net = (shown(one(14.0, pixels=160, lines=160), 0.02) for one in (grating, lattice))
     assert "one wave is in the image, as of bars" in refused(bars, HEXAGONAL)
     assert "two waves are in the image, as of a lattice" in refused(net, BARS)
-    assert "not those of a given lattice" in refused(net, Sample(Cell(40.0, 200.0, 90.0, "given")))
+    assert "not those of a given lattice" in refused(net, KnownSample(Cell(40.0, 200.0, 90.0, "given")))
 
 
 def test_another_size_than_said_and_an_alias_are_named() -> None:

@@ -1,4 +1,4 @@
-"""docs/images.md: every command of it runs, in its order, on images that the virtual scanner takes; what it reaches."""
+"""docs/images.md: every command of it runs, in its order, on images that the virtual scanner takes."""
 
 import re
 from pathlib import Path

@@ -9,7 +9,7 @@ from foreign_plants import BoucWen, ForeignPlant, ManyPlays
 
 from tablegen.calibration.image_line import fit_line
 from tablegen.calibration.image_scale import Cell, Grating, size_of_line
-from tablegen.calibration.image_sizes import Sample, SampleImage, Taking
+from tablegen.calibration.image_sizes import KnownSample, SampleImage, Taking
 from tablegen.calibration.operator.fit import fit_operator
 from tablegen.calibration.operator.imaged_line import imaged_line
 from tablegen.calibration.operator.periodic_line import PHASES, PeriodicLine
@@ -28,7 +28,7 @@ pytestmark = pytest.mark.common
 ROOT = Path(__file__).parents[2]
 RATE = 5.0
 LATTICE_NM, PITCH_NM = 17.7, 50.0
-KNOWN = Sample(Cell.hexagonal(LATTICE_NM), Grating(PITCH_NM))
+KNOWN = KnownSample(Cell.hexagonal(LATTICE_NM), Grating(PITCH_NM))
 
 
 class Axis:

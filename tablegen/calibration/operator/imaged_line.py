@@ -2,9 +2,10 @@
 
 import numpy as np
 
+from tablegen.calibration.estimate import LineSize
 from tablegen.calibration.image_line import fit_line
-from tablegen.calibration.image_scale import LineSize, size_of_line
-from tablegen.calibration.image_sizes import Sample, SampleImage, Taking
+from tablegen.calibration.image_scale import size_of_line
+from tablegen.calibration.image_sizes import KnownSample, SampleImage, Taking
 from tablegen.calibration.operator.periodic_line import PHASES, PeriodicLine
 from tablegen.problems import Unphysical
 
@@ -12,7 +13,7 @@ _SPANNED = (0.05, 0.95)  # of each sweep: the rest is extrapolated, to 0.4 % of 
 
 
 def imaged_line(
-    image: SampleImage, rate_hz: float, v_max: float, sample: Sample, taking: Taking
+    image: SampleImage, rate_hz: float, v_max: float, sample: KnownSample, taking: Taking
 ) -> tuple[PeriodicLine, LineSize]:
     """The line of a triangle of ``v_scan`` about ``v_offset``, at ``rate_hz``, and its size.
 
