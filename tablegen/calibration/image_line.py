@@ -33,7 +33,7 @@ _MIN_EXPLAINED = 0.03  # share of an image's variance
 _MISFIT_SIGNIFICANCE = 1e-3  # probability that noise alone is taken for misfit
 _MIN_OPENING = 0.004  # of the line: what is a loop, and has a sign
 _LARGEST_GAP, _GAP_ERRORS = 0.005, 4.0  # of the line, and in standard errors
-_LARGEST_CROP, _CROP_ERRORS, _CROP_RIPPLES = 0.015, 6.0, 6  # of the line; what few periods cannot tell is not
+_LARGEST_CROP, _CROP_ERRORS, _CROP_RIPPLES = 0.008, 6.0, 6  # of the line; what few periods cannot tell is not
 _NEAR_TURN, _LEAST_WIDTH = (0.1, 0.9), 1e-3  # of the line
 
 
@@ -232,6 +232,13 @@ def _opening(model: PeriodicModel, state: FitState) -> Floats:
     return found
 
 
+def _cropped(model: PeriodicModel, state: FitState, gap: Floats) -> Floats:
+    """How much of the line is missing at each end, (2,), if that is what keeps trace and retrace apart there."""
+    width = np.abs(np.interp(_NEAR_TURN, model.geometry.place, _opening(model, state)))
+    found: Floats = np.abs(gap) / np.maximum(width, _LEAST_WIDTH) * _NEAR_TURN[0]
+    return found
+
+
 def _gap(fit: _Degree) -> tuple[Floats, Floats]:
     """How far trace and retrace are apart at the turns, where they meet if the columns are the whole sweep."""
     model, state, free = fit.model, fit.state, fit.free
@@ -253,8 +260,7 @@ def _gap(fit: _Degree) -> tuple[Floats, Floats]:
     gap, error = found.parameters[-2:], np.sqrt(np.diag(errors)[-2:])
     worst = int(np.argmax(np.abs(gap)))
     # A narrow loop is as little open where much is cropped: how much, its width a tenth of the line further says.
-    width = abs(float(np.interp(_NEAR_TURN, geometry.place, _opening(model, state))[worst]))
-    cropped = abs(gap[worst]) / max(width, _LEAST_WIDTH) * _NEAR_TURN[0]
+    cropped = float(_cropped(model, state, gap)[worst])
     told = abs(gap[worst]) / error[worst]
     if (abs(gap[worst]) > _LARGEST_GAP and told > _GAP_ERRORS) or (
         cropped > _LARGEST_CROP and told > _CROP_ERRORS and count >= _CROP_RIPPLES
@@ -276,7 +282,7 @@ def _result(best: _Degree, fits: list[_Degree], gap: Floats, gap_error: Floats) 
     indices = np.arange(len(free))
     watched = free & ((indices >= 5) & (indices < model.rippled_from) & ((indices - 5) % (model.order + 1) == 0))
     found, widened = covariance(model, state, free, watched, max(misfit, 1.0), [one.clean for one in binned])
-    found = found + _of_the_form(best, fits, gap)
+    found = found + _of_the_form(best, fits, gap, gap_error)
     power = sum(float(np.vdot(image, image)) for _, image in model.images)
     drawn = np.concatenate([image - left for (_, image), left in zip(model.images, state.left, strict=True)])
     return ImageLine(
@@ -295,7 +301,7 @@ def _result(best: _Degree, fits: list[_Degree], gap: Floats, gap_error: Floats) 
     )
 
 
-def _of_the_form(best: _Degree, fits: list[_Degree], gap: Floats) -> Floats:
+def _of_the_form(best: _Degree, fits: list[_Degree], gap: Floats, gap_error: Floats) -> Floats:
     """What the choice of the polynomials adds to the covariance of the base waves; what is open at the turns as well.
 
     Fits of neighbouring degrees describe the image about as well.
@@ -309,7 +315,10 @@ def _of_the_form(best: _Degree, fits: list[_Degree], gap: Floats) -> Floats:
     ]
     if moved:
         whole[:end, :end] = np.mean([np.outer(one, one) for one in moved], axis=0)
-    open_by = 0.5 * float(np.nanmean(np.abs(gap))) if np.isfinite(gap).any() else _UNSEEN_GAP
+    open_by = _UNSEEN_GAP
+    if np.isfinite(gap).all():
+        clear = np.abs(gap) > _GAP_ERRORS * gap_error
+        open_by = 0.5 * float(np.mean(np.abs(gap))) + float(np.sum(_cropped(best.model, best.state, gap)[clear]))
     if not shows_turns(best.model.geometry):
         low, high = best.model.geometry.window
         open_by = _UNSEEN_TURNS * (low + 1.0 - high)

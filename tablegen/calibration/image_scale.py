@@ -8,9 +8,9 @@ whatever its direction. Drift from line to line, and a slow axis of another size
 wave, of a grating, gives L = q pitch / cos(angle); the angle comes from the rows, whose length has to be known about.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
-from math import atan, cos, hypot, log, nan, radians, sin, sqrt, tan
+from math import atan, cos, hypot, isnan, log, nan, radians, sin, sqrt, tan
 from typing import Protocol
 
 import numpy as np
@@ -101,13 +101,31 @@ def size_of_line(
 ) -> LineSize:
     """The size by what the image shows: two base waves are the lattice, one is the grating.
 
-    ``aspect`` is the frame's height over the line's length, by default of square pixels: its standard error is 10 %.
-    It decides between readings of a lattice that differ in size by a tenth and more, and gives the angle of a grating.
-    Raises ``Unphysical``.
+    ``aspect`` is the frame's height over the line's length: its standard error is 10 %. It decides between readings of
+    a lattice that differ in size by a tenth and more, and gives the angle of a grating. Where it is not given, pixels
+    or the frame may be square. Raises ``Unphysical``, also where that makes a difference to a lattice.
     """
-    waves, covariance = line.waves, line.waves_covariance
+    if aspect is not None:
+        return _size(line, cell, grating, aspect)
     span = line.geometry.window[1] - line.geometry.window[0]
-    expected = aspect or line.geometry.rows * span / line.geometry.columns
+    found = _size(line, cell, grating, line.geometry.rows * span / line.geometry.columns)
+    if line.geometry.rows == line.geometry.columns:
+        return found
+    try:
+        other = _size(line, cell, grating, span)
+    except Unphysical:
+        return found
+    differs = abs(other.nm.value / found.nm.value - 1.0)
+    if differs > _SAME_SIZE:
+        raise Unphysical(
+            f"the line is {found.nm.value:.4g} nm long if pixels are square, and {other.nm.value:.4g} nm if the frame "
+            f"is; say how high it is with --aspect"
+        )
+    return replace(found, shared=hypot(found.shared, differs if isnan(found.aspect) else 0.0))
+
+
+def _size(line: ImagedWaves, cell: Cell | None, grating: Grating | None, expected: float) -> LineSize:
+    waves, covariance = line.waves, line.waves_covariance
     if len(waves) == 2:
         if cell is None:
             raise Unphysical(

@@ -62,8 +62,8 @@ def offset(
     \b
     Examples:
       tablegen calibrate offset --axis x offsets.csv --scanner scanner.toml --size-v 20 --write
-      tablegen calibrate offset --axis x --lattice-nm 17.7 --image 13 7 t1.npy r1.npy --image 13 50 t2.npy r2.npy \\
-          --image 13 93 t3.npy r3.npy --scanner scanner.toml --write
+      tablegen calibrate offset --axis x --lattice-nm 17.7 --image 13 7 t1.npy r1.npy \\
+          --image 13 50 t2.npy r2.npy --image 13 93 t3.npy r3.npy --scanner scanner.toml --write
     """
     from tablegen.calibration.columns import APPARENT, OFFSET, SIZE
     from tablegen.calibration.offset import fit_offset

@@ -80,8 +80,8 @@ def size(
     \b
     Examples:
       tablegen calibrate size --axis x sizes.csv --scanner scanner.toml --write
-      tablegen calibrate size --axis x --lattice-nm 17.7 --image 10 t1.npy r1.npy --image 30 t2.npy r2.npy \\
-          --image 90 t3.npy r3.npy --scanner scanner.toml --write
+      tablegen calibrate size --axis x --lattice-nm 17.7 --image 10 t1.npy r1.npy \\
+          --image 30 t2.npy r2.npy --image 90 t3.npy r3.npy --scanner scanner.toml --write
     """
     from tablegen.calibration.columns import ACTUAL, APPARENT, DRIVE, NOMINAL, TRUE
     from tablegen.calibration.size import fit_size

@@ -15,8 +15,7 @@ from tablegen.calibration.estimate import Estimate
 from tablegen.calibration.frequency import fit_frequency
 from tablegen.calibration.hysteresis import HysteresisFit, Trace, fit_hysteresis
 from tablegen.calibration.image_scale import Cell, Grating
-from tablegen.calibration.image_sizes import ImageSizes, SampleImage, Taking, sizes_of
-from tablegen.calibration.image_sizes import KnownSample as Known
+from tablegen.calibration.image_sizes import ImageSizes, KnownSample, SampleImage, Taking, sizes_of
 from tablegen.calibration.images import Pair, fit_images
 from tablegen.calibration.offset import fit_offset
 from tablegen.calibration.resonance import fit_resonance
@@ -232,7 +231,7 @@ def scan_of(
 
 def measured(images: list[SampleImage]) -> ImageSizes:
     """What such images say."""
-    return sizes_of(images, V_MAX, Known(Cell.hexagonal(LATTICE_NM), Grating(PITCH_NM)), Taking())
+    return sizes_of(images, V_MAX, KnownSample(Cell.hexagonal(LATTICE_NM), Grating(PITCH_NM)), Taking())
 
 
 def size_of_images_case(random: np.random.Generator, noise: float) -> Found:
