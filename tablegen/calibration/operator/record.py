@@ -67,7 +67,7 @@ def operator_file(fit: OperatorFit, axis: str, v_max: float, sources: Sequence[s
             depth_nm=loop.depth,
             n=loop.n,
             beta=loop.beta,
-            gamma=loop.gamma,
+            common=loop.common,
             asymmetry=loop.asymmetry,
             bend=list(loop.bend),
         ),
