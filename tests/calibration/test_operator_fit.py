@@ -75,7 +75,7 @@ def test_the_family_and_the_creep_are_found() -> None:
     core, loop = BoucWen(), other.operator.family.bouc_wen
     assert loop is not None
     by = core.a ** (core.n - 1.0)
-    found = [loop.depth, loop.n, loop.beta, loop.common, loop.asymmetry]
+    found = [loop.depth, loop.n, loop.beta, loop.gamma, loop.asymmetry]
     assert found == pytest.approx(
         [1250.0 * core.depth * core.a, core.n, core.beta * by, core.gamma * by, 0.5 * core.asymmetry],
         rel=0.06,

@@ -20,14 +20,14 @@ from tablegen.numerics.arrays import Floats
 from tablegen.problems import Rejected
 
 N = 83 / 64
-LOOP = {"depth_nm": 500.0, "n": N, "beta": 4.0, "common": -1.5, "asymmetry": 0.25, "bend": [0.0, 0.0]}
+LOOP = {"depth_nm": 500.0, "n": N, "beta": 4.0, "gamma": -1.5, "asymmetry": 0.25, "bend": [0.0, 0.0]}
 MODEL = BoucWen(500.0, N, 4.0, -1.5, 0.25, (0.0, 0.0))
 PLAYS = Family(Plays(np.array([0.05, 0.2]), np.array([[30.0, 60.0]]), np.array([900.0, 40.0]), np.zeros((1, 4))))
 
 
 def stepped(model: BoucWen) -> Stepped:
     """The plant of the tests with these parameters: its h is that of the model, times a."""
-    return Stepped(1.0, model.beta, model.common, model.n, model.depth / 1250.0, 2.0 * model.asymmetry, 0.0)
+    return Stepped(1.0, model.beta, model.gamma, model.n, model.depth / 1250.0, 2.0 * model.asymmetry, 0.0)
 
 
 def period(low: float, stroke: float, count: int = 250) -> Floats:

@@ -66,7 +66,7 @@ def operator_file(
             bends=FIXED_BENDS.tolist(),
             reversible=list(REVERSIBLE),
         ),
-        bouc_wen=BoucWenTable(depth_nm=0.0, n=1.0, beta=0.0, common=0.0, asymmetry=0.0, bend=[0.0, 0.0]),
+        bouc_wen=BoucWenTable(depth_nm=0.0, n=1.0, beta=0.0, gamma=0.0, asymmetry=0.0, bend=[0.0, 0.0]),
         lengths=LengthsTable(stroke=0.4, centre=0.6, noise=1e-5),
         lines=lines,
     )

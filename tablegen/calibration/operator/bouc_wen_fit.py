@@ -16,12 +16,12 @@ _RIDGE = 1e-5
 
 
 class BoucWenProblem(FamilyProblem):
-    """Its own numbers are n, beta, common, the asymmetry and both bends; its one weight is the depth."""
+    """Its own numbers are n, beta, gamma, the asymmetry and both bends; its one weight is the depth."""
 
     shape_limits = ((1.0, 3.0), (0.05, 40.0), (-30.0, 30.0), (-0.9, 0.9), (-0.6, 0.6), (-0.6, 0.6))
     shape_steps = (0.02, 0.05, 0.05, 0.02, 0.01, 0.01)
     starts: ClassVar[tuple[Floats, ...]] = tuple(
-        np.array([n, beta, common, 0.0, 0.0, 0.0, 0.02]) for n, beta, common in ((1.2, 4.0, -1.0), (1.2, 1.5, 0.0))
+        np.array([n, beta, gamma, 0.0, 0.0, 0.0, 0.02]) for n, beta, gamma in ((1.2, 4.0, -1.0), (1.2, 1.5, 0.0))
     )
 
     def __init__(self, lines: Sequence[PeriodicLine], main: float, creep: CreepOf) -> None:
@@ -43,5 +43,5 @@ class BoucWenProblem(FamilyProblem):
 
 
 def _model(depth: float, shape: Floats) -> BoucWen:
-    n, beta, common, asymmetry, linear, cubic = shape.tolist()
-    return BoucWen(depth, n, beta, common, asymmetry, (linear, cubic))
+    n, beta, gamma, asymmetry, linear, cubic = shape.tolist()
+    return BoucWen(depth, n, beta, gamma, asymmetry, (linear, cubic))

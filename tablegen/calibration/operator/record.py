@@ -67,7 +67,7 @@ def operator_file(fit: OperatorFit, axis: str, v_max: float, sources: Sequence[s
             depth_nm=loop.depth,
             n=loop.n,
             beta=loop.beta,
-            common=loop.common,
+            gamma=loop.gamma,
             asymmetry=loop.asymmetry,
             bend=list(loop.bend),
         ),

@@ -1,6 +1,6 @@
 """Bouc and Wen's hysteresis, settled: an internal h that follows the drive, and saturates.
 
-dh/dv = 1 - |h|^n (common + beta d (asymmetry + sign h)), with d = 1 where the drive rises and -1 where it falls, and v
+dh/dv = 1 - |h|^n (gamma + beta d (asymmetry + sign h)), with d = 1 where the drive rises and -1 where it falls, and v
 the bent drive u + l u (1 - u) + s u (1 - u) (u - 1/2). The right hand side does not contain v: every rising branch is
 a part of the one curve through h = 0, and so is every falling one. Of a settled line only where it begins on them has
 to be found.
@@ -35,7 +35,7 @@ class BoucWen:
     depth: float
     n: float
     beta: float
-    common: float
+    gamma: float
     asymmetry: float
     bend: tuple[float, float]
 
@@ -85,7 +85,7 @@ class BoucWen:
 
     def _curve(self, direction: float) -> "_Curve":
         """h from 0 on to both sides."""
-        against, more = self.common, direction * self.beta
+        against, more = self.gamma, direction * self.beta
         parts = [
             _grown(against + more * (self.asymmetry + side), self.n)
             for side in (1.0, -1.0)  # of h

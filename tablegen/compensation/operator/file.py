@@ -55,7 +55,7 @@ class BoucWenTable(_Table, frozen=True, kw_only=True):
     depth_nm: Annotated[float, Meta(ge=0.0, le=1e9)]
     n: Annotated[float, Meta(ge=1.0, le=4.0)]
     beta: Annotated[float, Meta(ge=0.0, le=100.0)]
-    common: Annotated[float, Meta(ge=-100.0, le=100.0)]
+    gamma: Annotated[float, Meta(ge=-100.0, le=100.0)]
     asymmetry: Annotated[float, Meta(gt=-1.0, lt=1.0)]
     bend: Annotated[list[_Bend], Meta(min_length=2, max_length=2)]
 
@@ -148,7 +148,7 @@ def _operator(file: OperatorFile) -> Operator:
     plays, loop = file.plays, file.bouc_wen
     family = Family(
         Plays(*(np.array(one) for one in (plays.thresholds, plays.weights, plays.reversible, plays.bends))),
-        BoucWen(loop.depth_nm, loop.n, loop.beta, loop.common, loop.asymmetry, (loop.bend[0], loop.bend[1]))
+        BoucWen(loop.depth_nm, loop.n, loop.beta, loop.gamma, loop.asymmetry, (loop.bend[0], loop.bend[1]))
         if loop.depth_nm
         else None,
     )
