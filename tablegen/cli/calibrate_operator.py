@@ -22,6 +22,7 @@ from tablegen.cli.image_samples import (
     sample_options,
     taking_of,
 )
+from tablegen.cli.progress import Progress
 from tablegen.reading import CONFIGURATION, read_text
 
 if TYPE_CHECKING:
@@ -114,7 +115,9 @@ def operator(
         lines += _imaged(images, pairs, v_max, given)
         if (k := in_file(common, "size", "k_nm_per_v")) is not None:
             check_size(lines, k * v_max, f"k_nm_per_v = {k:g} of {common.scanner}")
-        fit = fit_operator(lines, response, lambda centre: offset_law.factor(2.0 * centre - 1.0))
+        with Progress() as progress:
+            progress.now("fitting the families, with and without each trace")
+            fit = fit_operator(lines, response, lambda centre: offset_law.factor(2.0 * centre - 1.0))
     except Unphysical as reason:
         fail([f"{', '.join(table.file for table in sources)}: {reason}"], ExitStatus.WRONG_INPUT)
     further = next_trace(fit, lines, v_max)

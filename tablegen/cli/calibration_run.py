@@ -11,6 +11,7 @@ import click
 
 from tablegen.cli.common import OutputFile, fail, require, written
 from tablegen.cli.exit_status import ExitStatus
+from tablegen.cli.progress import Progress
 from tablegen.reading import CONFIGURATION, RESPONSE, read_bytes, read_text
 
 if TYPE_CHECKING:
@@ -116,7 +117,9 @@ def read_columns(path: Path, needed: "Sequence[Column]", optional: "Sequence[Col
     from tablegen.problems import Rejected
 
     try:
-        return read_table(path, needed, optional)
+        with Progress() as progress:
+            progress.now("reading the measurements")
+            return read_table(path, needed, optional)
     except Rejected as rejected:
         fail(rejected.problems, ExitStatus.WRONG_INPUT)
 
@@ -235,7 +238,9 @@ def finish(
     from tablegen.problems import Unphysical
 
     try:
-        fit = run()
+        with Progress() as progress:
+            progress.now("fitting")
+            fit = run()
     except Unphysical as reason:
         fail([f"{', '.join(dict.fromkeys(table.file for table in tables))}: {reason}"], ExitStatus.WRONG_INPUT)
     sources = list(dict.fromkeys(table.source for table in tables))  # images may stand in one file

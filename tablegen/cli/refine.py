@@ -10,6 +10,7 @@ import click
 from tablegen.cli.common import OutputFile, fail, finite, require, scan_argument, written
 from tablegen.cli.exit_status import ExitStatus
 from tablegen.cli.image_samples import CommandOfRunningImages
+from tablegen.cli.progress import Progress
 from tablegen.cli.refine_images import ImageArguments, image_options
 from tablegen.reading import CONFIGURATION, read_text
 
@@ -146,12 +147,13 @@ def refine(
     from tablegen.refinement.round import Options
 
     options = Options(gain, harmonics, period_s, delay_s, settle, drift)
-    if trace is None:
-        found, sources, text = images.learn(scan, axis, options)
-        files = images.names
-    else:
-        found, sources, text = _learn(scan, trace, axis, triggered, options)
-        files = str(trace)
+    files = images.names if trace is None else str(trace)
+    with Progress() as progress:
+        progress.now("reading and learning")
+        if trace is None:
+            found, sources, text = images.learn(scan, axis, options)
+        else:
+            found, sources, text = _learn(scan, trace, axis, triggered, options)
     from tablegen.cli.refine_text import refine_record, refine_text
 
     name = found.setup.scan.name
