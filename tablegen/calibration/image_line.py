@@ -35,6 +35,7 @@ _MIN_OPENING = 0.004  # of the line: what is a loop, and has a sign
 _LARGEST_GAP, _GAP_ERRORS = 0.005, 4.0  # of the line, and in standard errors
 _LARGEST_CROP, _CROP_ERRORS, _CROP_RIPPLES = 0.008, 6.0, 6  # of the line; what few periods cannot tell is not
 _NEAR_TURN, _LEAST_WIDTH = (0.1, 0.9), 1e-3  # of the line
+_LAG_GAP = 0.002  # of the line: so far apart the lag of the axis and its dynamics may keep both sweeps
 
 
 @dataclass(frozen=True, eq=False)
@@ -263,7 +264,7 @@ def _gap(fit: _Degree) -> tuple[Floats, Floats]:
     cropped = float(_cropped(model, state, gap)[worst])
     told = abs(gap[worst]) / error[worst]
     if (abs(gap[worst]) > _LARGEST_GAP and told > _GAP_ERRORS) or (
-        cropped > _LARGEST_CROP and told > _CROP_ERRORS and count >= _CROP_RIPPLES
+        cropped > _LARGEST_CROP and abs(gap[worst]) > _LAG_GAP and told > _CROP_ERRORS and count >= _CROP_RIPPLES
     ):
         raise Unphysical(
             f"trace and retrace are {100.0 * abs(gap[worst]):.2g} % of the line apart at its "
