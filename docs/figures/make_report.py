@@ -35,7 +35,7 @@ def main() -> None:
     both = Image.new("RGB", (2 * SHRUNK, light.height))
     both.paste(light, (0, 0))
     both.paste(dark, (SHRUNK, 0))
-    both.quantize(256, dither=Image.Dither.NONE).save(FOLDER / "report.png", optimize=True)
+    both.quantize(256, kmeans=3, dither=Image.Dither.NONE).save(FOLDER / "report.png", optimize=True)
 
 
 if __name__ == "__main__":

@@ -57,7 +57,7 @@ def begin(geometry: Geometry, heights: list[Floats], mirrored: bool) -> tuple[Sp
     spot = strongest(geometry, heights[0])
     forward = bend_of(geometry, heights[0], True, spot, spot.sharpest)
     if len(heights) == 1:
-        check_signs(forward.shape.xi, 0.0, 0.02, "")
+        check_signs(forward.shape.lag, 0.0, 0.02, "")
         return spot, (forward,)
     backward = bend_of(geometry, heights[1], False, spot)
     turned = bend_of(geometry, heights[1][:, ::-1], False, spot)
@@ -67,8 +67,7 @@ def begin(geometry: Geometry, heights: list[Floats], mirrored: bool) -> tuple[Sp
     if backward.match < 0.3 * forward.match:
         raise Unphysical("the retrace does not show the trace's pattern; are they from one scan?")
     # A grating square to the lines looks the same mirrored; then the bend tells.
-    # xi is the mean lag of a sweep; few periods leave its skew, and with it the sign of the peak, open.
-    check_signs(forward.shape.xi, backward.shape.xi, 0.02, advice)
+    check_signs(forward.shape.lag, backward.shape.lag, 0.02, advice)
     return spot, (forward, backward)
 
 

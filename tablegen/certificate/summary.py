@@ -8,7 +8,7 @@ import numpy as np
 from tablegen.certificate.certificate import Certificate
 from tablegen.certificate.excess import excess
 from tablegen.certificate.matching import apart_note, apart_percent
-from tablegen.compensation.expectation import Expectation, Figure
+from tablegen.compensation.expectation import LEVEL_PERCENT, Expectation, Figure
 from tablegen.compensation.hold import hold_inverse
 from tablegen.planning.line_plan import LinePlan, Plan
 from tablegen.planning.settling import settling, settling_text
@@ -129,7 +129,8 @@ def expected_lines(expectation: Expectation) -> list[str]:
     texts = [f"{what} {_figure(figure, what == 'size')}" for what, figure in rows]
     lines = [", ".join(texts[i : i + 2]) for i in range(0, len(texts), 2)]
     if expectation.distance is not None:
-        lines.append(f"nearest measured line {expectation.distance:.2g} % of v_max away")
+        away = f"nearest measured line {expectation.distance:.2g} % of v_max away"
+        lines.append(f"{away}; +- holds for {LEVEL_PERCENT} % of scans")
     return lines
 
 

@@ -1,11 +1,10 @@
 """``tablegen calibrate hysteresis``: sensor traces to (17)-(22)."""
 
-from math import isfinite
 from pathlib import Path
 
 import click
 
-from tablegen.cli.calibration_options import points_option, rho_option
+from tablegen.cli.calibration_options import delay_of, delay_option, points_option, rho_option
 from tablegen.cli.calibration_run import Common, finish, full_scale, read_columns, shared_options
 
 
@@ -25,13 +24,7 @@ from tablegen.cli.calibration_run import Common, finish, full_scale, read_column
     metavar="N",
     help="Order of the polynomial that describes drift.  [default: 1 to 3, more with more periods]",
 )
-@click.option(
-    "--delay-s",
-    default="0",
-    show_default=True,
-    metavar="S|fit",
-    help="Delay of the sensor relative to the drive in seconds, or `fit` to fit it.",
-)
+@delay_option
 @points_option
 def hysteresis(
     common: Common,
@@ -60,12 +53,7 @@ def hysteresis(
     from tablegen.calibration.hysteresis import fit_hysteresis
     from tablegen.calibration.traces import split_traces
 
-    try:
-        delay = None if delay_s == "fit" else float(delay_s)
-        if delay is not None and not isfinite(delay):
-            raise ValueError
-    except ValueError:
-        raise click.UsageError(f"--delay-s {delay_s}: seconds, or fit") from None
+    delay = delay_of(delay_s)
     tables = [read_columns(path, [TIME, DRIVE, DISPLACEMENT], [TRACE]) for path in data]
     v_max = full_scale(common)
     traces = [trace for table in tables for trace in split_traces(table)]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from tablegen.cli.calibration_options import delay_of, delay_option
 from tablegen.cli.calibration_run import Common, full_scale, in_file, read_columns, scanner_axis, shared_options
 from tablegen.cli.common import fail, written
 from tablegen.cli.exit_status import ExitStatus
@@ -21,7 +22,6 @@ from tablegen.cli.image_samples import (
     sample_options,
     taking_of,
 )
-from tablegen.cli.sensor_delay import delay_of, delay_option
 from tablegen.reading import CONFIGURATION, read_text
 
 if TYPE_CHECKING:
@@ -192,7 +192,8 @@ def _text(
 ) -> list[str]:
     """What was found, what it leaves of every trace, and what to measure next."""
     creep = fit.operator.creep
-    tried = ", ".join(f"{name} {score:.3g} %" for name, score in fit.candidates.items())
+    pure = {name: score for name, score in fit.candidates.items() if name == fit.family or "," not in name}
+    tried = ", ".join(f"{name} {score:.3g} %" for name, score in pure.items())
     out = [
         f"operator of {axis} from {len(lines)} traces",
         "",

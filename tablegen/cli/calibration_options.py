@@ -1,5 +1,6 @@
 """Options that several calibrations have."""
 
+from math import isfinite
 from pathlib import Path
 
 import click
@@ -51,3 +52,22 @@ delay_pixels_option = click.option(
     metavar="N",
     help="Delay of the images relative to the drive in pixels.",
 )
+
+delay_option = click.option(
+    "--delay-s",
+    default="0",
+    show_default=True,
+    metavar="S|fit",
+    help="Delay of the sensor relative to the drive in seconds, or `fit` to fit it.",
+)
+
+
+def delay_of(text: str) -> float | None:
+    """In s, as the option has it; None where it is to be fitted."""
+    try:
+        delay = None if text == "fit" else float(text)
+        if delay is not None and not isfinite(delay):
+            raise ValueError
+    except ValueError:
+        raise click.UsageError(f"--delay-s {text}: seconds, or fit") from None
+    return delay

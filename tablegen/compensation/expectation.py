@@ -4,10 +4,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
+LEVEL_PERCENT = 90  # of scans that leave less than a figure and its uncertainty together
+
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """A figure in percent of the line, and what it is uncertain by, in the same unit; None where nobody knows."""
+    """A figure in percent of the line, and what it is uncertain by, in the same unit; None where nobody knows.
+
+    The uncertainty is at ``LEVEL_PERCENT``.
+    """
 
     value: float
     uncertainty: float | None = None

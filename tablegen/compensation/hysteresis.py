@@ -36,6 +36,14 @@ class BranchShape(Sweep):
         """lambda, equation (18)."""
         return 1.0 + 2.0 * self.xi_gamma
 
+    @property
+    def lag(self) -> float:
+        """How far the sweep lags behind the drive in its first mode: xi.
+
+        Its sign is sure where few data leave the skew, and with it the sign of the peak, open.
+        """
+        return self.xi
+
     @classmethod
     def sinusoidal(cls, beta: float) -> "BranchShape":
         """Equation (15)."""

@@ -8,7 +8,7 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from tablegen.correction.agreement import levelled
-from tablegen.correction.straight import Picture, StraightScan
+from tablegen.correction.straight import ScanPicture, StraightScan
 from tablegen.numerics.arrays import Floats, Ints
 
 _METADATA_WITHOUT_DATE: dict[str, dict[str, Any]] = {"png": {}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
@@ -94,7 +94,7 @@ def _arrow_places(rows: int, columns: int) -> tuple[Ints, Ints]:
     return down, right
 
 
-def _image(panel: Any, picture: Picture, size_nm: tuple[float, float] | None, title: str) -> None:
+def _image(panel: Any, picture: ScanPicture, size_nm: tuple[float, float] | None, title: str) -> None:
     heights = _levelled(picture.heights)
     low, high = (float(np.nanpercentile(heights, share)) for share in (1.0, 99.0))
     rows, columns = heights.shape

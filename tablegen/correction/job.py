@@ -15,7 +15,7 @@ from tablegen.correction.agreement import difference
 from tablegen.correction.distortion import Distortion, Resampler
 from tablegen.correction.periodic_scan import PeriodicScan, periodic_scan
 from tablegen.correction.settled_scan import AxisScan, ScannerModel, lines_of, scanner_distortion, triangle
-from tablegen.correction.straight import Picture, StraightScan, put_straight
+from tablegen.correction.straight import ScanPicture, StraightScan, put_straight
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.drive import size_law_of
 from tablegen.planning.line_plan import LinePlan, make_plan
@@ -93,10 +93,10 @@ class Images:
         return np.ascontiguousarray(found[:, ::-1]) if mirrored else found
 
     @property
-    def pictures(self) -> list[Picture]:
+    def pictures(self) -> list[ScanPicture]:
         """All of them."""
         return [
-            Picture(one.channel, forward, self.heights(i), one.unit, one.first_row == "bottom")
+            ScanPicture(one.channel, forward, self.heights(i), one.unit, one.first_row == "bottom")
             for i, (one, forward) in enumerate(zip(self.channels, self.forward, strict=True))
         ]
 

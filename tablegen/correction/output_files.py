@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tablegen.correction.straight import Picture, StraightScan
+from tablegen.correction.straight import ScanPicture, StraightScan
 from tablegen.numerics.arrays import Floats
 
 MODULES = {".gwy": "gwyfile", ".tif": "tifffile", ".tiff": "tifffile", ".png": "PIL", ".npy": None}
@@ -27,12 +27,12 @@ def files_of(scan: StraightScan, name: str, suffix: str) -> dict[str, bytes]:
     return _WRITERS[suffix](scan, name, suffix)
 
 
-def _shown(picture: Picture) -> Floats:
+def _shown(picture: ScanPicture) -> Floats:
     """With the first row of the picture on top."""
     return np.ascontiguousarray(picture.heights[::-1] if picture.bottom_first else picture.heights)
 
 
-def _titles(pictures: Sequence[Picture]) -> list[str]:
+def _titles(pictures: Sequence[ScanPicture]) -> list[str]:
     """What pictures are called: all different, and each with its direction where there are both."""
     both = len({picture.forward for picture in pictures}) > 1
     found: list[str] = []

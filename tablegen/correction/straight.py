@@ -14,7 +14,7 @@ from tablegen.version import __version__
 
 
 @dataclass(frozen=True, eq=False)
-class Picture:
+class ScanPicture:
     """One channel of one direction, rows x columns, rows in the order of time, left on the left.
 
     ``bottom_first`` says that the first row in time is the lowest of the picture.
@@ -35,12 +35,12 @@ class StraightScan:
     ``lattice`` is what is left of its bends, None without a period.
     """
 
-    pictures: tuple[Picture, ...]
+    pictures: tuple[ScanPicture, ...]
     size_nm: tuple[float, float] | None
     distortion: Distortion
     agreement: Agreement | None
     lattice: ResidualLattice | None
-    taken: tuple[Picture, ...]
+    taken: tuple[ScanPicture, ...]
     judged: tuple[int, ...]
     record: dict[str, Any] = field(default_factory=dict)
 
@@ -56,7 +56,7 @@ class StraightScan:
 
 
 def put_straight(
-    taken: Sequence[Picture],
+    taken: Sequence[ScanPicture],
     distortion: Distortion,
     size_nm: tuple[float, float] | None,
     judged: Sequence[int],
@@ -68,7 +68,7 @@ def put_straight(
     """
     ways = {way: Resampler.of(distortion, way) for way in {picture.forward for picture in taken}}
     pictures = tuple(
-        Picture(one.title, one.forward, ways[one.forward](one.heights), one.unit, one.bottom_first) for one in taken
+        ScanPicture(one.title, one.forward, ways[one.forward](one.heights), one.unit, one.bottom_first) for one in taken
     )
     found = None
     if len(judged) == 2:

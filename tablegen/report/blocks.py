@@ -53,7 +53,7 @@ class Charts:
 
 
 @dataclass(frozen=True)
-class Picture:
+class PagePicture:
     """A picture with places where its features should be, in shares of width and height from the upper left."""
 
     title: str
@@ -67,7 +67,7 @@ class Picture:
 class Pictures:
     """Pictures side by side."""
 
-    pictures: tuple[Picture, ...]
+    pictures: tuple[PagePicture, ...]
     kind: Literal["pictures"] = "pictures"
 
 

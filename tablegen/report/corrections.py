@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from tablegen.compensation import models
 from tablegen.manifest.fields import ManifestAxis
 from tablegen.planning.line_plan import LinePlan
 from tablegen.report.blocks import Charts, Grid, Section, TableCell, row
@@ -35,14 +36,14 @@ def _steps(entry: ManifestAxis, line: LinePlan | None) -> list[tuple[TableCell, 
         row("offset, m", "(1)-(4)", f"{drive.m:.5f}", f"{drive.m * drive.v_scan:.6g} V at {drive.v_offset:.6g} V"),
         row("line rate, g", "(23)", f"{drive.g:.5f}", f"{drive.v_amplitude:.6g} V peak to peak"),
     ]
+    kind = models.get(drive.model) if drive.model in models.names() else None  # of another package, it may be missing
     for side in ("forward", "backward"):
         branch = getattr(drive, side)
-        shown = f"{branch.beta:+.5f}"
-        equation = "(17), (22)" if drive.model != "operator" else "operator"
         text = f"peak residual of the {drive.model} model at u = {branch.u_peak:.3f}"
-        rows.append(
-            row(f"hysteresis {side}", equation, shown, text if drive.model != "triangle" else "not compensated")
-        )
+        applied = kind is None or kind.compensates
+        equation = "" if kind is None or not applied else kind.purpose
+        text = text if applied else "not compensated"
+        rows.append(row(f"hysteresis {side}", equation, f"{branch.beta:+.5f}", text))
     rate = entry.line.rate_exact[0] / entry.line.rate_exact[1]
     low, high = fourier.window
     rows.append(

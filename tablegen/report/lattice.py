@@ -5,7 +5,7 @@ import numpy as np
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan
 from tablegen.planning.windows import pixel_places
-from tablegen.report.blocks import Paragraph, Picture, Pictures, Section
+from tablegen.report.blocks import PagePicture, Paragraph, Pictures, Section
 from tablegen.report.playing import PlayedAxis
 from tablegen.report.png import data_address, grey_png
 from tablegen.report.subject import PlannedScan
@@ -32,9 +32,8 @@ def lattice(planned: PlannedScan, axes: tuple[PlayedAxis, PlayedAxis]) -> Sectio
         images, apart = _images(planned, one, other, ratio)
         for side, image in images:
             alternative = f"{side} image of a lattice, {name} the correction of hysteresis"
-            pictures.append(
-                Picture(f"{name} correction, {side} (simulation)", data_address(image[0]), alternative, image[1], ratio)
-            )
+            title = f"{name} correction, {side} (simulation)"
+            pictures.append(PagePicture(title, data_address(image[0]), alternative, image[1], ratio))
         worst.append(f"{name} it by up to {apart:.3g} % of the image")
     grounds = [f"{'the operator' if one.on_operator else 'the laws of the scanner file'}" for one in axes]
     where = f"x on {grounds[0]}, y on {grounds[1]}" if grounds[0] != grounds[1] else f"both axes on {grounds[0]}"

@@ -35,7 +35,7 @@ def lines(subject: Subject, axes: tuple[PlayedAxis, PlayedAxis] | None) -> Secti
                 f"{axis} drive, one {'line' if axis == 'x' else 'frame'}",
                 label,
                 "drive at the piezo [V]",
-                (*_sides(t, period, volts, turn), DrawnCurve("triangle", "before", t * period, triangle)),
+                (*_sides(t, period, volts, turn), DrawnCurve("plain triangle", "before", t * period, triangle)),
                 imaged,
             )
         )

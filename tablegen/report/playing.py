@@ -147,7 +147,7 @@ def _played(line: LinePlan, plain: LinePlan, others: dict[str, tuple[LinePlan, L
             name = "uncompensated" if model == models.UNCOMPENSATED else "laws"
             corrections.append((name, lines[0 if line.axis == "x" else 1]))
     if plain.drive.hysteresis.compensates:
-        corrections.append(("operator" if own else "laws", plain))
+        corrections.append((plain.drive.model if own else "laws", plain))
     played = []
     for name, one in corrections:
         try:

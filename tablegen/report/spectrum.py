@@ -39,7 +39,7 @@ def _spectrum(axis: str, entry: ManifestAxis) -> Chart:
     turn = entry.drive.turn
     triangle = (np.sin(np.pi * n * turn) / (np.pi * n) ** 2 / (turn * (1.0 - turn))) ** 2
     seen = triangle > triangle[0] * 10.0 ** (0.1 * _FLOOR_DB)
-    shown.append(DrawnCurve("triangle", "before", n[seen] * rate, _db(triangle[seen] / triangle[0]), "points"))
+    shown.append(DrawnCurve("plain triangle", "before", n[seen] * rate, _db(triangle[seen] / triangle[0]), "points"))
     last = series.harmonics * rate
     ticks = entry.line.ticks
     if ticks <= _MOST_SPECTRUM_TICKS:

@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from foreign_plants import SIX, TEN, BoucWen, ForeignPlant, ManyPlays, record, triangle
+from foreign_plants import SIX, TEN, BoucWen, ForeignPlant, JilesAtherton, ManyPlays, record, triangle
 
 from tablegen.calibration.hysteresis import Trace
 from tablegen.calibration.operator.errors import compare
@@ -95,6 +95,8 @@ def test_the_family_and_the_creep_are_found() -> None:
         (BoucWen, SIX, 0.5, (0.15, 0.35, 0.55, 0.75, 0.9), 3.0, 0.4, 0.5),
         (BoucWen, SIX, 0.85, (0.05, 0.15, 0.28), 3.0, 0.4, 1.0),
         (BoucWen, TEN, 0.7, (0.15, 0.35, 0.55), 3.0, 0.4, 0.5),
+        (JilesAtherton, SIX, 0.5, (0.15, 0.55, 0.9), 3.0, 0.4, 0.5),
+        (JilesAtherton, TEN, 0.7, (0.15, 0.35, 0.55), 3.0, 0.4, 0.5),
     ],
 )
 def test_lines_that_were_not_measured(

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from building import REPOSITORY
 from editing import SCAN, SCANNER, edited, run, write_pair
+from operator_files import REVERSIBLE, THRESHOLDS, WEIGHTS, operator_file
 
 from tablegen.certificate.certificate import Certificate, broken_limits, certify
 from tablegen.certificate.converter_errors import converter_errors
@@ -22,17 +23,7 @@ from tablegen.certificate.scan_warnings import brief_warnings, scan_warnings
 from tablegen.certificate.summary import certificate_lines, summary
 from tablegen.compensation.expectation import Figure
 from tablegen.compensation.models.operator import OperatorLine
-from tablegen.compensation.operator.file import (
-    VERSION,
-    BoucWenTable,
-    CreepTable,
-    LengthsTable,
-    LineTable,
-    OperatorFile,
-    PlaysTable,
-    operator_text,
-)
-from tablegen.compensation.operator.plays import FIXED_BENDS
+from tablegen.compensation.operator.file import operator_text
 from tablegen.config.load import Setup, load
 from tablegen.manifest.fields import ManifestAxis, ManifestBranch
 from tablegen.manifest.read import read_build
@@ -46,60 +37,18 @@ from tablegen.virtual.parameters import load_truth
 from tablegen.virtual.scanner import VirtualScanner
 from tablegen.waveform.series import FourierSeries
 
-THRESHOLDS = np.geomspace(0.01, 0.4, 30)
-WEIGHTS = np.stack([np.full(30, 12.0), np.full(30, 3.0), np.full(30, 5.0)])
-REVERSIBLE = (700.0, 60.0)
 LEFT_OUT = (0.05, 1.5, 0.2, -0.1)  # rms, scaling, mismatch, size
 STROKES = (0.1, 0.25, 0.4)
 FREE = ("- [limits]",)
 LINEAR = ("- [x.offset]", "- [x.frequency]", "- [x.resonance]")
 
 
-def operator_bytes() -> bytes:
-    """Plays alone: no residual, no creep."""
-    none = [0.0] * 21
-    rms, scaling, mismatch, size = LEFT_OUT
-    lines = [
-        LineTable(
-            name=f"{stroke:g}.csv",
-            stroke=stroke,
-            centre=0.5,
-            rate_hz=100.0,
-            size=0.0,
-            rising=none,
-            falling=none,
-            rms_percent=rms,
-            scaling_percent=scaling,
-            mismatch_percent=mismatch,
-            size_percent=size,
-            in_fit_percent=list(LEFT_OUT),  # all that is left out is noise
-        )
-        for stroke in STROKES
-    ]
-    file = OperatorFile(
-        version=VERSION,
-        axis="x",
-        v_max=100.0,
-        centre=0.5,
-        creep=CreepTable(loss_per_decade=0.0, fastest_s=1e-5, slowest_s=0.1, reference_hz=100.0),
-        plays=PlaysTable(
-            thresholds=THRESHOLDS.tolist(),
-            weights=WEIGHTS.tolist(),
-            reversible=list(REVERSIBLE),
-            bends=FIXED_BENDS.tolist(),
-        ),
-        bouc_wen=BoucWenTable(depth_nm=0.0, n=1.0, beta=0.0, gamma=0.0, asymmetry=0.0, bend=[0.0, 0.0]),
-        lengths=LengthsTable(stroke=0.3, centre=0.5, noise=1e-6),
-        lines=lines,
-    )
-    return operator_text(file, []).encode("utf-8")
-
-
 def with_operator(folder: Path, *scan: str) -> Path:
     """The example, whose x axis has the operator and nothing else, with edits of the scan."""
     table = '+ [x.hysteresis]\nmodel = "operator"\nfile = "x_operator.toml"'
     scanner = edited(SCANNER, "- [x.hysteresis]", "- [[x.hysteresis.branches]]", *LINEAR, table)
-    (folder / "x_operator.toml").write_bytes(operator_bytes())
+    file = operator_file(strokes=STROKES, left_out=LEFT_OUT)
+    (folder / "x_operator.toml").write_text(operator_text(file, []), "utf-8")
     return write_pair(folder, edited(SCAN, *FREE, *scan), scanner)
 
 
@@ -118,7 +67,7 @@ def stepped(u: Floats) -> Floats:
         for k in range(len(u)):
             g = np.array([[transform[k]] for transform in transforms])
             state = np.minimum(np.maximum(state, g - THRESHOLDS), g + THRESHOLDS)
-            out[k] = float(np.sum(WEIGHTS * state)) + REVERSIBLE[0] * u[k] + REVERSIBLE[1] * u[k] ** 2
+            out[k] = float(WEIGHTS @ np.sum(state, axis=1)) + REVERSIBLE[0] * u[k] + REVERSIBLE[1] * u[k] ** 2
     return out
 
 

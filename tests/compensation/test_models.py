@@ -73,6 +73,11 @@ def test_names_stand_with_the_models() -> None:
 
 # What says the equations once more does so on purpose; the page for notebooks draws a triangle, and no model.
 OTHER_NAMES = {"verification/scaling.py", "compensation/models/__init__.py", "api/html.py"}
+# Bouc-Wen's equation has a gamma of its own, which is none of (17).
+ANOTHER_GAMMA = {
+    *("compensation/operator/bouc_wen.py", "compensation/operator/file.py"),
+    *("calibration/operator/bouc_wen_fit.py", "calibration/operator/record.py"),
+}
 
 
 def test_names_and_parameters_of_models_stand_in_no_other_module() -> None:
@@ -84,7 +89,7 @@ def test_names_and_parameters_of_models_stand_in_no_other_module() -> None:
                 names.add(where)
             if isinstance(node, ast.Name | ast.Attribute | ast.arg):
                 called = getattr(node, "id", None) or getattr(node, "attr", None) or getattr(node, "arg", None)
-                if called in {"xi", "gamma", "xi_gamma"}:
+                if called in {"xi", "xi_gamma"} or (called == "gamma" and where not in ANOTHER_GAMMA):
                     parameters.add(where)
     assert names == OTHER_NAMES | {f"compensation/models/{name}.py" for name in models.names()}
     assert parameters == {"compensation/hysteresis.py", "verification/scaling.py"}

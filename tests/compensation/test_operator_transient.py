@@ -140,6 +140,7 @@ def test_the_virtual_scanner_drifts_as_the_operator_says(stroke: float, centre: 
 
 
 PLANTS = {"plays": plays_played(ManyPlays()), "Bouc-Wen": bouc_wen_played(BoucWen())}
+PERIODS = {"plays": 3, "Bouc-Wen": 300}  # that a loop takes to close
 CORES = {"plays": ManyPlays(), "Bouc-Wen": BoucWen()}
 
 
@@ -162,7 +163,15 @@ def followed_plant(name: str, change: str, turn: float, period_s: float, line_s:
         return [float(at_once) * part for part in PLANTS[name](parts)]
 
     return followed(
-        play, (shares, plant.times_s), *CHANGES[change], turn, period_s, line_s, lines, 100 if turn > 0.5 else 40
+        play,
+        (shares, plant.times_s),
+        *CHANGES[change],
+        turn,
+        period_s,
+        line_s,
+        lines,
+        100 if turn > 0.5 else 40,
+        PERIODS[name],
     )
 
 

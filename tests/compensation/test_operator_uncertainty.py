@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tablegen.compensation.expectation import LEVEL_PERCENT
 from tablegen.compensation.operator.operator import MeasuredLine
-from tablegen.compensation.operator.uncertainty import LEVEL_PERCENT, departures, of_formulas, of_places
+from tablegen.compensation.operator.uncertainty import departures, of_formulas, of_places
 from tablegen.numerics.arrays import Floats
 
 SIX = tuple((stroke, 0.5) for stroke in (0.1, 0.25, 0.45, 0.65, 0.82, 0.97))

@@ -14,6 +14,7 @@ from tablegen.calibration.hysteresis import Trace
 from tablegen.calibration.operator.fit import OperatorFit, fit_operator
 from tablegen.calibration.operator.periodic_line import periodic_line
 from tablegen.calibration.operator.record import operator_file
+from tablegen.compensation.dynamics import SecondOrder
 from tablegen.correction.distortion import Distortion
 from tablegen.numerics.arrays import Floats
 from tablegen.virtual.experiments import sensor_trace
@@ -54,6 +55,11 @@ k_nm_per_v = 12.0
 model = "operator"
 file = "y.toml"
 """
+
+
+# What `calibrate resonance` would say of the foreign piezos, as docs/operator.md takes it.
+MODE = SecondOrder(60e3, 14.0, 2e-6)
+RESONANCES = "".join(f"[{axis}.resonance]\nfrequency_hz = 60e3\nquality = 14.0\ndelay_s = 2e-6\n" for axis in "xy")
 
 
 @dataclass(frozen=True)
@@ -134,7 +140,7 @@ def scanner_file(plant: str, folder: Path) -> Path:
         fit = _identified(plant, "x" if plant in FOREIGN else axis)  # of a foreign piezo both are the same
         (folder / f"{axis}.toml").write_bytes(operator_file(fit, "x" if axis == "x" else "y", 100.0))
     path = folder / "scanner.toml"
-    path.write_text(SCANNER, "utf-8")
+    path.write_text(SCANNER + (RESONANCES if plant in FOREIGN else ""), "utf-8")
     return path
 
 
@@ -149,7 +155,8 @@ def _identified(plant: str, axis: str) -> OperatorFit:
         sensor = Sensor(noise_nm=1.2 * stroke, seed=seed)
         columns = sensor_trace(its, 100.0 * stroke, 100.0 * centre, RATE_HZ, periods=5, sensor=sensor)
         traces.append(Trace(f"{stroke:g}", columns["time_s"], columns["drive_v"], columns["displacement_nm"]))
-    return fit_operator([periodic_line(trace, 100.0) for trace in traces], None, lambda _: 1.0)
+    response = MODE if plant in FOREIGN else None
+    return fit_operator([periodic_line(trace, 100.0) for trace in traces], response, lambda _: 1.0)
 
 
 @dataclass(frozen=True)

@@ -23,10 +23,20 @@ STROKES = (0.1, 0.3, 0.6, 0.95)
 
 
 def operator_file(
-    axis: str = "x", rms: float = 0.05, size: float = 0.1, creep: float = 0.0, weights: tuple[float, ...] = WEIGHTS
+    axis: str = "x",
+    rms: float = 0.05,
+    size: float = 0.1,
+    creep: float = 0.0,
+    weights: tuple[float, ...] = WEIGHTS,
+    strokes: tuple[float, ...] = STROKES,
+    left_out: tuple[float, float, float, float] | None = None,
 ) -> OperatorFile:
-    """The operator; ``rms`` and ``size`` are what the traces that were left out are missed by, in percent."""
+    """The operator; ``rms`` and ``size`` are what the traces that were left out are missed by, in percent.
+
+    With ``left_out`` all four figures of that.
+    """
     nothing = [0.0] * 12
+    rms, scaling, mismatch, size = left_out or (rms, 20.0 * rms, 3.0 * rms, size)
     lines = [
         LineTable(
             name=f"{stroke:g}",
@@ -37,12 +47,12 @@ def operator_file(
             rising=nothing,
             falling=nothing,
             rms_percent=rms,
-            scaling_percent=20.0 * rms,
-            mismatch_percent=3.0 * rms,
+            scaling_percent=scaling,
+            mismatch_percent=mismatch,
             size_percent=size,
-            in_fit_percent=[rms, 20.0 * rms, 3.0 * rms, size],  # all that is left out is noise
+            in_fit_percent=[rms, scaling, mismatch, size],  # all that is left out is noise
         )
-        for stroke in STROKES
+        for stroke in strokes
     ]
     return OperatorFile(
         version=1,

@@ -15,7 +15,6 @@ Floats = npt.NDArray[np.float64]
 Play = Callable[[list[Floats]], list[Floats]]  # nm of drives one after the other, from rest at 0 on
 
 _EARLIER = np.concatenate([np.linspace(0.0, 1.0, 60), np.linspace(1.0, 0.0, 60)])  # up and down, then up again
-_CLOSED = 12  # periods after which every core has closed its loop
 
 
 def sweep(low: float, high: float, turn: float, samples: int) -> Floats:
@@ -52,10 +51,10 @@ def bouc_wen_played(core: BoucWen) -> Play:
         for u in parts:
             moved = np.empty(len(u))
             for k, drive in enumerate(u.tolist()):
-                h = core._moved(h, drive - before)
+                h = core.moved(h, before, drive - before)
                 before = drive
-                moved[k] = drive * (1.0 + core.bend * drive) - core.depth * h
-            out.append(1250.0 * moved)
+                moved[k] = h
+            out.append(core.nm(u, moved))
         return out
 
     return play
@@ -83,14 +82,18 @@ def followed(
     line_s: float,
     lines: int,
     samples: int,
+    periods: int = 3,
 ) -> Followed:
-    """From one line (low, high) to another; ``creep`` has shares of what a slow drive reaches, and times in s."""
+    """From one line (low, high) to another; ``creep`` has shares of what a slow drive reaches, and times in s.
+
+    The loop has closed after ``periods``.
+    """
     rest = np.concatenate([_EARLIER, np.linspace(0.0, before[0], 20)])
     old, new = sweep(*before, turn, samples), sweep(*now, turn, samples)
     slew = np.linspace(before[0], now[0], 20)
-    played = play([rest, *[old] * _CLOSED, slew, *[new] * _CLOSED])
-    last, periods = played[_CLOSED], played[_CLOSED + 2 :]
-    settled = periods[-1]
+    played = play([rest, *[old] * periods, slew, *[new] * periods])
+    last, found = played[periods], played[periods + 2 :]
+    settled = found[-1]
     shares, times = creep
     dt = period_s / samples
     decay = np.exp(-dt / times)[:, None]
@@ -105,11 +108,11 @@ def followed(
     count = int(np.ceil(lines * line_s / period_s))
     off = np.empty(count * samples)
     for k in range(count):
-        period = periods[min(k, _CLOSED - 1)] - settled
+        period = found[min(k, periods - 1)] - settled
         for j in range(samples):
             state = decay[:, 0] * state + (1.0 - decay[:, 0]) * period[j]
             off[k * samples + j] = period[j] + float(shares @ state)
     a_line = round(line_s / dt)
     means = off[: lines * a_line].reshape(lines, a_line).mean(axis=1)
     up = round(turn * samples)
-    return Followed(means, (periods[0] - settled)[:up])
+    return Followed(means, (found[0] - settled)[:up])

@@ -194,6 +194,15 @@ def test_a_retrace_that_was_stored_mirrored_can_be_told(setup: Setup, lattice: P
         refine_images(setup, "x", [lattice], Options(), ImageOptions(retrace_mirrored=True))
 
 
+def test_a_grating_exchanged_is_refused_in_the_next_round(setup: Setup) -> None:
+    """Nothing in the images tells it; the layer that it teaches makes the scan worse, and that does."""
+    wrong = [pair[::-1] for pair in frames_of(setup, GRATING)]
+    taught = refine_images(setup, "x", wrong, Options())
+    assert taught.worse == ""
+    again = [pair[::-1] for pair in frames_of(taught.setup, GRATING, seed=1)]
+    assert "the residual grew" in refine_images(taught.setup, "x", again, Options()).worse
+
+
 def test_half_a_period_between_the_images_is_refused(setup: Setup, bars: Pair) -> None:
     """As of a retrace that was cropped, and pasted."""
     with pytest.raises(Unphysical, match=r"0\.\d+ periods of the sample apart"):

@@ -123,7 +123,7 @@ def test_values_under_the_pointer_and_zoom(page: Path, tmp_path: Path) -> None:
     assert title
     told = json.loads(title[1].replace("&gt;", ">").replace("&lt;", "<").replace("&amp;", "&"))
     number = r"(-?[\d.]+)"
-    value = re.fullmatch(rf"time \[ms\]: {number} .*: forward {number}, triangle {number}", told["value"])
+    value = re.fullmatch(rf"time \[ms\]: {number} .*: forward {number}, plain triangle {number}", told["value"])
     assert value, told["value"]
     samples = tablegen.build(page.with_name("scan.toml")).x
     played = np.interp(float(value[1]), 1e3 * samples.time_s, samples.volts)

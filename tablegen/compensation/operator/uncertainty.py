@@ -15,7 +15,6 @@ from tablegen.compensation.operator.operator import MeasuredLine, chebyshev
 from tablegen.numerics.arrays import Floats, tree_sum
 from tablegen.numerics.linear import Cholesky
 
-LEVEL_PERCENT = 90  # of scans that leave less than what is expected and its uncertainty together
 _ALIKE = Lengths(0.6, 2.5, 1e-3)  # departures of lines; the noise is what rates and turns change
 _FEW = 3  # traces, below which all count
 _PLACES = 0.5  # share of what the family leaves that may be another one, for an offset that is v_max from all traces
@@ -67,7 +66,10 @@ def of_formulas(steps: Sequence[float]) -> float:
 
 
 def _deviations(freedom: float) -> float:
-    """Within which Student's t is at ``LEVEL_PERCENT``, to second order in the inverse of the degrees of freedom."""
+    """Within which Student's t is with 90 %, to second order in the inverse of the degrees of freedom.
+
+    That is ``expectation.LEVEL_PERCENT``.
+    """
     return 1.645 + (1.524 + 1.42 / freedom) / freedom
 
 
