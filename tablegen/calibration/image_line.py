@@ -32,9 +32,10 @@ _UNSEEN_TURNS = 0.02  # of what a window leaves out of the sweep: how far its en
 _MIN_EXPLAINED = 0.03  # share of an image's variance
 _MISFIT_SIGNIFICANCE = 1e-3  # probability that noise alone is taken for misfit
 _MIN_OPENING = 0.004  # of the line: what is a loop, and has a sign
-_LARGEST_GAP, _GAP_ERRORS = 0.005, 4.0  # of the line, and in standard errors
+_LARGEST_GAP, _GAP_ERRORS = 0.01, 4.0  # of the line, and in standard errors
 _LARGEST_CROP, _CROP_ERRORS, _CROP_RIPPLES = 0.008, 6.0, 6  # of the line; what few periods cannot tell is not
 _NEAR_TURN, _LEAST_WIDTH = (0.1, 0.9), 1e-3  # of the line
+_LAG_GAP = 0.004  # of the line: so far apart dynamics and creep may keep both sweeps; more where one is fast
 
 
 @dataclass(frozen=True, eq=False)
@@ -262,8 +263,9 @@ def _gap(fit: _Degree) -> tuple[Floats, Floats]:
     # A narrow loop is as little open where much is cropped: how much, its width a tenth of the line further says.
     cropped = float(_cropped(model, state, gap)[worst])
     told = abs(gap[worst]) / error[worst]
-    if (abs(gap[worst]) > _LARGEST_GAP and told > _GAP_ERRORS) or (
-        cropped > _LARGEST_CROP and told > _CROP_ERRORS and count >= _CROP_RIPPLES
+    fast = min(sqrt(0.5 / min(geometry.turn, 1.0 - geometry.turn)), 3.0)
+    if (abs(gap[worst]) > fast * _LARGEST_GAP and told > _GAP_ERRORS) or (
+        cropped > _LARGEST_CROP and abs(gap[worst]) > fast * _LAG_GAP and told > _CROP_ERRORS and count >= _CROP_RIPPLES
     ):
         raise Unphysical(
             f"trace and retrace are {100.0 * abs(gap[worst]):.2g} % of the line apart at its "
