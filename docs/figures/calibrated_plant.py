@@ -161,12 +161,12 @@ def scanned(
 
 
 def refined(plant: ForeignPlant, folder: Path, size_nm: float, offset_v: float, rate_hz: float) -> Line:
-    """The same on the operator after one round of refining, by a sensor with 0.2 % of noise."""
+    """The same on the operator after one round of refining, from 50 periods of a sensor with 0.2 % of noise."""
     path = folder / "scan.toml"
     text = SCAN.format(size_nm=size_nm, offset_v=offset_v, rate_hz=rate_hz, pixels=100)
     path.write_text(text.replace("scanner.toml", "operator.toml"), "utf-8")
     volts = tablegen.build(path).x.volts
-    turns = 0.37 + np.arange(11 * len(volts)) / len(volts)
+    turns = 0.37 + np.arange(50 * len(volts)) / len(volts)
     position = moved(plant, volts, rate_hz, 0.5)
     middles = (np.arange(len(volts)) + 0.5) / len(volts)
     noise = 0.002 * size_nm * np.random.default_rng(1).standard_normal(len(turns))

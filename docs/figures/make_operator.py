@@ -112,13 +112,14 @@ def draw(drawn: dict[tuple[str, str], Line]) -> None:
                 if axes is last:
                     x, error = averaged(x), averaged(error)
                 label = f"{name.split(CUT)[0]}, {'forward' if forward else 'backward'}"
-                axes.plot(x, error, "-" if forward else "--", color=colour, lw=1.6, label=label)
+                width, shade = (4.5, 0.4) if name == REFINED else (1.6, 1.0)
+                axes.plot(x, error, "-" if forward else "--", color=colour, lw=width, alpha=shade, label=label)
         for axes, most in ((before, 7.0), (after, 1.0), (last, 0.05)):
             axes.axhline(0.0, color="#bbbbbb", lw=0.6)
             axes.set(xlim=(0.1, 0.9), ylabel="residual [% of the line]", xlabel="position in the line")
             axes.legend(frameon=False, fontsize=8, ncols=2, loc="upper center")
             axes.set_ylim(-most, 1.4 * most)
-        for axes, what in ((before, "a triangle"), (after, "compensated"), (last, "finer, averaged over 2 %")):
+        for axes, what in ((before, "a triangle"), (after, "compensated"), (last, "20 times finer")):
             axes.set_title(f"{plant}: {size_nm:g} nm at {offset_v:g} V, {what}")
     figure.savefig(FOLDER / "operator.png", dpi=100, metadata={"Software": None})
 
