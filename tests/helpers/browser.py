@@ -5,7 +5,6 @@ import re
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
-from urllib.parse import urlsplit
 
 import numpy as np
 from building import tool
@@ -19,13 +18,11 @@ _OPTIONS = (
     "--headless",
     "--no-sandbox",
     "--disable-gpu",
+    "--disable-dev-shm-usage",
     "--no-first-run",
     "--hide-scrollbars",
 )
-# What Chromium asks for itself, and does not get: by whole names, so that fonts.googleapis.com is a page's.
-_OWN = {f"{name}.google.com" for name in ("accounts", "clients2", "android.clients", "www", "mtalk")}
-_OWN |= {f"{name}.googleapis.com" for name in ("update", "content-autofill", "safebrowsing", "optimizationguide-pa")}
-_OWN |= {"redirector.gvt1.com", "edgedl.me.gvt1.com"}
+_OWN = "not an origin"  # who asks, where it is Chromium itself and no page
 
 
 @dataclass(frozen=True)
@@ -58,13 +55,9 @@ def seen(page: Path, folder: Path) -> Seen:
     """Load a page; ``folder`` is for the browser's own files."""
     log = folder / "net.json"
     done = loaded(folder, page.as_uri(), "--enable-logging=stderr", f"--log-net-log={log}", "--dump-dom")
-    asked = {
-        event["params"]["url"]
-        for event in json.loads(log.read_text("utf-8"))["events"]
-        if isinstance(event.get("params"), dict) and "url" in event["params"]
-    }
-    hosts = {address: str(urlsplit(address).hostname) for address in asked}
-    requests = sorted(address for address, host in hosts.items() if host not in _OWN)
+    events = (event.get("params") for event in json.loads(log.read_text("utf-8"))["events"])
+    asked = [one for one in events if isinstance(one, dict) and one.get("initiator", _OWN) != _OWN]
+    requests = sorted({one["url"] for one in asked})
     return Seen(done.stdout, re.findall(r":CONSOLE[:(]\d*\)?\]? ?(.*)", done.stderr), requests)
 
 
