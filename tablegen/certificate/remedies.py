@@ -151,7 +151,7 @@ def _value(value: object) -> str:
 
 def _against_quantisation(setup: Setup, plan: Plan, line: LinePlan, found: Excess) -> Iterator[Iterator[Change]]:
     axis, table = line.axis, line.program
-    bits = ceil(log2(_MARGIN * found.times))
+    bits = ceil(log2(_MARGIN) + log2(abs(found.percent)) - log2(found.limit))  # their quotient may be no float
     words_per_code = 2.0**table.bits / (abs(line.codes_per_unit) * line.scale)
     if words_per_code < 2.0:
         yield ({f"{axis}.table.bits": b} for b in range(table.bits + bits, _MOST_BITS + 1))

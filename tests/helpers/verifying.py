@@ -129,6 +129,7 @@ class Report:
 
     counts: tuple[str | None, str | None, str | None]  # tests, failures, errors
     cases: dict[tuple[str, str], list[ElementTree.Element]]
+    manifest_sha256: str | None
     seconds: float
     times: list[float]
 
@@ -140,14 +141,17 @@ class Report:
 def read_report(path: Path) -> Report:
     """Its one suite."""
     (suite,) = ElementTree.parse(path).getroot()
+    found = suite.findall("testcase")
     cases = {}
-    for case in suite:
+    for case in found:
         classname = case.get("classname", "")
         assert classname.startswith(f"{NAME}."), classname
         cases[classname.removeprefix(f"{NAME}."), case.get("name", "")] = list(case)
-    assert len(cases) == len(suite), "two cases of one name"
+    assert len(cases) == len(found), "two cases of one name"
     counts = suite.get("tests"), suite.get("failures"), suite.get("errors")
-    return Report(counts, cases, float(suite.get("time", "nan")), [float(case.get("time", "nan")) for case in suite])
+    properties = {one.get("name"): one.get("value") for one in suite.findall("properties/property")}
+    seconds, times = float(suite.get("time", "nan")), [float(case.get("time", "nan")) for case in found]
+    return Report(counts, cases, properties.get("manifest_sha256"), seconds, times)
 
 
 def command(*arguments: str | Path, **environment: str) -> subprocess.CompletedProcess[str]:

@@ -8,6 +8,7 @@ import json
 import re
 import shutil
 import signal
+from hashlib import sha256
 from pathlib import Path
 
 import pytest
@@ -421,6 +422,7 @@ def test_junit_has_a_case_a_check(short: Build, tmp_path: Path) -> None:
     assert 0.0 < told.seconds == pytest.approx(sum(told.times), abs=0.02 * CHECKS)
     assert list(told.cases) == list(verdicts(outcome))
     assert told.failed == set()
+    assert told.manifest_sha256 == sha256((short.folder / "manifest.json").read_bytes()).hexdigest()
 
 
 @pytest.mark.common
