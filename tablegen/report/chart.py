@@ -18,7 +18,7 @@ _ROOM = 0.06  # above and below the curves, of their range
 class DrawnCurve:
     """Values over a coordinate, (n,) each; NaN breaks the line. ``role`` decides colour and line style.
 
-    A curve without a name is not in the legend.
+    A curve without a name is not in the legend. A ``faint`` one is of the same direction and matters less.
     """
 
     name: str
@@ -26,6 +26,7 @@ class DrawnCurve:
     x: Floats
     y: Floats
     kind: Literal["line", "points", "stems", "area"] = "line"
+    faint: bool = False
 
 
 @dataclass(frozen=True)
@@ -47,8 +48,38 @@ class Mark:
 
 
 @dataclass(frozen=True, eq=False)
+class Raster:
+    """An image: values of shape (rows, columns), the first row on top, NaN left out; ``low`` to ``high`` are shaded.
+
+    It spans ``x``, from left to right, and ``y``, from below to above. ``label`` is that of the scale of its shades,
+    with the unit; without one there is no scale.
+    """
+
+    values: Floats
+    x: tuple[float, float]
+    y: tuple[float, float]
+    low: float
+    high: float
+    shades: Literal["grey", "heat", "signed"] = "grey"
+    label: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Arrows:
+    """Arrows from (x, y) by (dx, dy), (n,) each, in the units of the axes."""
+
+    x: Floats
+    y: Floats
+    dx: Floats
+    dy: Floats
+
+
+@dataclass(frozen=True, eq=False)
 class Chart:
-    """One chart. ``key`` is its id in the page and its name as a file; labels contain the unit."""
+    """One chart. ``key`` is its id in the page and its name as a file; labels contain the unit.
+
+    ``equal``: a step of x is as long as one of y.
+    """
 
     key: str
     title: str
@@ -61,15 +92,22 @@ class Chart:
     x_range: tuple[float, float] | None = None
     y_range: tuple[float, float] | None = None
     caption: str = ""
+    raster: Raster | None = None
+    arrows: Arrows | None = None
+    equal: bool = False
 
     @property
     def x_limits(self) -> tuple[float, float]:
         """What the horizontal axis spans."""
+        if self.raster is not None and self.x_range is None:
+            return self.raster.x
         return self.x_range or _range([curve.x for curve in self.curves], [], 0.0)
 
     @property
     def y_limits(self) -> tuple[float, float]:
-        """What the vertical axis spans."""
+        """What the vertical axis spans, from below to above."""
+        if self.raster is not None and self.y_range is None:
+            return self.raster.y
         marks = [mark.at for mark in self.marks if mark.of == "y"]
         return self.y_range or _range([curve.y for curve in self.curves], marks, _ROOM)
 

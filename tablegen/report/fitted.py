@@ -151,8 +151,8 @@ def operator_page(
         "trace",
         "rms residual [% of the line]",
         (
-            DrawnCurve("in the fit", "forward", numbers - _BESIDE, inside, "points"),
-            DrawnCurve("left out", "backward", numbers + _BESIDE, left_out, "points"),
+            DrawnCurve("in the fit", "before", numbers - _BESIDE, inside, "points"),
+            DrawnCurve("left out", "other", numbers + _BESIDE, left_out, "points"),
         ),
         marks=(Mark(0.0, "", "y"),),
         x_range=(0.0, len(traces) + 1.0),

@@ -65,8 +65,8 @@ def _errors(found: Round) -> Section:
 def _layer(found: Round) -> Section:
     lesson, bound = found.lesson, found.bound
     curves = (
-        DrawnCurve("this round", "other", _TURNS, 100.0 * lesson.change.value(_TURNS)),
-        DrawnCurve("the layer now", "forward", _TURNS, 100.0 * lesson.layer.value(_TURNS)),
+        DrawnCurve("this round", "other", _TURNS, 100.0 * lesson.change.value(_TURNS), faint=True),
+        DrawnCurve("the layer now", "other", _TURNS, 100.0 * lesson.layer.value(_TURNS)),
     )
     text = (
         f"Harmonics 1 to {lesson.harmonics} of {bound.used}, at a gain of {bound.gain:g}. It converges while the "
