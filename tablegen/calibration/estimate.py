@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from math import isfinite, nan
+from typing import Literal
 
 from tablegen.numerics.arrays import Floats
 
@@ -29,13 +30,19 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Curve:
-    """Points and the fitted line through them, for a plot; as (x, y)."""
+    """Points and the fitted line through them, for a plot; as (x, y). Labels contain the unit.
+
+    ``backward`` has the first points of the backward direction, measured and fitted, where a curve has both directions;
+    ``direction`` is that of a curve that has one.
+    """
 
     title: str
     x_label: str
     y_label: str
     measured: tuple[Floats, Floats]
     fitted: tuple[Floats, Floats]
+    backward: tuple[int, int] | None = None
+    direction: Literal["forward", "backward", ""] = ""
 
 
 @dataclass(frozen=True)

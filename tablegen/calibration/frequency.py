@@ -75,7 +75,7 @@ def fit_frequency(frequency_hz: Floats, gain: Floats, reference_hz: float | None
         before_percent=float(np.max(np.abs(100.0 * (measured - 1.0)))),
         remarks=tuple(remarks),
         outliers=outliers(solution.jacobian, solution.residuals, _MIN_SCATTER),
-        curves=(Curve("gain", "log10 of Hz", "gain", (np.log10(frequency_hz), measured), (np.log10(line), fitted)),),
+        curves=(Curve("gain", "frequency [Hz]", "gain [ratio]", (frequency_hz, measured), (line, fitted)),),
         alpha=alpha,
         reference_hz=reference_hz,
         gain=Estimate(height.value * scale, height.standard_error * scale),

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -12,6 +13,8 @@ from tablegen.calibration.trace import TraceFit, fit_trace
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
+
+_SIDES: tuple[Literal["forward", "backward"], ...] = ("forward", "backward")
 
 TYPICAL_RHO = 1.5  # the paper's backward scan, and the default of the scanner file
 OFFSET_TOLERANCE = 0.02  # of v_max: offsets that differ by less are one
@@ -181,11 +184,12 @@ def _curves(branches: Sequence[TurnFit], v_max: float) -> list[Curve]:
     line = np.linspace(0.0, 1.0, 101)
     for branch in branches:
         curves += branch.traces[-1].curves
-        for name in ("forward", "backward"):
+        for name in _SIDES:
             growth: Growth = getattr(branch, name)
             v = np.array([fit.v_scan for fit in branch.traces])
             beta = np.array([getattr(fit, name).beta.value for fit in branch.traces])
             title = f"peak residual {name}, turn {branch.turn.value:.3g}"
             fitted = (line * v_max, 100.0 * growth.beta(line))
-            curves.append(Curve(title, "scan voltage [V]", "% of scan", (v, 100.0 * beta), fitted))
+            label = "peak residual [% of the scan]"
+            curves.append(Curve(title, "scan voltage [V]", label, (v, 100.0 * beta), fitted, None, name))
     return curves

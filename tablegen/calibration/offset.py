@@ -85,7 +85,7 @@ def fit_offset(
             Curve(
                 "apparent size, relative",
                 "offset [V]",
-                "size / that at v_max / 2",
+                "size / that at v_max / 2 [ratio]",
                 (offset_v, apparent_nm / centre),
                 (line, curve),
             ),

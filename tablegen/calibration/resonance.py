@@ -87,10 +87,10 @@ def fit_resonance(frequency_hz: Floats, gain: Floats, phase_deg: Floats | None =
         missed = float(np.degrees(np.sqrt(np.mean((lag - phase) ** 2))))
         if missed > _POOR_DEGREES:
             remarks.append(f"the phase is missed by {missed:.2g} degrees rms; are the points near enough to follow it?")
-    curves = [Curve("gain", "log10 of Hz", "dB", (np.log10(f), decibels[0]), (np.log10(line), decibels[1]))]
+    curves = [Curve("gain", "frequency [Hz]", "gain [dB]", (f, decibels[0]), (line, decibels[1]))]
     if phase is not None:
-        degrees = (np.log10(line), np.degrees(model_phase))
-        curves.append(Curve("phase", "log10 of Hz", "degrees", (np.log10(f), np.degrees(phase)), degrees))
+        degrees = (line, np.degrees(model_phase))
+        curves.append(Curve("phase", "frequency [Hz]", "phase [degrees]", (f, np.degrees(phase)), degrees))
     rows = outliers(solution.jacobian, solution.residuals, _MIN_SCATTER)
     return ResonanceFit(
         points=len(f),

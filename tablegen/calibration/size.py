@@ -104,7 +104,7 @@ def fit_size(
             Curve(
                 "size against that of the linear law",
                 "drive [V]",
-                "ratio",
+                "size / that law [ratio]",
                 (drive_v, actual_nm / (linear * v)),
                 (line * v_max, fit.size(solution.values, line) / (linear * line)),
             ),

@@ -6,7 +6,6 @@ from typing import Any, Literal
 import msgspec
 import numpy as np
 
-from tablegen.calibration.estimate import Curve
 from tablegen.config.load import Setup
 from tablegen.config.schema import Refinement
 from tablegen.numerics.arrays import Floats
@@ -50,18 +49,6 @@ class Round:
     def recorded(self) -> str:
         """How much was recorded, in words."""
         raise NotImplementedError
-
-    @property
-    def curves(self) -> list[Curve]:
-        """Residual of each direction: measured, and as predicted with the new layer."""
-        before, after = self.lesson.before, self.lesson.after
-        curves = []
-        for side, x in before.points.by_side(before.points.position).items():
-            measured, predicted = (100.0 * d.points.by_side(d.error)[side] for d in (before, after))
-            thin = slice(None, None, 20)
-            title = f"residual {side}: measured (points), predicted (line)"
-            curves.append(Curve(title, "position", "% of line", (x[thin], measured[thin]), (x, predicted)))
-        return curves
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -11,6 +11,7 @@ from tablegen.numerics.arrays import Floats
 
 Role = Literal["forward", "backward", "before", "other", "limit"]
 _BINS = 400  # of a curve with more points than twice that: the least and the largest of each are drawn
+POSITION = "position on the line [share]"
 _ROOM = 0.06  # above and below the curves, of their range
 
 
@@ -116,6 +117,12 @@ class Chart:
         """The curves that have a name, each name once."""
         return list({curve.name: curve for curve in self.curves if curve.name}.values())
 
+    @property
+    def needed_legend(self) -> list[DrawnCurve]:
+        """The same, but none of a single curve that has no direction: the title says what it is."""
+        found = self.legend
+        return found if len(found) > 1 or any(curve.role in ("forward", "backward") for curve in found) else []
+
 
 def _range(values: list[Floats], more: list[float], room: float) -> tuple[float, float]:
     found = np.concatenate([*values, np.array(more)])
@@ -162,7 +169,7 @@ def ticks(low: float, high: float, log: bool = False, wanted: int = 5) -> list[t
     step = next(size for size in (1.0, 2.0, 5.0, 10.0) if size * 10.0**power >= raw * 0.999) * 10.0**power
     digits = max(0, -floor(log10(step) + 1e-9))
     first, last = ceil(low / step - 1e-9), floor(high / step + 1e-9)
-    return [(i * step, f"{i * step:.{digits}f}" if digits < 7 else f"{i * step:.3g}") for i in range(first, last + 1)]
+    return [(i * step, f"{i * step:.{digits}f}" if digits < 5 else f"{i * step:.3g}") for i in range(first, last + 1)]
 
 
 def _power(power: int) -> str:

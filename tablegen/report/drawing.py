@@ -6,12 +6,13 @@ Places are in pixels from the upper left. What is ``Inside`` a chart has places 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import log10
+from textwrap import wrap
 from typing import Literal
 
 import numpy as np
 
 from tablegen.numerics.arrays import Floats
-from tablegen.report.chart import Chart, DrawnCurve, Mark, Raster, runs, ticks
+from tablegen.report.chart import Band, Chart, DrawnCurve, Mark, Raster, runs, ticks
 from tablegen.report.looks import palette, shaded
 
 WIDTH, HEIGHT = 536, 290
@@ -22,6 +23,7 @@ _FAR = 10_000.0  # nothing is drawn farther out than that
 _HEAD = 4.0  # of an arrow
 _ROW = 18  # of a legend
 _LETTER = 7.1  # about as wide as one is
+_TITLE_LETTERS = 54  # of a row
 
 
 @dataclass(frozen=True)
@@ -236,32 +238,45 @@ def _arrows(chart: Chart, frame: _Frame) -> Iterator[tuple[float, float, float, 
                 yield c, d, c - head * (along + side * across), d - head * (across - side * along)
 
 
-def legend_rows(chart: Chart) -> list[list[tuple[float, DrawnCurve]]]:
+def legend_rows(chart: Chart) -> list[list[tuple[float, DrawnCurve | Band]]]:
     """The entries of a legend in rows, each with its place from the left."""
-    rows: list[list[tuple[float, DrawnCurve]]] = []
+    rows: list[list[tuple[float, DrawnCurve | Band]]] = []
+    bands = {band.name: band for band in chart.bands if band.name}
     x = float(WIDTH)
-    for curve in chart.legend if len(chart.legend) > 1 else ():
-        needs = 56.0 + _LETTER * len(curve.name)
+    entries: list[DrawnCurve | Band] = [*chart.needed_legend, *bands.values()]
+    for one in entries:
+        needs = 56.0 + _LETTER * len(one.name)
         if x + needs > WIDTH - _LEFT - _RIGHT:
             rows.append([])
             x = 0.0
-        rows[-1].append((x, curve))
+        rows[-1].append((x, one))
         x += needs
     return rows
 
 
-def _with_title(chart: Chart, rows: int) -> tuple[Part, ...]:
-    """A chart below its title and a legend that has room for some rows."""
-    parts: list[Part] = [Words("title", _LEFT, 20, chart.title)]
+def _title_rows(chart: Chart) -> list[str]:
+    """The title in as many rows as it takes."""
+    return wrap(chart.title, _TITLE_LETTERS) or [""]
+
+
+def _with_title(chart: Chart, titles: int, rows: int) -> tuple[Part, ...]:
+    """A chart below its title and a legend, which have room for some rows."""
+    parts: list[Part] = [Words("title", _LEFT, 20 + _ROW * at, text) for at, text in enumerate(_title_rows(chart))]
     for number, entries in enumerate(legend_rows(chart)):
-        y = 38.0 + _ROW * number
-        for x, curve in entries:
+        y = 20.0 + _ROW * (titles + number)
+        for x, one in entries:
             left = _LEFT + x
-            across = np.array([left + 15.0] if curve.kind == "points" else [left, left + 30.0])
-            piece = curve if curve.kind == "points" else replace(curve, kind="line")
-            parts.append(Trail(piece, ((across, np.full(len(across), y)),)))
-            parts.append(Words("legend", left + 38, y + 4, curve.name))
-    return (*parts, Moved(0, 26 + _ROW * rows, drawing(chart)))
+            parts += [_swatch(one, left, y), Words("legend", left + 38, y + 4, one.name)]
+    return (*parts, Moved(0, 8 + _ROW * (titles + rows), drawing(chart)))
+
+
+def _swatch(one: DrawnCurve | Band, left: float, y: float) -> Part:
+    """A piece of what a legend names."""
+    if isinstance(one, Band):
+        return Box("band", left, y - 7, 30, 14)
+    across = np.array([left + 15.0] if one.kind == "points" else [left, left + 30.0])
+    piece = one if one.kind == "points" else replace(one, kind="line")
+    return Trail(piece, ((across, np.full(len(across), y)),))
 
 
 def sheet(heading: str, charts: Sequence[Chart], columns: int) -> tuple[int, int, tuple[Part, ...]]:
@@ -274,7 +289,8 @@ def sheet(heading: str, charts: Sequence[Chart], columns: int) -> tuple[int, int
     columns = min(columns, len(charts))
     for first in range(0, len(charts), columns):
         row = charts[first : first + columns]
+        titles = max(len(_title_rows(chart)) for chart in row)
         rows = max(len(legend_rows(chart)) for chart in row)
-        parts += [Moved(WIDTH * at, y, _with_title(chart, rows)) for at, chart in enumerate(row)]
-        y += 26 + _ROW * rows + max(map(height_of, row))
+        parts += [Moved(WIDTH * at, y, _with_title(chart, titles, rows)) for at, chart in enumerate(row)]
+        y += 8 + _ROW * (titles + rows) + max(map(height_of, row))
     return WIDTH * columns, y, tuple(parts)

@@ -51,13 +51,21 @@ def svg(chart: Chart) -> Markup:
 
 def standalone(charts: Sequence[Chart], heading: str = "", columns: int = 2) -> str:
     """Charts as a file of its own, with their titles and legends. No style sheet: it would be that of a whole page."""
+    space = Markup(' xmlns="http://www.w3.org/2000/svg"')
+    return f'<?xml version="1.0" encoding="utf-8"?>\n{_alone(charts, heading, columns, space)}\n'
+
+
+def embedded(charts: Sequence[Chart], columns: int = 2) -> str:
+    """The same as a part of an HTML page of somebody else, such as a notebook."""
+    return str(_alone(charts, "", columns, Markup("")))
+
+
+def _alone(charts: Sequence[Chart], heading: str, columns: int, space: Markup) -> Markup:
     width, height, parts = sheet(heading, charts, columns)
-    return str(
-        Markup(
-            '<svg xmlns="http://www.w3.org/2000/svg" width="{0}" height="{1}" viewBox="0 0 {0} {1}" '
-            'font-family="sans-serif"><rect width="{0}" height="{1}" fill="#ffffff"/>{2}</svg>\n'
-        ).format(width, height, _all(parts, _looks))
-    )
+    return Markup(
+        '<svg{3} width="{0}" height="{1}" viewBox="0 0 {0} {1}" font-family="sans-serif">'
+        '<rect width="{0}" height="{1}" fill="#ffffff"/>{2}</svg>'
+    ).format(width, height, _all(parts, _looks), space)
 
 
 def swatch(curve: DrawnCurve) -> Markup:
