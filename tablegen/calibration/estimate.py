@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from math import isfinite, nan
 from typing import Literal
 
+from tablegen.findings import Remark
 from tablegen.numerics.arrays import Floats
 
 
@@ -89,7 +90,7 @@ class Fit:
     points: int
     residual_percent: Floats
     before_percent: float
-    remarks: tuple[str, ...]
+    remarks: tuple[Remark, ...]
     outliers: tuple[int, ...]
     curves: tuple[Curve, ...]
     images: tuple[ImageSize, ...] = ()

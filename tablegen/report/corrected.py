@@ -127,7 +127,7 @@ def _apart(scan: StraightScan) -> Chart:
     title, curves = "trace and retrace have too little in common", []
     if len(found.place):
         after = float(np.max(np.abs(found.apart[1])))
-        title = f"retrace right of the trace; after: {after:.2g} pixels at most"
+        title = f"retrace right of the trace, after: {after:.2g} pixels"
         before = DrawnCurve("before", "before", found.place, found.apart[0])
         curves = [before, DrawnCurve("after", "other", found.place, found.apart[1])]
     zero = (Mark(0.0, "", "y"),)

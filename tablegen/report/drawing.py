@@ -23,7 +23,7 @@ _FAR = 10_000.0  # nothing is drawn farther out than that
 _HEAD = 4.0  # of an arrow
 _ROW = 18  # of a legend
 _LETTER = 7.1  # about as wide as one is
-_TITLE_LETTERS = 54  # of a row
+_TITLE_LETTERS = 50  # of a row
 
 
 @dataclass(frozen=True)

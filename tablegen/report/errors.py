@@ -121,7 +121,7 @@ def windows(line: LinePlan, period: float) -> tuple[Band, ...]:
     found = []
     for side in sides:
         first, last = sorted(float(t) for t in line.drive.shape.times(side, np.array([low, high])))
-        found.append(Band(first * period, last * period, f"imaged {side}"))
+        found.append(Band(first * period, last * period, "imaged"))
     return tuple(found)
 
 

@@ -54,7 +54,7 @@ def _errors(found: Round) -> Section:
 def round_charts(found: Round, name: str) -> PlottedCharts:
     """What a round measured, what it predicts, and what it adds to the drive."""
     heading = f"{name}: refinement of {found.line.axis}"
-    return PlottedCharts(heading, (*_residuals(found), _layer_chart(found)))
+    return PlottedCharts(heading, (*_residuals(found), _layer_chart(found)), 3)
 
 
 def _residuals(found: Round) -> tuple[Chart, ...]:

@@ -40,7 +40,7 @@ def _trace(number: int, fit: OperatorFit, line: PeriodicLine, v_max: float) -> C
     where = f"{line.stroke * v_max:.3g} V about {line.centre * v_max:.3g} V, {line.rate_hz:.3g} Hz"
     return Chart(
         f"trace-{number + 1}",
-        f"{where}: rms {inside.rms:.2g} %, left out {outside.rms:.2g} %",
+        f"{where}: {outside.rms:.2g} % rms left out",
         POSITION,
         "residual [% of the line]",
         tuple(curves),
