@@ -55,8 +55,7 @@ def _members(content: bytes) -> Iterator[tuple[str, AnyArray]]:
         for one in members:
             if one.flag_bits & 1:
                 raise ValueError(f"{one.filename} is encrypted")
-            with archive.open(one) as member:
-                yield one.filename.removesuffix(".npy"), _array(member.read(one.file_size))
+            yield one.filename.removesuffix(".npy"), _array(archive.read(one))
 
 
 def _fields(content: bytes) -> Iterator[tuple[str, AnyArray]]:
