@@ -8,7 +8,7 @@ from tablegen.certificate.doubts import Doubt, doubts
 from tablegen.certificate.excess import Excess, excess
 from tablegen.certificate.matching import apart_percent, apart_warning
 from tablegen.config.load import Setup
-from tablegen.findings import Finding, worst_first
+from tablegen.findings import Finding, as_printed, worst_first
 from tablegen.planning.line_plan import LinePlan, Plan
 from tablegen.problems import Problem
 
@@ -56,7 +56,7 @@ def weighed_warnings(setup: Setup, plan: Plan, certificates: Mapping[str, Certif
         given = setup.scan.timing.ticks_per_line is not None
         key = f"timing.{'ticks_per_line' if given else 'line_rate_hz'}"
         warnings.append((apart_percent(plan), setup.scan_file.problem(key, apart)))
-    return sorted(warnings, key=lambda one: -one[0])
+    return sorted(warnings, key=lambda one: -as_printed(one[0]))
 
 
 def doubt_percent(doubt: Doubt, certificate: Certificate) -> float:
