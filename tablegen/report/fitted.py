@@ -156,7 +156,7 @@ def operator_page(
     chart = Chart(
         "left-out",
         "rms residual of each trace",
-        "trace",
+        "trace [number]",
         "rms residual [% of the line]",
         (
             DrawnCurve("in the fit", "before", numbers - _BESIDE, inside, "points"),

@@ -13,6 +13,7 @@ import pytest
 from chart_rules import drawn_charts, faults, text_faults
 from editing import run
 from plotting_lab import PLOTTING, REPORTING, make_lab
+from sets import quick
 
 from tablegen.cli import cli
 from tablegen.report.chart import Band, Chart, DrawnCurve, Mark, Raster
@@ -29,8 +30,7 @@ def lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     os.chdir(before)
 
 
-@pytest.mark.common
-@pytest.mark.parametrize("name", PLOTTING)
+@pytest.mark.parametrize("name", quick(["show", "refine", "calibrate hysteresis"], [*PLOTTING]))
 def test_every_picture_of_a_command(name: str, lab: Path) -> None:
     """In the file, and in a terminal of 80 and of 120 characters, with Unicode and without."""
     with drawn_charts() as charts:
@@ -47,8 +47,7 @@ def test_every_picture_of_a_command(name: str, lab: Path) -> None:
                 assert text_faults(chart, width, unicode) == [], chart.title
 
 
-@pytest.mark.common
-@pytest.mark.parametrize("name", REPORTING)
+@pytest.mark.parametrize("name", quick(["report"], [*REPORTING]))
 def test_every_chart_of_a_page(name: str, lab: Path) -> None:
     if name == "report of a build":
         assert run(*PLOTTING["build"]).status == 0
