@@ -50,31 +50,33 @@ def make_lab(folder: Path) -> None:
     own = folder / "own"
     own.mkdir()
     write_operator_scan(own, operator_file(), "- [limits]")
-    _write(folder / "offset.csv", offset_v=OFFSETS, apparent_nm=apparent(OFFSETS, 0.93, 1.22, 17.7) * NOISE[:5])
+    write_csv(folder / "offset.csv", offset_v=OFFSETS, apparent_nm=apparent(OFFSETS, 0.93, 1.22, 17.7) * NOISE[:5])
     sizes = actual(DRIVES, 11.0, 0.6, 0.5, 200.0) * NOISE[:11]
-    _write(folder / "size.csv", drive_v=DRIVES, actual_nm=sizes)
+    write_csv(folder / "size.csv", drive_v=DRIVES, actual_nm=sizes)
     gain = (1.0 - 0.025 * np.log10(FREQUENCIES / 100.0)) * NOISE[:15]
-    _write(folder / "frequency.csv", frequency_hz=FREQUENCIES, gain=gain)
+    write_csv(folder / "frequency.csv", frequency_hz=FREQUENCIES, gain=gain)
     r = RESPONSE / 41e3
     h = np.exp(-2j * np.pi * RESPONSE * 2e-6) / (1.0 - r**2 + 1j * r / 15.0)
     phase = np.degrees(np.angle(h))
-    _write(folder / "resonance.csv", frequency_hz=RESPONSE, gain=np.abs(h) * NOISE[:58], phase_deg=phase)
+    write_csv(folder / "resonance.csv", frequency_hz=RESPONSE, gain=np.abs(h) * NOISE[:58], phase_deg=phase)
     noise = np.random.default_rng(12).standard_normal((3, 2, 800)) * 0.002
     for v, one in zip(AMPLITUDES, noise, strict=True):
         trace = Scanner(forward=(0.04, 3.0, 0.4), backward=(0.07, 1.2, 0.46)).trace(v, 3.3, 800, one)
         columns = {"time_s": trace.time_s, "drive_v": trace.drive_v, "displacement_nm": trace.displacement_nm}
-        _write(folder / f"trace{v:g}.csv", **columns)
+        write_csv(folder / f"trace{v:g}.csv", **columns)
     pair = Scanner().images(100.0, grating(16.0, pixels=128, lines=96), 0.05, np.random.default_rng(8))
     np.save(folder / "t100.npy", pair.trace)
     np.save(folder / "r100.npy", pair.retrace)
     for number, (centre, stroke) in enumerate(SIX[1::2]):
         time_s, drive_v, nm = record(ForeignPlant(ManyPlays()), centre, stroke, seed=number)
-        _write(folder / f"o{2 * number + 1}.csv", time_s=time_s, drive_v=drive_v, displacement_nm=nm)
+        write_csv(folder / f"o{2 * number + 1}.csv", time_s=time_s, drive_v=drive_v, displacement_nm=nm)
     save_pair(old_frame("paper", pixels=96, lines=64), folder)
     step = play(load(folder / "scan.toml"), "x", scanner().x)
-    _write(folder / "trace.csv", **sensed(step.line, scanner().x, 0, samples=1000, periods=6.3))
+    write_csv(folder / "trace.csv", **sensed(step.line, scanner().x, 0, samples=1000, periods=6.3))
 
 
-def _write(path: Path, **columns: Any) -> None:
+def write_csv(path: Path, **columns: Any) -> Path:
+    """Columns of numbers as a file; its path."""
     rows = zip(*([repr(float(v)) for v in values] for values in columns.values()), strict=True)
     path.write_text("\n".join([",".join(columns), *map(",".join, rows)]) + "\n", "utf-8")
+    return path
