@@ -8,6 +8,7 @@ from typing import Annotated
 from msgspec import Meta, Struct
 
 from tablegen.compensation.model import Hysteresis
+from tablegen.config.schema import Amplifier, Dac
 from tablegen.quantities import FileName, Hertz, Name, Nanometres, PositiveVolts, Volts
 
 Factor = Annotated[float, Meta(ge=0.1, le=10.0)]
@@ -107,6 +108,10 @@ class ScannerAxis(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     hysteresis: Hysteresis | None = None
     frequency: Frequency | None = None
     resonance: Resonance | None = None
+    dac: Annotated[Dac, Meta(description="The converter of this axis; its keys go before those of `[dac]`.")] = Dac()
+    amplifier: Annotated[
+        Amplifier, Meta(description="The amplifier of this axis; its keys go before those of `[amplifier]`.")
+    ] = Amplifier()
 
 
 class Scanner(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -116,5 +121,9 @@ class Scanner(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     v_max: Annotated[
         PositiveVolts, Meta(description="maximum output of the piezo driver; normalised voltages refer to it")
     ]
+    dac: Annotated[Dac, Meta(description="The converter of both axes, for every scan on this scanner.")] = Dac()
+    amplifier: Annotated[Amplifier, Meta(description="The amplifier of both axes, for every scan on this scanner.")] = (
+        Amplifier()
+    )
     x: ScannerAxis
     y: ScannerAxis

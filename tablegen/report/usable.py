@@ -76,7 +76,7 @@ def largest_sizes(planned: PlannedScan, line: LinePlan) -> tuple[Floats, Floats,
         line.converter.v_zero + line.converter.v_per_code * code for code in (0, (1 << line.converter.bits) - 1)
     )
     bottom, top = max(0.0, ends[0]), min(v_max, ends[1])
-    slew = planned.setup.scan.amplifier.max_slew_v_per_s
+    slew = planned.setup.hardware(line.axis).amplifier.max_slew_v_per_s
     fastest = np.inf if slew is None else slew / (line.series.peak_slope() * float(Fraction(line.rate)))
     surface = _surface(planned, line)
     v = np.linspace(0.0, 1.0, _SIZES)[1:]

@@ -280,7 +280,7 @@ KEYS = [
     case("limits.max_error = 1", says="scan.toml:55: limits.max_error: unknown key; max_error_lsb is given as well"),
     case("- dac.bits", says="scan.toml:5: dac.bits: missing; this key is required"),
     case("- timing.lines", says="scan.toml:17: timing.lines: missing; this key is required"),
-    case("- [dac]", says="scan.toml:1: dac: missing; this table is required"),
+    case("- [dac]", says="scan.toml:1: dac: missing; this table is required, here or in the scanner file"),
     case("- [timing]", says="scan.toml:1: timing: missing; this table is required"),
     case("- name", says="scan.toml:1: name: missing; this key is required"),
     case("- scanner", says="scan.toml:1: scanner: missing; this key is required"),
@@ -1341,7 +1341,8 @@ def test_every_fault_of_both_files_is_reported_in_one_run(here: Path) -> None:
     outcome = run("build", "scan.toml", "-o", "out")
     assert outcome.messages == [
         "scan.toml:2: name: 'wire' is a reserved word of C, C++, Verilog, SystemVerilog or VHDL",
-        "scan.toml:6: dac.hue: unknown key; known here: align, bits, coding, update_rate_hz, v_max, v_min, word_bits",
+        "scan.toml:6: dac.hue: unknown key; known here: align, bits, coding, inverted, update_rate_hz, v_max, v_min, "
+        "word_bits",
         "scan.toml:7: dac.bits: 30 is above 24",
         "scan.toml:14: amplifier.gain: nan is not a finite number",
         "scan.toml:18: timing.lines: missing; this key is required",
