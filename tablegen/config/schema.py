@@ -105,7 +105,7 @@ class FastAxis(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         Meta(description="what `size_nm` measures: the whole line, or the imaging window"),
     ] = "line"
     offset_v: Annotated[Volts, Meta(description="offset voltage at the piezo; or give `offset_nm`")] | None = None
-    offset_nm: Annotated[float, Meta(ge=0.0, le=1e9, description="position relative to that at 0 V")] | None = None
+    offset_nm: Annotated[float, Meta(ge=-1e9, le=1e9, description="position relative to that at 0 V")] | None = None
     park_v: Annotated[Volts, Meta(description="voltage at the piezo after park; default: the offset")] | None = None
     turn: Annotated[
         Normalised, Meta(description="turning point: fraction of the period in which the axis moves forward")

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from math import ceil, floor
 
 from tablegen.config.hardware import AxisAmplifier, AxisDac
+from tablegen.driver import Driver
 from tablegen.fixedpoint.interpolation import guard_bits
 from tablegen.fixedpoint.output import UNIT_GAIN_BITS, Output
 from tablegen.fixedpoint.rounding import round_number
@@ -48,16 +49,16 @@ def fit_gain(amplitude: float, peak: float, bits: int, dac_bits: int) -> tuple[i
 def make_output(
     dac: AxisDac,
     converter: Converter,
-    v_max: float,
+    driver: Driver,
     v_offset: float,
     v_park: float,
     bits: int,
     gain_word: int,
     max_step: int,
 ) -> Output:
-    """The output stage of one axis; the clamp keeps the piezo inside 0..v_max and the code inside the converter."""
+    """The output stage of one axis; the clamp keeps the piezo in the driver's range, the code in the converter's."""
     gain_q = UNIT_GAIN_BITS + bits + guard_bits(bits) - dac.bits
-    ends = sorted((converter.code(0.0), converter.code(v_max)))
+    ends = sorted((converter.code(driver.v_min), converter.code(driver.v_max)))
     # A millionth of a code forgives the last bits of the voltages, not the voltages.
     code_min, code_max = max(0, ceil(ends[0] - 1e-6)), min((1 << dac.bits) - 1, floor(ends[1] + 1e-6))
     return Output(

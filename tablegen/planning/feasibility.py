@@ -11,6 +11,7 @@ import numpy as np
 from tablegen.config.hardware import AxisAmplifier, AxisDac
 from tablegen.config.load import Setup
 from tablegen.config.schema import FastAxis
+from tablegen.driver import Driver
 from tablegen.figures import at_least, at_most
 from tablegen.fixedpoint.converter import Converter
 from tablegen.fixedpoint.interpolation import guard_bits
@@ -100,15 +101,15 @@ class Feasibility:
 
     def check_range(self, drive: Drive, converter: Converter, low: float, high: float) -> None:
         """The drive, for w from ``low`` to ``high``, has to stay inside the driver and inside the converter."""
-        self._check_park(drive.v_max, converter)
+        self._check_park(drive.driver, converter)
         down, up = drive.v_amplitude * (0.5 - low), drive.v_amplitude * (high - 0.5)
         bottom, top = drive.v_offset - down, drive.v_offset + up
-        outside = max(-bottom, top - drive.v_max)
-        if outside > 1e-9 * drive.v_max:
+        outside = drive.driver.beyond(bottom, top)
+        if outside > 1e-9 * drive.driver.span:
             self._add(
                 self._size_key,
                 f"the drive spans {bottom:.4f}..{top:.4f} V, {outside:.4g} V outside the driver's "
-                f"0..{drive.v_max:g} V; {_offsets_that_fit(drive, low, high)}, {self._size_that_fits(drive, down, up)}",
+                f"{drive.driver}; {_offsets_that_fit(drive, low, high)}, {self._size_that_fits(drive, down, up)}",
             )
             return
         ends = sorted((converter.code(bottom), converter.code(top)))
@@ -135,13 +136,13 @@ class Feasibility:
     def _size_key(self) -> str:
         return f"{self._axis}.{'size_v' if self._scan.size_v is not None else 'size_nm'}"
 
-    def _check_park(self, v_max: float, converter: Converter) -> None:
+    def _check_park(self, driver: Driver, converter: Converter) -> None:
         """The park voltage has to be one that the driver and the converter reach."""
         park_v, key = self._scan.park_v, f"{self._axis}.park_v"
         if park_v is None:
             return
-        if not 0.0 <= park_v <= v_max:
-            self._add(key, outside_driver(park_v, v_max))
+        if driver.beyond(park_v, park_v) > 0.0:
+            self._add(key, outside_driver(park_v, driver))
             return
         last = (1 << converter.bits) - 1
         if not -0.5 <= converter.code(park_v) < last + 0.5:
@@ -150,13 +151,13 @@ class Feasibility:
 
     def _size_that_fits(self, drive: Drive, down: float, up: float) -> str:
         """The largest scan at this offset, as its key counts it."""
-        share = min(drive.v_offset / down, (drive.v_max - drive.v_offset) / up)
+        share = min((drive.v_offset - drive.driver.v_min) / down, (drive.driver.v_max - drive.v_offset) / up)
         if share < 1e-3:
             return "at this one nothing"
         v = 0.99 * share * drive.v_scan_normalised  # a smaller line has another shape, and overshoots a little more
         line_nm = drive.size_law.size_nm(v)
         if self._scan.size_v is not None:
-            return f"or at this offset about {at_most(v * drive.v_max, 3)} V"
+            return f"or at this offset about {at_most(v * drive.driver.span, 3)} V"
         if self._scan.size_of == "window":
             return f"or at this offset a window of about {at_most(line_nm * drive.window_nm / drive.size_nm, 3)} nm"
         return f"or at this offset a line of about {at_most(line_nm, 3)} nm"
@@ -250,17 +251,19 @@ def _amplifier_that_fits(dac: AxisDac, amplifier: AxisAmplifier, bottom: float, 
 def _offsets_that_fit(drive: Drive, low: float, high: float) -> str:
     """At which offsets the drive stays inside the driver; its amplitude changes with the offset by (1)."""
 
+    driver = drive.driver
+
     def fits(v_offset: float) -> bool:
         amplitude = drive.v_amplitude_at(v_offset)
-        return amplitude * (0.5 - low) <= v_offset <= drive.v_max - amplitude * (high - 0.5)
+        return driver.v_min + amplitude * (0.5 - low) <= v_offset <= driver.v_max - amplitude * (high - 0.5)
 
-    grid = [drive.v_max * i / 1000 for i in range(1001)]
+    grid = [driver.v_min + driver.span * i / 1000 for i in range(1001)]
     good = [v for v in grid if fits(v)]
     if not good:
         least = min(drive.v_amplitude_at(v) for v in grid) * (high - low)
         return (
             f"it takes at least {at_least(least)} V, so that no offset fits"
-            if least > drive.v_max
+            if least > driver.span
             else "no offset fits"
         )
     # The nearest stretch of the grid without a gap.

@@ -191,7 +191,7 @@ def _line_plan(setup: Setup, axis: Literal["x", "y"], schedule: Schedule, proble
     amplitude = 0.5 * drive.v_amplitude / converter.v_per_code  # codes for 2 w - 1 = 1
     gain_word, scale = fit_gain(amplitude, peak, bits, converter.bits)
     park_v = drive.v_offset if scan.park_v is None else scan.park_v
-    output = make_output(hardware.dac, converter, drive.v_max, drive.v_offset, park_v, bits, gain_word, max_step)
+    output = make_output(hardware.dac, converter, drive.driver, drive.v_offset, park_v, bits, gain_word, max_step)
     fourier = encode(series.a0, series.a, series.b, scale)
     program = Program(RationalPhase(period), hold, scan.table.mode, bits, synthesize(fourier, length, bits), output)
     return LinePlan(

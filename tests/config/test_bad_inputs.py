@@ -124,7 +124,11 @@ RANGES = [
     case("x.size_nm = 0", says="scan.toml:23: x.size_nm: 0 is below 1e-06"),
     case("x.size_nm = 2e9", says="scan.toml:23: x.size_nm: 2000000000 is above 1000000000"),
     case("- x.size_nm", "x.size_v = 0", says="scan.toml:23: x.size_v: 0 is below 0.001"),
-    case("- x.offset_v", "x.offset_nm = -1", says="scan.toml:23: x.offset_nm: -1 is below 0"),
+    case(
+        "- x.offset_v",
+        "x.offset_nm = -1",
+        says="scan.toml:23: x.offset_nm: -1 nm is outside the 0..980.98 nm that 0..100 V reach",
+    ),
     case("x.park_v = 2e5", says="scan.toml:23: x.park_v: 200000 is above 100000"),
     case("x.band_limit.window = [-0.1, 0.9]", says="scan.toml:30: x.band_limit.window[0]: -0.1 is below 0"),
     case("x.band_limit.window = [0.1, 1.1]", says="scan.toml:30: x.band_limit.window[1]: 1.1 is above 1"),
@@ -856,7 +860,7 @@ HYSTERESIS = [
             "apparent_nm = 204 }"
         ),
         says=(
-            "scanner.toml:6: x.offset.points: the amplitude factor falls to -3.594 inside [0, v_max]; it has "
+            "scanner.toml:6: x.offset.points: the amplitude factor falls to -3.594 inside the driver's range; it has "
             "to stay above 0"
         ),
     ),
@@ -882,7 +886,10 @@ HYSTERESIS = [
     ),
     case(
         scanner=("- x.offset.m_minus", "- x.offset.m_plus", "x.offset.alpha = 0.9", "x.offset.beta = -0.5"),
-        says=("scanner.toml:5: x.offset: the amplitude factor falls to -0.4 inside [0, v_max]; it has to stay above 0"),
+        says=(
+            "scanner.toml:5: x.offset: the amplitude factor falls to -0.4 inside the driver's range; it has to stay "
+            "above 0"
+        ),
     ),
     case(
         "x.size_nm = 1350.0",
