@@ -20,7 +20,7 @@ from tablegen.cli.exit_status import ExitStatus
 # x: an amplifier of 15 on offset binary; y: one of -20 on complementary two's complement, in the upper bits of 24.
 SCANNER = {
     "dac": {"bits": 16, "update_rate_hz": 500e3},
-    "x.dac": {"v_min": -5.0, "v_max": 5.0},
+    "x.dac": {"v_min": -5.0, "v_max": 5.0, "output": "B"},
     "x.amplifier": {"gain": 15.0, "bias_v": 60.0},
     "y.dac": {
         "v_min": -2.5,
@@ -29,6 +29,7 @@ SCANNER = {
         "inverted": True,
         "word_bits": 24,
         "align": "left",
+        "output": "A",
     },
     "y.amplifier": {"gain": -20.0, "bias_v": 45.0, "max_slew_v_per_s": 1e6},
 }
