@@ -238,8 +238,8 @@ def test_swapped_outputs_are_told_to_the_board_and_change_no_code() -> None:
     for name in ("annexin_200nm.h", "annexin_200nm.vh"):
         assert b"_X_DAC_OUTPUT" not in before[name]
         text = after[name].decode("ascii")
-        assert re.search(r"ANNEXIN_200NM_X_DAC_OUTPUT\b[ =]+(32'd)?1\b", text), text
-        assert re.search(r"ANNEXIN_200NM_Y_DAC_OUTPUT\b[ =]+(32'd)?0\b", text)
+        assert re.search(r"ANNEXIN_200NM_X_DAC_OUTPUT\b[ =]+(32'sd)?1\b", text), text
+        assert re.search(r"ANNEXIN_200NM_Y_DAC_OUTPUT\b[ =]+(32'sd)?0\b", text)
     manifest = json.loads(after["manifest.json"])
     assert [manifest["axes"][axis]["output"]["channel"] for axis in "xy"] == ["B", "A"]
     assert b"channel" not in before["manifest.json"]
