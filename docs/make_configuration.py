@@ -12,7 +12,7 @@ from tablegen.compensation import models
 from tablegen.compensation.model import Hysteresis
 from tablegen.config.describe import model_fields, purposes
 from tablegen.config.scanner import Scanner
-from tablegen.config.schema import Scan
+from tablegen.config.schema import WrittenScan
 
 PAGE = Path(__file__).with_name("configuration.md")
 INTRODUCTION = """\
@@ -34,7 +34,7 @@ which its model holds. Numbers in parentheses, such as (17), are equations of th
 def page() -> str:
     """The whole page."""
     parts = [INTRODUCTION]
-    for title, kind in (("Scan file", Scan), ("Scanner file", Scanner)):
+    for title, kind in (("Scan file", WrittenScan), ("Scanner file", Scanner)):
         parts += [f"## {title}\n", *_tables(types.type_info(kind), "", {})]
     return "\n".join(parts)
 
@@ -113,6 +113,10 @@ def _accepts(kind: types.Type) -> str:
             return "text"
         case types.BoolType():
             return "`true`, `false`"
+        case types.ListType():
+            count = kind.min_length if kind.min_length == kind.max_length else None
+            inner = _accepts(_plain(kind.item_type)[0])
+            return f"[{', '.join([inner] * count)}]" if count else f"array: {inner}"
         case types.TupleType():
             return f"[{', '.join(_accepts(_plain(t)[0]) for t in kind.item_types)}]"
     raise NotImplementedError(kind)

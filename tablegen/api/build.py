@@ -144,6 +144,11 @@ class Build:
         return "\n".join(summary(self.plan, self.certificates))
 
     @property
+    def choices(self) -> tuple[str, ...]:
+        """What was chosen for what the scan file says of the image, in sentences; empty where it says all itself."""
+        return self.setup.choices
+
+    @property
     def notes(self) -> list[str]:
         """What to know before the image is trusted, in sentences."""
         return notes(self.plan)

@@ -78,7 +78,7 @@ def tried_on_operator(setup: Setup, plan: Plan, line: LinePlan, most: float, own
             return None
         more = {side: max(one.total, one.band_limit) for side, one in scaling_errors(changed_line).items() if own}
         left = max(figure.value + more.get(side, 0.0) for side, figure in expected.scaling.items())
-        return Remedy(_text(change), left, left <= most, _keeps_the_error(plan, other))
+        return Remedy(_text(setup, change), left, left <= most, _keeps_the_error(plan, other))
 
     return _tried(_other_bands(setup, plan, line), trial)
 
@@ -120,7 +120,7 @@ def _trial(setup: Setup, plan: Plan, line: LinePlan, change: Change, most: float
         return None
     scaling = scaling_errors(other.x if line.axis == "x" else other.y)
     left = max(max(one.total, one.band_limit, abs(one.size)) for one in scaling.values())
-    return Remedy(_text(change), left, excess(scaling, most) is None, _keeps_the_error(plan, other))
+    return Remedy(_text(setup, change), left, excess(scaling, most) is None, _keeps_the_error(plan, other))
 
 
 def _planned(setup: Setup, change: Change) -> Plan | None:
@@ -130,8 +130,14 @@ def _planned(setup: Setup, change: Change) -> Plan | None:
         return None
 
 
-def _text(change: Change) -> str:
-    return " with ".join(f"{key} = {_value(value)}" for key, value in change.items() if value is not None)
+def _text(setup: Setup, change: Change) -> str:
+    """The change as its keys and values would be written in the scan file."""
+    said = []
+    for key, value in change.items():
+        if value is not None:
+            written, factor = setup.scan_file.as_said(key)
+            said.append(f"{written} = {_value(value if factor == 1.0 else factor * value)}")
+    return " with ".join(said)
 
 
 def _keeps_the_error(plan: Plan, other: Plan) -> bool:

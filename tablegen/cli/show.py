@@ -42,5 +42,7 @@ def show(scan: Path, as_json: bool, formats: tuple[str, ...], plot: bool) -> Non
             click.echo()
             click.echo("\n".join(plots(line, unicode)))
     click.echo()
+    for choice in built.choices:
+        click.echo(f"chosen: {choice}")
     for note in built.notes:
         click.echo(f"note: {note}")

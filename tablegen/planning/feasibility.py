@@ -228,7 +228,11 @@ class Feasibility:
             return "timing.ticks_per_line", f"{ceil(times * timing.ticks_per_line)} ticks_per_line"
         if timing.ticks_per_pixel is not None:
             return "timing.ticks_per_pixel", f"{ceil(times * timing.ticks_per_pixel)} ticks_per_pixel"
-        return "timing.line_rate_hz", f"{at_most(timing.line_rate_hz / times, 5)} Hz"
+        written, factor = self._setup.scan_file.as_said("timing.line_rate_hz")
+        slower = at_most(factor * timing.line_rate_hz / times, 5)
+        if factor == 1.0:
+            return "timing.line_rate_hz", f"{slower} Hz"
+        return "timing.line_rate_hz", f"{written.rpartition('.')[2]} = {slower}"
 
 
 def _amplifier_that_fits(dac: Dac, amplifier: Amplifier, bottom: float, top: float) -> str:
