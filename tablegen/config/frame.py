@@ -71,17 +71,21 @@ def frame_of_image(mode: FrameMode, image_lines: int, window: tuple[float, float
     Raises ``Unphysical`` where no frame does.
     """
     if window is not None:
-        way = Fraction(1, 2) if mode == "up-down" else Fraction(_FLYBACK, _FLYBACK + 1)
-        return _searched(image_lines, way, window, lambda lines: _split(mode, lines, window))
+        if mode == "up-down":
+            return lines_of_image(image_lines, 0.5, window, both=True)
+        return _searched(
+            image_lines, Fraction(_FLYBACK, _FLYBACK + 1), window, lambda count: _flying(count, window), up=True
+        )
     margin = max(1, round(Fraction(image_lines, _MARGIN)))
     up = image_lines + 2 * margin
-    lines = 2 * up if mode == "up-down" else up + max(1, round(Fraction(up, _FLYBACK)))
+    lines = 2 * up if mode == "up-down" else up + _flyback(up)
     if lines > MOST_LINES:
         most = floor(Fraction(image_lines * MOST_LINES, lines)) - 3
         raise Unphysical(
             f"{image_lines} image lines take {lines} line periods a frame, above {MOST_LINES}; at most {most} fit"
         )
-    return ImageFrame(lines, _turn(mode, up, lines), _margins(margin, up), mode == "up-down")
+    turn = _turn(mode, up, lines)
+    return ImageFrame(lines, turn, _margins(margin, up, lines, turn), mode == "up-down")
 
 
 def frame_of_lines(mode: FrameMode, lines: int, window: tuple[float, float] | None) -> ImageFrame:
@@ -97,13 +101,17 @@ def lines_of_image(image_lines: int, turn: float, window: tuple[float, float], b
 
     Raises ``Unphysical`` where there is none.
     """
-    return _searched(image_lines, exact(turn), window, lambda lines: ImageFrame(lines, turn, window, both))
+    return _searched(image_lines, exact(turn), window, lambda lines: [ImageFrame(lines, turn, window, both)])
 
 
 def _searched(
-    image_lines: int, way: Fraction, window: tuple[float, float], make: Callable[[int], ImageFrame]
+    image_lines: int,
+    way: Fraction,
+    window: tuple[float, float],
+    make: Callable[[int], list[ImageFrame]],
+    up: bool = False,
 ) -> ImageFrame:
-    """The first frame, by its lines, that holds the image; y goes up in about ``way`` of its lines."""
+    """The first frame that holds the image, by its lines or by those ``up``; y goes up in about ``way`` of them."""
     low, high = window
     share = (exact(high) - exact(low)) * way
     near = image_lines / share
@@ -112,10 +120,12 @@ def _searched(
             f"{image_lines} image lines in the window [{low:g}, {high:g}] of y take about {float(near):.7g} line "
             f"periods a frame, above {MOST_LINES}; at most {floor(MOST_LINES * share)} fit, or widen the window"
         )
-    for lines in range(max(floor(near) - 2, 1), min(ceil(near + 3 / share) + 3, MOST_LINES) + 1):
-        frame = make(lines)
-        if frame.up[1] == image_lines and (not frame.both or frame.turn != 0.5 or frame.down[1] == image_lines):
-            return frame
+    first = floor(near * way) if up else floor(near)
+    for count in range(max(first - 2, 1), first + ceil(3 / share) + 5):
+        for frame in make(count):
+            same = not frame.both or frame.turn != 0.5 or frame.down[1] == image_lines
+            if frame.up[1] == image_lines and same and frame.lines <= MOST_LINES:
+                return frame
     raise Unphysical(
         f"no frame has {image_lines} lines in the window [{low:g}, {high:g}] of y; take another number, or "
         "another window"
@@ -127,7 +137,18 @@ def _split(mode: FrameMode, lines: int, window: tuple[float, float] | None) -> I
         return ImageFrame(lines, 0.5, window or (0.05, 0.95), True)
     up = max(lines - max(1, round(Fraction(lines, _FLYBACK + 1))), 1)
     margin = max(1, round(Fraction(up, _MARGIN + 2)))
-    return ImageFrame(lines, _turn(mode, up, lines), window or _margins(margin, up), False)
+    turn = _turn(mode, up, lines)
+    return ImageFrame(lines, turn, window or _margins(margin, up, lines, turn), False)
+
+
+def _flying(up: int, window: tuple[float, float]) -> list[ImageFrame]:
+    """Frames of so many lines up; with two flybacks, since a turn of another last digit may hold another line."""
+    lines = [up + _flyback(up) + more for more in (0, 1)]
+    return [ImageFrame(count, _turn("flyback", up, count), window, False) for count in lines]
+
+
+def _flyback(up: int) -> int:
+    return max(1, round(Fraction(up, _FLYBACK)))
 
 
 def _turn(mode: FrameMode, up: int, lines: int) -> float:
@@ -136,7 +157,9 @@ def _turn(mode: FrameMode, up: int, lines: int) -> float:
     return 0.5 if mode == "up-down" else floor(Fraction(up * digits, lines)) / digits
 
 
-def _margins(margin: int, up: int) -> tuple[float, float]:
-    """A window that is rounded outwards, so that it holds every line between the margins."""
+def _margins(margin: int, up: int, lines: int, turn: float) -> tuple[float, float]:
+    """A window that is rounded outwards, and more than the turn is, so that it holds every line between the margins."""
     low = floor(Fraction(margin * _PARTS, up))
+    if exact(turn) * lines != up and low * up == margin * _PARTS:
+        low -= 1
     return low / _PARTS, (_PARTS - low) / _PARTS
