@@ -13,6 +13,8 @@ from typing import Literal
 
 from tablegen.problems import Unphysical
 
+# Of y at rest: so near to the end of the frame that no line comes after it.
+RESTING_TURN = 0.999999999999
 FrameMode = Literal["flyback", "up-down"]
 MOST_LINES = 65536
 _MARGIN = 18  # image lines for each line of turnaround on one side: about 0.05 of the way up
@@ -60,6 +62,8 @@ def lines_inside(
         return first, max(floor(end * lines) - first, 0)
 
     up = between(share * low, share * high)
+    if turn == RESTING_TURN:
+        return (0, lines), (0, 0)
     if not both:
         return up, (0, 0)
     return up, between(share + (1 - share) * (1 - high), share + (1 - share) * (1 - low))

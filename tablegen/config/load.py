@@ -209,7 +209,8 @@ def _check_axis(
     kind: type, key: str, image: bool, written: Mapping[str, Any], file: Document, problems: Problems
 ) -> None:
     """A size and an offset, each said once; the size of an ``image``, which stands elsewhere, does for one."""
-    for names in (SIZES, OFFSETS):
+    resting = written.get("motion") == "off"  # which needs no size
+    for names in (OFFSETS,) if resting else (SIZES, OFFSETS):
         _at_most_one(names, key, written, file, problems)
         if not (_any_of(names, written, kind) or (names is SIZES and image)):
             first, second = (name for name in names if not name.endswith("_um"))

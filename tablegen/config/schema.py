@@ -130,9 +130,17 @@ class SlowAxis(FastAxis, frozen=True, kw_only=True, forbid_unknown_fields=True):
         | None
     ) = None
     motion: Annotated[
-        Literal["ramp", "step"],
-        Meta(description="ramp: moves on every tick; step: moves once per line, at its start"),
+        Literal["ramp", "step", "off"],
+        Meta(
+            description="ramp: moves on every tick; step: moves once per line, at its start; off: rests at its offset, "
+            "for line scans"
+        ),
     ] = "ramp"
+
+    @property
+    def off(self) -> bool:
+        """Whether it rests."""
+        return self.motion == "off"
 
 
 class Dac(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -8,7 +8,7 @@ from typing import Any
 
 from msgspec import structs
 
-from tablegen.config.frame import ImageFrame, exact, frame_of_image, frame_of_lines, lines_of_image
+from tablegen.config.frame import RESTING_TURN, ImageFrame, exact, frame_of_image, frame_of_lines, lines_of_image
 from tablegen.config.schema import FastAxis, Scan, SlowAxis, Timing, WrittenScan
 from tablegen.problems import Document, Problems
 
@@ -43,11 +43,21 @@ def check_words(values: Mapping[str, Any], file: Document, problems: Problems) -
         problems.add(file, key, f"{other}{at} {why}")
 
     timing, y = table("timing"), table("y")
+    off = y.get("motion") == "off"
     own = [key for key in y if f"y.{key}" not in file.inherited]
+    if off:
+        for key in ("turn", "band_limit", "table", "refinement", *SIZES, "size_of"):
+            if key in own:
+                refuse(f"y.{key}", "y.motion", "keeps y where it is; leave this out, or motion = 'off'")
+        if "frame" in timing:
+            refuse("timing.frame", "y.motion", "keeps y where it is; leave out one of the two")
     image = next((key for key in IMAGES if key in values), None)
+    if off and image is not None and isinstance(values[image], list):
+        refuse(image, "y.motion", "keeps y where it is; give one number, the length of the line scan")
     for axis in ("x", "y"):
         for key in (*SIZES, "size_of"):
-            if image is None or key not in table(axis) or f"{axis}.{key}" in file.inherited:
+            rests = off and axis == "y"  # which is told already
+            if image is None or rests or key not in table(axis) or f"{axis}.{key}" in file.inherited:
                 continue
             why = "sets the size of both axes already, as that of the imaging windows"
             refuse(f"{axis}.{key}", image, f"{why}; leave out one of the two")
@@ -90,7 +100,7 @@ class _Words:
         if len(self._problems.found) > before:
             return None
         x = self._whole_pixels(x, line_rate)
-        if self._image is not None:
+        if self._image is not None and not y.off:
             lines_nm = [axis.size_nm / _width(axis) for axis in (x, y) if axis.size_nm is not None]
             self._choices.append(
                 f"the imaging windows span {_sizes([a.size_nm or 0.0 for a in (x, y)])}: the lines are "
@@ -115,7 +125,7 @@ class _Words:
         """An axis with its size and offset in nm, whatever they were given in."""
         changes: dict[str, Any] = {"size_um": None, "offset_um": None}
         image = self._image
-        if image is not None:
+        if image is not None and not (axis == "y" and self._written.y.off):
             given = getattr(self._written, image)
             size = given[0 if axis == "x" else 1] if isinstance(given, list) else given
             changes |= {"size_nm": size if image == "image_nm" else _nm(size), "size_of": "window"}
@@ -130,6 +140,10 @@ class _Words:
     def _frame(self, y: SlowAxis) -> ImageFrame | None:
         """Line periods, turn and window of y. None after a problem."""
         timing = self._written.timing
+        if y.off:
+            lines = timing.lines or timing.image_lines or 1
+            self._choices.append(f"a line scan: y rests, and all {lines} lines of a frame are imaged")
+            return ImageFrame(lines, RESTING_TURN, (0.0, 1.0), False)
         limit, mode = y.band_limit, timing.frame
         given = limit.window if "window" in self._written_keys("band_limit") else None
         both = limit.directions == "both"
@@ -157,6 +171,8 @@ class _Words:
     def _framed(self, y: SlowAxis, frame: ImageFrame) -> SlowAxis:
         """y with the turn and the window of its frame; short turnarounds take more harmonics."""
         limit = y.band_limit
+        if y.off:
+            limit = structs.replace(limit, harmonics=1)
         chosen = "window" not in self._written_keys("band_limit") and frame.window != limit.window
         short = chosen and limit.harmonics is None and limit.cutoff_hz is None
         if short and y.motion == "ramp" and limit.method == "window":

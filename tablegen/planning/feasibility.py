@@ -97,7 +97,7 @@ class Feasibility:
         outside = max(-bottom, top - drive.v_max)
         if outside > 1e-9 * drive.v_max:
             self._add(
-                self._size_key,
+                self._size_key if not drive.resting else f"{self._axis}.offset_v",
                 f"the drive spans {bottom:.4f}..{top:.4f} V, {outside:.4g} V outside the driver's "
                 f"0..{drive.v_max:g} V; {_offsets_that_fit(drive, low, high)}, {self._size_that_fits(drive, down, up)}",
             )
@@ -115,7 +115,7 @@ class Feasibility:
                 f"converter, {beyond:.4g} V beyond its {dac.v_min:g}..{highest:.6g} V; "
                 f"{_amplifier_that_fits(dac, amplifier, bottom, top)} would carry it, or scan less",
             )
-        if abs(ends[1] - ends[0]) < 2.0:
+        if abs(ends[1] - ends[0]) < 2.0 and not drive.resting:
             self._add(
                 self._size_key,
                 f"the drive of {down + up:.4g} V is {ends[1] - ends[0]:.3g} codes of the converter, which cannot "

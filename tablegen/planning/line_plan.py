@@ -165,7 +165,8 @@ def _line_plan(setup: Setup, axis: Literal["x", "y"], schedule: Schedule, proble
         return None
     target = None
     with problems.at(file, f"{axis}.band_limit.harmonics"):
-        target = band_limited(drive.shape, scan.band_limit, harmonics, layer)
+        flat = FourierSeries(0.5, np.zeros(1), np.zeros(1))
+        target = flat if drive.resting else band_limited(drive.shape, scan.band_limit, harmonics, layer)
     if target is None:
         return None
     at_piezo: FourierSeries = target
