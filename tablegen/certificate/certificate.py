@@ -25,7 +25,8 @@ from tablegen.problems import Document, Problem
 class Certificate:
     """The error budget of one axis. Codes and LSB are the converter's; dB are of power, relative to the scan's.
 
-    An axis at rest has no scaling errors and no cutoff. ``refinement`` is what the layer of ``tablegen refine`` moves, where there is one; it is not counted as an error.
+    An axis at rest has no scaling errors and no cutoff. ``refinement`` is what the layer of ``tablegen refine`` moves,
+    where there is one; it is not counted as an error.
     ``expected`` is what the scanner should do with the line; everything else is of the waveform.
     """
 
