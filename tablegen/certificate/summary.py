@@ -30,7 +30,7 @@ def drive_lines(line: LinePlan) -> list[tuple[str, str]]:
             f"{drive.size_nm:.6g} nm line, {drive.window_nm:.6g} nm window, at {drive.position_nm:.6g} nm",
         ),
         ("V_offset", f"{drive.v_offset:.6g} V   p = {drive.p_offset:+.4f}"),
-        ("V_scan", f"{drive.v_scan:.6g} V   {drive.v_scan_normalised:.6g} of v_max, (9) (12)"),
+        ("V_scan", f"{drive.v_scan:.6g} V   {drive.v_scan_normalised:.6g} of {drive.driver.unit}, (9) (12)"),
         ("m", f"{drive.m:.6f}   offset, (1)"),
         ("g", f"{drive.g:.6f}   frequency, (23)"),
         ("m g V_scan", f"{drive.v_amplitude:.6g} V peak to peak"),

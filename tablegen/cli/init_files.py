@@ -55,7 +55,6 @@ def files(wishes: Wishes) -> dict[str, str]:
 def _scan(wishes: Wishes) -> str:
     key, value, why = wishes.timing
     others = [other for other in ("line_rate_hz", "frame_rate_hz", "speed_um_per_s") if other != key]
-    gain = _V_MAX / 10.0
     few = wishes.bits < _FEW_BITS
     limits = [("max_error_lsb", 1.0)] + ([] if few else [("max_scaling_error_percent", 0.5)])
     table = [f"length = {wishes.table_length}"] if wishes.table_length != TABLE_LENGTHS[0] else []
@@ -67,18 +66,6 @@ def _scan(wishes: Wishes) -> str:
 name = "{wishes.scan_name}"
 scanner = "{SCANNER_FILE}"         # relative to this file
 {_line(f"image_nm = {_number(wishes.image_nm)}", "what the image spans; or [x, y]; or image_um")}
-
-[dac]
-{_line(f"bits = {wishes.bits}", "")}
-{_line('coding = "offset-binary"', "offset-binary | twos-complement")}
-{_line("v_min = -5.0", "V at the converter")}
-v_max = 5.0
-{_line(f"update_rate_hz = {_number(wishes.update_rate_hz)}", "samples a second: ticks")}
-
-[amplifier]                      # piezo voltage = gain * converter voltage + bias_v
-gain = {_number(gain)}
-bias_v = {_number(0.5 * _V_MAX)}
-{_line("max_slew_v_per_s = 2.0e6", "optional, at the piezo")}
 
 [timing]
 {_line(f"pixels = {wishes.pixels}", "per line and direction")}
@@ -99,11 +86,24 @@ bias_v = {_number(0.5 * _V_MAX)}
 
 def _scanner(wishes: Wishes) -> str:
     factor = _factor(wishes)
+    larger = "" if factor == 1.0 else f", with a range {factor:g} times as large"
     return f"""\
-# A high-speed AFM scanner as the paper measured it{"" if factor == 1.0 else f", with a range {factor:g} times as large"}.
-# `tablegen calibrate` writes what yours does in place of these values. Voltages are at the piezo.
+# The instrument: converter, amplifier, and a high-speed AFM scanner as the paper measured it{larger}.
+# `tablegen calibrate` writes what your scanner does in place of these values. Voltages are at the piezo.
 name = "hs-afm"
 {_line(f"v_max = {_number(_V_MAX)}", "V, maximum output of the piezo driver; normalised voltages refer to it")}
+
+[dac]
+{_line(f"bits = {wishes.bits}", "")}
+{_line('coding = "offset-binary"', "offset-binary | twos-complement")}
+{_line("v_min = -5.0", "V at the converter")}
+v_max = 5.0
+{_line(f"update_rate_hz = {_number(wishes.update_rate_hz)}", "ticks: updates of both converters a second")}
+
+[amplifier]                      # piezo voltage = gain * converter voltage + bias_v
+gain = {_number(_V_MAX / 10.0)}
+bias_v = {_number(0.5 * _V_MAX)}
+{_line("max_slew_v_per_s = 2.0e6", "optional, at the piezo")}
 
 [x.offset]                       # equations (1)-(4)
 m_minus = 0.92                   # amplitude factor at V_offset = 0

@@ -77,14 +77,22 @@ def check_words(values: Mapping[str, Any], file: Document, problems: Problems) -
         refuse(f"timing.{rate}", f"timing.{ticks}", "sets the length of the line already; leave out one of the two")
 
 
-def solved(written: WrittenScan, values: Mapping[str, Any], file: Document, problems: Problems) -> Solved | None:
-    """The scan for what was said; ``values`` are the tables as they were written. None where ``problems`` grew."""
-    return _Words(written, values, file, problems).solved()
+def solved(
+    written: WrittenScan, update_rate_hz: float, values: Mapping[str, Any], file: Document, problems: Problems
+) -> Solved | None:
+    """The scan for what was said, at an update rate; ``values`` are the tables as they were written.
+
+    None where ``problems`` grew.
+    """
+    return _Words(written, update_rate_hz, values, file, problems).solved()
 
 
 class _Words:
-    def __init__(self, written: WrittenScan, values: Mapping[str, Any], file: Document, problems: Problems) -> None:
-        self._written, self._values, self._file, self._problems = written, values, file, problems
+    def __init__(
+        self, written: WrittenScan, update_rate_hz: float, values: Mapping[str, Any], file: Document, problems: Problems
+    ) -> None:
+        self._written, self._update_rate_hz = written, update_rate_hz
+        self._values, self._file, self._problems = values, file, problems
         self._said: dict[str, tuple[str, float]] = {}
         self._choices: list[str] = []
 
@@ -213,7 +221,7 @@ class _Words:
         speed = timing.speed_um_per_s or timing.speed_mm_per_s
         if self._image is None or not free or given or speed or not 0.0 < line_rate < 1e9:
             return x
-        ticks = floor(exact(self._written.dac.update_rate_hz) / exact(line_rate) + Fraction(1, 2))
+        ticks = floor(exact(self._update_rate_hz) / exact(line_rate) + Fraction(1, 2))
         way = exact(x.turn) * ticks
         of_pixel = round(_WIDTH * way / timing.pixels)
         width = of_pixel * timing.pixels / way if way else Fraction(0)
