@@ -198,7 +198,7 @@ class Build:
         worst = max(self.certificates.values(), key=lambda one: one.scaling_error_percent)
         errors = f"error up to {worst.max_error_lsb:.3f} LSB, scaling error {worst.scaling_error_percent:.3g} %"
         head = first.replace("<tablegen plan", "<tablegen build")
-        volts = ", ".join(f"{line.axis}: {line.drive.v_amplitude:.6g} V" for line in self.plan.lines)
+        volts = ", ".join(f"{line.axis}: {line.drive.v_amplitude:.6g} V" for line in self.plan.moving)
         found = [f"  warning: {text}\n" for text in brief_warnings(self.plan, self.certificates)]
         return f"{head}\n  {errors} peak to peak\n{''.join(found)}  {volts}; formats {', '.join(self.formats)}>"
 

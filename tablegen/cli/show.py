@@ -38,7 +38,7 @@ def show(scan: Path, as_json: bool, formats: tuple[str, ...], plot: bool) -> Non
         tell(text, bold=bool(text) and not text.startswith(" "))
     if plot:
         unicode = "utf" in (getattr(sys.stdout, "encoding", None) or "").lower()
-        for line in plan.lines:
+        for line in plan.moving:
             click.echo()
             click.echo("\n".join(plots(line, unicode)))
     click.echo()

@@ -108,11 +108,11 @@ class _Words:
         if len(self._problems.found) > before:
             return None
         x = self._whole_pixels(x, line_rate)
-        if self._image is not None and not y.off:
-            lines_nm = [axis.size_nm / _width(axis) for axis in (x, y) if axis.size_nm is not None]
+        if self._image is not None:
+            sizes = [(axis.size_nm, _width(axis)) for axis in (x, y) if axis.size_nm is not None]
             self._choices.append(
-                f"the imaging windows span {_sizes([a.size_nm or 0.0 for a in (x, y)])}: the lines are "
-                f"{_sizes(lines_nm)} long with their turnarounds"
+                f"the imaging windows span {_sizes([size for size, _ in sizes])}: the lines are "
+                f"{_sizes([size / width for size, width in sizes])} long with their turnarounds"
             )
         timing = Timing(
             **{

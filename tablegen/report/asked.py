@@ -36,6 +36,9 @@ def asked(subject: Subject) -> Section:
         ]
         if planned is not None:
             rows += _settles(planned.plan.x if axis == "x" else planned.plan.y, subject)
+    y = subject.manifest.axes.y
+    if y.resting:
+        rows.append(row("y", "off", f"rests at {y.drive.v_offset:.6g} V, code {y.output.offset_code}"))
     return Section(
         "asked", "What was asked for, and what will be played", (Grid("", ("", "asked", "played"), tuple(rows)),)
     )
