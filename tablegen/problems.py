@@ -79,12 +79,10 @@ class Document:
         asked, (key, _) = key, self.as_said(key)
         if asked[1:2] == "." and key[1:2] != ".":  # a key for both axes
             why = f"{asked[0]}: {why}"
-        return Problem(self.name, self.line_of(self.inherited.get(key, key)), key, f"{why}{self.note_of_like(key)}")
-
-    def note_of_like(self, key: str) -> str:
-        """What a message says of a key that an axis has from another one."""
         other = self.inherited.get(key)
-        return f"; {key.split('.')[0]} has it from {other} by like" if other else ""
+        if other is not None:
+            why = f"{why}; {key.split('.')[0]} has it from {other} by like"
+        return Problem(self.name, self.line_of(other or key), key, why)
 
     def as_said(self, key: str) -> tuple[str, float]:
         """The key that was written in place of this one, and the factor to its value; itself where it was written."""

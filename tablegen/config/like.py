@@ -49,15 +49,12 @@ def told_once(problems: Problems, document: Document) -> None:
     """Of a fault of x that y has by like, that of x stays."""
     if not document.inherited:
         return
-    own, note = document.lines or {}, document.note_of_like
-    of_x = {(p.key[2:], p.why) for p in problems.found if p.file == document.name and p.key.startswith("x.")}
+    own = document.lines or {}
+    of_x = {p.key[2:] for p in problems.found if p.file == document.name and p.key.startswith("x.")}
     problems.found[:] = [
         p
         for p in problems.found
-        if p.file != document.name
-        or not p.key.startswith("y.")
-        or p.key in own
-        or (p.key[2:], p.why.removesuffix(note(p.key))) not in of_x
+        if p.file != document.name or not p.key.startswith("y.") or p.key in own or p.key[2:] not in of_x
     ]
 
 
