@@ -57,7 +57,7 @@ class HysteresisFit(Fit):
 
 def fit_hysteresis(
     traces: Sequence[Trace],
-    driver: Driver | float,
+    v_max: Driver | float,
     rho: float = TYPICAL_RHO,
     settle_periods: int | None = None,
     drift_order: int | None = None,
@@ -67,7 +67,7 @@ def fit_hysteresis(
 
     ``rho`` is kept where a turn was measured at one amplitude only. Raises ``Unphysical``, with the trace's name.
     """
-    driver = Driver.of(driver)
+    driver = Driver.of(v_max)
     fits: list[TraceFit] = []
     remarks: list[str] = []
     for trace in traces:

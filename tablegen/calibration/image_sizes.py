@@ -65,13 +65,13 @@ class ImageSizes:
     remarks: tuple[str, ...]
 
 
-def sizes_of(images: Sequence[SampleImage], driver: Driver | float, sample: KnownSample, taking: Taking) -> ImageSizes:
+def sizes_of(images: Sequence[SampleImage], v_max: Driver | float, sample: KnownSample, taking: Taking) -> ImageSizes:
     """Each image's line from turn to turn. Raises ``Unphysical``, with the image's name."""
     found: list[ImageSize] = []
     remarks: list[str] = []
     for image in images:
         try:
-            _check_drive(image, Driver.of(driver))
+            _check_drive(image, Driver.of(v_max))
             line = fit_line(
                 image.trace,
                 image.retrace,

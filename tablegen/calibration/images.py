@@ -28,7 +28,7 @@ class Pair:
 
 def fit_images(
     pairs: Sequence[Pair],
-    driver: Driver | float,
+    v_max: Driver | float,
     rho: float = TYPICAL_RHO,
     turn: float = 0.5,
     window: tuple[float, float] = (0.0, 1.0),
@@ -39,7 +39,7 @@ def fit_images(
 
     ``rho`` is kept where there is one amplitude only. Raises ``Unphysical``, with the pair's name.
     """
-    driver = Driver.of(driver)
+    driver = Driver.of(v_max)
     fits: list[ImageFit] = []
     remarks: list[str] = []
     for pair in pairs:

@@ -33,7 +33,7 @@ class OffsetFit(Fit):
 def fit_offset(
     offset_v: Floats,
     apparent_nm: Floats,
-    driver: Driver | float,
+    v_max: Driver | float,
     size_law: SizeLaw | None = None,
     size_v: float | None = None,
     errors_nm: Floats | None = None,
@@ -45,7 +45,7 @@ def fit_offset(
     sizes are R(V) / R(V / m). Without, they are taken for m itself, as ``OffsetLaw.fit`` does. ``errors_nm``, where
     they are known, are the sizes' weights, as in ``fit_size``. Raises ``Unphysical``.
     """
-    driver = Driver.of(driver)
+    driver = Driver.of(v_max)
     outside = (offset_v < driver.v_min) | (offset_v > driver.v_max)
     if outside.any():
         wrong = float(offset_v[outside][0])

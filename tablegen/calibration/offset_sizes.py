@@ -25,7 +25,7 @@ def fit_offset_sizes(
     offset_v: Floats,
     apparent_nm: Floats,
     size_v: Floats,
-    driver: Driver | float,
+    v_max: Driver | float,
     size_law: SizeLaw,
     errors_nm: Floats | None = None,
 ) -> OffsetFit | OffsetSizesFit:
@@ -35,7 +35,7 @@ def fit_offset_sizes(
     show another. Of one scan voltage it is the fit of ``fit_offset``, as are ``errors_nm``. Raises ``Unphysical``.
     """
     volts = np.unique(size_v).tolist()
-    driver = Driver.of(driver)
+    driver = Driver.of(v_max)
     if volts[-1] > driver.span:
         raise Unphysical(f"a size_v of {volts[-1]:g} V is above {driver.full_scale}")
     fits: list[OffsetFit] = []

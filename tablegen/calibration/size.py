@@ -34,7 +34,7 @@ class SizeFit(Fit):
 def fit_size(
     drive_v: Floats,
     actual_nm: Floats,
-    driver: Driver | float,
+    v_max: Driver | float,
     base_nm: float = 200.0,
     threshold: float | None = None,
     noise: Literal["relative", "absolute"] = "relative",
@@ -49,7 +49,7 @@ def fit_size(
     law by more than that. ``shared`` is a relative error that all sizes have together; it counts for k. Raises
     ``Unphysical``.
     """
-    driver = Driver.of(driver)
+    driver = Driver.of(v_max)
     span, v = driver.span, drive_v / driver.span
     if float(np.max(v)) > 1.0:
         raise Unphysical(f"a drive of {np.max(drive_v):g} V is above {driver.full_scale}")

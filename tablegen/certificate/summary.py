@@ -196,6 +196,12 @@ def notes(plan: Plan) -> list[str]:
     return found
 
 
+def _volts(line: LinePlan) -> str:
+    """Said where the axes have converters or amplifiers of their own."""
+    zero, step = line.converter.v_zero, line.converter.v_per_code
+    return f"{zero:.6g} V {'-' if step < 0.0 else '+'} {abs(step):.6g} V c, at the piezo"
+
+
 def summary(plan: Plan, certificates: dict[str, Certificate]) -> list[str]:
     """The whole block, a list of lines of text."""
     schedule = plan.schedule
@@ -208,6 +214,8 @@ def summary(plan: Plan, certificates: dict[str, Certificate]) -> list[str]:
     for line in plan.lines:
         lines += ["", f"{line.axis} drive"]
         lines += [f"  {label:<18}{value}" for label, value in drive_lines(line)]
+        if plan.x.converter != plan.y.converter:
+            lines.append(f"  {'volts of code c':<18}{_volts(line)}")
         one = settles[line.axis]
         texts = [f"not known: there is no operator of {line.axis}"] if any(settles.values()) else []
         for i, text in enumerate(texts if one is None else settling_text(one)):

@@ -30,7 +30,10 @@ _Tables: TypeAlias = Mapping[Place, Dac | Amplifier]
 
 @dataclass(frozen=True, slots=True)
 class AxisDac:
-    """The converter of one axis; fields as the keys of ``Dac``, ``word_bits`` None where it is that of ``bits``."""
+    """The converter of one axis; fields as the keys of ``Dac``, ``word_bits`` None where it is that of ``bits``.
+
+    ``output`` is None on both axes where neither says it.
+    """
 
     bits: int
     v_min: float
@@ -38,6 +41,7 @@ class AxisDac:
     update_rate_hz: float
     coding: Literal["offset-binary", "twos-complement"] = "offset-binary"
     inverted: bool = False
+    output: Literal["A", "B"] | None = None
     align: Literal["right", "left"] = "right"
     word_bits: int | None = None
 
@@ -233,6 +237,10 @@ def _apart(x: AxisHardware, y: AxisHardware, files: Mapping[bool, Document]) -> 
                 f"{x.dac.update_rate_hz:.12g} of x; both axes move on the same ticks: give it once, in [dac]",
             )
         )
+    outputs = (x.dac.output, y.dac.output)
+    if outputs not in ((None, None), ("A", "B"), ("B", "A")):
+        said = " and ".join(f"{axis} is on {one or 'none'}" for axis, one in zip("xy", outputs, strict=True))
+        found.append(("dac.output", f"{said}; give one axis 'A' and the other 'B', or none of them"))
     return found
 
 

@@ -175,6 +175,13 @@ class Dac(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         ]
         | None
     ) = None
+    output: (
+        Annotated[
+            Literal["A", "B"],
+            Meta(description="output of a dual converter that drives this axis; default: A for x, B for y"),
+        ]
+        | None
+    ) = None
     update_rate_hz: (
         Annotated[float, Meta(ge=1.0, le=1e9, description="required; ticks per second, for both axes")] | None
     ) = None

@@ -73,4 +73,5 @@ def make_output(
         coding=dac.coding,
         align=dac.align,
         word_bits=dac.word_bits if dac.word_bits is not None else dac.bits,
+        channel=dac.output or "",
     )

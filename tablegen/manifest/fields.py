@@ -117,7 +117,10 @@ CONVERTER_KEYS = ("v_zero", "v_per_code", "coding", "align", "word_bits")  # of 
 
 
 class ManifestOutput(Struct):
-    """The output stage, and volts of its codes; ``own_hardware`` of y where they are not those of x."""
+    """The output stage, and volts of its codes; ``own_hardware`` of y where they are not those of x.
+
+    ``channel`` is the output of a dual converter, if that was said.
+    """
 
     gain_word: Number
     gain_q: Number
@@ -134,6 +137,7 @@ class ManifestOutput(Struct):
     align: Literal["right", "left"]
     word_bits: Annotated[int, Meta(ge=8, le=32)]
     own_hardware: bool = False
+    channel: Literal["", "A", "B"] = ""
 
 
 class ManifestFigure(Struct):
@@ -217,6 +221,7 @@ class ManifestAxis(Struct):
                 coding=output.coding,
                 align=output.align,
                 word_bits=output.word_bits,
+                channel=output.channel,
             ),
         )
 

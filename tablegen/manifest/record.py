@@ -194,5 +194,6 @@ def _axis(line: LinePlan) -> dict[str, Any]:
             "coding": output.coding,
             "align": output.align,
             "word_bits": output.word_bits,
+            **({"channel": output.channel} if output.channel else {}),
         },
     }

@@ -1350,8 +1350,8 @@ def test_every_fault_of_both_files_is_reported_in_one_run(here: Path) -> None:
     outcome = run("build", "scan.toml", "-o", "out")
     assert outcome.messages == [
         "scan.toml:2: name: 'wire' is a reserved word of C, C++, Verilog, SystemVerilog or VHDL",
-        "scan.toml:6: dac.hue: unknown key; known here: align, bits, coding, inverted, update_rate_hz, v_max, v_min, "
-        "word_bits",
+        "scan.toml:6: dac.hue: unknown key; known here: align, bits, coding, inverted, output, update_rate_hz, v_max, "
+        "v_min, word_bits",
         "scan.toml:7: dac.bits: 30 is above 24",
         "scan.toml:14: amplifier.gain: nan is not a finite number",
         "scan.toml:18: timing.lines: missing; give lines or image_lines",

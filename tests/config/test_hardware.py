@@ -1,17 +1,21 @@
 """Converter and amplifier said once, in the scanner file: which key counts, and what is refused where."""
 
+import json
 import re
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from building import REMOVED, Variant, changed, to_toml
 from editing import EXAMPLES, run
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tablegen.certificate.certificate import certify
 from tablegen.config.hardware import AxisAmplifier, AxisDac, Place
 from tablegen.config.load import Setup, from_values, load, load_scanner
+from tablegen.emit.render import render
 from tablegen.planning.line_plan import make_plan
 from tablegen.problems import Rejected
 
@@ -46,9 +50,9 @@ def test_each_axis_has_its_own_hardware_and_the_common_table_fills_up() -> None:
         },
     )
     x, y = setup.hardware("x"), setup.hardware("y")
-    assert x.dac == AxisDac(16, -5.0, 5.0, 500e3, "offset-binary", False, "right", None)
+    assert x.dac == AxisDac(16, -5.0, 5.0, 500e3, "offset-binary", False, None, "right", None)
     assert x.amplifier == AxisAmplifier(10.0, 0.0, 1e6)
-    assert y.dac == AxisDac(16, 0.0, 5.0, 500e3, "twos-complement", True, "left", 24)
+    assert y.dac == AxisDac(16, 0.0, 5.0, 500e3, "twos-complement", True, None, "left", 24)
     assert y.amplifier == AxisAmplifier(-20.0, 100.0, 1e6)
     assert y.where("amplifier.gain") == (Place(True, "y.amplifier.gain"),)
     assert y.where("amplifier.max_slew_v_per_s") == (Place(True, "amplifier.max_slew_v_per_s"),)
@@ -121,6 +125,16 @@ CASES = {
             "scanner.toml:N: y.dac.update_rate_hz: 250000 of y, and x.dac.update_rate_hz at line N is 500000 of x; "
             "both axes move on the same ticks: give it once, in [dac]"
         ],
+    ),
+    "both on one output": (
+        {},
+        {"x.dac": {"output": "B"}, "y.dac": {"output": "B"}},
+        ["scanner.toml:N: y.dac.output: x is on B and y is on B; give one axis 'A' and the other 'B', or none of them"],
+    ),
+    "one of two outputs": (
+        {},
+        {"x.dac": {"output": "B"}},
+        ["dac.output: x is on B and y is on none; give one axis 'A' and the other 'B', or none of them"],
     ),
     "a range of two files that is none": (
         {"dac.v_min": REMOVED},
@@ -213,3 +227,23 @@ def test_swapping_the_axes_swaps_the_converters_and_each_gives_the_volts_of_its_
             assert line.converter.v_zero + line.converter.v_per_code * code == pytest.approx(volts, abs=1e-9)
             assert -1e-4 <= volts <= 100.0 + 1e-4
         assert abs(output.offset_code - line.converter.code(50.0)) <= 0.5 + 1e-6
+
+
+def test_swapped_outputs_are_told_to_the_board_and_change_no_code() -> None:
+    """Constants, manifest and the channels of a WAV file; the words of both axes are those of a build without it."""
+    scan = {**SMALL, "emit": {"formats": ["c", "verilog", "wav"]}}
+    outputs = {"x.dac": {"output": "B"}, "y.dac": {"output": "A"}}
+    plain, swapped = (make_plan(setup_of(scan, scanner)) for scanner in ({}, outputs))
+    before, after = (render(plan, certify(plan)) for plan in (plain, swapped))
+    for name in ("annexin_200nm.h", "annexin_200nm.vh"):
+        assert b"_X_DAC_OUTPUT" not in before[name]
+        text = after[name].decode("ascii")
+        assert re.search(r"ANNEXIN_200NM_X_DAC_OUTPUT\b[ =]+(32'sd)?1\b", text), text
+        assert re.search(r"ANNEXIN_200NM_Y_DAC_OUTPUT\b[ =]+(32'sd)?0\b", text)
+    manifest = json.loads(after["manifest.json"])
+    assert [manifest["axes"][axis]["output"]["channel"] for axis in "xy"] == ["B", "A"]
+    assert b"channel" not in before["manifest.json"]
+    samples = [np.frombuffer(files["annexin_200nm.wav"][44:], "<i2").reshape(-1, 2) for files in (before, after)]
+    assert np.array_equal(samples[0], samples[1][:, ::-1])
+    for axis in "xy":
+        assert before[f"annexin_200nm_{axis}.mem"] == after[f"annexin_200nm_{axis}.mem"]

@@ -5,18 +5,20 @@ The law that holds it all: a scanner whose driver, offsets and biases are moved 
 
 import re
 from math import sqrt
+from pathlib import Path
 from typing import Any
 
 import mpmath
 import numpy as np
 import pytest
-from building import REMOVED, changed
-from editing import EXAMPLES
+from building import REMOVED, changed, to_toml
+from editing import EXAMPLES, run
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tablegen.compensation.offset import OffsetLaw
 from tablegen.config.load import Setup, from_values, load
+from tablegen.correction.settled_scan import AxisScan, ScannerModel, triangle
 from tablegen.driver import Driver
 from tablegen.planning.line_plan import make_plan
 from tablegen.problems import Rejected, Unphysical
@@ -169,3 +171,34 @@ def test_the_virtual_scanner_follows_from_v_min_on() -> None:
 
     one, other = found(25.0), found(50.0)
     assert np.max(np.abs(one.displacement_nm - other.displacement_nm)) < 0.02
+
+
+def test_an_image_is_put_straight_alike() -> None:
+    """What `tablegen correct` takes the axis to have done, by the laws, does not depend on where 0 V is."""
+
+    def position(by: float) -> Any:
+        setup = moved(by, points=True)
+        model = ScannerModel(setup.scanner, setup.scanner_file, Path())
+        return model.moved("x", AxisScan(triangle(60.0, 55.0 - by, 0.5), 100.0, 0.5, (0.1, 0.9)))
+
+    one, other = position(0.0), position(50.0)
+    assert np.ptp(one) > 400.0
+    assert np.max(np.abs((one - one.mean()) - (other - other.mean()))) < 1e-6 * np.ptp(one)
+    setup, beyond = moved(50.0, points=False), AxisScan(triangle(60.0, -35.0, 0.5), 100.0, 0.5, (0.1, 0.9))
+    with pytest.raises(Unphysical, match=r"x: -65 V is outside the driver's -50\.\.50 V, by 15 V"):
+        ScannerModel(setup.scanner, setup.scanner_file, Path()).moved("x", beyond)
+
+
+def test_the_tubes_page_and_terminal_speak_of_its_range(tmp_path: Path) -> None:
+    scan = changed(TUBE, {"timing.lines": 20, "y.band_limit.harmonics": 16, "limits": REMOVED})
+    (tmp_path / "scan.toml").write_text(to_toml(scan), "utf-8")
+    (tmp_path / "tube_scanner.toml").write_bytes((EXAMPLES / "tube_scanner.toml").read_bytes())
+    shown = run("show", tmp_path / "scan.toml")
+    assert shown.status == 0, shown.err
+    assert "187.325 V   0.425739 of v_max - v_min, (9) (12)" in shown.out
+    assert run("report", tmp_path / "scan.toml", "-o", tmp_path / "page.html").status == 0
+    page = (tmp_path / "page.html").read_text("utf-8")
+    assert "The driver&#39;s -220..220 V bound it." in page or "The driver's -220..220 V bound it." in page
+    for key, value in (("v_min", "-220 V"), ("dac.coding", "twos-complement"), ("y.amplifier.gain", "-22.5")):
+        assert f">{key}<" in page, key
+        assert value in page

@@ -10,17 +10,21 @@ from typing import Any
 
 import numpy as np
 import pytest
-from building import REMOVED, VARIANTS, Build, Variant, build
+from building import EXAMPLE, NAME, REMOVED, VARIANTS, Build, Variant, build
 from editing import run
 from manifest_integers import played_codes
 from verifying import edit_manifest, make_right
 
+from tablegen.certificate.certificate import certify
+from tablegen.certificate.summary import summary
 from tablegen.cli.exit_status import ExitStatus
+from tablegen.config.load import load
+from tablegen.planning.line_plan import make_plan
 
 # x: an amplifier of 15 on offset binary; y: one of -20 on complementary two's complement, in the upper bits of 24.
 SCANNER = {
     "dac": {"bits": 16, "update_rate_hz": 500e3},
-    "x.dac": {"v_min": -5.0, "v_max": 5.0},
+    "x.dac": {"v_min": -5.0, "v_max": 5.0, "output": "B"},
     "x.amplifier": {"gain": 15.0, "bias_v": 60.0},
     "y.dac": {
         "v_min": -2.5,
@@ -29,6 +33,7 @@ SCANNER = {
         "inverted": True,
         "word_bits": 24,
         "align": "left",
+        "output": "A",
     },
     "y.amplifier": {"gain": -20.0, "bias_v": 45.0, "max_slew_v_per_s": 1e6},
 }
@@ -81,6 +86,15 @@ def test_the_words_of_each_axis_are_the_volts_of_its_drive(mixed: Build, axis: s
     assert ends[1] <= reach[1] + 1e-6
     assert ends[0] - reach[0] <= lsb
     assert reach[1] - ends[1] <= lsb
+
+
+def test_every_file_says_which_volts_a_code_is(mixed: Build) -> None:
+    for name in (f"{NAME}.h", f"{NAME}.vh"):
+        text = mixed.files[name].decode("ascii")
+        assert "volts of code c   -15 V + 0.00228882 V c, at the piezo" in text
+        assert "volts of code c   -4.99847 V + 0.00152588 V c, at the piezo" in text  # two inversions
+    plan = make_plan(load(EXAMPLE))
+    assert not [line for line in summary(plan, certify(plan)) if "volts of code" in line]
 
 
 def test_the_slew_of_one_amplifier_is_the_guard_of_its_axis_alone(mixed: Build) -> None:
