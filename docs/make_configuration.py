@@ -79,9 +79,9 @@ before that, also those that say the same in another way: beside `size_v` of y, 
 learnt on x, `[x.refinement]`, stays with x; with `frame`, the turn and directions of x do too. A fault of a key that y
 has from x is reported at the line in `[x]`.
 
-**A line scan** has `motion = "off"` in `[y]`: x runs, and y rests at its `offset_v` or `offset_nm`. All lines of a frame
-are imaged, and y has no size, turn, band limit or table. `verify`, `upload` and the sequencers treat it as any other
-scan: the table of y holds zeros. `simulate` does not play line scans.
+**A line scan** has `motion = "off"` in `[y]`: x runs, and y rests at its `offset_v` or `offset_nm`. All lines of a
+frame are imaged, and y has no size, turn, band limit or table. `verify`, `upload` and the sequencers treat it as any
+other scan: the table of y holds zeros. `simulate` does not play line scans.
 """
 
 
