@@ -261,3 +261,23 @@ def test_build_and_show_say_what_was_chosen(tmp_path: Path) -> None:
 
 def test_a_file_without_words_has_nothing_chosen_for_it(tmp_path: Path) -> None:
     assert tablegen.load(write_pair(tmp_path)).choices == ()
+
+
+def test_words_are_the_keys_that_they_are_solved_for(tmp_path: Path) -> None:
+    """The same scan in other words: line periods, turn, window, sizes of the windows. Every file is the same."""
+    words = with_timing(image_lines=61, frame_rate_hz=0.5, frame="flyback")
+    words["timing"]["pixels"] = 50
+    scan = from_values(words, SCANNER_VALUES).scan
+    sizes = {"size_nm": 2000.0, "size_of": "window", "offset_v": 75.0, "table": {"bits": 20}}
+    limit = {"window": list(scan.y.band_limit.window), "directions": "forward", "harmonics": 64}
+    keys = {
+        "dac": DAC,
+        "amplifier": {"gain": 10.0},
+        "timing": {"pixels": 50, "lines": scan.timing.lines, "line_rate_hz": 0.5 * scan.timing.lines},
+        "x": {**sizes, "band_limit": {"window": list(scan.x.band_limit.window)}},
+        "y": {**sizes, "turn": scan.y.turn, "band_limit": limit},
+    }
+    one, other = (tablegen.build(scan=values, scanner=SCANNER_VALUES) for values in (words, keys))
+    assert one.choices
+    assert other.choices == ()
+    assert one.files == other.files
