@@ -183,9 +183,10 @@ class _Words:
             limit = structs.replace(limit, harmonics=1)
         chosen = "window" not in self._written_keys("band_limit") and frame.window != limit.window
         short = chosen and limit.harmonics is None and limit.cutoff_hz is None
-        if short and y.motion == "ramp" and limit.method == "window":
-            limit = structs.replace(limit, harmonics=_HARMONICS)
-            self._choices.append(f"y has {_HARMONICS} harmonics of the frame rate, for its short turnarounds")
+        if short and limit.method == "window":
+            count = _carried(y, frame.lines)
+            limit = structs.replace(limit, harmonics=count)
+            self._choices.append(f"y has {count} harmonics of the frame rate, for its short turnarounds")
         limit = structs.replace(limit, window=frame.window, directions="both" if frame.both else "forward")
         return structs.replace(y, turn=frame.turn, band_limit=limit)
 
@@ -249,6 +250,16 @@ def _frame_text(frame: ImageFrame) -> str:
         f"{image} take {frame.lines} line periods a frame: y turns at {frame.turn:.6g} of it, and images "
         f"{low:.6g}..{high:.6g} of its way"
     )
+
+
+def _carried(y: SlowAxis, lines: int) -> int:
+    """As many harmonics as short turnarounds need, if steps and table carry them."""
+    carried = [_HARMONICS]
+    if y.motion == "step":
+        carried.append((lines - 1) // 2)
+    if y.table.mode == "interpolated" and y.table.length is not None:
+        carried.append(y.table.length // 2 - 1)
+    return max(min(carried), 1)
 
 
 def _width(axis: FastAxis) -> float:

@@ -151,6 +151,15 @@ def test_a_frame_of_so_many_line_periods_keeps_them(lines: int, mode: str) -> No
     assert up >= 0.8 * lines / (2 if down else 1) - 3
 
 
+@pytest.mark.parametrize(("lines", "harmonics"), [(200, 64), (20, 11)])
+def test_a_y_that_steps_has_the_harmonics_that_its_lines_carry(lines: int, harmonics: int) -> None:
+    values = with_timing(image_lines=lines, line_rate_hz=40.0, frame="flyback", pixels=64)
+    plan = tablegen.plan(scan={**values, "y": {"like": "x", "motion": "step"}}, scanner=SCANNER_VALUES)
+    assert plan.y.series.harmonics == harmonics
+    assert plan.schedule.up.count == lines
+    assert (plan.schedule.lines - 1) // 2 >= harmonics
+
+
 def test_a_speed_is_that_of_the_tip_over_the_window() -> None:
     for key, value in (("speed_mm_per_s", 0.04), ("speed_um_per_s", 40.0)):
         schedule = schedule_of(with_timing(image_lines=64, **{key: value}))

@@ -120,7 +120,23 @@ def test_frames_and_sizes_of_two_axes_are_refused(tmp_path: Path) -> None:
         "scan.toml:1: image_nm: y.motion on line 40 keeps y where it is; give one number, the length of the line scan",
         "scan.toml:19: timing.frame: y.motion on line 40 keeps y where it is; leave out one of the two",
     ]
-    assert run("simulate", write_pair(tmp_path, LINE_SCAN)).status == 2
+
+
+def test_commands_for_frames_say_that_this_is_none(tmp_path: Path) -> None:
+    """A corrected image of a scan that has no second axis would lie."""
+    path = write_pair(tmp_path, LINE_SCAN.replace("image_lines = 7", "image_lines = 64"))
+    np.save(tmp_path / "a.npy", np.random.default_rng(1).normal(size=(64, 200)))
+    (tmp_path / "t.csv").write_text("time_s,displacement_nm,drive_v\n0,0,0\n", "ascii")
+    image = tmp_path / "a.npy"
+    for command in (
+        ("simulate", path),
+        ("correct", image, image, "--scan", path, "-o", tmp_path / "o.npy"),
+        ("refine", path, "--axis", "x", "--images", image, image, "--mismatch"),
+        ("refine", path, tmp_path / "t.csv", "--axis", "y"),
+    ):
+        outcome = run(*command)
+        assert outcome.status == 2, outcome.out
+        assert f"{path}:39: y.motion: 'off' " in outcome.err, outcome.err
 
 
 def test_y_off_may_be_like_x(tmp_path: Path) -> None:
