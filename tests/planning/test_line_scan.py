@@ -125,13 +125,14 @@ def test_frames_and_sizes_of_two_axes_are_refused(tmp_path: Path) -> None:
 def test_commands_for_frames_say_that_this_is_none(tmp_path: Path) -> None:
     """A corrected image of a scan that has no second axis would lie."""
     path = write_pair(tmp_path, LINE_SCAN.replace("image_lines = 7", "image_lines = 64"))
-    np.save(tmp_path / "a.npy", np.random.default_rng(1).normal(size=(64, 200)))
+    trace, retrace = tmp_path / "trace.npy", tmp_path / "retrace.npy"
+    for image in (trace, retrace):
+        np.save(image, np.random.default_rng(1).normal(size=(64, 200)))
     (tmp_path / "t.csv").write_text("time_s,displacement_nm,drive_v\n0,0,0\n", "ascii")
-    image = tmp_path / "a.npy"
     for command in (
         ("simulate", path),
-        ("correct", image, image, "--scan", path, "-o", tmp_path / "o.npy"),
-        ("refine", path, "--axis", "x", "--images", image, image, "--mismatch"),
+        ("correct", trace, retrace, "--scan", path, "-o", tmp_path / "o.npy"),
+        ("refine", path, "--axis", "x", "--images", trace, retrace, "--mismatch"),
         ("refine", path, tmp_path / "t.csv", "--axis", "y"),
     ):
         outcome = run(*command)
