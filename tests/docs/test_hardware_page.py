@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 from building import REPOSITORY, changed
-from editing import EXAMPLES
+from editing import EXAMPLES, run
 
 from tablegen.config.hardware import AxisAmplifier, AxisDac
 from tablegen.config.load import from_values, load
@@ -69,3 +69,6 @@ def test_a_reference_of_the_other_sign_is_a_gain_of_the_other_sign() -> None:
 def test_the_tube_has_the_keys_of_both_files() -> None:
     hardware = load(EXAMPLES / "tube_5um.toml").hardware("y")
     assert hardware.amplifier == AxisAmplifier(-22.5, 1.5, 1e5)
+    outcome = run("check", EXAMPLES / "tube_5um.toml")
+    assert outcome.status == 0, outcome.err
+    assert outcome.messages == [], "and its limits hold, without a warning"
