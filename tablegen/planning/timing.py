@@ -85,11 +85,12 @@ def _line_ticks(setup: Setup, rate: Fraction, problems: Problems) -> int:
             fits = "take more of them" if ticks < 8 else f"at most {most} fit" if most else "take fewer pixels"
         problems.add(file, key, f"a line of {shown} ticks is outside 8..{MAXIMUM_LINE_TICKS}; {fits}")
     elif ticks * timing.lines > MAXIMUM_TICKS:
+        what = "lines" if file.as_said("timing.lines")[0] == "timing.lines" else "line periods"
         problems.add(
             file,
             "timing.lines",
-            f"{timing.lines} lines of {ticks} ticks are {ticks * timing.lines} ticks a frame, above {MAXIMUM_TICKS}; "
-            f"at most {MAXIMUM_TICKS // ticks} lines fit",
+            f"{timing.lines} {what} of {ticks} ticks are {ticks * timing.lines} ticks a frame, above {MAXIMUM_TICKS}; "
+            f"at most {MAXIMUM_TICKS // ticks} {what} fit",
         )
     return ticks
 
