@@ -19,6 +19,8 @@ from tablegen.problems import Document, Problems, Rejected
 from tablegen.quantities import MAXIMUM_FILE_NAME
 from tablegen.toml import read_toml
 
+_LIBRARY = "this file is a library of scans; `tablegen sweep` builds them, each into a directory of its own"
+
 
 @dataclass(frozen=True, repr=False)
 class Setup:
@@ -51,12 +53,33 @@ def load(path: str | Path) -> Setup:
     Raises ``Rejected`` with every fault of both files.
     """
     path = Path(path)
+    values, scan_file = read_scan_file(path)
+    if "scans" in values:
+        raise Rejected([scan_file.problem("scans", _LIBRARY)])
+    return assembled(path, values, scan_file)
+
+
+def read_scan_file(path: Path) -> tuple[dict[str, Any], Document]:
+    """The values of a scan file, and where its keys stand. Raises ``Rejected`` where it is none."""
     values, scan_file = read_toml(path, str(path))
     if "v_max" in values and "dac" not in values:  # else every key of it is a fault, and none says this
         why = f"this is a scanner file; give the scan file that names it, scanner = '{shown_path(Path(path.name))}'"
         raise Rejected([scan_file.problem("", why)])
+    return values, scan_file
+
+
+Scanners = dict[Path, tuple[Scanner, Document]]
+"""Scanner files that were read already, and found right."""
+
+
+def assembled(path: Path, values: Mapping[str, Any], scan_file: Document, scanners: Scanners | None = None) -> Setup:
+    """The setup of the values of a scan file at a path, with the scanner that it names.
+
+    ``scanners`` are taken as they are, and what is read is kept there: for many scans of one scanner. Raises
+    ``Rejected`` with every fault of both files.
+    """
     problems = Problems()
-    scan = decode(Scan, values, scan_file, problems, partial(_check, scan_file, problems))
+    scan = decode(Scan, dict(values), scan_file, problems, partial(_check, scan_file, problems))
     name = values.get("name")
     if isinstance(name, str) and 0 < len(name) <= MAXIMUM_NAME and (fault := why_not_a_name(name)):
         problems.add(scan_file, "name", fault)
@@ -65,6 +88,10 @@ def load(path: str | Path) -> Setup:
     if not isinstance(named, str) or not 0 < len(named) <= MAXIMUM_FILE_NAME:
         raise Rejected(problems.found)
     scanner_path = path.parent / named
+    if scanners is not None and scanner_path in scanners:
+        problems.stop_if_any()
+        assert scan is not None
+        return Setup(scan, scanners[scanner_path][0], scan_file, scanners[scanner_path][1], scanner_path.parent)
     if not os.path.isfile(scanner_path):  # unlike the method of Path it never raises
         problems.add(
             scan_file, "scanner", f"{shown_path(scanner_path)} is not a file; the path is relative to this file"
@@ -81,6 +108,8 @@ def load(path: str | Path) -> Setup:
     problems.stop_if_any()
     assert scan is not None
     assert scanner is not None
+    if scanners is not None:
+        scanners[scanner_path] = scanner, scanner_file
     return Setup(scan, scanner, scan_file, scanner_file, scanner_path.parent)
 
 
@@ -108,6 +137,8 @@ def from_values(scan: Mapping[str, Any], scanner: Mapping[str, Any], folder: str
     """
     values: dict[str, Any] = {"name": "scan", "scanner": "values", **_plain(scan)}
     scan_file, scanner_file, problems = Document("scan", None), Document("scanner", None), Problems()
+    if "scans" in values:
+        raise Rejected([scan_file.problem("scans", "values are of one scan; give each of many its own")])
     built = decode(Scan, values, scan_file, problems, partial(_check, scan_file, problems))
     if isinstance(values["name"], str) and (why := why_not_a_name(values["name"])):
         problems.add(scan_file, "name", why)
