@@ -46,7 +46,7 @@ module library_bench #(
         memory_data <= memory_ready ? 32'hDEADBEEF : memory[memory_address];
     end
 
-    dac_library #(.PROGRAMS(LINES_LIBRARY_PROGRAMS), .ADDRESS_BITS(ADDRESS_BITS)) library (
+    dac_library #(.PROGRAMS(LINES_LIBRARY_PROGRAMS), .ADDRESS_BITS(ADDRESS_BITS)) picker (
         .clock(clock), .reset(1'b0), .pick(pick), .number(number), .busy(busy), .failed(failed),
         .memory_read(memory_read), .memory_address(memory_address), .memory_ready(memory_ready),
         .memory_data(memory_data), .writable(writable), .write(write), .write_region(region),

@@ -15,7 +15,7 @@ Scans = Iterable["str | Path | Setup | Variant"]
 
 
 @dataclass(frozen=True, repr=False)
-class Outcome:
+class BuildOutcome:
     """What became of one scan of many: a build, or the error that kept it from being one."""
 
     number: int
@@ -55,7 +55,7 @@ def build_many(
     *,
     formats: Sequence[str] | None = None,
     jobs: int | None = None,
-) -> Iterator[Outcome]:
+) -> Iterator[BuildOutcome]:
     """Build many scans in parallel processes, and give each as it completes, its error in place of a build.
 
     ``sources`` are scan files, setups or variants; they are taken as workers become free, and nothing is kept, so that
@@ -72,9 +72,9 @@ def build_many(
     for number, found in results(_built, tasks(), default_jobs() if jobs is None else jobs):
         source = given.pop(number)
         if isinstance(found, Exception):
-            yield Outcome(number, source, None, found)
+            yield BuildOutcome(number, source, None, found)
         else:
-            yield Outcome(number, source, found, None)
+            yield BuildOutcome(number, source, found, None)
 
 
 def _setup(source: "str | Path | Setup | Variant") -> Setup | Exception:
@@ -90,4 +90,6 @@ def _built(setup: Setup | Exception, out: str | None, formats: Sequence[str] | N
     """In a worker. What went wrong before comes back as it went."""
     if isinstance(setup, Exception):
         raise setup
-    return build(setup, None if out is None else Path(out) / setup.scan.name, formats=formats)
+    built = build(setup, None if out is None else Path(out) / setup.scan.name, formats=formats)
+    built.__dict__.pop("files", None)  # ten times what the rest is; it makes them again when it is asked
+    return built

@@ -10,7 +10,7 @@ from tablegen.cli.common import OutputFolder, fail, format_option, scan_argument
 from tablegen.cli.exit_status import ExitStatus
 
 if TYPE_CHECKING:
-    from tablegen.sweep.run import Sweep
+    from tablegen.sweep.run import ScanLibrary
 
 _SHOWN = 20  # scans with the same reason, by name
 
@@ -113,21 +113,21 @@ def sweep(
     return _told(found, only_check, quiet)
 
 
-def _asked(scan: Path, texts: tuple[str, ...], output: Path) -> "Sweep":
+def _asked(scan: Path, texts: tuple[str, ...], output: Path) -> "ScanLibrary":
     """The scans that are asked for; a file that cannot be read, or a wrong setting, ends the command."""
     from tablegen.config.settings import parse_setting
     from tablegen.config.variants import variants
     from tablegen.problems import Rejected
-    from tablegen.sweep.run import Sweep
+    from tablegen.sweep.run import ScanLibrary
 
     try:
         library, found = variants(scan, [parse_setting(text) for text in texts])
     except Rejected as rejected:
         fail(rejected.problems, ExitStatus.WRONG_INPUT)
-    return Sweep(library, found, output)
+    return ScanLibrary(library, found, output)
 
 
-def _listed(found: "Sweep", formats: list[str] | None) -> int:
+def _listed(found: "ScanLibrary", formats: list[str] | None) -> int:
     """A line a scan: what a sweep would do with it."""
     from tablegen.library.entry import Entry
     from tablegen.problems import Rejected
@@ -149,7 +149,7 @@ def _listed(found: "Sweep", formats: list[str] | None) -> int:
     return ExitStatus.WRONG_INPUT if wrong == len(found.variants) else ExitStatus.PARTIAL
 
 
-def _told(found: "Sweep", only_check: bool, quiet: bool) -> int:
+def _told(found: "ScanLibrary", only_check: bool, quiet: bool) -> int:
     """Print what became of a sweep, and return the status."""
     for entry in found.in_order:
         for warning in entry.warnings:
@@ -172,7 +172,7 @@ def _told(found: "Sweep", only_check: bool, quiet: bool) -> int:
     return status
 
 
-def _reasons(found: "Sweep") -> list[str]:
+def _reasons(found: "ScanLibrary") -> list[str]:
     """Each reason once, with the scans that it holds for."""
     by_reason: dict[str, list[str]] = {}
     for failed in found.failed:
@@ -184,7 +184,7 @@ def _reasons(found: "Sweep") -> list[str]:
     return lines
 
 
-def _status(found: "Sweep") -> ExitStatus:
+def _status(found: "ScanLibrary") -> ExitStatus:
     if not found.failed:
         return ExitStatus.OK
     if found.entries:

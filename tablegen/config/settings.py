@@ -41,9 +41,11 @@ def parse_setting(text: str) -> Setting:
         values += _values(item.strip(), origin)
         if len(values) > MOST_VALUES:
             raise _refused(origin, f"has more than {MOST_VALUES} values")
-    for at, value in enumerate(values):
-        if any(value == other and type(value) is type(other) for other in values[:at]) and at < 1000:
+    seen: set[str] = set()
+    for value in values:
+        if repr(value) in seen:
             raise _refused(origin, f"has {value!r} twice")
+        seen.add(repr(value))
     return Setting(key, tuple(values), origin)
 
 

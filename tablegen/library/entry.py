@@ -11,9 +11,8 @@ from msgspec import Struct
 
 from tablegen.device.widths import least_widths
 from tablegen.emit.content import AxisContent, Content
+from tablegen.library.whole import RECORD
 from tablegen.reading import BUILD_FILE, file_sha256, read_bytes
-
-RECORD = "program.json"
 
 
 class AxisEntry(Struct, frozen=True, kw_only=True):

@@ -11,7 +11,8 @@ from tablegen.config.load import Setup
 from tablegen.emit.render import plan_content
 from tablegen.emit.write import outdated_files, write_files
 from tablegen.interruption import ENDINGS, held
-from tablegen.library.entry import RECORD, Entry, entry_file, make_entry
+from tablegen.library.entry import Entry, entry_file, make_entry
+from tablegen.library.whole import RECORD
 from tablegen.reading import holds
 
 
@@ -75,9 +76,10 @@ def _outdated(folder: Path, files: dict[str, bytes]) -> list[str]:
 
 
 def _entry(job: Job, built: Build, files: dict[str, bytes]) -> Entry:
-    content = plan_content(built.plan, built.certificates, str(json.loads(built.manifest)["hash"]))
+    manifest = json.loads(built.manifest)
+    content = plan_content(built.plan, built.certificates, manifest["hash"])
     errors = {
-        axis: (certificate.max_error_lsb, certificate.scaling_error_percent)
+        axis: (manifest["axes"][axis]["certificate"]["max_error_lsb"], certificate.scaling_error_percent)
         for axis, certificate in built.certificates.items()
     }
     return make_entry(

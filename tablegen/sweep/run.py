@@ -13,8 +13,9 @@ from tablegen.config.variants import Variant
 from tablegen.emit.format import Unphysical
 from tablegen.emit.write import CannotWrite, write_files
 from tablegen.interruption import ENDINGS, held
-from tablegen.library.entry import RECORD, Entry, changed_files, is_whole, read_entry
-from tablegen.library.index import INDEX, listed_files, make_index
+from tablegen.library.entry import Entry, changed_files, is_whole, read_entry
+from tablegen.library.index import listed_files, make_index
+from tablegen.library.whole import INDEX, RECORD
 from tablegen.problems import Problem, Rejected
 from tablegen.reading import file_sha256, holds
 from tablegen.sweep.inputs import Inputs
@@ -33,7 +34,7 @@ class Failed:
 
 
 @dataclass
-class Sweep:
+class ScanLibrary:
     """The scans of a library, and what became of them."""
 
     library: str
@@ -62,7 +63,9 @@ class Sweep:
         return [self.entries[variant.name] for variant in self.variants if variant.name in self.entries]
 
 
-def state(sweep: Sweep, variant: Variant, formats: Sequence[str] | None, inputs: Inputs) -> Entry | tuple[Any, str]:
+def state(
+    sweep: ScanLibrary, variant: Variant, formats: Sequence[str] | None, inputs: Inputs
+) -> Entry | tuple[Any, str]:
     """The entry of a program that is up to date; otherwise the setup to build, and the digest of its inputs.
 
     Raises ``Rejected``.
@@ -83,7 +86,7 @@ def state(sweep: Sweep, variant: Variant, formats: Sequence[str] | None, inputs:
 
 
 def run(
-    sweep: Sweep,
+    sweep: ScanLibrary,
     *,
     formats: Sequence[str] | None = None,
     jobs: int,
@@ -126,7 +129,7 @@ def run(
     _finish(sweep, before, only_check)
 
 
-def _current(sweep: Sweep, variant: Variant, entry: Entry, strict: bool) -> None:
+def _current(sweep: ScanLibrary, variant: Variant, entry: Entry, strict: bool) -> None:
     if strict and entry.warnings:
         sweep.failed.append(Failed(variant, "limit", entry.warnings))
         return
@@ -134,7 +137,7 @@ def _current(sweep: Sweep, variant: Variant, entry: Entry, strict: bool) -> None
     sweep.current.append(variant.name)
 
 
-def _note(sweep: Sweep, variant: Variant, found: "Made | Exception", only_check: bool) -> None:
+def _note(sweep: ScanLibrary, variant: Variant, found: "Made | Exception", only_check: bool) -> None:
     """What a worker has said of a program."""
     match found:
         case Made():
@@ -153,7 +156,7 @@ def _note(sweep: Sweep, variant: Variant, found: "Made | Exception", only_check:
             sweep.failed.append(Failed(variant, "error", [f"{type(found).__name__}: {found}"]))
 
 
-def _finish(sweep: Sweep, before: dict[str, str], only_check: bool) -> None:
+def _finish(sweep: ScanLibrary, before: dict[str, str], only_check: bool) -> None:
     """Write the index and the runtime, and remove what an earlier sweep has left; or say what would be."""
     order = {variant.name: number for number, variant in enumerate(sweep.variants)}
     sweep.failed.sort(key=lambda failed: order[failed.variant.name])
@@ -185,7 +188,7 @@ def _remove_index(folder: Path, listed: dict[str, str]) -> None:
             (folder / name).unlink()
 
 
-def _dropped(sweep: Sweep) -> list[Entry]:
+def _dropped(sweep: ScanLibrary) -> list[Entry]:
     """Programs of this library in its directory that are not among the scans."""
     wanted = {variant.name for variant in sweep.variants}
     try:
@@ -198,7 +201,7 @@ def _dropped(sweep: Sweep) -> list[Entry]:
     ]
 
 
-def _remove_program(sweep: Sweep, entry: Entry) -> None:
+def _remove_program(sweep: ScanLibrary, entry: Entry) -> None:
     folder = sweep.folder / entry.name
     edited = changed_files(folder, entry)
     for name in [*(name for name in entry.files if name not in edited), RECORD]:

@@ -17,7 +17,7 @@ BASE = edited(
     "timing.pixels = 20",
     "x.band_limit.harmonics = 24",
     "y.band_limit.harmonics = 64",
-    "x.table.length = 256",
+    "x.table.length = 128",
     "y.table.length = 256",
     "- [limits]",
 )
