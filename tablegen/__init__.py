@@ -7,7 +7,8 @@ From a scan file to arrays and files in two lines::
 
 What is public stands in ``tablegen.__all__`` and docs/python.md: ``load``, ``plan``, ``certify`` and ``build`` make a
 scan, ``variants`` and ``build_many`` many, ``read_build`` and ``verify`` take one from its directory, ``Device`` talks
-to an instrument. Everything else may change. Names are loaded when they are first used, so that importing tablegen costs nothing.
+to an instrument. Everything else may change. Names are loaded when they are first used, so that importing tablegen
+costs nothing.
 """
 
 from importlib import import_module

@@ -1,12 +1,12 @@
 """Values of a key that a sweep goes through, from the text of ``--set``: ranges, lists, texts."""
 
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
 from typing import Any
 
 from tablegen.problems import Problem, Rejected, shortened
+from tablegen.toml import parse_toml
 
 MOST_VALUES = 65_536  # of one key, and of scans in one sweep
 _OPENING, _CLOSING = "[{", "]}"
@@ -93,8 +93,8 @@ def _values(item: str, origin: str) -> list[Any]:
         if any(number is not None for number in numbers):
             raise _refused(origin, f"{item!r} is no range START:STOP:STEP of numbers; quote it if it is a text")
     try:
-        return [tomllib.loads(f"value = {item}")["value"]]
-    except (tomllib.TOMLDecodeError, ValueError, RecursionError):
+        return [parse_toml(f"value = {item}", origin)[0]["value"]]
+    except Rejected:
         return [item]  # a word without quotes
 
 

@@ -12,6 +12,7 @@ from msgspec import Struct
 from tablegen.device.widths import least_widths
 from tablegen.emit.content import AxisContent, Content
 from tablegen.library.whole import RECORD
+from tablegen.manifest.format import read_json
 from tablegen.reading import BUILD_FILE, file_sha256, read_bytes
 
 
@@ -116,8 +117,8 @@ def entry_file(entry: Entry) -> bytes:
 def read_entry(folder: Path) -> Entry | None:
     """The entry in the folder of a program; None where there is none, or a damaged one."""
     try:
-        return msgspec.json.decode(read_bytes(folder / RECORD, BUILD_FILE), type=Entry)
-    except (OSError, msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
+        return msgspec.convert(read_json(read_bytes(folder / RECORD, BUILD_FILE)), Entry)
+    except (OSError, ValueError, RecursionError):  # a ValidationError is a ValueError
         return None
 
 

@@ -1,12 +1,12 @@
 """A program of a library as a build by itself: with the runtime, which stands once, beside all programs."""
 
-import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from tablegen.manifest.read import read_build
+from tablegen.reading import BUILD_FILE, read_bytes
 
 INDEX, RECORD = "library.json", "program.json"
 
@@ -25,9 +25,9 @@ def whole_build(folder: Path) -> Iterator[Path]:
     with tempfile.TemporaryDirectory(prefix="tablegen-", ignore_cleanup_errors=True) as name:
         for path in folder.iterdir():
             if path.is_file() and path.name != RECORD:
-                shutil.copyfile(path, Path(name) / path.name)
+                (Path(name) / path.name).write_bytes(read_bytes(path, BUILD_FILE))
         for file in files:
             beside = folder.parent / file
             if not (folder / file).exists() and beside.is_file():
-                shutil.copyfile(beside, Path(name) / file)
+                (Path(name) / file).write_bytes(read_bytes(beside, BUILD_FILE))
         yield Path(name)

@@ -1,6 +1,5 @@
 """One program of a library: built, certified, and written into its folder, in a worker."""
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +12,7 @@ from tablegen.emit.write import outdated_files, write_files
 from tablegen.interruption import ENDINGS, held
 from tablegen.library.entry import Entry, entry_file, make_entry
 from tablegen.library.whole import RECORD
+from tablegen.manifest.format import read_json
 from tablegen.reading import holds
 
 
@@ -76,7 +76,7 @@ def _outdated(folder: Path, files: dict[str, bytes]) -> list[str]:
 
 
 def _entry(job: Job, built: Build, files: dict[str, bytes]) -> Entry:
-    manifest = json.loads(built.manifest)
+    manifest = read_json(built.files["manifest.json"])
     content = plan_content(built.plan, built.certificates, manifest["hash"])
     errors = {
         axis: (manifest["axes"][axis]["certificate"]["max_error_lsb"], certificate.scaling_error_percent)
