@@ -28,6 +28,7 @@ class AxisEntry(Struct, frozen=True, kw_only=True):
     word_bits: int
     coding: str
     align: str
+    channel: str
     max_error_lsb: float
     scaling_error_percent: float
 
@@ -86,6 +87,7 @@ def make_entry(
             word_bits=output.word_bits,
             coding=output.coding,
             align=output.align,
+            channel=output.channel,
             max_error_lsb=float(f"{errors[one.axis][0]:.6g}"),
             scaling_error_percent=float(f"{errors[one.axis][1]:.6g}"),
         )

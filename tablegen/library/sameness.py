@@ -10,9 +10,11 @@ _OUTPUT: dict[str, Callable[[AxisEntry], Any]] = {
     "dac.word_bits": lambda axis: axis.word_bits,
     "dac.coding": lambda axis: axis.coding,
     "dac.align": lambda axis: axis.align,
+    "dac.output": lambda axis: axis.channel,
 }
 _VERILOG: dict[str, Callable[[AxisEntry], Any]] = {
     "dac.bits": lambda axis: axis.dac_bits,
+    "dac.output": lambda axis: axis.channel,
     "table.mode": lambda axis: "interpolated" if axis.interpolated else "direct",
     "table.bits": lambda axis: axis.table_bits,
     "table.length": lambda axis: axis.table_words if axis.interpolated else None,
