@@ -1,7 +1,7 @@
 """What a build costs among many in one process: CPU milliseconds of plan, certificate and files; and memory.
 
-Every build is of another size and offset, after some that fill the caches. Seconds differ between machines: compare runs
-on one. Usage: OPENBLAS_NUM_THREADS=1 python benchmarks/batch.py [BUILDS]
+Every build is of another size, after some that fill the caches. Seconds differ between machines: compare runs on one.
+Usage: OPENBLAS_NUM_THREADS=1 python benchmarks/batch.py [BUILDS]
 """
 
 import os

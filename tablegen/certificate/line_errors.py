@@ -16,7 +16,7 @@ from tablegen.fixedpoint.runs import Runs, runs_of
 from tablegen.numerics.arrays import Floats, Ints, merged
 from tablegen.planning.line_plan import LinePlan
 from tablegen.waveform.sampler import Expansion, Sampler, on_grid
-from tablegen.waveform.series import FourierSeries
+from tablegen.waveform.series import FourierSeries, values
 
 CHORD = 0.05  # share of the line, about one lattice constant of the paper's images
 _POINTS_PER_HARMONIC = 16  # points per harmonic over the window, for analytic slopes
@@ -162,10 +162,15 @@ def _followed(line: LinePlan, played: EmittedPeriod, side: str, position: Floats
     shape, reached = line.drive.shape, _reached(line)
     times = shape.times(side, position)
 
+    def at_times(series: FourierSeries) -> list[Floats]:
+        if shape.waveform is not None:  # its branches are a series too, and equal ones have to leave nothing
+            return list(values(times, (series, 0), (series, 1)))
+        return played.expansion(series).at(times, 0, 1)
+
     def follow(series: FourierSeries) -> tuple[Floats, Floats]:
-        value, slope = played.expansion(series).at(times, 0, 1)
+        value, slope = at_times(series)
         if line.layer is not None:
-            layer_value, layer_slope = played.expansion(line.layer).at(times, 0, 1)
+            layer_value, layer_slope = at_times(line.layer)
             series, value, slope = series.less(line.layer), value - layer_value, slope - layer_slope
         return shape.followed(side, position, series, value, slope)
 
