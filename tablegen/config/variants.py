@@ -61,6 +61,9 @@ def variants(
     path = Path(path)
     chosen = _chosen(settings)
     given(chosen)
+    if names := [setting for setting in chosen if setting.parts[0] in ("name", "scans")]:
+        why = f"{names[0].key} is not set: names follow from what is, or stand in [[scans]]"
+        raise Rejected([Problem(names[0].origin, 0, "", why)])
     values, file = read_scan_file(path)
     library = values.get("name")
     if not isinstance(library, str) or why_not_a_name(library) or len(library) > MAXIMUM_NAME:
@@ -91,6 +94,8 @@ def variants(
 def _chosen(settings: "Mapping[str, Iterable[Any]] | Sequence[Setting]") -> list[Setting]:
     if not isinstance(settings, Mapping):
         return list(settings)
+    if texts := [key for key, values in settings.items() if isinstance(values, str)]:
+        raise TypeError(f"{texts[0]}: give the values as a list, [{settings[texts[0]]!r}]")
     return [
         Setting(key, tuple(value.item() if hasattr(value, "item") else value for value in values), "settings")
         for key, values in settings.items()

@@ -10,7 +10,7 @@ from tablegen.api.build import BrokenLimit
 from tablegen.api.workers import results
 from tablegen.config.schema import DEFAULT_FORMATS
 from tablegen.config.variants import Variant
-from tablegen.emit.format import Unphysical
+from tablegen.emit.formats import UnknownFormat
 from tablegen.emit.write import CannotWrite, write_files
 from tablegen.interruption import ENDINGS, held
 from tablegen.library.entry import Entry, changed_files, is_whole, read_entry
@@ -74,7 +74,7 @@ def state(
     wanted = list(formats or setup.scan.emit.formats or DEFAULT_FORMATS)
     try:
         digest = inputs.digest(setup, variant.values, wanted)
-    except Unphysical as error:  # an unknown format
+    except UnknownFormat as error:
         raise Rejected([Problem("formats", 0, "", str(error))]) from None
     except OSError:
         return setup, ""  # the build says what is wrong

@@ -102,6 +102,17 @@ def test_a_library_that_cannot_be_is_refused_as_a_whole(tmp_path: Path, scans: s
         variants(write_library(tmp_path, scans))
 
 
+@pytest.mark.parametrize("key", ["name", "scans"])
+def test_names_are_not_set(tmp_path: Path, key: str) -> None:
+    with pytest.raises(Rejected, match="names follow from what is"):
+        variants(write_pair(tmp_path), {key: ["one", "two"]})
+
+
+def test_a_text_is_no_list_of_values(tmp_path: Path) -> None:
+    with pytest.raises(TypeError, match=r"\['window'\]"):
+        variants(write_pair(tmp_path), {"x.band_limit.method": "window"})
+
+
 @pytest.mark.parametrize("command", ["build", "show", "check"])
 def test_commands_of_one_scan_say_what_a_library_is(tmp_path: Path, command: str) -> None:
     path = write_library(tmp_path)
