@@ -22,10 +22,12 @@ class VariedDocument(Document):
 
     def problem(self, key: str, why: str) -> Problem:
         """A problem of a key, at the option that set it or in the file."""
+        told = super().problem(key, why)
+        written = self.inherited.get(told.key, told.key)
         for known, origin in self.set_by.items():
-            if key == known or key.startswith((f"{known}.", f"{known}[")):
-                return Problem(origin, 0, key, why)
-        return super().problem(key, why)
+            if written == known or written.startswith((f"{known}.", f"{known}[")):
+                return told._replace(file=origin, line=0)
+        return told
 
 
 @dataclass(frozen=True, repr=False)
@@ -86,7 +88,7 @@ def variants(
                 told[setting.key] = value
             name = _name(entry or library, list(zip(labels, combination, strict=True)), len(found), total)
             own = {**own, "name": name}
-            found.append(Variant(name, told, path, own, VariedDocument(file.name, lines, set_by), scanners))
+            found.append(Variant(name, told, path, own, VariedDocument(file.name, lines, set_by=set_by), scanners))
     _refuse_clashes(found, library)
     return library, found
 
