@@ -136,6 +136,10 @@ def build(
         for finding in built.findings:
             if finding.weight == "spoils":  # `show` prints the small print too
                 click.echo(finding.line)
+        if built.choices:
+            click.echo()
+        for choice in built.choices:
+            click.echo(f"chosen: {choice}")
         click.echo(f"\n{output}: {_state(built, changed)}")
         if removed:
             click.echo(f"{output}: removed files of an earlier build: {_few(removed)}")

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 from tablegen.compensation import models
@@ -15,10 +16,13 @@ from tablegen.compensation.response_file import read_response
 from tablegen.compensation.size import SizeLaw
 from tablegen.config.load import Setup
 from tablegen.config.scanner import Offset, Resonance, ScannerAxis, Size
-from tablegen.config.schema import FastAxis
+from tablegen.config.schema import FastAxis, SlowAxis
 from tablegen.driver import Driver
 from tablegen.figures import at_most
 from tablegen.problems import Problems, Unphysical
+
+# An axis at rest plays w = 1/2 throughout; gain and table refer to so small a share of v_max.
+RESTING_SHARE = 2.0**-24
 
 
 @dataclass(frozen=True)
@@ -50,6 +54,11 @@ class Drive:
     max_boost_db: float
     line_at: Callable[[float], LineShape | None] = field(compare=False, repr=False)
     model_files: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def resting(self) -> bool:
+        """Whether the axis stays at its offset: w is 1/2 throughout, and the line has no size."""
+        return self.size_nm == 0.0
 
     @property
     def model(self) -> str:
@@ -107,8 +116,11 @@ def compensate(setup: Setup, axis: str, rate_hz: float, harmonics: int, problems
             v_offset = surface.small.voltage_at(scan.offset_nm, driver, scanner.size.k_nm_per_v)
 
     low, high = scan.band_limit.window
-    v, size_nm = 0.0, 0.0
-    if size_law is not None and scan.size_nm is not None:
+    resting = isinstance(scan, SlowAxis) and scan.off
+    v, size_nm = (RESTING_SHARE if resting else 0.0), 0.0
+    if resting:
+        pass
+    elif size_law is not None and scan.size_nm is not None:
         with problems.at(scan_file, f"{axis}.size_nm"):
             size_nm = scan.size_nm / (high - low) if scan.size_of == "window" else scan.size_nm
             try:
@@ -126,7 +138,7 @@ def compensate(setup: Setup, axis: str, rate_hz: float, harmonics: int, problems
             size_nm = size_law.size_nm(v)
 
     g = 1.0
-    if scanner.frequency is not None:
+    if scanner.frequency is not None and not resting:
         with problems.at(scanner_file, f"{axis}.frequency.alpha"):
             g = frequency_gain(rate_hz, scanner.frequency.alpha, scanner.frequency.reference_hz)
 
@@ -134,12 +146,14 @@ def compensate(setup: Setup, axis: str, rate_hz: float, harmonics: int, problems
     offset_law = surface.at(v)
     m = offset_law.factor(p)
     response, max_boost_db, law = None, 0.0, scanner.frequency
-    if scanner.resonance is not None:
+    if scanner.resonance is not None and not resting:
         max_boost_db = scanner.resonance.max_boost_db
         key = f"{axis}.resonance.response" if scanner.resonance.response is not None else f"{axis}.resonance"
         with problems.at(scanner_file, key):
             response = dynamics_of(scanner.resonance, setup.scanner_folder)
-    hysteresis = models.get(models.UNCOMPENSATED)() if scanner.hysteresis is None else scanner.hysteresis
+    uncompensated = scanner.hysteresis is None or resting
+    hysteresis = models.get(models.UNCOMPENSATED)() if uncompensated else scanner.hysteresis
+    assert hysteresis is not None
     wanted = WantedLine(
         axis=axis,
         turn=scan.turn,
@@ -154,18 +168,13 @@ def compensate(setup: Setup, axis: str, rate_hz: float, harmonics: int, problems
         both=scan.band_limit.directions == "both",
         response=response,
         max_boost_db=max_boost_db,
-        factor_at=lambda share: surface.small.factor(driver.p(driver.volts(share))),
-        rate_gain=None if law is None else lambda hz: frequency_gain(hz, law.alpha, law.reference_hz),
+        factor_at=partial(_factor_at, surface.small, driver),
+        rate_gain=None if law is None else partial(frequency_gain, alpha=law.alpha, reference_hz=law.reference_hz),
         folder=setup.scanner_folder,
         scan_file=scan_file,
         scanner_file=scanner_file,
         problems=problems,
     )
-
-    def line_at(v: float) -> LineShape | None:
-        apart = Problems()
-        made = hysteresis.line(replace(wanted, v=v, problems=apart))
-        return None if apart.found else made
 
     shape = hysteresis.line(wanted)
     if len(problems.found) > before or shape is None or size_law is None:
@@ -188,7 +197,7 @@ def compensate(setup: Setup, axis: str, rate_hz: float, harmonics: int, problems
         shape=shape,
         response=response,
         max_boost_db=max_boost_db,
-        line_at=line_at,
+        line_at=partial(_line_at, hysteresis, wanted),
         model_files=tuple(
             (Path(name).name, digest)
             for name, digest in zip(hysteresis.files(), hysteresis.contents(setup.scanner_folder), strict=True)
@@ -199,6 +208,17 @@ def compensate(setup: Setup, axis: str, rate_hz: float, harmonics: int, problems
 def outside_driver(volts: float, driver: Driver) -> str:
     """Say that a voltage is outside the driver's range, and by how much."""
     return f"{volts:.6g} V is outside the driver's {driver}, by {driver.beyond(volts, volts):.4g} V"
+
+
+# Functions of a module, not of a call: a plan that travels to another process takes them along.
+def _factor_at(law: OffsetLaw, driver: Driver, share: float) -> float:
+    return law.factor(driver.p(driver.volts(share)))
+
+
+def _line_at(hysteresis: Hysteresis, wanted: WantedLine, v: float) -> LineShape | None:
+    apart = Problems()
+    made = hysteresis.line(replace(wanted, v=v, problems=apart))
+    return None if apart.found else made
 
 
 def _check_points(setup: Setup, axis: str, problems: Problems) -> None:
