@@ -18,6 +18,7 @@ from tablegen.compensation.expectation import Expectation
 from tablegen.compensation.transient import Transient
 from tablegen.numerics.arrays import Bools, Floats, FloatsLike
 from tablegen.problems import Document, Problems, Unphysical
+from tablegen.waveform.gentle_fit import AllowedError
 from tablegen.waveform.series import FourierSeries
 
 _GRID = 1025  # points on which a sweep is inverted first
@@ -92,6 +93,11 @@ class LineShape:
     @property
     def waveform(self) -> FourierSeries | None:
         """The band-limited waveform, where the model itself makes it; None leaves it to ``band_limit`` of the scan."""
+        return None
+
+    @property
+    def kept_percent(self) -> float | None:
+        """The scaling error that ``waveform`` was made for, where that was ``WantedLine.allowed``."""
         return None
 
     @property
@@ -196,7 +202,8 @@ class WantedLine:
     the piezo for w from 0 to 1; ``harmonics`` the highest that is played; ``both`` whether both directions image.
     ``response`` are the dynamics, whose inverse gives no harmonic more than ``max_boost_db``; ``factor_at`` is m of (1)
     at an offset as a share of v_max, for small scans, ``rate_gain`` g of (23) at a rate in Hz, None where it is
-    not calibrated.
+    not calibrated. ``allowed`` is the scaling error in the window that may be left for the sake of less acceleration: a
+    model that makes the whole waveform itself keeps it, where it is not None.
     """
 
     axis: str
@@ -218,6 +225,7 @@ class WantedLine:
     scan_file: Document
     scanner_file: Document
     problems: Problems
+    allowed: AllowedError | None = None
 
     @contextmanager
     def at(self, key: str) -> Iterator[None]:

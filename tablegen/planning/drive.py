@@ -17,7 +17,10 @@ from tablegen.config.load import Setup
 from tablegen.config.scanner import Offset, Resonance, ScannerAxis, Size
 from tablegen.config.schema import FastAxis
 from tablegen.figures import at_most
+from tablegen.fixedpoint.converter import Converter
+from tablegen.planning.allowed_error import allowed_error
 from tablegen.problems import Problems, Unphysical
+from tablegen.waveform.gentle_fit import AllowedError
 
 
 @dataclass(frozen=True)
@@ -27,7 +30,8 @@ class Drive:
     ``v_scan`` is from (9)/(12), before ``m`` of (1) and ``g`` of (23). The amplitude played is m g v_scan, peak to
     peak, for w from 0 to 1. ``position_nm`` is that of the offset, above the one at 0 V. ``line_at`` is the line that
     the model makes at another normalised scan voltage, None where it makes none; ``model_files`` has the files that the
-    model names, and their SHA-256.
+    model names, and their SHA-256. ``harmonics`` is the highest that is played, ``allowed`` the scaling error that may
+    be left for less acceleration.
     """
 
     v_max: float
@@ -48,6 +52,8 @@ class Drive:
     response: Response | None
     max_boost_db: float
     line_at: Callable[[float], LineShape | None] = field(compare=False, repr=False)
+    harmonics: int
+    allowed: AllowedError | None
     model_files: tuple[tuple[str, str], ...] = ()
 
     @property
@@ -75,10 +81,12 @@ class Drive:
         return self.offset_law.factor(normalised_offset(v_offset, self.v_max)) * self.g * self.v_scan
 
 
-def compensate(setup: Setup, axis: str, rate_hz: float, harmonics: int, problems: Problems) -> Drive | None:
+def compensate(
+    setup: Setup, axis: str, rate_hz: float, harmonics: Callable[[AllowedError | None], int], problems: Problems
+) -> Drive | None:
     """Apply the scanner's calibration to one axis ("x" or "y") at its rate; None where ``problems`` grew.
 
-    ``harmonics`` is the highest that is played.
+    ``harmonics`` gives the highest that is played, where so much of a scaling error is allowed.
     """
     scan: FastAxis = getattr(setup.scan, axis)
     scanner: ScannerAxis = getattr(setup.scanner, axis)
@@ -139,16 +147,20 @@ def compensate(setup: Setup, axis: str, rate_hz: float, harmonics: int, problems
         with problems.at(scanner_file, key):
             response = dynamics_of(scanner.resonance, setup.scanner_folder)
     hysteresis = models.get(models.UNCOMPENSATED)() if scanner.hysteresis is None else scanner.hysteresis
+    v_amplitude = m * g * v * v_max
+    codes = abs(v_amplitude / Converter.of(setup.scan.dac, setup.scan.amplifier).v_per_code)
+    allowed = allowed_error(scan.band_limit, setup.scan.limits, codes)
+    most = harmonics(allowed)
     wanted = WantedLine(
         axis=axis,
         turn=scan.turn,
         v=v,
         v_max=v_max,
-        v_amplitude=m * g * v * v_max,
+        v_amplitude=v_amplitude,
         v_offset=v_offset,
         size_nm=size_nm,
         rate_hz=rate_hz,
-        harmonics=harmonics,
+        harmonics=most,
         window=(low, high),
         both=scan.band_limit.directions == "both",
         response=response,
@@ -159,6 +171,7 @@ def compensate(setup: Setup, axis: str, rate_hz: float, harmonics: int, problems
         scan_file=scan_file,
         scanner_file=scanner_file,
         problems=problems,
+        allowed=allowed,
     )
 
     def line_at(v: float) -> LineShape | None:
@@ -188,6 +201,8 @@ def compensate(setup: Setup, axis: str, rate_hz: float, harmonics: int, problems
         response=response,
         max_boost_db=max_boost_db,
         line_at=line_at,
+        harmonics=most,
+        allowed=allowed,
         model_files=tuple(
             (Path(name).name, digest)
             for name, digest in zip(hysteresis.files(), hysteresis.contents(setup.scanner_folder), strict=True)

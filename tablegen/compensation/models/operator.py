@@ -15,6 +15,7 @@ from tablegen.compensation.hysteresis import BranchShape
 from tablegen.compensation.line import LineShape, WantedLine, WholeLine
 from tablegen.compensation.operator.creep import LogarithmicCreep
 from tablegen.compensation.operator.file import read_operator
+from tablegen.compensation.operator.gentle_line import gentlest_waveform
 from tablegen.compensation.operator.loop import Loop
 from tablegen.compensation.operator.operator import Operator
 from tablegen.compensation.operator.scan_line import Expected, Found, Wanted, find_waveform
@@ -43,7 +44,8 @@ class OperatorLine(WholeLine):
     ``uncertainty`` is what the operator may be wrong by at this stroke, centre and rate, at ``LEVEL_PERCENT``;
     ``distance`` is that of stroke or centre to the nearest trace, of v_max. ``operator`` is that of this rate,
     ``factor`` that of its loops at the mean of this drive, and ``between`` which share of the size is uncertain since
-    its turns are not even about that mean; ``after`` is what follows a change of offset and one of size.
+    its turns are not even about that mean; ``after`` is what follows a change of offset and one of size. ``kept`` is
+    the scaling error, percent, for which it is the gentlest waveform; None where it was learnt alone.
     """
 
     expected: Expected
@@ -53,6 +55,12 @@ class OperatorLine(WholeLine):
     factor: float
     between: float
     after: tuple[Transient, Transient]
+    kept: float | None = None
+
+    @property
+    def kept_percent(self) -> float | None:
+        """What was allowed, and kept."""
+        return self.kept
 
     @property
     def transients(self) -> tuple[Transient, Transient]:
@@ -146,7 +154,7 @@ def _at(operator: Operator, wanted: WantedLine) -> tuple[Operator, float]:
     return operator, factor
 
 
-def _line(operator: Operator, wanted: WantedLine) -> OperatorLine:
+def _line(operator: Operator, wanted: WantedLine) -> OperatorLine | None:
     centre = wanted.v_offset / wanted.v_max
     operator, factor = _at(operator, wanted)
     at_offset = wanted.factor_at(centre)
@@ -176,6 +184,17 @@ def _line(operator: Operator, wanted: WantedLine) -> OperatorLine:
     straight = LineShape(wanted.turn, BranchShape(), BranchShape())
     start = fit_window(straight, wanted.harmonics, wanted.window, wanted.both)
     found = find_waveform(operator, line, start, through, None if response is None else dynamics)
+    kept = None
+    if wanted.allowed is not None:
+        try:
+            found = gentlest_waveform(
+                operator, line, found, wanted.allowed.percent, through, None if response is None else dynamics
+            )
+            kept = wanted.allowed.percent
+        except Unphysical as reason:
+            if wanted.allowed.firm:
+                wanted.problems.add(wanted.scan_file, f"{wanted.axis}.band_limit", str(reason))
+                return None
     factor *= with_mean(found.mean)
     between = _BEND_UNKNOWN * found.grown
     _check_reach(operator, found.stroke, found.centre, wanted.v_max)
@@ -192,6 +211,7 @@ def _line(operator: Operator, wanted: WantedLine) -> OperatorLine:
         operator=operator,
         factor=factor,
         between=between,
+        kept=kept,
         after=(
             after_offset(late, found.stroke, found.centre, factor, wanted.turn, 1.0 / wanted.rate_hz),
             after_size(late, found.stroke, found.centre, factor, wanted.turn, 1.0 / wanted.rate_hz),
