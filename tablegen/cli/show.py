@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from tablegen.cli.common import format_option, planned, rendered, scan_argument
+from tablegen.cli.common import format_option, planned, rendered, require, scan_argument
 from tablegen.cli.terminal import tell
 
 
@@ -13,8 +13,13 @@ from tablegen.cli.terminal import tell
 @scan_argument
 @click.option("--json", "as_json", is_flag=True, help="Print manifest.json instead of text.")
 @format_option
+@click.option(
+    "--optimum",
+    is_flag=True,
+    help="Add the least peak acceleration that any waveform of this scaling error could have. Needs scipy.",
+)
 @click.option("--plot/--no-plot", default=True, show_default=True, help="Plot one period of the drive of each axis.")
-def show(scan: Path, as_json: bool, formats: tuple[str, ...], plot: bool) -> None:
+def show(scan: Path, as_json: bool, formats: tuple[str, ...], optimum: bool, plot: bool) -> None:
     """Show drive, rates, accuracy and plots of a scan. Writes no file.
 
     Under each plot, > and < mark the imaging windows of the forward and backward lines.
@@ -26,6 +31,10 @@ def show(scan: Path, as_json: bool, formats: tuple[str, ...], plot: bool) -> Non
 
     Exit status: 0 done, 2 wrong input, 3 a limit of the certificate is exceeded.
     """
+    if optimum:
+        if as_json:
+            raise click.UsageError("The manifest has no optimum: leave out --json or --optimum.")
+        require("scipy", extra="calibrate")
     built = planned(scan, list(formats) or None)
     if as_json:
         click.echo(rendered(built)["manifest.json"], nl=False)
@@ -34,7 +43,17 @@ def show(scan: Path, as_json: bool, formats: tuple[str, ...], plot: bool) -> Non
 
     plan = built.plan
     tell(f"{plan.name} on {plan.scanner!r}", bold=True)
-    for text in built.summary.splitlines():
+    lines = built.summary.splitlines()
+    if optimum:
+        from tablegen.certificate.certificate import Certificate
+        from tablegen.certificate.optimum import with_optimum
+        from tablegen.certificate.summary import summary
+
+        found: dict[str, Certificate] = {
+            line.axis: with_optimum(line, built.certificates[line.axis]) for line in plan.lines
+        }
+        lines = summary(plan, found)
+    for text in lines:
         tell(text, bold=bool(text) and not text.startswith(" "))
     if plot:
         unicode = "utf" in (getattr(sys.stdout, "encoding", None) or "").lower()

@@ -101,6 +101,11 @@ class LineShape:
         return None
 
     @property
+    def learnt_line(self) -> "LineShape":
+        """The line that the piezo follows straight, where ``waveform`` keeps an error beside that."""
+        return self
+
+    @property
     def transients(self) -> tuple[Transient, Transient] | None:
         """What follows a change of offset and one of size, where the model knows."""
         return None

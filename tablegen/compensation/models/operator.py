@@ -45,7 +45,8 @@ class OperatorLine(WholeLine):
     ``distance`` is that of stroke or centre to the nearest trace, of v_max. ``operator`` is that of this rate,
     ``factor`` that of its loops at the mean of this drive, and ``between`` which share of the size is uncertain since
     its turns are not even about that mean; ``after`` is what follows a change of offset and one of size. ``kept`` is
-    the scaling error, percent, for which it is the gentlest waveform; None where it was learnt alone.
+    the scaling error, percent, for which it is the gentlest waveform beside the one that was ``learnt``; both are None
+    where that is the waveform.
     """
 
     expected: Expected
@@ -56,6 +57,12 @@ class OperatorLine(WholeLine):
     between: float
     after: tuple[Transient, Transient]
     kept: float | None = None
+    learnt: FourierSeries | None = None
+
+    @property
+    def learnt_line(self) -> LineShape:
+        """What was learnt before acceleration was traded for error."""
+        return self if self.learnt is None else WholeLine.of(self.learnt, self.turn)
 
     @property
     def kept_percent(self) -> float | None:
@@ -184,10 +191,10 @@ def _line(operator: Operator, wanted: WantedLine) -> OperatorLine | None:
     straight = LineShape(wanted.turn, BranchShape(), BranchShape())
     start = fit_window(straight, wanted.harmonics, wanted.window, wanted.both)
     found = find_waveform(operator, line, start, through, None if response is None else dynamics)
-    kept = None
+    kept, learnt = None, None
     if wanted.allowed is not None:
         try:
-            found = gentlest_waveform(
+            found, learnt = gentlest_waveform(
                 operator, line, found, wanted.allowed.percent, through, None if response is None else dynamics
             )
             kept = wanted.allowed.percent
@@ -201,7 +208,11 @@ def _line(operator: Operator, wanted: WantedLine) -> OperatorLine | None:
     late = replace(operator, creep=operator.creep.down_to(_SLOWEST_HZ))  # for all that a few frames may last
     # w = 0 and 1 are the ends of the laws' amplitude everywhere else.
     scale = found.v_amplitude * wanted.v_max / wanted.v_amplitude
-    series = FourierSeries(0.5 + scale * (found.series.a0 - 0.5), scale * found.series.a, scale * found.series.b)
+
+    def scaled(series: FourierSeries) -> FourierSeries:
+        return FourierSeries(0.5 + scale * (series.a0 - 0.5), scale * series.a, scale * series.b)
+
+    series = scaled(found.series)
     return OperatorLine.of(
         series,
         wanted.turn,
@@ -212,6 +223,7 @@ def _line(operator: Operator, wanted: WantedLine) -> OperatorLine | None:
         factor=factor,
         between=between,
         kept=kept,
+        learnt=None if learnt is None else scaled(learnt),
         after=(
             after_offset(late, found.stroke, found.centre, factor, wanted.turn, 1.0 / wanted.rate_hz),
             after_size(late, found.stroke, found.centre, factor, wanted.turn, 1.0 / wanted.rate_hz),

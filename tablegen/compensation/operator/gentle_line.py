@@ -16,15 +16,18 @@ _ROUNDS = 2  # a third changes nothing that shows
 
 def gentlest_waveform(
     operator: Operator, wanted: Wanted, found: Found, percent: float, inverse: ThroughInverse, dynamics: Linear | None
-) -> Found:
+) -> tuple[Found, FourierSeries]:
     """The waveform of least acceleration in place of the learnt ``found``, ``percent`` of scaling error beside that.
+
+    The second is the learnt one beside which it is.
 
     Raises ``Unreachable`` where the harmonics cannot be so straight, ``Unphysical`` as ``find_waveform`` does.
     """
     for _ in range(_ROUNDS):
         gentle = _gentle(wanted, found.series, percent)
         found = find_waveform(operator, wanted, gentle, inverse, dynamics)
-    return find_waveform(operator, wanted, _gentle(wanted, found.series, percent), inverse, dynamics, learn=False)
+    gentle = _gentle(wanted, found.series, percent)
+    return find_waveform(operator, wanted, gentle, inverse, dynamics, learn=False), found.series
 
 
 def _gentle(wanted: Wanted, learnt: FourierSeries, percent: float) -> FourierSeries:
