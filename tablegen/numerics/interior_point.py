@@ -7,6 +7,7 @@ a step solves the normal equations of sum R^T (l / s) R. A solution within some 
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import isfinite
 from typing import Protocol
 
 import numpy as np
@@ -60,6 +61,11 @@ def least_bound(
 ) -> Least:
     """Minimise v from y = ``start`` on, until it is within the share ``gap`` of the optimum, or ``reached(v)``."""
     state = _State(parts, start)
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # what contradicts itself ends so
+        return _least(state, gap, reached)
+
+
+def _least(state: "_State", gap: float, reached: Callable[[float], bool]) -> Least:
     for step in range(_MOST_STEPS + 1):
         kept, below = state.bounds()
         done = state.inside and (reached(kept) or (state.dual and kept - below <= gap * kept))
@@ -177,6 +183,8 @@ class _State:
             float(tree_sum(((slack + ahead * by) * (one + up * change)).reshape(-1)))
             for slack, by, one, change in zip(self._slack, slacks, self._multiplier, multipliers, strict=True)
         )
+        if not (mean > 0.0 and isfinite(after)):  # what contradicts itself has no other end
+            return False
         ratio = after / self._sides / mean
         centred = ratio * ratio * ratio * mean
         y, v, moved, slacks, multipliers = step(

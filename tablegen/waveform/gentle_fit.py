@@ -28,7 +28,7 @@ POSITION = 0.1  # of the slope's bound: by how much of the line w may be beside 
 _GAP = 0.02  # of the optimum
 _NODES_PER_WAVE = 14  # in a window, of the highest harmonic
 _ACCELERATIONS_PER_WAVE = 12
-_RANGE_PER_WAVE = 8
+_RANGE_PER_WAVE, _LEAST_RANGE = 8, 512
 _PLACES = 17  # of a window at which the position is held
 _TIGHT = 0.94  # what is asked of the nodes, so that it holds between them
 _TRIALS = 4
@@ -140,8 +140,10 @@ def _window(straight: Straightness, harmonics: int) -> FourierSeries:
 
 
 def _in_range(series: FourierSeries) -> bool:
-    w = series.on_grid(32 * series.harmonics)
-    return float(np.min(w)) >= 0.0 and float(np.max(w)) <= 1.0
+    count = 32 * series.harmonics
+    w = series.on_grid(count)
+    between = series.peak_acceleration() / (8.0 * count * count)  # by which it may bulge from one time to the next
+    return float(np.min(w)) >= between and float(np.max(w)) <= 1.0 - between
 
 
 def _promised(bound: float) -> float:
@@ -196,7 +198,7 @@ class _Programme:
         self._accelerations = HarmonicRows(t, np.ones(len(t)), harmonics, 2), np.zeros(len(t))
         self._range: list[Within] = []
         if held:
-            count = _RANGE_PER_WAVE * harmonics
+            count = max(_RANGE_PER_WAVE * harmonics, _LEAST_RANGE)
             rows = HarmonicRows(np.arange(count) / count, np.ones(count), harmonics, 0)
             self._range = [Within(rows, np.full(count, 0.5), 0.5 - _RANGE_MARGIN, 0.0)]
 
