@@ -26,7 +26,7 @@ def with_optimum(line: LinePlan, certificate: Certificate) -> Certificate:
     needs scipy.
     """
     straight = straightness(line.drive.shape.learnt_line, line.band_limit, line.layer)
-    percent = line.kept_percent or straight.error_percent(line.target)
+    percent = line.drive.shape.beside_learnt_percent or line.kept_percent or straight.error_percent(line.target)
     least = least_acceleration(straight, line.target.harmonics, percent) if percent > 1e-9 else None
     return replace(certificate, peak_acceleration=line.target.peak_acceleration(), optimum=least)
 

@@ -106,6 +106,11 @@ class LineShape:
         return self
 
     @property
+    def beside_learnt_percent(self) -> float | None:
+        """The scaling error of ``waveform`` beside ``learnt_line``."""
+        return None
+
+    @property
     def transients(self) -> tuple[Transient, Transient] | None:
         """What follows a change of offset and one of size, where the model knows."""
         return None

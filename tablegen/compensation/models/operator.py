@@ -15,7 +15,7 @@ from tablegen.compensation.hysteresis import BranchShape
 from tablegen.compensation.line import LineShape, WantedLine, WholeLine
 from tablegen.compensation.operator.creep import LogarithmicCreep
 from tablegen.compensation.operator.file import read_operator
-from tablegen.compensation.operator.gentle_line import gentlest_waveform
+from tablegen.compensation.operator.gentle_line import Gentle, gentlest_waveform
 from tablegen.compensation.operator.loop import Loop
 from tablegen.compensation.operator.operator import Operator
 from tablegen.compensation.operator.scan_line import Expected, Found, Wanted, find_waveform
@@ -45,8 +45,8 @@ class OperatorLine(WholeLine):
     ``distance`` is that of stroke or centre to the nearest trace, of v_max. ``operator`` is that of this rate,
     ``factor`` that of its loops at the mean of this drive, and ``between`` which share of the size is uncertain since
     its turns are not even about that mean; ``after`` is what follows a change of offset and one of size. ``kept`` is
-    the scaling error, percent, for which it is the gentlest waveform beside the one that was ``learnt``; both are None
-    where that is the waveform.
+    the scaling error, percent, for which it is the gentlest waveform ``beside`` the one that was ``learnt``; they are
+    None where that is the waveform.
     """
 
     expected: Expected
@@ -58,6 +58,12 @@ class OperatorLine(WholeLine):
     after: tuple[Transient, Transient]
     kept: float | None = None
     learnt: FourierSeries | None = None
+    beside: float | None = None
+
+    @property
+    def beside_learnt_percent(self) -> float | None:
+        """What of ``kept`` the learnt waveform leaves for the sake of acceleration."""
+        return self.beside
 
     @property
     def learnt_line(self) -> LineShape:
@@ -191,16 +197,18 @@ def _line(operator: Operator, wanted: WantedLine) -> OperatorLine | None:
     straight = LineShape(wanted.turn, BranchShape(), BranchShape())
     start = fit_window(straight, wanted.harmonics, wanted.window, wanted.both)
     found = find_waveform(operator, line, start, through, None if response is None else dynamics)
-    kept, learnt = None, None
+    gentle: Gentle | None = None
     if wanted.allowed is not None:
         try:
-            found, learnt = gentlest_waveform(
+            gentle = gentlest_waveform(
                 operator, line, found, wanted.allowed.percent, through, None if response is None else dynamics
             )
-            kept = wanted.allowed.percent
+            found = gentle.found
         except Unphysical as reason:
             if wanted.allowed.firm:
-                wanted.problems.add(wanted.scan_file, f"{wanted.axis}.band_limit", str(reason))
+                wanted.problems.add(
+                    wanted.scan_file, f"{wanted.axis}.band_limit.max_scaling_error_percent", str(reason)
+                )
                 return None
     factor *= with_mean(found.mean)
     between = _BEND_UNKNOWN * found.grown
@@ -222,8 +230,9 @@ def _line(operator: Operator, wanted: WantedLine) -> OperatorLine | None:
         operator=operator,
         factor=factor,
         between=between,
-        kept=kept,
-        learnt=None if learnt is None else scaled(learnt),
+        kept=None if gentle is None or wanted.allowed is None else wanted.allowed.percent,
+        learnt=None if gentle is None else scaled(gentle.learnt),
+        beside=None if gentle is None else gentle.beside_percent,
         after=(
             after_offset(late, found.stroke, found.centre, factor, wanted.turn, 1.0 / wanted.rate_hz),
             after_size(late, found.stroke, found.centre, factor, wanted.turn, 1.0 / wanted.rate_hz),
