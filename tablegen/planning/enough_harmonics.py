@@ -51,6 +51,8 @@ class EnoughHarmonics:
         elif self.usual < self.most:
             found = fewest_harmonics(straight, percent, self.usual + 1, self.most)
         if found is None:
+            if straight.up_to_its_turns:
+                raise Unphysical("an end of the line is imaged, where it turns; image a narrower window")
             least = least_percent(straight, self.most)
             raise Unphysical(f"{self.most} harmonics, the most there can be here, {_leave(least)}")
         return found

@@ -56,6 +56,11 @@ class Straightness:
     window: tuple[float, float]
     both: bool
 
+    @property
+    def up_to_its_turns(self) -> bool:
+        """Whether an end of the line is imaged: within [0, 1] there is no room to turn."""
+        return self.window[0] <= 0.0 or self.window[1] >= 1.0
+
     def times(self, x: Floats) -> list[Floats]:
         """When the directions that image pass places x of the window, 0..1."""
         low, high = self.window
@@ -115,8 +120,11 @@ def least_percent(straight: Straightness, harmonics: int, enough: float = 0.0) -
 def fewest_harmonics(straight: Straightness, percent: float, first: int, most: int) -> int | None:
     """The fewest harmonics from ``first`` to ``most`` that keep a scaling error of ``percent``; None if none do.
 
-    More harmonics are never less straight, so that the number is found by halves.
+    More harmonics are never less straight, so that the number is found by halves. None draw a line that is straight up
+    to where it turns.
     """
+    if straight.up_to_its_turns:
+        return None
 
     def reach(harmonics: int) -> bool:
         try:

@@ -359,19 +359,21 @@ CHOICES = [
     case(
         "x.band_limit.max_scaling_error_percent = 0.1",
         "x.band_limit.harmonics = 16",
-        says="scan.toml:28: x.band_limit.max_scaling_error_percent: 16 harmonics leave 0.621 % of scaling error in this "
-        "window; allow that much, or take 22 harmonics",
+        says="scan.toml:28: x.band_limit.max_scaling_error_percent: 16 harmonics leave 0.621 % of scaling error in "
+        "this window; allow that much, or take 21 harmonics",
     ),
     case(
         "x.band_limit.max_scaling_error_percent = 0.1",
         "x.band_limit.window = [0.0, 1.0]",
-        says="?",
+        says="scan.toml:28: x.band_limit.max_scaling_error_percent: 32 harmonics leave 217 % of scaling error in this "
+        "window; image a narrower one",
     ),
     case(
         "x.band_limit.max_scaling_error_percent = 0.1",
         "- x.band_limit.harmonics",
         "x.band_limit.window = [0.0, 1.0]",
-        says="?",
+        says="scan.toml:28: x.band_limit.max_scaling_error_percent: an end of the line is imaged, where it turns; "
+        "image a narrower window",
     ),
     case(
         "x.band_limit.method = 'boxcar'",
