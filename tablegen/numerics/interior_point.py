@@ -5,7 +5,7 @@ of Mehrotra (SIAM J. Optim. 2, 575, 1992) for the upper and the lower side of ea
 a step solves the normal equations of sum R^T (l / s) R. A solution within some percent of the optimum takes 8 to 15.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from typing import Protocol
@@ -74,43 +74,64 @@ def _least(state: "_State", gap: float, reached: Callable[[float], bool]) -> Lea
     raise AssertionError("the last step returns")  # pragma: no cover
 
 
+class _Stack:
+    """The rows of all parts, one above the other."""
+
+    def __init__(self, parts: Sequence[Within]) -> None:
+        self._rows = [part.rows for part in parts]
+        self._ends = [len(part.target) for part in parts]
+        self.target = np.concatenate([part.target for part in parts])
+        self.fixed, self.share = (
+            np.concatenate([np.full(len(part.target), value) for part, value in zip(parts, values, strict=True)])
+            for values in ([part.fixed for part in parts], [part.share for part in parts])
+        )
+
+    def times(self, y: Floats) -> Floats:
+        return np.concatenate([rows.times(y) for rows in self._rows])
+
+    def transposed(self, z: Floats) -> Floats:
+        first, *others = [rows.transposed(of) for rows, of in self._split(z)]
+        for other in others:
+            first = first + other
+        return first
+
+    def gram(self, diagonal: Floats) -> Floats:
+        first, *others = [rows.gram(of) for rows, of in self._split(diagonal)]
+        for other in others:
+            first += other
+        return first
+
+    def _split(self, z: Floats) -> Iterator[tuple[Rows, Floats]]:
+        begin = 0
+        for rows, count in zip(self._rows, self._ends, strict=True):
+            yield rows, z[begin : begin + count]
+            begin += count
+
+
 class _State:
-    """y, v, and for each part the slacks and multipliers of both sides, (2, m): upper, lower."""
+    """y and v; slacks and multipliers of both sides of each row, upper and lower, (2, m)."""
 
     def __init__(self, parts: Sequence[Within], start: Floats) -> None:
-        self._parts, self.y = parts, np.array(start, dtype=np.float64)
-        self._far = [part.rows.times(self.y) - part.target for part in parts]
-        need = [
-            (float(np.max(np.abs(far))) - part.fixed) / part.share
-            for part, far in zip(parts, self._far, strict=True)
-            if part.share
-        ]
-        self.v = 1.1 * max(*need, 1e-12)
-        room = [np.stack([b - far, b + far]) for b, far in zip(self._widths(), self._far, strict=True)]
+        self._rows, self.y = _Stack(parts), np.array(start, dtype=np.float64)
+        self._far = self._rows.times(self.y) - self._rows.target
+        moves = self._rows.share > 0.0
+        need = (np.abs(self._far[moves]) - self._rows.fixed[moves]) / self._rows.share[moves]
+        self.v = 1.1 * max(float(np.max(need)), 1e-12)
         # What is outside its bound gets a slack of its own; the lack is made good on the way.
-        self._slack = [np.maximum(one, 1e-3 * b) for b, one in zip(self._widths(), room, strict=True)]
-        weight = [1.0 / one for one in self._slack]
-        total = sum(part.share * float(tree_sum(one.reshape(-1))) for part, one in zip(parts, weight, strict=True))
-        self._multiplier = [one / total for one in weight]
+        self._slack = np.maximum(self._room(), 1e-3 * self._widths())
+        weight = 1.0 / self._slack
+        self._multiplier = weight / _sum(self._rows.share * weight)
 
-    def _widths(self) -> list[float]:
-        return [part.fixed + part.share * self.v for part in self._parts]
+    def _widths(self) -> Floats:
+        return self._rows.fixed + self._rows.share * self.v
 
-    @property
-    def _sides(self) -> int:
-        return sum(one.size for one in self._slack)
-
-    def _lack(self) -> list[Floats]:
-        return [
-            np.stack([b - far, b + far]) - slack
-            for b, far, slack in zip(self._widths(), self._far, self._slack, strict=True)
-        ]
+    def _room(self) -> Floats:
+        return np.stack([self._widths() - self._far, self._widths() + self._far])
 
     @property
     def inside(self) -> bool:
         """Whether every row keeps its bound."""
-        lacks = zip(self._widths(), self._lack(), strict=True)
-        return all(float(np.max(np.abs(lack))) <= _FEASIBLE * b for b, lack in lacks)
+        return bool(np.all(np.abs(self._room() - self._slack) <= _FEASIBLE * self._widths()))
 
     @property
     def dual(self) -> bool:
@@ -119,91 +140,61 @@ class _State:
         return max(float(np.max(np.abs(y))), abs(v)) < _FEASIBLE_DUAL
 
     def _residual(self) -> tuple[Floats, float]:
-        y, v = np.zeros_like(self.y), -1.0
-        for part, one in zip(self._parts, self._multiplier, strict=True):
-            y = y - part.rows.transposed(one[0] - one[1])
-            v += part.share * float(tree_sum(one.reshape(-1)))
-        return y, v
+        one = self._multiplier
+        return -self._rows.transposed(one[0] - one[1]), _sum(self._rows.share * one) - 1.0
 
     def bounds(self) -> tuple[float, float]:
         """v, and v less the gap."""
-        gap = sum(
-            float(tree_sum((slack * one).reshape(-1))) for slack, one in zip(self._slack, self._multiplier, strict=True)
-        )
-        return self.v, self.v - gap
+        return self.v, self.v - _sum(self._slack * self._multiplier)
 
     def advance(self) -> bool:
-        """One predictor and corrector; False where the matrix is singular to working precision."""
-        weights = [one / slack for slack, one in zip(self._slack, self._multiplier, strict=True)]
-        size = len(self.y)
+        """One predictor and corrector; False where it goes no further in working precision."""
+        rows, slack, one, size = self._rows, self._slack, self._multiplier, len(self.y)
+        weight = one / slack
         matrix = np.zeros((size + 1, size + 1))
-        for part, weight in zip(self._parts, weights, strict=True):
-            both = weight[0] + weight[1]
-            matrix[:size, :size] += part.rows.gram(both)
-            if part.share:
-                across = -part.share * part.rows.transposed(weight[0] - weight[1])
-                matrix[:size, size] += across
-                matrix[size, :size] += across
-                matrix[size, size] += part.share * part.share * float(tree_sum(both))
+        matrix[:size, :size] = rows.gram(weight[0] + weight[1])
+        matrix[:size, size] = matrix[size, :size] = -rows.transposed(rows.share * (weight[0] - weight[1]))
+        matrix[size, size] = _sum(rows.share * rows.share * weight)
         diagonal = np.arange(size + 1)
         matrix[diagonal, diagonal] *= 1.0 + _REGULAR
         try:
             factor = Cholesky(matrix)
         except ArithmeticError:
             return False
-        lack, residual = self._lack(), self._residual()
+        lack, residual = self._room() - slack, self._residual()
 
-        def step(complement: list[Floats]) -> tuple[Floats, float, list[Floats], list[Floats], list[Floats]]:
-            right = np.append(residual[0], residual[1])
-            pulls = [
-                (c - one * short) / slack
-                for c, one, short, slack in zip(complement, self._multiplier, lack, self._slack, strict=True)
-            ]
-            for part, pull in zip(self._parts, pulls, strict=True):
-                right[:size] -= part.rows.transposed(pull[0] - pull[1])
-                right[size] += part.share * float(tree_sum(pull.reshape(-1)))
+        def step(complement: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+            """Of (y, v), of the rows, of slacks and of multipliers, where their products change by ``complement``."""
+            pull = (complement - one * lack) / slack
+            right = np.append(residual[0] - rows.transposed(pull[0] - pull[1]), residual[1] + _sum(rows.share * pull))
             solution = factor.solve(right)
-            y, v = solution[:size], float(solution[size])
-            moved = [part.rows.times(y) for part in self._parts]
-            slacks = [
-                np.stack([part.share * v - far, part.share * v + far]) + short
-                for part, far, short in zip(self._parts, moved, lack, strict=True)
-            ]
-            multipliers = [
-                (c - one * by) / slack
-                for c, one, by, slack in zip(complement, self._multiplier, slacks, self._slack, strict=True)
-            ]
-            return y, v, moved, slacks, multipliers
+            moved, wider = rows.times(solution[:size]), rows.share * solution[size]
+            slacks = np.stack([wider - moved, wider + moved]) + lack
+            return solution, moved, slacks, (complement - one * slacks) / slack
 
-        products = [slack * one for slack, one in zip(self._slack, self._multiplier, strict=True)]
-        mean = sum(float(tree_sum(one.reshape(-1))) for one in products) / self._sides
-        _, _, _, slacks, multipliers = step([-one for one in products])
-        ahead, up = _reach(self._slack, slacks), _reach(self._multiplier, multipliers)
-        after = sum(
-            float(tree_sum(((slack + ahead * by) * (one + up * change)).reshape(-1)))
-            for slack, by, one, change in zip(self._slack, slacks, self._multiplier, multipliers, strict=True)
-        )
+        products = slack * one
+        mean = _sum(products) / products.size
+        _, _, slacks, ones = step(-products)
+        ahead, up = _reach(slack, slacks), _reach(one, ones)
+        after = _sum((slack + ahead * slacks) * (one + up * ones)) / products.size
         if not (mean > 0.0 and isfinite(after)):  # what contradicts itself has no other end
             return False
-        ratio = after / self._sides / mean
-        centred = ratio * ratio * ratio * mean
-        y, v, moved, slacks, multipliers = step(
-            [centred - one - by * change for one, by, change in zip(products, slacks, multipliers, strict=True)]
-        )
-        ahead, up = _NEAR * _reach(self._slack, slacks), _NEAR * _reach(self._multiplier, multipliers)
-        self.y = self.y + ahead * y
-        self.v += ahead * v
-        self._far = [far + ahead * by for far, by in zip(self._far, moved, strict=True)]
-        self._slack = [slack + ahead * by for slack, by in zip(self._slack, slacks, strict=True)]
-        self._multiplier = [one + up * by for one, by in zip(self._multiplier, multipliers, strict=True)]
+        ratio = after / mean
+        solution, moved, slacks, ones = step(ratio * ratio * ratio * mean - products - slacks * ones)
+        ahead, up = _NEAR * _reach(slack, slacks), _NEAR * _reach(one, ones)
+        self.y = self.y + ahead * solution[:size]
+        self.v += ahead * float(solution[size])
+        self._far = self._far + ahead * moved
+        self._slack = slack + ahead * slacks
+        self._multiplier = one + up * ones
         return True
 
 
-def _reach(values: list[Floats], steps: list[Floats]) -> float:
+def _sum(values: Floats) -> float:
+    return float(tree_sum(values.reshape(-1)))
+
+
+def _reach(values: Floats, steps: Floats) -> float:
     """How much of the steps can be taken until a value is 0; at most 1."""
-    reach = 1.0
-    for value, step in zip(values, steps, strict=True):
-        shrinking = step < 0.0
-        if bool(np.any(shrinking)):
-            reach = min(reach, float(np.min(value[shrinking] / -step[shrinking])))
-    return reach
+    shrinking = steps < 0.0
+    return min(1.0, float(np.min(values[shrinking] / -steps[shrinking], initial=1.0)))

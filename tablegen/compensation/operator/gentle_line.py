@@ -7,6 +7,7 @@ not make what the loop needs, counts as well.
 """
 
 from dataclasses import dataclass
+from math import ceil
 
 from tablegen.compensation.line import WholeLine
 from tablegen.compensation.operator.operator import Operator
@@ -18,6 +19,7 @@ from tablegen.waveform.series import FourierSeries
 _ROUNDS = 2  # a third changes nothing that shows
 _TRIALS = 3
 _LEAST_SHARE = 0.1  # of the error that is asked for, left for the sake of acceleration
+_ROUNDING = 2.0**20
 _MARGIN = 1.2  # of an error that is said to be enough: another waveform makes another loop
 
 
@@ -66,8 +68,9 @@ def _straightness(wanted: Wanted, learnt: Found) -> Straightness:
 
 
 def _scaling(wanted: Wanted, found: Found) -> float:
-    """The worse of the directions that image, percent."""
-    return max(found.expected.scaling) if wanted.both else found.expected.scaling[0]
+    """The worse of the directions that image, percent, rounded up: the last bits of a figure must not turn a word."""
+    worst = max(found.expected.scaling) if wanted.both else found.expected.scaling[0]
+    return ceil(worst * _ROUNDING) / _ROUNDING
 
 
 def _unreachable(wanted: Wanted, learnt: Found) -> Unreachable:
