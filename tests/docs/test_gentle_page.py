@@ -2,10 +2,13 @@
 
 import re
 import runpy
+from pathlib import Path
 
 import pytest
 from building import REPOSITORY
+from variants import plan_of
 
+from tablegen.certificate.certificate import certify
 from tablegen.certificate.optimum import least_acceleration
 from tablegen.waveform.gentle_fit import Straightness, gentlest, least_percent
 from tablegen.waveform.window_fit import fit_window
@@ -48,3 +51,13 @@ def test_rows_of_16_and_32_harmonics_are_measured(name: str) -> None:
             assert optimum is not None
             assert float(figures[1]) == pytest.approx(optimum, abs=0.06)
             assert float(figures[2]) == pytest.approx(peak / optimum, abs=0.003)
+
+
+def test_what_rounder_turns_do_to_a_line_by_laws_is_measured(tmp_path: Path) -> None:
+    told = re.search(r"is (\S+) % of the line between trace and retrace with 32 harmonics, and\n(\S+) % at an", PAGE)
+    assert told is not None
+    for stated, edits in zip(told.groups(), ({}, {"x.band_limit.max_scaling_error_percent": "0.3"}), strict=True):
+        expected = certify(plan_of(tmp_path, edits))["x"].expected
+        assert expected is not None
+        assert expected.mismatch is not None
+        assert stated == f"{expected.mismatch.value:.2f}"
