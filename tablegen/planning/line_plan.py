@@ -71,6 +71,8 @@ class LinePlan:
     def __repr__(self) -> str:
         table = f"{self.program.mode} table of {len(self.program.words)} x {self.program.bits} bits"
         volts = f"{self.drive.v_amplitude:.6g} V about {self.drive.v_offset:.6g} V"
+        if self.drive.resting:
+            return f"{self.axis}: rests at {self.drive.v_offset:.6g} V"
         return f"{self.axis}: {volts}, {self.series.harmonics} harmonics, {table}"
 
     @property
@@ -114,6 +116,11 @@ class Plan:
     def lines(self) -> tuple[LinePlan, LinePlan]:
         """Both axes, fast first."""
         return self.x, self.y
+
+    @property
+    def moving(self) -> tuple[LinePlan, ...]:
+        """The axes that move: of a line scan x alone."""
+        return tuple(line for line in self.lines if not line.drive.resting)
 
     @property
     def program(self) -> DualProgram:
@@ -191,7 +198,9 @@ def _line_plan(setup: Setup, axis: Literal["x", "y"], schedule: Schedule, proble
         return None
     target, kept = None, None
     with problems.at(file, key):
-        if drive.allowed is None:
+        if drive.resting:
+            target = FourierSeries(0.5, np.zeros(1), np.zeros(1))
+        elif drive.allowed is None:
             target = band_limited(drive.shape, limit, harmonics, layer)
         else:
             target, kept = _gentle(drive, limit, harmonics, layer, most, float(rate))
