@@ -17,17 +17,26 @@ from tablegen.report.subject import PlannedScan, Subject, of_scan
 
 
 def planned_scan(
-    scan: Path, verified: VerifyRecord | None = None, tell: Callable[[str], None] = lambda _: None
+    scan: Path,
+    verified: VerifyRecord | None = None,
+    tell: Callable[[str], None] = lambda _: None,
+    remedies: bool = True,
 ) -> Subject:
-    """Plan and certify a scan, and make its files, without writing them. Raises ``Rejected`` for wrong input."""
+    """Plan and certify a scan, and make its files, without writing them. Raises ``Rejected`` for wrong input.
+
+    Without ``remedies`` none is tried: limits that are broken are named, and there are no warnings.
+    """
     tell("shaping the waveforms")
     setup = load(scan)
     plan = make_plan(setup)
     tell("measuring every tick of a line and a frame")
     certificates = certify(plan)
-    tell("looking for remedies")
-    broken = broken_limits(plan, certificates, setup.scan_file, partial(limit_advice, setup, plan, certificates))
-    warnings = weighed(plan, certificates, scan_warnings(setup, plan, certificates))
+    if remedies:
+        tell("looking for remedies")
+        broken = broken_limits(plan, certificates, setup.scan_file, partial(limit_advice, setup, plan, certificates))
+        warnings = weighed(plan, certificates, scan_warnings(setup, plan, certificates))
+    else:
+        broken, warnings = broken_limits(plan, certificates, setup.scan_file), []
     tell("writing the formats")
     try:
         files = render(plan, certificates, list(plan.formats))

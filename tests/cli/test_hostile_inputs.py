@@ -106,6 +106,7 @@ WRITING: dict[str, Callable[[Path], tuple[str | Path, ...]]] = {
     "csv": lambda path: ("simulate", "scan.toml", "--csv", path),
     "junit": lambda path: ("verify", "out", "--junit", path),
     "report": lambda path: ("report", "scan.toml", "-o", path),
+    "comparison": lambda path: ("compare", "scan.toml", "scan.toml", "-o", path),
     "keep": lambda path: ("verify", "out", "--keep", path),
     "readback": lambda path: ("readback", "--port", "socket://127.0.0.1:9", "-o", path),
     "init": lambda path: ("init", path),

@@ -31,6 +31,7 @@ LAYERS = (
     "virtual",
     "correction",
     "report",
+    "comparison",
     "api",
     "cli",
     "__main__",

@@ -1,0 +1,80 @@
+"""``tablegen compare``: two scans, builds or calibrations side by side."""
+
+import json
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from tablegen.cli.common import OutputFile, fail, written
+from tablegen.cli.exit_status import ExitStatus
+from tablegen.cli.progress import Progress
+
+if TYPE_CHECKING:
+    from tablegen.comparison.comparison import SideBySide
+
+_path = click.Path(path_type=Path)
+
+
+@click.command(
+    short_help="Compare two scans, builds or calibrations.",
+    epilog="""\b
+Examples:
+  tablegen compare annexin_200nm.toml faster.toml
+  tablegen compare annexin_200nm.toml build               is the build of this scan?
+  tablegen compare scanner_may.toml scanner_june.toml     what has changed more than the errors?
+  tablegen compare scan.toml other.toml -o compare.html
+
+\b
+Exit status: 0 the same, 1 different, 2 wrong input, 4 cannot write.""",
+)
+@click.argument("a", type=_path, metavar="A")
+@click.argument("b", type=_path, metavar="B")
+@click.option("--all", "everything", is_flag=True, help="Also print what is the same.")
+@click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="Also write an HTML page with all charts.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")
+def compare(a: Path, b: Path, everything: bool, output: Path | None, as_json: bool) -> int:
+    """Compare A and B, which are two scan files, two directories of builds, a scan file and a build, two scanner
+    files, or two operator files. Print each quantity that differs, the difference, and its percentage.
+
+    Of scanner files the standard errors are compared too, if `tablegen calibrate --write` wrote both: a parameter has
+    changed if it differs by more than twice the standard error of the difference.
+
+    A build contains neither the limits of its scan file nor the scanner file, so these are not compared with it.
+    """
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    if output is not None and output.suffix == ".toml":
+        raise click.UsageError(f"-o {output}: the page would replace a scan or a scanner file; give a name in .html")
+    from tablegen.comparison.charts import comparison_charts
+
+    with Progress() as progress:
+        both = _read(a, b, progress)
+        charts = []
+        if output is not None:
+            progress.now("playing both and drawing")
+            charts = comparison_charts(both)
+    if as_json:
+        click.echo(json.dumps(both.record(everything), indent=2, allow_nan=False))
+    else:
+        from tablegen.cli.compare_text import compare_text
+
+        click.echo("\n".join(compare_text(both, everything)))
+    if output is not None:
+        from tablegen.comparison.page import comparison_page
+
+        written(output.parent, {output.name: comparison_page(both, charts)})
+    return ExitStatus.OK if both.same else ExitStatus.STALE
+
+
+def _read(a: Path, b: Path, progress: Progress) -> "SideBySide":
+    from tablegen.comparison.comparison import compared
+    from tablegen.manifest.read import NotABuild
+    from tablegen.problems import Rejected, Unphysical
+
+    try:
+        return compared(a, b, progress.now)
+    except Rejected as rejected:
+        fail(rejected.problems, ExitStatus.WRONG_INPUT)
+    except (NotABuild, Unphysical) as error:
+        fail([error], ExitStatus.WRONG_INPUT)
