@@ -140,11 +140,14 @@ def bench_text(content: Content, index_bits: tuple[int, int]) -> str:
     )
 
 
-def bench_parameters(folder: Path, script: str, capture: str, converters: bool) -> dict[str, int | str]:
-    """The files that the bench reads and writes, all in its folder; words and wires only with ``converters``."""
+def bench_parameters(script: str, capture: str, converters: bool) -> dict[str, int | str]:
+    """The files that the bench reads and writes in the folder of its run; words and wires only with ``converters``.
+
+    They are named from the folder in which the model runs, so that the model is the same wherever that is.
+    """
     names = {"SCRIPT": script, "CAPTURE": capture, "STATES": STATES, "WORDS": WORDS, "WIRES": WIRES}
-    files: dict[str, int | str] = {key: str(folder / name) for key, name in names.items()}
-    return {**files, "CONSTANTS": str(folder / CONSTANTS), "CONVERTERS": int(converters), "COUNT_BITS": COUNT_BITS}
+    files: dict[str, int | str] = {key: f"../{name}" for key, name in names.items()}
+    return {**files, "CONSTANTS": f"../{CONSTANTS}", "CONVERTERS": int(converters), "COUNT_BITS": COUNT_BITS}
 
 
 def different_constants(folder: Path, content: Content) -> list[str]:
