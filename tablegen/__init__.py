@@ -6,8 +6,9 @@ From a scan file to arrays and files in two lines::
     plot(scan.x.time_s, scan.x.volts)               # numpy arrays of one line, a value a tick
 
 What is public stands in ``tablegen.__all__`` and docs/python.md: ``load``, ``plan``, ``certify`` and ``build`` make a
-scan, ``read_build`` and ``verify`` take one from its directory, ``Device`` talks to an instrument. Everything else may
-change. Names are loaded when they are first used, so that importing tablegen costs nothing.
+scan, ``read_build`` and ``verify`` take one from its directory, ``Device`` talks to an instrument. ``calibrate``,
+``refine`` and ``correct`` take measurements and images; ``Laboratory`` simulates them. Everything else may change.
+Names are loaded when they are first used, so that importing tablegen costs nothing.
 """
 
 from importlib import import_module
@@ -17,6 +18,10 @@ from tablegen.version import __version__
 
 if TYPE_CHECKING:
     from tablegen.api.build import BrokenLimit, Build, build, certify, load, plan
+    from tablegen.api.calibrate import Calibrated, calibrate
+    from tablegen.api.correct import Corrected, correct
+    from tablegen.api.laboratory import Laboratory
+    from tablegen.api.refine import RefinedScan, refine
     from tablegen.api.samples import Samples
     from tablegen.certificate.certificate import Certificate
     from tablegen.config.load import Setup
@@ -28,7 +33,7 @@ if TYPE_CHECKING:
     from tablegen.link.prepare import PreparedScan
     from tablegen.manifest.read import NotABuild, StoredBuild, read_build
     from tablegen.planning.line_plan import Plan
-    from tablegen.problems import Problem, Rejected
+    from tablegen.problems import Problem, Rejected, Unphysical
     from tablegen.verification.build import Report
     from tablegen.verification.run import verify
     from tablegen.verification.simulate import ToolMissing
@@ -40,6 +45,13 @@ _HOMES = {
     "build": "tablegen.api.build",
     "read_build": "tablegen.manifest.read",
     "verify": "tablegen.verification.run",
+    "calibrate": "tablegen.api.calibrate",
+    "refine": "tablegen.api.refine",
+    "correct": "tablegen.api.correct",
+    "Laboratory": "tablegen.api.laboratory",
+    "Calibrated": "tablegen.api.calibrate",
+    "RefinedScan": "tablegen.api.refine",
+    "Corrected": "tablegen.api.correct",
     "Device": "tablegen.link.device",
     "Setup": "tablegen.config.load",
     "Plan": "tablegen.planning.line_plan",
@@ -52,6 +64,7 @@ _HOMES = {
     "Content": "tablegen.emit.content",
     "Rejected": "tablegen.problems",
     "Problem": "tablegen.problems",
+    "Unphysical": "tablegen.problems",
     "BrokenLimit": "tablegen.api.build",
     "CannotWrite": "tablegen.emit.write",
     "NotABuild": "tablegen.manifest.read",
@@ -67,12 +80,19 @@ __all__ = [  # noqa: RUF022 - in the order in which they are used
     "build",
     "read_build",
     "verify",
+    "calibrate",
+    "refine",
+    "correct",
+    "Laboratory",
     "Device",
     "Setup",
     "Plan",
     "Certificate",
     "Build",
     "Samples",
+    "Calibrated",
+    "RefinedScan",
+    "Corrected",
     "StoredBuild",
     "PreparedScan",
     "Report",
@@ -80,6 +100,7 @@ __all__ = [  # noqa: RUF022 - in the order in which they are used
     "Content",
     "Rejected",
     "Problem",
+    "Unphysical",
     "BrokenLimit",
     "CannotWrite",
     "NotABuild",

@@ -23,7 +23,7 @@ from tablegen.compensation.models.harmonic import HarmonicModel
 
 _FACTORS = ("m_minus", "m_plus")
 _DIRECTIONS = ("forward", "backward")
-_ERRORS = 3  # standard errors in a line of a comment
+_WIDTH = 116  # of a line of a comment
 
 
 def parameters(fit: Fit) -> list[tuple[str, Estimate, str]]:
@@ -160,7 +160,13 @@ def _errors(found: Sequence[tuple[str, Estimate]]) -> list[str]:
         for key, one in found
         if isfinite(one.standard_error) and one.standard_error > 0.0
     ]
-    return [f"standard errors: {', '.join(known[i : i + _ERRORS])}" for i in range(0, len(known), _ERRORS)]
+    lines: list[str] = []
+    for one in known:
+        if lines and len(lines[-1]) + len(one) < _WIDTH:
+            lines[-1] += f", {one}"
+        else:
+            lines.append(f"standard errors: {one}")
+    return lines
 
 
 def record(fit: Fit, axis: str, sources: Sequence[Source]) -> dict[str, Any]:
