@@ -11,6 +11,7 @@ import click
 
 from tablegen.cli.common import OutputFile, fail, require, written
 from tablegen.cli.exit_status import ExitStatus
+from tablegen.cli.plot import check_plot, plot_option, put_plot
 from tablegen.cli.progress import Progress
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from tablegen.compensation.dynamics import Response
     from tablegen.compensation.offset import OffsetLaw
     from tablegen.compensation.size import SizeLaw
+    from tablegen.report.picture import PlottedCharts
 
 F = TypeVar("F", bound=Callable[..., Any])
 _REQUIRED_MODULES = ("scipy", "tomlkit")
@@ -39,6 +41,7 @@ class Common:
     write: bool
     force: bool
     plot: Path | None
+    no_plot: bool
     report: Path | None
     as_json: bool
 
@@ -65,12 +68,7 @@ def shared_options(command: F) -> F:
             help="Update the scanner file. With --v-max, create it if it does not exist.",
         ),
         click.option("--force", is_flag=True, help="With --write, write a fit even if it is meaningless."),
-        click.option(
-            "--plot",
-            type=OutputFile(),
-            metavar="FILE",
-            help="Plot the data and the fit to FILE: .png, .svg or .pdf.",
-        ),
+        plot_option("the data and the fit", by_default=True),
         click.option(
             "--report",
             type=OutputFile(),
@@ -87,6 +85,7 @@ def shared_options(command: F) -> F:
         write: bool,
         force: bool,
         plot: Path | None,
+        no_plot: bool,
         report: Path | None,
         as_json: bool,
         **rest: Any,
@@ -97,11 +96,8 @@ def shared_options(command: F) -> F:
             raise click.UsageError("--force is for --write")
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the fits are small, and its threads would only spin
         require(*_REQUIRED_MODULES, extra="calibrate")
-        if plot is not None:
-            if plot.suffix not in (".png", ".svg", ".pdf"):
-                raise click.UsageError(f"--plot {plot}: the name has to end in .png, .svg or .pdf")
-            require("matplotlib", extra="plot")
-        return command(common=Common(axis, scanner, v_max, write, force, plot, report, as_json), **rest)
+        check_plot(plot, as_json)
+        return command(common=Common(axis, scanner, v_max, write, force, plot, no_plot, report, as_json), **rest)
 
     run.__doc__, run.__name__ = command.__doc__, command.__name__
     for option in reversed(options):
@@ -242,11 +238,7 @@ def finish(
         click.echo(json.dumps(found.record, indent=2, allow_nan=False))
     else:
         click.echo("\n".join(calibration_text(fit, common.axis, tables, points)))
-    if common.plot is not None:
-        from tablegen.calibration.figure import draw
-
-        kind: Any = common.plot.suffix[1:]
-        written(common.plot.parent, {common.plot.name: draw(fit.curves, kind)})
+    plot_fit(common, lambda: _charts(fit, common.axis))
     if common.report is not None:
         from tablegen.report.fitted import fit_page
 
@@ -260,6 +252,17 @@ def finish(
             fail([*(f"{where}: {doubt}" for doubt in meaningless), f"{where}: {advice}"], ExitStatus.WRONG_INPUT)
         _write(common, found)
     return ExitStatus.OK
+
+
+def plot_fit(common: Common, charts: "Callable[[], PlottedCharts]") -> None:
+    """Draw as the options say."""
+    put_plot(common.plot, charts, by_default=not (common.as_json or common.no_plot))
+
+
+def _charts(fit: "Fit", axis: str) -> "PlottedCharts":
+    from tablegen.report.fitted import fit_charts
+
+    return fit_charts(fit, axis)
 
 
 def _place(table: "MeasuredTable | ScanImage", at: int) -> str:

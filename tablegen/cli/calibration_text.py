@@ -12,7 +12,6 @@ from tablegen.calibration.image_fit import ImageFit
 from tablegen.calibration.summary import change, parameters
 from tablegen.calibration.table import MeasuredTable
 from tablegen.calibration.trace import TraceFit
-from tablegen.cli.scatter import scatter
 
 _TRACE_HEAD = ("turn", "V_scan", "rate [Hz]", "periods", "noise [%]", "drift [%]")
 _IMAGE_HEAD = ("turn", "V_scan", "periods", "noise [%]", "drift [%]", "apart [%]")
@@ -46,8 +45,6 @@ def calibration_text(
         lines += [*_traces(fit), ""]
     if fit.images:
         lines += [*image_lines(fit), ""]
-    for curve in fit.curves:
-        lines += [*scatter(curve), ""]
     for row in fit.outliers:
         place = f"{tables[0].file}:{tables[0].lines[row]}" if isinstance(tables[0], MeasuredTable) else tables[0].file
         place, part = (fit.images[row].name, "image") if fit.images else (place, "row")

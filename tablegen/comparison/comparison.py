@@ -37,6 +37,12 @@ class SideBySide:
         return [pair for pair in self.pairs if not pair.same]
 
     @property
+    def titles(self) -> tuple[str, str]:
+        """What A and B are called: the names in the files, or those of the files where these are the same."""
+        a, b = self.a.title, self.b.title
+        return (a, b) if a != b else (self.a.path.name, self.b.path.name)
+
+    @property
     def same(self) -> bool:
         """Whether nothing differs, and every file of a build is as its manifest says."""
         return not self.differing and not any(side.damaged for side in (self.a, self.b))

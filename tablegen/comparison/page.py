@@ -28,7 +28,7 @@ def comparison_page(both: SideBySide, charts: Sequence[Chart]) -> bytes:
     ]
     verdict = TableCell(f"{both.verdict}.", "good" if both.same else "quiet")
     findings = [Finding("note", 0.0, note) for note in both.notes]
-    title = f"{both.a.title} and {both.b.title}"
+    title = "{} and {}".format(*both.titles)
     foot = f"Made by tablegen {__version__}. All is worked out from the files; nothing is measured."
     return document(title, verdict, findings, found, "", foot)
 

@@ -18,6 +18,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from operator_files import operator_file, write_operator_scan
 
+from tablegen.comparison.charts import comparison_charts, differing_charts
+from tablegen.comparison.comparison import compared
 from tablegen.comparison.difference import _merged, pairs
 from tablegen.comparison.quantity import ComparedQuantity
 from tablegen.comparison.scans import scan_quantities
@@ -202,6 +204,42 @@ def test_the_page_is_one_file_without_a_network(lab: Path, tmp_path: Path) -> No
     again = run("compare", lab / "scan.toml", lab / "larger.toml", "-o", tmp_path / "again.html")
     assert again.out == outcome.out
     assert (tmp_path / "again.html").read_bytes() == content
+
+
+def test_a_plot_has_what_differs_first(lab: Path, tmp_path: Path) -> None:
+    """In a file all charts, the same bytes each time; in the terminal those that differ."""
+    sides = lab / "scan.toml", lab / "larger.toml"
+    assert run("compare", *sides, "--plot", tmp_path / "compare.svg").status == 1
+    content = (tmp_path / "compare.svg").read_text("utf-8")
+    titles = re.findall(r">([xy] [^<]+)</text>", content)
+    charts = [title for title in titles if "drive" in title or "simulated" in title]
+    assert charts.index("x drive, B less A") < charts.index("y drive, B less A")  # nothing of y was changed
+    assert charts.index("x scaling error backward, simulated") < charts.index("y drive, one frame")
+    assert "A: scan.toml, B: larger.toml" in content  # both have one name
+    assert run("compare", *sides, "--plot", tmp_path / "again.svg").status == 1
+    assert (tmp_path / "again.svg").read_text("utf-8") == content
+    shown = run("compare", *sides, "--plot").out
+    assert "x drive, B less A" in shown
+    assert "y drive" not in shown
+    refused = run("compare", *sides, "--plot", "--json")
+    assert refused.status == 2
+    assert "--plot FILE" in refused.err
+
+
+def test_a_pixel_of_each_side_is_where_its_drive_is(lab: Path) -> None:
+    """The curves of the charts are those of the plans, A and B not exchanged."""
+    both = compared(lab / "scan.toml", lab / "other")
+    charts = {chart.key: chart for chart in comparison_charts(both)}
+    assert "residual-x-forward" not in charts  # a build does not know the scanner
+    a, b = charts["drive-x"].curves
+    assert (a.name, b.name) == ("A", "B")
+    for curve, folder in ((a, "one"), (b, "other")):
+        stored = json.loads((lab / folder / "manifest.json").read_text("utf-8"))["axes"]["x"]
+        assert np.ptp(curve.y) == pytest.approx(stored["drive"]["v_amplitude"], rel=0.06)  # turnarounds are rounded
+        assert curve.x[-1] == pytest.approx(1e3 / stored["line"]["rate_hz"])
+    (apart,) = charts["apart-x"].curves
+    assert apart.y == pytest.approx(b.y - a.y)
+    assert [chart.key for chart in differing_charts(list(charts.values()))] == ["drive-x", "apart-x", "spectrum-x"]
 
 
 def test_names_of_others_are_text(tmp_path: Path) -> None:
