@@ -68,6 +68,7 @@ READING: dict[str, Callable[[Path], tuple[str | Path, ...]]] = {
     "simulate": lambda path: ("simulate", path),
     "truth": lambda path: ("simulate", "scan.toml", "--scanner-truth", path),
     "upload": lambda path: ("upload", path, "--dry-run"),
+    "compared": lambda path: ("compare", path, "scan.toml"),
     "key": lambda path: ("status", "--port", "socket://127.0.0.1:9", "--key-file", path),
     "refined scan": lambda path: ("refine", path, "t.csv", "--axis", "x"),
     "trace": lambda path: ("refine", "scan.toml", path, "--axis", "x"),
