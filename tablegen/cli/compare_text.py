@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 
 from tablegen.comparison.comparison import SideBySide
-from tablegen.comparison.difference import ComparedPair
 from tablegen.comparison.side import WORDS
 from tablegen.comparison.words import HEAD, cells
 
@@ -22,7 +21,7 @@ def _table(both: SideBySide, everything: bool) -> Iterator[str]:
         return
     rows = [(pair, [_cut(cell) for cell in cells(pair)]) for pair in pairs]
     widths = [max(len(HEAD[i]), *(len(row[i]) for _, row in rows)) for i in range(3)]
-    width = max(len(_name(pair)) for pair in pairs)
+    width = 2 + max(len(pair.label) for pair in pairs)
     yield ""
     yield _line(" " * width, [*HEAD], widths)
     section = ""
@@ -30,11 +29,7 @@ def _table(both: SideBySide, everything: bool) -> Iterator[str]:
         if pair.section != section:
             section = pair.section
             yield section
-        yield _line(_name(pair).ljust(width), row, widths)
-
-
-def _name(pair: ComparedPair) -> str:
-    return f"  {pair.name}{f' [{pair.unit}]' if pair.unit else ''}"
+        yield _line(f"  {pair.label}".ljust(width), row, widths)
 
 
 def _line(name: str, row: list[str], widths: list[int]) -> str:

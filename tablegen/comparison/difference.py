@@ -21,6 +21,11 @@ class ComparedPair:
     b: ComparedQuantity | None
 
     @property
+    def label(self) -> str:
+        """The name with the unit."""
+        return f"{self.name} [{self.unit}]" if self.unit else self.name
+
+    @property
     def same(self) -> bool:
         """Whether both have it, and the same."""
         return self.a is not None and self.b is not None and self.a.value == self.b.value

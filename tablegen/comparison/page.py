@@ -39,7 +39,7 @@ def _grids(pairs: Sequence[ComparedPair], folded: bool = False) -> list[Grid]:
         Grid(
             section,
             ("", *HEAD),
-            tuple(row(pair.name, *cells(pair)) for pair in pairs if pair.section == section),
+            tuple(row(pair.label, *cells(pair)) for pair in pairs if pair.section == section),
             folded=folded,
         )
         for section in dict.fromkeys(pair.section for pair in pairs)
