@@ -71,8 +71,13 @@ def spoils(text: str, percent: float = 0.0) -> Remark:
 
 
 def worst_first(findings: Iterable[Finding]) -> list[Finding]:
-    """In order; those of one weight and percentage stay as they are."""
-    return sorted(findings, key=lambda one: (_ORDER.index(one.weight), -one.percent))
+    """In order; those of one weight and, as it is printed, one percentage stay as they are."""
+    return sorted(findings, key=lambda one: (_ORDER.index(one.weight), -as_printed(one.percent)))
+
+
+def as_printed(percent: float) -> float:
+    """In three digits: what reads the same is the same."""
+    return float(f"{percent:.3g}")
 
 
 def of_remarks(remarks: Iterable[Remark]) -> list[Finding]:

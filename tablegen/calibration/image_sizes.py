@@ -105,8 +105,8 @@ def sizes_of(images: Sequence[SampleImage], v_max: float, sample: KnownSample, t
         remarks.append(
             Remark(
                 f"the angle of the bars is that of the rows, for a frame as high as its pixels, its file or --aspect "
-                f"say within {100.0 * ASPECT_ERROR:.0f} %, and a drift of some {100.0 * DRIFT_ERROR:.0f} % of the line; "
-                f"--angle-deg gives it where it is known"
+                f"say within {100.0 * ASPECT_ERROR:.0f} %, and a drift of some {100.0 * DRIFT_ERROR:.0f} % of the "
+                f"line; --angle-deg gives it where it is known"
             )
         )
     nm = np.array([one.size.nm.value for one in found])

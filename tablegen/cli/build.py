@@ -133,6 +133,9 @@ def build(
         from tablegen.cli.tables import certificate_table
 
         click.echo("\n".join(certificate_table(built.plan, built.certificates)))
+        for finding in built.findings:
+            if finding.weight == "spoils":  # `show` prints the small print too
+                click.echo(finding.line)
         click.echo(f"\n{output}: {_state(built, changed)}")
         if removed:
             click.echo(f"{output}: removed files of an earlier build: {_few(removed)}")

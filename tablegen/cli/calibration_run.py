@@ -223,6 +223,7 @@ def finish(
     A fit that says nothing is printed with its doubts, and not written unless forced.
     """
     from tablegen.api.calibrate import Calibrated
+    from tablegen.calibration.fit_findings import fit_findings
     from tablegen.cli.calibration_text import calibration_text
     from tablegen.problems import Unphysical
 
@@ -237,13 +238,17 @@ def finish(
     if common.as_json:
         click.echo(json.dumps(found.record, indent=2, allow_nan=False))
     else:
-        click.echo("\n".join(calibration_text(fit, common.axis, tables, points)))
+        click.echo("\n".join(calibration_text(fit, common.axis, tables)))
     plot_fit(common, lambda: _charts(fit, common.axis))
+    places = [_place(fit, tables[0], tables[0].file, at) for at in fit.outliers]
+    if not common.as_json:
+        for finding in fit_findings(fit, places, points):
+            click.echo(finding.line)
     if common.report is not None:
         from tablegen.report.fitted import fit_page
 
-        places = [_place(tables[0], at) for at in fit.outliers]
-        written(common.report.parent, {common.report.name: fit_page(fit, common.axis, sources, places, points)})
+        names = [_place(fit, tables[0], tables[0].source.name, at) for at in fit.outliers]
+        written(common.report.parent, {common.report.name: fit_page(fit, common.axis, sources, names, points)})
     if common.write:
         meaningless = found.doubts
         if meaningless and not common.force:
@@ -265,11 +270,12 @@ def _charts(fit: "Fit", axis: str) -> "PlottedCharts":
     return fit_charts(fit, axis)
 
 
-def _place(table: "MeasuredTable | ScanImage", at: int) -> str:
-    """File and line of a point."""
+def _place(fit: "Fit", table: "MeasuredTable | ScanImage", name: str, at: int) -> str:
+    """File, as it is called, and line of a point, or its image."""
     from tablegen.calibration.table import MeasuredTable
 
-    name = table.source.name
+    if fit.images:
+        return fit.images[at].name
     return f"{name}:{table.lines[at]}" if isinstance(table, MeasuredTable) else name
 
 

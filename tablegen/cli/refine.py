@@ -13,6 +13,7 @@ from tablegen.cli.image_samples import CommandOfRunningImages
 from tablegen.cli.plot import check_plot, plot_option, put_plot
 from tablegen.cli.progress import Progress
 from tablegen.cli.refine_images import ImageArguments, image_options
+from tablegen.findings import of_remarks, worst_first
 
 if TYPE_CHECKING:
     from tablegen.api.refine import RefinedScan
@@ -152,6 +153,9 @@ def refine(
     else:
         click.echo("\n".join(refine_text(found, name, sources)))
     put_plot(plot, lambda: _charts(found), by_default=not (as_json or no_plot))
+    if not as_json:
+        for finding in worst_first(of_remarks(found.remarks)):
+            click.echo(finding.line)
     refused = refined.refused
     if report is not None:
         from tablegen.report.learnt import round_page

@@ -32,7 +32,7 @@ def refine_text(found: Round, name: str, sources: Sequence[Source]) -> list[str]
         *_bound(found),
         "",
     ]
-    return lines + [f"note: {remark}" for remark in found.remarks]
+    return lines
 
 
 def _what(found: Round, sources: Sequence[Source]) -> str:

@@ -5,16 +5,20 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
+from tablegen.certificate.certificate import broken_limits, certify
 from tablegen.comparison.operators import ComparedOperator
 from tablegen.comparison.quantity import ComparedQuantity
 from tablegen.comparison.scanners import scanner_quantities
 from tablegen.comparison.scans import scan_quantities
-from tablegen.config.load import load_scanner
+from tablegen.config.load import load, load_scanner
 from tablegen.config.scanner import Scanner
+from tablegen.emit.formats import UnknownFormat
+from tablegen.emit.render import render
 from tablegen.manifest.format import MANIFEST
-from tablegen.problems import Problem, Rejected
-from tablegen.report.planned import planned_scan
-from tablegen.report.subject import Subject, of_directory
+from tablegen.planning.line_plan import make_plan
+from tablegen.problems import Problem, Rejected, Unphysical
+from tablegen.report.ranking import placed
+from tablegen.report.subject import PlannedScan, Subject, of_directory, of_scan
 from tablegen.toml import read_toml
 
 Kind = Literal["scan", "build", "scanner", "operator"]
@@ -87,12 +91,11 @@ def read_side(path: Path, kind: Kind, tell: Callable[[str], None] = lambda _: No
         subject = of_directory(path)
         wrong = [state.name for state in subject.files if state.wrong]
         names = ", ".join(wrong[:_NAMES]) + (" and others" if len(wrong) > _NAMES else "")
-        notes = (f"{path}: not as its manifest says: {names}",) if wrong else ()
+        notes = (f"{path.name or path}: not as its manifest says: {names}",) if wrong else ()
         return ComparedSide(path, kind, scan_quantities(subject), notes, subject)
     if kind == "scan":
-        subject = planned_scan(path, None, tell, remedies=False)
-        assert subject.planned is not None
-        return ComparedSide(path, kind, scan_quantities(subject), subject.planned.broken, subject)
+        subject, broken = _planned(path, tell)
+        return ComparedSide(path, kind, scan_quantities(subject), broken, subject)
     if kind == "operator":
         return ComparedSide(path, kind, [], operators={"": ComparedOperator.read(path)})
     scanner, file = load_scanner(path)
@@ -102,3 +105,19 @@ def read_side(path: Path, kind: Kind, tell: Callable[[str], None] = lambda _: No
         for name in () if table is None or table.model() != "operator" else table.files():
             operators[axis] = ComparedOperator.read(path.parent / name)
     return ComparedSide(path, kind, scanner_quantities(file, scanner), (), None, scanner, operators)
+
+
+def _planned(scan: Path, tell: Callable[[str], None]) -> tuple[Subject, tuple[str, ...]]:
+    """A scan as it would be built, and the limits that it exceeds; no remedies are tried. Raises ``Rejected``."""
+    tell("shaping the waveforms")
+    setup = load(scan)
+    plan = make_plan(setup)
+    tell("measuring every tick of a line and a frame")
+    certificates = certify(plan)
+    broken = tuple(map(placed, broken_limits(plan, certificates, setup.scan_file)))
+    tell("writing the formats")
+    try:
+        files = render(plan, certificates, list(plan.formats))
+    except (UnknownFormat, Unphysical) as error:
+        raise Rejected([setup.scan_file.problem("emit.formats", str(error))]) from None
+    return of_scan(PlannedScan(setup, plan, certificates, broken), files), broken

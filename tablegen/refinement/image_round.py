@@ -154,8 +154,8 @@ def _size_remarks(plan: Plan, size: LineSize | None) -> list[Remark]:
     return [
         spoils(
             f"the line of x is {found:.5g} nm where the scan file asks for {asked:.5g} nm "
-            f"({100.0 * (found / asked - 1.0):+.2f} %); sizes are not learnt: tablegen calibrate size --images corrects it "
-            f"at every size, or ask for {asked * asked / found:.5g} nm to have {asked:.5g} nm here",
+            f"({100.0 * (found / asked - 1.0):+.2f} %); sizes are not learnt: tablegen calibrate size --images "
+            f"corrects it at every size, or ask for {asked * asked / found:.5g} nm to have {asked:.5g} nm here",
             100.0 * abs(found / asked - 1.0),
         )
     ]
@@ -166,8 +166,8 @@ def _remarks(line: LinePlan, frames: Sequence[LatticeLine], lesson: Lesson) -> t
     if line.axis == "y" and len(frames) == 1:
         found.append(
             spoils(
-                "a drift that becomes faster or slower counts as an error of y; give two frames that follow each other, "
-                "which tell it"
+                "a drift that becomes faster or slower counts as an error of y; give two frames that follow each "
+                "other, which tell it"
             )
         )
     return tuple(found + _learning_remarks(lesson))
@@ -189,8 +189,8 @@ def _remarks_of(seen: LatticeLine) -> list[Remark]:
     if seen.start.apart > _FAR_APART:
         found.append(
             spoils(
-                f"trace and retrace are {seen.start.apart:.2g} periods apart, and beyond half a period they would be taken "
-                f"for the next one; calibrate first, or take a sample of a longer period"
+                f"trace and retrace are {seen.start.apart:.2g} periods apart, and beyond half a period they would be "
+                f"taken for the next one; calibrate first, or take a sample of a longer period"
             )
         )
     if fit.loud:

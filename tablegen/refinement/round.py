@@ -203,8 +203,8 @@ def _remarks(
     if measured.correlated > 3.0:
         found.append(
             Remark(
-                f"residuals are correlated over {measured.correlated:.0f} samples: besides noise, they contain drift, hum "
-                f"or what the harmonics leave; standard errors were widened by {measured.correlated**0.5:.2g}"
+                f"residuals are correlated over {measured.correlated:.0f} samples: besides noise, they contain drift, "
+                f"hum or what the harmonics leave; standard errors were widened by {measured.correlated**0.5:.2g}"
             )
         )
     if measured.periods < 1.99:

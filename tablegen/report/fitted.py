@@ -9,6 +9,7 @@ import numpy as np
 from tablegen.calibration.branch import AmplitudeFit
 from tablegen.calibration.doubts import doubts
 from tablegen.calibration.estimate import Curve, Estimate, Fit
+from tablegen.calibration.fit_findings import fit_findings
 from tablegen.calibration.hysteresis import HysteresisFit
 from tablegen.calibration.summary import change, parameters
 from tablegen.calibration.table import Source
@@ -29,11 +30,7 @@ def fit_page(fit: Fit, axis: str, sources: Sequence[Source], places: Sequence[st
     """The page of a fit. ``places`` are files and lines of its outliers, ``points`` what would be written."""
     kind = change(fit, []).kind
     meaningless = doubts(fit, points)
-    findings = [Finding("limit", 1.0, text, "\u2717 means nothing") for text in meaningless]
-    findings += [
-        Finding("spoils", 1.0, f"{place}: far from the other points, but used", "! outlier") for place in places
-    ]
-    findings += [Finding("note", 0.0, remark) for remark in fit.remarks]
+    findings = fit_findings(fit, places, points)
     verdict = TableCell("\u2713 Nothing speaks against this fit.", "good")
     if meaningless:
         verdict = TableCell("\u2717 This fit means nothing as it is; measure again.", "bad")
@@ -159,7 +156,7 @@ def operator_page(
     chart = Chart(
         "left-out",
         "rms residual of each trace",
-        "trace",
+        "trace [number]",
         "rms residual [% of the line]",
         (
             DrawnCurve("in the fit", "before", numbers - _BESIDE, inside, "points"),

@@ -5,13 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from tablegen.calibration.table import Source
+from tablegen.findings import Finding, of_remarks, worst_first
 from tablegen.refinement.round import Round
 from tablegen.report.blocks import Charts, Grid, Paragraph, Section, TableCell, row
 from tablegen.report.chart import POSITION, Chart, DrawnCurve, Mark
 from tablegen.report.document import document
 from tablegen.report.errors import windows
 from tablegen.report.picture import PlottedCharts
-from tablegen.report.ranking import Finding
 from tablegen.version import __version__
 
 _TURNS = np.linspace(0.0, 1.0, 601)
@@ -20,7 +20,7 @@ _TURNS = np.linspace(0.0, 1.0, 601)
 def round_page(found: Round, name: str, sources: Sequence[Source], earlier: Sequence[str], refused: str) -> bytes:
     """The page of a round. ``earlier`` are the comments of rounds before, ``refused`` why it is not learnt from."""
     axis, lesson = found.line.axis, found.lesson
-    findings = [Finding("note", 0.0, remark) for remark in found.remarks]
+    findings = worst_first(of_remarks(found.remarks))
     both = f"{lesson.before.rms_percent:.3g} % rms measured; {lesson.after.rms_percent:.2g} % predicted after it."
     verdict = TableCell(f"\u2713 {both}", "good")
     if refused:

@@ -5,38 +5,29 @@ from functools import partial
 from pathlib import Path
 
 from tablegen.certificate.certificate import broken_limits, certify
-from tablegen.certificate.scan_warnings import limit_advice, scan_warnings
+from tablegen.certificate.scan_warnings import limit_advice, weighed_warnings
 from tablegen.config.load import load
 from tablegen.emit.formats import UnknownFormat
 from tablegen.emit.render import render
 from tablegen.planning.line_plan import make_plan
 from tablegen.problems import Rejected, Unphysical
-from tablegen.report.ranking import placed, weighed
+from tablegen.report.ranking import placed
 from tablegen.report.record import VerifyRecord
 from tablegen.report.subject import PlannedScan, Subject, of_scan
 
 
 def planned_scan(
-    scan: Path,
-    verified: VerifyRecord | None = None,
-    tell: Callable[[str], None] = lambda _: None,
-    remedies: bool = True,
+    scan: Path, verified: VerifyRecord | None = None, tell: Callable[[str], None] = lambda _: None
 ) -> Subject:
-    """Plan and certify a scan, and make its files, without writing them. Raises ``Rejected`` for wrong input.
-
-    Without ``remedies`` none is tried: limits that are broken are named, and there are no warnings.
-    """
+    """Plan and certify a scan, and make its files, without writing them. Raises ``Rejected`` for wrong input."""
     tell("shaping the waveforms")
     setup = load(scan)
     plan = make_plan(setup)
     tell("measuring every tick of a line and a frame")
     certificates = certify(plan)
-    if remedies:
-        tell("looking for remedies")
-        broken = broken_limits(plan, certificates, setup.scan_file, partial(limit_advice, setup, plan, certificates))
-        warnings = weighed(plan, certificates, scan_warnings(setup, plan, certificates))
-    else:
-        broken, warnings = broken_limits(plan, certificates, setup.scan_file), []
+    tell("looking for remedies")
+    broken = broken_limits(plan, certificates, setup.scan_file, partial(limit_advice, setup, plan, certificates))
+    warnings = [(percent, placed(one)) for percent, one in weighed_warnings(setup, plan, certificates)]
     tell("writing the formats")
     try:
         files = render(plan, certificates, list(plan.formats))

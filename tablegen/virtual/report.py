@@ -7,12 +7,14 @@ from typing import Any
 
 import numpy as np
 
+from tablegen.findings import Finding, worst_first
 from tablegen.virtual.line_error import BranchError, ideal_triangle
 from tablegen.virtual.parameters import Truth
 from tablegen.virtual.simulation import AxisRun, Run
 
 LABEL = "simulation on a virtual scanner"
 _MAX_CSV_ROWS = 10_000
+_LARGE_PERCENT = 1.0  # of the line: more spoils an image
 
 
 @dataclass(frozen=True)
@@ -47,8 +49,25 @@ def text(name: str, truth: Truth, stages: Sequence[SimulationStage]) -> list[str
     lines.append("* the model of the scanner file")
     if any(getattr(run, axis).refined for stage in stages for run in stage.runs for axis in ("x", "y")):
         lines.append("+ with the refinement of the scan file")
+    lines += [finding.line for finding in simulation_findings(stages)]
     lines.append(f"A simulation, not a measurement: the virtual scanner was identified on {truth.identified_on}.")
     return lines
+
+
+def simulation_findings(stages: Sequence[SimulationStage]) -> list[Finding]:
+    """What the scanner file's own models leave in the image, the worst first; of the last stage that was played."""
+    played = [stage for stage in stages if stage.runs]
+    found = []
+    for run in played[-1].runs if played else ():
+        for one in (getattr(run, axis) for axis in run.asked):
+            left = {side: max(map(abs, getattr(one.imaged, side).residual_range)) for side in one.directions}
+            side = max(left, key=lambda name: left[name])
+            text = f"the {run.model} model leaves {left[side]:.2g} % of the line of {one.axis}, {side}"
+            found.append(Finding("spoils" if left[side] > _LARGE_PERCENT else "expect", left[side], text))
+            by = one.size_error_percent
+            if abs(by) > _LARGE_PERCENT:
+                found.append(Finding("spoils", abs(by), f"the image is {by:+.2g} % off in the size of {one.axis}"))
+    return worst_first(found)
 
 
 def _rows(axis: str, run: Run) -> list[str]:
