@@ -35,6 +35,7 @@ from tablegen.calibration.traces import split_traces
 from tablegen.compensation.size import SizeLaw
 from tablegen.config.decode import decode
 from tablegen.config.scanner import Scanner
+from tablegen.driver import Driver
 from tablegen.emit.write import write_files
 from tablegen.planning.drive import size_law_of
 from tablegen.problems import Problem, Problems, Rejected, Unphysical
@@ -58,6 +59,7 @@ def calibrate(
     axis: Literal["x", "y"],
     scanner: str | Path | None = None,
     v_max: float | None = None,
+    v_min: float = 0.0,
     points: bool = False,
     **options: Any,
 ) -> "Calibrated":
@@ -65,9 +67,9 @@ def calibrate(
 
     Sizes take ``drive_v`` and ``actual_nm``; offsets ``offset_v`` and ``apparent_nm``, optionally ``size_v``;
     hysteresis one or more traces of ``time_s``, ``drive_v``, ``displacement_nm``; frequency ``frequency_hz`` and
-    ``gain``; resonance also ``phase_deg``. Volts are at the piezo, and drives peak to peak. ``v_max`` and what a fit
-    needs of other calibrations are read from the file ``scanner``, unless it is given or the file is not there yet.
-    With ``points`` hysteresis, or a response, is kept as measured, in place of a law.
+    ``gain``; resonance also ``phase_deg``. Volts are at the piezo, and drives peak to peak. ``v_max``, ``v_min`` and
+    what a fit needs of other calibrations are read from the file ``scanner``; without one, give them. With ``points``
+    hysteresis, or a response, is kept as measured, in place of a law.
 
     ``options`` are those of the fits: ``base_nm``, ``threshold``, ``noise`` of sizes, ``size_v`` of offsets,
     ``reference_hz`` of frequency; ``rho``, ``settle_periods``, ``drift_order``, ``delay_s`` of hysteresis. Raises
@@ -79,7 +81,7 @@ def calibrate(
     tables = [table_of(one, *_COLUMNS[kind]) for one in measured]
     if len(tables) > 1 and kind != "hysteresis":
         raise ValueError(f"{kind} takes one table; hysteresis alone takes several")
-    found = _Scanner(None if scanner is None else Path(scanner), axis, v_max)
+    found = _Scanner(None if scanner is None else Path(scanner), axis, v_max, v_min)
     sources = tuple(dict.fromkeys(table.source for table in tables))
     return Calibrated(_fit(kind, tables, found, options), axis, sources, points)
 
@@ -124,11 +126,12 @@ class Calibrated:
         """As plain data: what ``tablegen calibrate --json`` prints."""
         return record(self.fit, self.axis, self.sources)
 
-    def content(self, scanner: Path, v_max: float | None = None, force: bool = False) -> dict[str, bytes]:
+    def content(self, scanner: Path, driver: Driver | float | None = None, force: bool = False) -> dict[str, bytes]:
         """Names and contents of the files that change beside ``scanner``, its own the last; nothing is written.
 
-        A file that is not there is begun, and needs ``v_max``. Raises ``Rejected`` where the file cannot take the
-        values, where the fit is meaningless unless by ``force``, and ``Unphysical`` where there are no ``points``.
+        A file that is not there is begun, and needs the range of the driver, or a number for ``v_max``. Raises
+        ``Rejected`` where the file cannot take the values, where the fit is meaningless unless by ``force``, and
+        ``Unphysical`` where there are no ``points``.
         """
         meaningless = self.doubts
         if meaningless and not force:
@@ -140,20 +143,22 @@ class Calibrated:
                 raise Rejected([Problem(str(beside), 0, "", "was not written by tablegen calibrate; move it away")])
             response = beside.name
             files[response] = response_csv(self.fit, self.sources)
-        if not path.exists() and v_max is None:
+        if not path.exists() and driver is None:
             raise Rejected([Problem(str(scanner), 0, "v_max", "the file is not there; give v_max to begin it")])
-        text = read_text(path, CONFIGURATION) if path.exists() else new_file(path.stem, v_max or 0.0)
+        text = read_text(path, CONFIGURATION) if driver is None or path.exists() else new_file(path.stem, driver)
         put = change(self.fit, self.sources, self.points, response, bool(meaningless))
         files[path.name] = updated(text, str(scanner), self.axis, put).encode("utf-8")
         return files
 
-    def write(self, scanner: str | Path, v_max: float | None = None, force: bool = False) -> list[str]:
+    def write(
+        self, scanner: str | Path, v_max: float | None = None, force: bool = False, v_min: float = 0.0
+    ) -> list[str]:
         """Put the parameters into a scanner file, as ``tablegen calibrate --write`` does; the names that changed.
 
         Raises as ``content`` does, and ``CannotWrite``.
         """
         path = Path(scanner)
-        files = self.content(path, v_max, force)
+        files = self.content(path, None if v_max is None else Driver(v_max, v_min), force)
         *beside, own = files
         changed = write_files(path.parent, {name: files[name] for name in beside}) if beside else []
         return changed + write_files(path.resolve().parent, {own: files[own]})
@@ -181,7 +186,7 @@ def scanner_tables(path: Path) -> tuple[dict[str, Any], list[Problem]]:
 class _Scanner:
     """What is known of the scanner beside the data."""
 
-    def __init__(self, path: Path | None, axis: str, v_max: float | None) -> None:
+    def __init__(self, path: Path | None, axis: str, v_max: float | None, v_min: float) -> None:
         self.path, self.axis = path, axis
         self.values: dict[str, Any] = read_toml(path, str(path))[0] if path is not None and path.exists() else {}
         known = self.values.get("v_max", v_max)
@@ -189,7 +194,7 @@ class _Scanner:
             raise ValueError("give v_max, the driver's maximum output in V, or a scanner file that has it")
         if v_max is not None and v_max != known:
             raise ValueError(f"v_max is {known:g} in {path}, and {v_max:g} was given")
-        self.v_max = float(known)
+        self.driver = Driver(float(known), float(self.values.get("v_min", v_min)))
 
     def number(self, kind: str, key: str) -> float | None:
         """A number of the file as it is, or None."""
@@ -203,23 +208,23 @@ class _Scanner:
         table = scanner_tables(self.path)[0].get(f"{self.axis}.size") if self.path is not None and self.values else None
         if table is None:
             raise Unphysical("sizes of the scan are known, and the size law is not; calibrate the size first")
-        return size_law_of(table, self.v_max)
+        return size_law_of(table, self.driver)
 
 
 def _fit(kind: Kind, tables: list[MeasuredTable], scanner: _Scanner, options: dict[str, Any]) -> Fit:
-    table, v_max = tables[0], scanner.v_max
+    table, driver = tables[0], scanner.driver
     match kind:
         case "size":
             base = options.pop("base_nm", None) or scanner.number("size", "base_nm") or 200.0
-            return fit_size(table[DRIVE], table[ACTUAL], v_max, base, **options)
+            return fit_size(table[DRIVE], table[ACTUAL], driver, base, **options)
         case "offset" if SIZE in table:
-            return fit_offset_sizes(table[OFFSET], table[APPARENT], table[SIZE], v_max, scanner.size_law(), **options)
+            return fit_offset_sizes(table[OFFSET], table[APPARENT], table[SIZE], driver, scanner.size_law(), **options)
         case "offset":
             size_v = options.pop("size_v", None)
             law = None if size_v is None else scanner.size_law()
-            return fit_offset(table[OFFSET], table[APPARENT], v_max, law, size_v, **options)
+            return fit_offset(table[OFFSET], table[APPARENT], driver, law, size_v, **options)
         case "hysteresis":
-            return fit_hysteresis([trace for one in tables for trace in split_traces(one)], v_max, **options)
+            return fit_hysteresis([trace for one in tables for trace in split_traces(one)], driver, **options)
         case "frequency":
             reference = options.pop("reference_hz", None) or scanner.number("frequency", "reference_hz")
             return fit_frequency(table[FREQUENCY], table[GAIN], reference, **options)

@@ -11,6 +11,7 @@ import numpy as np
 
 from tablegen.config.load import Setup, load, load_scanner
 from tablegen.config.scanner import Scanner
+from tablegen.driver import Driver
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import Plan, make_plan
 from tablegen.virtual.experiments import apparent_sizes, frequency_response, sensor_trace, triangle_size
@@ -48,14 +49,14 @@ class Laboratory:
         self.noise, self._seed = noise, seed
 
     @property
-    def v_max(self) -> float:
-        """The driver's maximum output in V."""
-        return self.scanner.x.v_max
+    def driver(self) -> Driver:
+        """The range of the driver: ``v_min``, ``v_max``, ``middle`` and ``span`` in V."""
+        return self.scanner.x.driver
 
     def sizes(self, axis: Axis, drives_v: Sequence[float], rate_hz: float) -> dict[str, Floats]:
-        """``drive_v``, ``actual_nm``: triangles of several sizes about v_max / 2, measured by a sensor."""
+        """``drive_v``, ``actual_nm``: triangles about the middle of the range, measured by a sensor."""
         one = self._axis(axis)
-        nm = np.array([triangle_size(one, volts, 0.5 * one.v_max, rate_hz) for volts in drives_v])
+        nm = np.array([triangle_size(one, volts, one.driver.middle, rate_hz) for volts in drives_v])
         noisy = nm * (1.0 + self.noise * np.random.default_rng(self._next()).standard_normal(len(nm)))
         return {"drive_v": np.array(drives_v, dtype=np.float64), "actual_nm": noisy}
 

@@ -10,8 +10,9 @@ from tablegen.comparison.overlay import overlaid
 from tablegen.compensation.branches import WithBranches
 from tablegen.compensation.frequency import frequency_gain
 from tablegen.compensation.line import LineShape, WantedLine
-from tablegen.compensation.offset import OffsetLaw, normalised_offset
+from tablegen.compensation.offset import OffsetLaw
 from tablegen.config.scanner import Scanner, ScannerAxis
+from tablegen.driver import Driver
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.drive import offset_surface, size_law_of
 from tablegen.problems import Document, Problems, Unphysical
@@ -19,7 +20,7 @@ from tablegen.report.chart import Chart, Mark
 
 _POINTS = 201
 _DECADES = (0.1, 10.0)  # about the rates at which the scanners were calibrated
-_SIZES = (0.2, 1.0)  # of v_max, at which branches are drawn
+_SIZES = (0.2, 1.0)  # of full scale, at which branches are drawn
 Pair = tuple[Floats, Floats]
 
 
@@ -27,7 +28,7 @@ def law_charts(a: Scanner, b: Scanner) -> Iterator[Chart]:
     """Each law that both files have."""
     for axis in ("x", "y"):
         one, other = getattr(a, axis), getattr(b, axis)
-        sides = (one, a.v_max), (other, b.v_max)
+        sides = (one, a.driver), (other, b.driver)
         size = [_size(*side) for side in sides]
         yield from _chart(f"size-{axis}", f"{axis} size", "V_scan [V]", "size [nm]", size)
         offset = [_offset(*side) for side in sides]
@@ -47,26 +48,26 @@ def _chart(
         yield overlaid(key, title, x_label, y_label, both[0], both[1], **more)
 
 
-def _size(axis: ScannerAxis, v_max: float) -> Pair | None:
+def _size(axis: ScannerAxis, driver: Driver) -> Pair | None:
     try:
-        law = size_law_of(axis.size, v_max)
+        law = size_law_of(axis.size, driver)
     except Unphysical:
         return None
     v = np.linspace(0.0, 1.0, _POINTS)
-    return v_max * v, np.array([law.size_nm(one) if one else 0.0 for one in v.tolist()])
+    return driver.span * v, np.array([law.size_nm(one) if one else 0.0 for one in v.tolist()])
 
 
-def _offset(axis: ScannerAxis, v_max: float) -> Pair | None:
+def _offset(axis: ScannerAxis, driver: Driver) -> Pair | None:
     try:
         small = (
             OffsetLaw()
             if axis.offset is None
-            else offset_surface(axis.offset, v_max, size_law_of(axis.size, v_max)).small
+            else offset_surface(axis.offset, driver, size_law_of(axis.size, driver)).small
         )
     except Unphysical:
         return None
-    volts = np.linspace(0.0, v_max, _POINTS)
-    return volts, np.array([small.factor(normalised_offset(one, v_max)) for one in volts.tolist()])
+    volts = np.linspace(driver.v_min, driver.v_max, _POINTS)
+    return volts, np.array([small.factor(driver.p(one)) for one in volts.tolist()])
 
 
 def _gain(axis: ScannerAxis, hz: Floats) -> Floats:
@@ -93,7 +94,7 @@ def _branches(axis: str, a: Scanner, b: Scanner) -> Iterator[Chart]:
             for side in SIDES:
                 curves = [None if shape is None else _bent(shape, side) for shape in shapes]
                 key = f"branch-{axis}-{turn:g}-{100 * share:.0f}-{side}"
-                title = f"{axis} {side} at turn {turn:g}, {100 * share:.0f} % of v_max"
+                title = f"{axis} {side} at turn {turn:g}, {100 * share:.0f} % of full scale"
                 label = "drive less line [% of V_scan]"
                 yield from _chart(key, title, "position on the line", label, curves, marks=(Mark(0.0, "", "y"),))
 
@@ -110,9 +111,9 @@ def _shape(axis: str, scanner: Scanner, turn: float, share: float) -> LineShape 
         axis=axis,
         turn=turn,
         v=share,
-        v_max=scanner.v_max,
-        v_amplitude=share * scanner.v_max,
-        v_offset=0.5 * scanner.v_max,
+        driver=scanner.driver,
+        v_amplitude=share * scanner.driver.span,
+        v_offset=scanner.driver.middle,
         size_nm=1.0,
         rate_hz=1.0,
         harmonics=1,

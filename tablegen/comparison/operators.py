@@ -12,6 +12,7 @@ from tablegen.compensation.operator.file import OperatorFile, read_operator
 from tablegen.compensation.operator.loop import POINTS, Loop
 from tablegen.compensation.operator.operator import Operator
 from tablegen.compensation.operator.uncertainty import departures
+from tablegen.driver import Driver
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 
@@ -36,12 +37,22 @@ class ComparedOperator:
     @property
     def places(self) -> list[Place]:
         """Strokes and centres of its traces in V, rounded to what a file of traces means."""
-        v_max = self.file.v_max
-        return list(dict.fromkeys((_short(one.stroke * v_max), _short(one.centre * v_max)) for one in self.file.lines))
+        driver = self.driver
+        places = ((driver.span * one.stroke, driver.volts(one.centre)) for one in self.file.lines)
+        return list(dict.fromkeys((_short(stroke), _short(centre)) for stroke, centre in places))
+
+    @property
+    def driver(self) -> Driver:
+        """The range that its shares are of."""
+        return Driver(self.file.v_max, self.file.v_min)
+
+    def shares(self, place: Place) -> tuple[float, float]:
+        """Stroke and centre as shares of the range."""
+        return place[0] / self.driver.span, self.driver.share(place[1])
 
     def loop(self, place: Place) -> Loop | None:
         """The settled loop there; None where the operator has none."""
-        stroke, centre = (volts / self.file.v_max for volts in place)
+        stroke, centre = self.shares(place)
         low, high = centre - 0.5 * stroke, centre + 0.5 * stroke
         if low < -1e-9 or high > 1.0 + 1e-9:
             return None
@@ -68,7 +79,7 @@ def _line(one: ComparedOperator, place: Place, section: str) -> Iterator[Compare
     loop = one.loop(place)
     if loop is None:
         return
-    stroke, centre = (volts / one.file.v_max for volts in place)
+    stroke, centre = one.shares(place)
     rms, _, mismatch, size = (by / _DEVIATIONS for by in departures(one.operator.lines, stroke, centre))
     name = f"{section}line of {place[0]:g} V at {place[1]:g} V"
     yield ComparedQuantity(name, "size", loop.extent_nm, "nm", 0.01 * size * loop.extent_nm)

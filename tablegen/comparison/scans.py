@@ -195,4 +195,6 @@ def _output(axis: str, entry: ManifestAxis) -> Iterator[ComparedQuantity]:
     for name, value, unit in numbers:
         yield ComparedQuantity(section, name, value, unit)
     yield ComparedQuantity(section, "coding", output.coding)
+    if output.channel:
+        yield ComparedQuantity(section, "output of the converter", output.channel)
     yield ComparedQuantity(section, "word", f"{output.word_bits} bits, {output.align}")

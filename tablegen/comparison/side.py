@@ -114,7 +114,9 @@ def _planned(scan: Path, tell: Callable[[str], None]) -> tuple[Subject, tuple[st
     plan = make_plan(setup)
     tell("measuring every tick of a line and a frame")
     certificates = certify(plan)
-    broken = tuple(map(placed, broken_limits(plan, certificates, setup.scan_file)))
+    broken = tuple(
+        map(placed, broken_limits(plan, certificates, setup.scan_file, hardware_problem=setup.hardware_problem))
+    )
     tell("writing the formats")
     try:
         files = render(plan, certificates, list(plan.formats))

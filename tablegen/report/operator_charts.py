@@ -9,6 +9,7 @@ from tablegen.calibration.operator.errors import WINDOW
 from tablegen.calibration.operator.fit import OperatorFit
 from tablegen.calibration.operator.periodic_line import PeriodicLine
 from tablegen.compensation.models.operator import CENTRE_REACH, STROKE_REACH
+from tablegen.driver import Driver
 from tablegen.report.chart import POSITION, Chart, DrawnCurve, Mark, Raster, Role
 from tablegen.report.picture import PlottedCharts
 
@@ -17,16 +18,16 @@ _SIDES: tuple[Role, Role] = ("forward", "backward")
 
 
 def operator_charts(
-    fit: OperatorFit, lines: Sequence[PeriodicLine], further: NextTrace, v_max: float, axis: str
+    fit: OperatorFit, lines: Sequence[PeriodicLine], further: NextTrace, driver: Driver, axis: str
 ) -> PlottedCharts:
     """The map over size and offset, then a chart for each trace with its residual left out and in the fit."""
-    where = _map(fit, lines, further, v_max)
-    traces = tuple(_trace(number, fit, line, v_max) for number, line in enumerate(lines))
+    where = _map(fit, lines, further, driver)
+    traces = tuple(_trace(number, fit, line, driver) for number, line in enumerate(lines))
     worst = max(range(len(lines)), key=lambda at: fit.left_out[at].rms)
     return PlottedCharts(f"operator of {axis}", (where, *traces), 3, (where, traces[worst]))
 
 
-def _trace(number: int, fit: OperatorFit, line: PeriodicLine, v_max: float) -> Chart:
+def _trace(number: int, fit: OperatorFit, line: PeriodicLine, driver: Driver) -> Chart:
     """Left out is what a scan is off that was predicted from the other traces; in the fit is fainter."""
     inside, outside = fit.left[number], fit.left_out[number]
     curves = []
@@ -37,7 +38,7 @@ def _trace(number: int, fit: OperatorFit, line: PeriodicLine, v_max: float) -> C
                 DrawnCurve(f"{side}, {name}", side, x, values, faint=errors is inside)
                 for side, values in zip(_SIDES, errors.sides, strict=True)
             ]
-    where = f"{line.stroke * v_max:.3g} V about {line.centre * v_max:.3g} V, {line.rate_hz:.3g} Hz"
+    where = f"{line.stroke * driver.span:.3g} V about {driver.volts(line.centre):.3g} V, {line.rate_hz:.3g} Hz"
     return Chart(
         f"trace-{number + 1}",
         f"{where}: {outside.rms:.2g} % rms left out",
@@ -49,7 +50,7 @@ def _trace(number: int, fit: OperatorFit, line: PeriodicLine, v_max: float) -> C
     )
 
 
-def _map(fit: OperatorFit, lines: Sequence[PeriodicLine], further: NextTrace, v_max: float) -> Chart:
+def _map(fit: OperatorFit, lines: Sequence[PeriodicLine], further: NextTrace, driver: Driver) -> Chart:
     """The rms residual to expect, where the driver reaches and scans are not refused."""
     strokes, centres = np.linspace(1.0, 0.02, _GRID), np.linspace(0.0, 1.0, _GRID)
     points = np.array([(stroke, centre) for stroke in strokes for centre in centres])
@@ -60,15 +61,23 @@ def _map(fit: OperatorFit, lines: Sequence[PeriodicLine], further: NextTrace, v_
     beyond = 0.5 * strokes[:, None] > np.minimum(centres, 1.0 - centres)
     shown = np.where(refused | beyond, np.nan, rms)
     high = float(np.nanmax(shown)) if np.isfinite(shown).any() else 1.0
-    raster = Raster(shown, (0.0, v_max), (0.02 * v_max, v_max), 0.0, high, "heat", "expected rms [% of the line]")
-    ends = v_max * np.array([0.0, 0.5, 1.0])
+    raster = Raster(
+        shown,
+        (driver.v_min, driver.v_max),
+        (0.02 * driver.span, driver.span),
+        0.0,
+        high,
+        "heat",
+        "expected rms [% of the line]",
+    )
+    ends = driver.volts(np.array([0.0, 0.5, 1.0]))
     curves = (
-        DrawnCurve("largest size of the driver", "before", ends, v_max * np.array([0.0, 1.0, 0.0])),
+        DrawnCurve("largest size of the driver", "before", ends, driver.span * np.array([0.0, 1.0, 0.0])),
         DrawnCurve(
             "traces",
             "other",
-            v_max * known,
-            v_max * np.array([line.stroke for line in lines]),
+            driver.volts(known),
+            driver.span * np.array([line.stroke for line in lines]),
             "points",
         ),
         DrawnCurve(
@@ -85,7 +94,7 @@ def _map(fit: OperatorFit, lines: Sequence[PeriodicLine], further: NextTrace, v_
         "offset [V]",
         "size [V]",
         curves,
-        x_range=(0.0, v_max),
-        y_range=(0.0, 1.05 * v_max),
+        x_range=(driver.v_min, driver.v_max),
+        y_range=(0.0, 1.05 * driver.span),
         raster=raster,
     )
