@@ -88,7 +88,7 @@ def fit_offset(
             Curve(
                 "apparent size, relative",
                 "offset [V]",
-                f"size / that at {driver.middle:g} V [ratio]" if driver.v_min else "size / that at v_max / 2 [ratio]",
+                f"size / that at {f'{driver.middle:g} V' if driver.v_min else 'v_max / 2'} [ratio]",
                 (offset_v, apparent_nm / centre),
                 (line, curve),
             ),

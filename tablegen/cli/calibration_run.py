@@ -107,7 +107,8 @@ def shared_options(command: F) -> F:
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the fits are small, and its threads would only spin
         require(*_REQUIRED_MODULES, extra="calibrate")
         check_plot(plot, as_json)
-        return command(common=Common(axis, scanner, v_max, v_min, write, force, plot, no_plot, report, as_json), **rest)
+        common = Common(axis, scanner, v_max, v_min, write, force, plot, no_plot, report, as_json)
+        return command(common=common, **rest)
 
     run.__doc__, run.__name__ = command.__doc__, command.__name__
     for option in reversed(options):

@@ -19,7 +19,6 @@ _BRAILLE = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))
 _UNICODE_RAMP, _ASCII_RAMP = "\u00b7\u2591\u2592\u2593\u2588", ".:-=+*%@"
 _EVERY = 9  # characters from mark to mark
 _LEAST, _MOST = 40, 200  # characters of a line
-_LEFT_OUT = " "
 
 
 def text_plot(chart: Chart, width: int, unicode: bool) -> list[list[Span]]:

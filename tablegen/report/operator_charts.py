@@ -52,6 +52,7 @@ def _trace(number: int, fit: OperatorFit, line: PeriodicLine, driver: Driver) ->
 
 def _map(fit: OperatorFit, lines: Sequence[PeriodicLine], further: NextTrace, driver: Driver) -> Chart:
     """The rms residual to expect, where the driver reaches and scans are not refused."""
+    span, ends = driver.span, (driver.v_min, driver.v_max)
     strokes, centres = np.linspace(1.0, 0.02, _GRID), np.linspace(0.0, 1.0, _GRID)
     points = np.array([(stroke, centre) for stroke in strokes for centre in centres])
     rms = expected_rms(fit, points).reshape(_GRID, _GRID)
@@ -61,23 +62,19 @@ def _map(fit: OperatorFit, lines: Sequence[PeriodicLine], further: NextTrace, dr
     beyond = 0.5 * strokes[:, None] > np.minimum(centres, 1.0 - centres)
     shown = np.where(refused | beyond, np.nan, rms)
     high = float(np.nanmax(shown)) if np.isfinite(shown).any() else 1.0
-    raster = Raster(
-        shown,
-        (driver.v_min, driver.v_max),
-        (0.02 * driver.span, driver.span),
-        0.0,
-        high,
-        "heat",
-        "expected rms [% of the line]",
-    )
-    ends = driver.volts(np.array([0.0, 0.5, 1.0]))
+    raster = Raster(shown, ends, (0.02 * span, span), 0.0, high, "heat", "expected rms [% of the line]")
     curves = (
-        DrawnCurve("largest size of the driver", "before", ends, driver.span * np.array([0.0, 1.0, 0.0])),
+        DrawnCurve(
+            "largest size of the driver",
+            "before",
+            driver.volts(np.array([0.0, 0.5, 1.0])),
+            span * np.array([0.0, 1.0, 0.0]),
+        ),
         DrawnCurve(
             "traces",
             "other",
             driver.volts(known),
-            driver.span * np.array([line.stroke for line in lines]),
+            span * np.array([line.stroke for line in lines]),
             "points",
         ),
         DrawnCurve(
@@ -94,7 +91,7 @@ def _map(fit: OperatorFit, lines: Sequence[PeriodicLine], further: NextTrace, dr
         "offset [V]",
         "size [V]",
         curves,
-        x_range=(driver.v_min, driver.v_max),
-        y_range=(0.0, 1.05 * driver.span),
+        x_range=ends,
+        y_range=(0.0, 1.05 * span),
         raster=raster,
     )

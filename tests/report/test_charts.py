@@ -102,6 +102,16 @@ def test_faults_of_a_chart_are_found(changed: dict[str, object], fault: str) -> 
     assert fault in faults(replace(GOOD, **changed))  # type: ignore[arg-type]
 
 
+def test_the_page_and_files_have_the_same_colours() -> None:
+    """The light scheme of the style sheet."""
+    from tablegen.report import looks
+
+    style = (Path(looks.__file__).parent / "page.css").read_text("utf-8")
+    light = style.split("prefers-color-scheme")[0]
+    for role, look in looks.ROLES.items():
+        assert f"--{role}:{look.stroke};" in light, role
+
+
 def test_directions_that_look_the_same_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     from tablegen.cli import text_plot
     from tablegen.report import looks
