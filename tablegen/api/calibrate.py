@@ -34,6 +34,7 @@ from tablegen.calibration.table import MeasuredTable, Source
 from tablegen.calibration.traces import split_traces
 from tablegen.compensation.size import SizeLaw
 from tablegen.config.decode import decode
+from tablegen.config.like import inherited
 from tablegen.config.scanner import Scanner
 from tablegen.driver import Driver
 from tablegen.emit.write import write_files
@@ -176,11 +177,16 @@ def scanner_tables(path: Path) -> tuple[dict[str, Any], list[Problem]]:
 
     Raises ``Rejected`` where the file is no TOML.
     """
-    values, document = read_toml(path, str(path))
+    values, document = inherited(*read_toml(path, str(path)))
     tables: dict[str, Any] = {}
     problems = Problems()
     decode(Scanner, values, document, problems, lambda _kind, key, _values, built: tables.update({key: built}))
     return tables, problems.found
+
+
+def _values(path: Path) -> dict[str, Any]:
+    """As the file says them, or as the axis says that it is like."""
+    return inherited(*read_toml(path, str(path)))[0]
 
 
 class _Scanner:
@@ -188,7 +194,7 @@ class _Scanner:
 
     def __init__(self, path: Path | None, axis: str, v_max: float | None, v_min: float) -> None:
         self.path, self.axis = path, axis
-        self.values: dict[str, Any] = read_toml(path, str(path))[0] if path is not None and path.exists() else {}
+        self.values: dict[str, Any] = _values(path) if path is not None and path.exists() else {}
         known = self.values.get("v_max", v_max)
         if not isinstance(known, int | float) or isinstance(known, bool) or known <= 0.0:
             raise ValueError("give v_max, the driver's maximum output in V, or a scanner file that has it")

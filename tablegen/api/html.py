@@ -18,7 +18,7 @@ def build_html(plan: Plan, certificates: dict[str, Certificate]) -> str:
         f"<p><b>{escape(title)}</b>, {schedule.lines} lines a frame, {escape(rate(schedule.frame_rate))} frames</p>"
     ]
     parts += [f"<p><b>warning</b>: {escape(text)}</p>" for text in brief_warnings(plan, certificates)]
-    for line in plan.lines:
+    for line in plan.moving:
         parts.append(f"<div>{embedded([drive_of(line), modelled_error(line)])}</div>")
         rows = [*drive_lines(line), *certificate_lines(certificates[line.axis])]
         cells = "".join(f"<tr><td>{escape(name)}</td><td>{escape(value)}</td></tr>" for name, value in rows)

@@ -36,6 +36,8 @@ def refine(
     that is not of this scan.
     """
     setup = scan if isinstance(scan, Setup) else load(scan)
+    if axis == "y" and setup.scan.y.off:
+        raise Rejected([setup.scan_file.problem("y.motion", "'off' keeps y where it is: it has nothing to refine")])
     path = None if isinstance(scan, Setup) else Path(scan)
     text = "" if path is None else read_text(path, CONFIGURATION)
     table = table_of(trace, [TIME, DISPLACEMENT], [DRIVE])

@@ -35,7 +35,7 @@ def expected_mismatch(axis: str, basis: str, percent: float, uncertainty: float 
 
 def note_findings(plan: Plan) -> list[Finding]:
     """What the plan alone tells, the worst first."""
-    schedule, found = plan.schedule, []
+    schedule, found, resting = plan.schedule, [], plan.y.drive.resting
     per_pixel = schedule.pixel_ticks
     if per_pixel.denominator != 1:
         whole = [n for n in (int(per_pixel), int(per_pixel) + 1) if n > 0]
@@ -50,7 +50,7 @@ def note_findings(plan: Plan) -> list[Finding]:
     pixels = (
         f"a frame images {schedule.pixels} x {schedule.up.count}"
         + (f" + {schedule.down.count}" if schedule.down.count else "")
-        + f" pixels: the lines inside the window of y, of {schedule.lines} a frame"
+        + (" pixels: y rests" if resting else f" pixels: the lines inside the window of y, of {schedule.lines} a frame")
     )
     found.append(Finding("note", 0.0, pixels))
     for line in plan.lines:
@@ -61,7 +61,7 @@ def note_findings(plan: Plan) -> list[Finding]:
                 f"settle_lines that follow a change of offset of {settles.offset_v:.4g} V or a smaller scan"
             )
             found.append(Finding("expect", 100.0 * settles.bound_nm / line.drive.size_nm, text))
-        if not line.drive.hysteresis.compensates:
+        if not line.drive.hysteresis.compensates and not line.drive.resting:
             text = f"hysteresis of {line.axis} is not compensated: the scanner file has no model for it"
             found.append(Finding("spoils", _TYPICAL_PERCENT, text))
     return worst_first(found)

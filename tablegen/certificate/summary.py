@@ -19,6 +19,11 @@ _GRID = 32  # points per period of the highest harmonic
 def drive_lines(line: LinePlan) -> list[tuple[str, str]]:
     """What is applied to an axis, factor by factor: label and value."""
     drive, output = line.drive, line.program.output
+    if drive.resting:
+        return [
+            ("rests", f"at {drive.v_offset:.6g} V, {drive.position_nm:.6g} nm"),
+            ("offset", f"code {output.offset_code}"),
+        ]
     rows = [
         (
             "scan",
@@ -106,8 +111,9 @@ def certificate_lines(certificate: Certificate) -> list[tuple[str, str]]:
             "step",
             f"at most {c.largest_step} of {c.max_step} codes a tick; {c.peak_slew_v_per_s:.4g} V/s at the piezo",
         ),
-        ("beyond cutoff", f"{c.beyond_cutoff_db:.1f} dB" + _resonance(c)),
     ]
+    if c.beyond_cutoff_db is not None:
+        rows.append(("beyond cutoff", f"{c.beyond_cutoff_db:.1f} dB" + _resonance(c)))
     return rows
 
 

@@ -133,6 +133,10 @@ def build(
         from tablegen.cli.tables import certificate_table
 
         click.echo("\n".join(certificate_table(built.plan, built.certificates)))
+        if built.choices:
+            click.echo()
+        for choice in built.choices:
+            click.echo(f"chosen: {choice}")
         for finding in built.findings:
             if finding.weight == "spoils":  # `show` prints the small print too
                 click.echo(finding.line)

@@ -146,13 +146,14 @@ def within(table: "MeasuredTable", from_hz: float, to_hz: float) -> "MeasuredTab
 
 def _scanner_values(common: Common) -> dict[str, Any]:
     """What the scanner file says now; nothing where it is to be made."""
+    from tablegen.config.like import inherited
     from tablegen.problems import Rejected
     from tablegen.toml import read_toml
 
     if common.scanner is None or (common.write and not common.scanner.exists()):
         return {}
     try:
-        return read_toml(common.scanner, str(common.scanner))[0]
+        return inherited(*read_toml(common.scanner, str(common.scanner)))[0]
     except Rejected as rejected:
         fail(rejected.problems, ExitStatus.WRONG_INPUT)
 

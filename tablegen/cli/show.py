@@ -44,6 +44,8 @@ def show(scan: Path, as_json: bool, formats: tuple[str, ...], plot: Path | None,
         tell(text, bold=bool(text) and not text.startswith(" "))
     click.echo()
     put_plot(plot, lambda: _charts(built, plot), by_default=not no_plot)
+    for choice in built.choices:
+        click.echo(f"chosen: {choice}")
     for finding in built.findings:
         click.echo(finding.line)
 

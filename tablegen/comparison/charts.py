@@ -49,13 +49,19 @@ def _alike(chart: Chart) -> bool:
 
 
 def _scans(a: Subject, b: Subject) -> Iterator[Chart]:
-    for (axis, one), (_, other) in zip(a.axes, b.axes, strict=True):
+    others = dict(b.axes)
+    for axis, one in a.axes:
+        other = others.get(axis)
+        if other is None:  # one of both is a line scan
+            continue
         yield _drive(axis, one, other)
         yield _apart(axis, one, other)
         yield _spectrum(axis, one, other)
     if a.planned is not None and b.planned is not None:
-        for first, second in zip(played_axes(a.planned), played_axes(b.planned), strict=True):
-            yield from _errors(first, second)
+        played = {one.axis: one for one in played_axes(b.planned)}
+        for first in played_axes(a.planned):
+            if first.axis in played:
+                yield from _errors(first, played[first.axis])
 
 
 def _drive(axis: str, a: ManifestAxis, b: ManifestAxis) -> Chart:

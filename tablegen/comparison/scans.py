@@ -23,7 +23,12 @@ def scan_quantities(subject: Subject) -> list[ComparedQuantity]:
     """Every quantity of a scan or a build, in the order in which they are told."""
     found = [*_asked(subject.planned)] if subject.planned is not None else []
     found += _rates(subject.manifest.sequence)
-    for axis, entry in subject.axes:
+    axes = (("x", subject.manifest.axes.x), ("y", subject.manifest.axes.y))
+    for axis, entry in axes:
+        found.append(ComparedQuantity(f"{axis} drive", "motion", "rests" if entry.resting else "moves"))
+        if entry.resting:
+            found.append(ComparedQuantity(f"{axis} drive", "offset", entry.drive.v_offset, "V"))
+            continue
         found += _corrections(axis, entry)
         found += _waveform(axis, entry)
         found += _certificate(axis, entry)
@@ -164,17 +169,17 @@ def _expected(axis: str, entry: ManifestAxis) -> Iterator[ComparedQuantity]:
 
 def _memory(subject: Subject) -> Iterator[ComparedQuantity]:
     """What a device stores. In C the words of all tables have one type, and a table has one word more than it plays."""
-    bits = 16 if all(entry.table.bits <= 16 for _, entry in subject.axes) else 32
-    tables = [entry.table for _, entry in subject.axes]
-    for axis, entry in subject.axes:
-        table = entry.table
+    axes = subject.manifest.axes.x, subject.manifest.axes.y
+    tables = [entry.table for entry in axes]
+    bits = 16 if all(table.bits <= 16 for table in tables) else 32
+    for axis, table in zip(("x", "y"), tables, strict=True):
         yield ComparedQuantity("memory", f"{axis} table", table.mode)
         yield ComparedQuantity("memory", f"{axis} table, bits a word", table.bits)
         yield ComparedQuantity("memory", f"{axis} table, words", len(table.words))
         yield ComparedQuantity("memory", f"{axis} table, content", digest(table.words))
     yield ComparedQuantity("memory", "tables in an FPGA", sum(len(one.words) * one.bits for one in tables), "bits")
     yield ComparedQuantity("memory", "tables in C", sum(len(one.words) + 1 for one in tables) * bits // 8, "bytes")
-    words = sum(len(entry.fourier_words) for _, entry in subject.axes)
+    words = sum(len(entry.fourier_words) for entry in axes)
     yield ComparedQuantity("memory", "Fourier words in C", 4 * words, "bytes")
 
 

@@ -20,9 +20,9 @@ _POINTS = 321
 
 def scan_charts(setup: Setup, plan: Plan, certificates: Mapping[str, Certificate], brief: bool) -> PlottedCharts:
     """A row for each axis; ``brief`` is without the last chart of it, for which the scan is played."""
-    rows = [[drive_of(line), *([shape_chart(line)] if _bent(line) else [])] for line in plan.lines]
+    rows = [[drive_of(line), *([shape_chart(line)] if _bent(line) else [])] for line in plan.moving]
     if not brief:
-        for row, line, axis in zip(rows, plan.lines, played_axes(PlannedScan(setup, plan, certificates)), strict=True):
+        for row, line, axis in zip(rows, plan.moving, played_axes(PlannedScan(setup, plan, certificates)), strict=True):
             row += [residual_chart(line.axis, one) for one in axis.corrections[-1:]]
     columns = max(map(len, rows))
     return PlottedCharts(f"{plan.name} on {plan.scanner}", tuple(chart for row in rows for chart in row), columns)

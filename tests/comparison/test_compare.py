@@ -242,6 +242,20 @@ def test_a_pixel_of_each_side_is_where_its_drive_is(lab: Path) -> None:
     assert [chart.key for chart in differing_charts(list(charts.values()))] == ["drive-x", "apart-x", "spectrum-x"]
 
 
+def test_a_line_scan_is_compared_with_a_frame(lab: Path) -> None:
+    """Its y rests: it has an offset and no drive."""
+    (lab / "line.toml").write_text(
+        edited(SCAN, "y.motion = 'off'", "- y.size_nm", "- y.turn", "- [y.band_limit]", "- [y.table]"), "utf-8"
+    )
+    found = rows(record(lab / "scan.toml", lab / "line.toml", status=1))
+    assert (found["y drive", "motion"]["a"], found["y drive", "motion"]["b"]) == ("moves", "rests")
+    assert found["y drive", "line"]["b"] is None
+    assert not any(section.startswith("x ") for section, _ in found)
+    assert run("compare", lab / "line.toml", lab / "line.toml").status == 0
+    assert run("compare", lab / "scan.toml", lab / "line.toml", "-o", lab / "line.html").status == 1
+    assert "chart-residual-x-forward" in Page((lab / "line.html").read_text("utf-8")).ids
+
+
 def test_names_of_others_are_text(tmp_path: Path) -> None:
     evil = "<script>alert(1)</script><img src=x onerror=f()>"
     write_pair(tmp_path)
