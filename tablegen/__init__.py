@@ -6,9 +6,9 @@ From a scan file to arrays and files in two lines::
     plot(scan.x.time_s, scan.x.volts)               # numpy arrays of one line, a value a tick
 
 What is public stands in ``tablegen.__all__`` and docs/python.md: ``load``, ``plan``, ``certify`` and ``build`` make a
-scan, ``read_build`` and ``verify`` take one from its directory, ``Device`` talks to an instrument. ``calibrate``,
-``refine`` and ``correct`` take measurements and images; ``Laboratory`` simulates them. Everything else may change.
-Names are loaded when they are first used, so that importing tablegen costs nothing.
+scan, ``variants`` and ``build_many`` many, ``read_build`` and ``verify`` take one from its directory, ``Device`` talks
+to an instrument. ``calibrate``, ``refine`` and ``correct`` take measurements and images; ``Laboratory`` simulates them.
+Everything else may change. Names are loaded when they are first used, so that importing tablegen costs nothing.
 """
 
 from importlib import import_module
@@ -21,10 +21,12 @@ if TYPE_CHECKING:
     from tablegen.api.calibrate import Calibrated, calibrate
     from tablegen.api.correct import Corrected, correct
     from tablegen.api.laboratory import Laboratory
+    from tablegen.api.many import BuildOutcome, build_many, variants
     from tablegen.api.refine import RefinedScan, refine
     from tablegen.api.samples import Samples
     from tablegen.certificate.certificate import Certificate
     from tablegen.config.load import Setup
+    from tablegen.config.variants import Variant
     from tablegen.emit.content import Content
     from tablegen.emit.format import Format
     from tablegen.emit.write import CannotWrite
@@ -43,6 +45,8 @@ _HOMES = {
     "plan": "tablegen.api.build",
     "certify": "tablegen.api.build",
     "build": "tablegen.api.build",
+    "build_many": "tablegen.api.many",
+    "variants": "tablegen.api.many",
     "read_build": "tablegen.manifest.read",
     "verify": "tablegen.verification.run",
     "calibrate": "tablegen.api.calibrate",
@@ -58,6 +62,8 @@ _HOMES = {
     "Certificate": "tablegen.certificate.certificate",
     "Build": "tablegen.api.build",
     "Samples": "tablegen.api.samples",
+    "BuildOutcome": "tablegen.api.many",
+    "Variant": "tablegen.config.variants",
     "StoredBuild": "tablegen.manifest.read",
     "Report": "tablegen.verification.build",
     "Format": "tablegen.emit.format",
@@ -78,6 +84,8 @@ __all__ = [  # noqa: RUF022 - in the order in which they are used
     "plan",
     "certify",
     "build",
+    "variants",
+    "build_many",
     "read_build",
     "verify",
     "calibrate",
@@ -90,6 +98,8 @@ __all__ = [  # noqa: RUF022 - in the order in which they are used
     "Certificate",
     "Build",
     "Samples",
+    "Variant",
+    "BuildOutcome",
     "Calibrated",
     "RefinedScan",
     "Corrected",

@@ -24,6 +24,7 @@ LAYERS = (
     "certificate",
     "manifest",
     "emit",
+    "library",
     "link",
     "verification",
     "calibration",
@@ -33,6 +34,7 @@ LAYERS = (
     "report",
     "comparison",
     "api",
+    "sweep",
     "cli",
     "__main__",
 )
