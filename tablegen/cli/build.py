@@ -133,13 +133,13 @@ def build(
         from tablegen.cli.tables import certificate_table
 
         click.echo("\n".join(certificate_table(built.plan, built.certificates)))
+        for finding in built.findings:
+            if finding.weight == "spoils":  # `show` prints the small print too
+                click.echo(finding.line)
         if built.choices:
             click.echo()
         for choice in built.choices:
             click.echo(f"chosen: {choice}")
-        for finding in built.findings:
-            if finding.weight == "spoils":  # `show` prints the small print too
-                click.echo(finding.line)
         click.echo(f"\n{output}: {_state(built, changed)}")
         if removed:
             click.echo(f"{output}: removed files of an earlier build: {_few(removed)}")
