@@ -7,8 +7,8 @@ From a scan file to arrays and files in two lines::
 
 What is public stands in ``tablegen.__all__`` and docs/python.md: ``load``, ``plan``, ``certify`` and ``build`` make a
 scan, ``variants`` and ``build_many`` many, ``read_build`` and ``verify`` take one from its directory, ``Device`` talks
-to an instrument. Everything else may change. Names are loaded when they are first used, so that importing tablegen
-costs nothing.
+to an instrument. ``calibrate``, ``refine`` and ``correct`` take measurements and images; ``Laboratory`` simulates them.
+Everything else may change. Names are loaded when they are first used, so that importing tablegen costs nothing.
 """
 
 from importlib import import_module
@@ -18,7 +18,11 @@ from tablegen.version import __version__
 
 if TYPE_CHECKING:
     from tablegen.api.build import BrokenLimit, Build, build, certify, load, plan
+    from tablegen.api.calibrate import Calibrated, calibrate
+    from tablegen.api.correct import Corrected, correct
+    from tablegen.api.laboratory import Laboratory
     from tablegen.api.many import BuildOutcome, build_many, variants
+    from tablegen.api.refine import RefinedScan, refine
     from tablegen.api.samples import Samples
     from tablegen.certificate.certificate import Certificate
     from tablegen.config.load import Setup
@@ -31,7 +35,7 @@ if TYPE_CHECKING:
     from tablegen.link.prepare import PreparedScan
     from tablegen.manifest.read import NotABuild, StoredBuild, read_build
     from tablegen.planning.line_plan import Plan
-    from tablegen.problems import Problem, Rejected
+    from tablegen.problems import Problem, Rejected, Unphysical
     from tablegen.verification.build import Report
     from tablegen.verification.run import verify
     from tablegen.verification.simulate import ToolMissing
@@ -45,6 +49,13 @@ _HOMES = {
     "variants": "tablegen.api.many",
     "read_build": "tablegen.manifest.read",
     "verify": "tablegen.verification.run",
+    "calibrate": "tablegen.api.calibrate",
+    "refine": "tablegen.api.refine",
+    "correct": "tablegen.api.correct",
+    "Laboratory": "tablegen.api.laboratory",
+    "Calibrated": "tablegen.api.calibrate",
+    "RefinedScan": "tablegen.api.refine",
+    "Corrected": "tablegen.api.correct",
     "Device": "tablegen.link.device",
     "Setup": "tablegen.config.load",
     "Plan": "tablegen.planning.line_plan",
@@ -59,6 +70,7 @@ _HOMES = {
     "Content": "tablegen.emit.content",
     "Rejected": "tablegen.problems",
     "Problem": "tablegen.problems",
+    "Unphysical": "tablegen.problems",
     "BrokenLimit": "tablegen.api.build",
     "CannotWrite": "tablegen.emit.write",
     "NotABuild": "tablegen.manifest.read",
@@ -76,6 +88,10 @@ __all__ = [  # noqa: RUF022 - in the order in which they are used
     "build_many",
     "read_build",
     "verify",
+    "calibrate",
+    "refine",
+    "correct",
+    "Laboratory",
     "Device",
     "Setup",
     "Plan",
@@ -84,6 +100,9 @@ __all__ = [  # noqa: RUF022 - in the order in which they are used
     "Samples",
     "Variant",
     "BuildOutcome",
+    "Calibrated",
+    "RefinedScan",
+    "Corrected",
     "StoredBuild",
     "PreparedScan",
     "Report",
@@ -91,6 +110,7 @@ __all__ = [  # noqa: RUF022 - in the order in which they are used
     "Content",
     "Rejected",
     "Problem",
+    "Unphysical",
     "BrokenLimit",
     "CannotWrite",
     "NotABuild",

@@ -3,6 +3,7 @@
 from typing import Any
 
 from tablegen.calibration.branch import MeasuredBranch
+from tablegen.calibration.estimate import Estimate
 from tablegen.calibration.hysteresis import TurnFit
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.problems import Unphysical
@@ -18,7 +19,14 @@ def measured_points(branch: TurnFit, direction: str) -> list[dict[str, Any]]:
     Where noise hides the peak, u_peak is that of the mean; an amplitude at which noise hides all is left out. Raises
     ``Unphysical`` where a residual has the wrong sign, or makes no branch.
     """
-    points: list[dict[str, Any]] = []
+    return [
+        {**place, "beta": beta.rounded, "u_peak": peak.rounded} for place, beta, peak in estimates(branch, direction)
+    ]
+
+
+def estimates(branch: TurnFit, direction: str) -> list[tuple[dict[str, float], Estimate, Estimate]]:
+    """Where each of these points is, and beta and u_peak with their standard errors. Raises as ``measured_points``."""
+    points: list[tuple[dict[str, float], Estimate, Estimate]] = []
     offsets = branch.offsets_v or (None,) * len(branch.traces)
     for trace, offset_v in sorted(zip(branch.traces, offsets, strict=True), key=lambda one: one[1] or 0.0):
         side: MeasuredBranch = getattr(trace, direction)
@@ -31,11 +39,11 @@ def measured_points(branch: TurnFit, direction: str) -> list[dict[str, Any]]:
         if beta.value < _MIN_BETA_ERRORS * beta.standard_error or peak.standard_error > _MAX_PEAK_ERROR:
             peak = getattr(branch, direction).u_peak
         place = {} if offset_v is None else {"offset_v": offset_v}
-        if any((point["size_v"], point.get("offset_v")) == (size_v, offset_v) for point in points):
+        if any((point["size_v"], point.get("offset_v")) == (size_v, offset_v) for point, _, _ in points):
             raise Unphysical(f"{size_v:g} V was measured twice; give one of the two")
         try:
             BranchShape.harmonic(beta.value, peak.value)
         except Unphysical as reason:
             raise Unphysical(f"{size_v:g} V, {direction}: {reason}") from None
-        points.append({**place, "size_v": size_v, "beta": beta.rounded, "u_peak": peak.rounded})
+        points.append(({**place, "size_v": size_v}, beta, peak))
     return points

@@ -20,7 +20,7 @@ from tablegen.toml import parse_toml
 
 _PROVENANCE_MARK = "# calibrate "
 _FIRST_MARK = re.compile(r"# calibrate (\w+)(?:, turn ([\d.]+))?: ")
-_FILE_MARK = re.compile(r"# from .*, sha256 [0-9a-f]{16}$")
+_FILE_MARK = re.compile(r"# (from .*, sha256 [0-9a-f]{16}|standard errors: .*)$")
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,8 @@ class Change:
 
     ``values`` replace keys or add them, ``removed`` keys go since they would contradict. ``branches`` are for
     ``[[AXIS.hysteresis.branches]]``: an entry of the same turn is updated, another one added. ``provenance`` holds the
-    lines of the comment above, for the table or for each of the branches: a summary, then "from FILE, sha256 DIGITS".
+    lines of the comment above, for the table or for each of the branches: a summary, then "from FILE, sha256 DIGITS",
+    then "standard errors: KEY VALUE +- ERROR, ...".
     """
 
     kind: str

@@ -12,7 +12,7 @@ from tablegen.calibration.hysteresis import HysteresisFit, TurnFit
 from tablegen.calibration.image_fit import ImageFit
 from tablegen.calibration.offset import OffsetFit
 from tablegen.calibration.offset_sizes import OffsetSizesFit
-from tablegen.calibration.points import measured_points
+from tablegen.calibration.points import estimates, measured_points
 from tablegen.calibration.resonance import ResonanceFit
 from tablegen.calibration.scanner_file import Change
 from tablegen.calibration.size import SizeFit
@@ -23,6 +23,7 @@ from tablegen.compensation.models.harmonic import HarmonicModel
 
 _FACTORS = ("m_minus", "m_plus")
 _DIRECTIONS = ("forward", "backward")
+_WIDTH = 116  # of a line of a comment
 
 
 def parameters(fit: Fit) -> list[tuple[str, Estimate, str]]:
@@ -90,6 +91,7 @@ def change(
     counted = "images" if fit.images else "points"
     residual = f"{fit.points} {counted}, residual {fit.rms_percent:.2g} % rms{by_force}"
     files = [f"from {_printable(source.name)}, sha256 {source.sha256}" for source in sources]
+    from_files = list(files)
     if isinstance(fit, HysteresisFit):
         branches, comments = [], []
         for branch in fit.branches:
@@ -106,7 +108,11 @@ def change(
             of = "pairs of images" if isinstance(branch.traces[0], ImageFit) else "traces"
             what = "pixels" if isinstance(branch.traces[0], ImageFit) else "samples"
             comments.append(
-                [f"{len(branch.traces)} {of}, {count} {what}, residual {fit.rms_percent:.2g} % rms{by_force}", *files]
+                [
+                    f"{len(branch.traces)} {of}, {count} {what}, residual {fit.rms_percent:.2g} % rms{by_force}",
+                    *files,
+                    *_errors(_branch_errors(branch, points)),
+                ]
             )
         return Change("hysteresis", {"model": HarmonicModel.model()}, (), branches, comments)
     if isinstance(fit, OffsetSizesFit):
@@ -114,7 +120,10 @@ def change(
         entries = [{"size_v": one.size_v, **row} for one, row in zip(fit.sizes, rows, strict=True)]
         law = ", drive factors by the size law"
         gone = (*_FACTORS, "alpha", "beta", "points")
-        return Change("offset", {"sizes": entries}, gone, (), [[residual + law, *files]])
+        known = [(f"sizes[{i}].{key}", one) for i, size in enumerate(fit.sizes) for key, one, _ in parameters(size)]
+        errors = _errors([(key, one) for key, one in known if key.endswith(_FACTORS)])
+        return Change("offset", {"sizes": entries}, gone, (), [[residual + law, *files, *errors]])
+    files += _errors([(key, estimate) for key, estimate, _ in parameters(fit) if not key.startswith("(")])
     values = {key: estimate.rounded for key, estimate, _ in parameters(fit) if not key.startswith("(")}
     match fit:
         case OffsetFit():
@@ -126,10 +135,38 @@ def change(
             return Change("frequency", values, (), (), [[residual, *files]])
         case ResonanceFit() if response:
             as_measured = f"{fit.points} points, as measured"
-            return Change("resonance", {"response": response}, tuple(values), (), [[as_measured, *files]])
+            return Change("resonance", {"response": response}, tuple(values), (), [[as_measured, *from_files]])
         case ResonanceFit():
             return Change("resonance", values, ("response",), (), [[residual, *files]])
     raise NotImplementedError(type(fit))
+
+
+def _branch_errors(branch: TurnFit, points: bool) -> list[tuple[str, Estimate]]:
+    """Keys within the entry of a turn, and their estimates."""
+    if not points:
+        return [(f"{side}.{key}", getattr(getattr(branch, side), key)) for side in _DIRECTIONS for key in LAW]
+    return [
+        (f"{side}.points[{i}].{key}", one)
+        for side in _DIRECTIONS
+        for i, (_, *both) in enumerate(estimates(branch, side))
+        for key, one in zip(("beta", "u_peak"), both, strict=True)
+    ]
+
+
+def _errors(found: Sequence[tuple[str, Estimate]]) -> list[str]:
+    """Lines of the comment: each value with its standard error, where that is known. `tablegen compare` reads them."""
+    known = [
+        f"{key} {one.rounded:.9g} +- {one.standard_error:.2g}"
+        for key, one in found
+        if isfinite(one.standard_error) and one.standard_error > 0.0
+    ]
+    lines: list[str] = []
+    for one in known:
+        if lines and len(lines[-1]) + len(one) < _WIDTH:
+            lines[-1] += f", {one}"
+        else:
+            lines.append(f"standard errors: {one}")
+    return lines
 
 
 def record(fit: Fit, axis: str, sources: Sequence[Source]) -> dict[str, Any]:

@@ -21,6 +21,7 @@ _COMMANDS = {
     "check": ("check", "check"),
     "show": ("show", "show"),
     "report": ("report", "report"),
+    "compare": ("compare", "compare"),
     "calibrate": ("calibrate", "calibrate"),
     "channels": ("channels", "channels"),
     "simulate": ("simulate", "simulate"),
@@ -69,7 +70,7 @@ First steps:
 \b
 Exit status of all commands:
     0 done
-    1 output is stale (build --check)
+    1 output is stale (build --check), or A and B differ (compare)
     2 wrong input or wrong usage
     3 a limit of the certificate is exceeded
     4 cannot write

@@ -13,16 +13,15 @@ from tablegen.cli.common import OutputFile, fail, require, written
 from tablegen.cli.exit_status import ExitStatus
 from tablegen.cli.plot import check_plot, plot_option, put_plot
 from tablegen.cli.progress import Progress
-from tablegen.reading import CONFIGURATION, RESPONSE, read_bytes, read_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from tablegen.api.calibrate import Calibrated
     from tablegen.calibration.columns import Column
     from tablegen.calibration.estimate import Fit
     from tablegen.calibration.image_files import ScanImage
-    from tablegen.calibration.resonance import ResonanceFit
-    from tablegen.calibration.table import MeasuredTable, Source
+    from tablegen.calibration.table import MeasuredTable
     from tablegen.compensation.dynamics import Response
     from tablegen.compensation.offset import OffsetLaw
     from tablegen.compensation.size import SizeLaw
@@ -205,17 +204,11 @@ def size_law(common: Common, driver: "Driver", source: str) -> "SizeLaw":
 
 def _tables(common: Common, *names: str) -> dict[str, Any]:
     """These tables of the axis as the scanner file has them, by path; a fault in one of them ends the command."""
-    from tablegen.config.decode import decode
-    from tablegen.config.like import inherited
-    from tablegen.config.scanner import Scanner
-    from tablegen.problems import Problems
-    from tablegen.toml import read_toml
+    from tablegen.api.calibrate import scanner_tables
 
-    values, document = inherited(*read_toml(common.scanner, str(common.scanner)))  # type: ignore[arg-type]
-    tables: dict[str, Any] = {}
-    problems = Problems()
-    decode(Scanner, values, document, problems, lambda _kind, key, _values, built: tables.update({key: built}))
-    found = [problem for problem in problems.found if problem.key.startswith(f"{common.axis}.")]
+    assert common.scanner is not None
+    tables, problems = scanner_tables(common.scanner)
+    found = [problem for problem in problems if problem.key.startswith(f"{common.axis}.")]
     used = [problem for problem in found if problem.key.split(".")[1] in names]
     if used:
         fail(used, ExitStatus.WRONG_INPUT)
@@ -248,9 +241,8 @@ def finish(
 
     A fit that says nothing is printed with its doubts, and not written unless forced.
     """
-    from tablegen.calibration.doubts import doubts
+    from tablegen.api.calibrate import Calibrated
     from tablegen.calibration.fit_findings import fit_findings
-    from tablegen.calibration.summary import record
     from tablegen.cli.calibration_text import calibration_text
     from tablegen.problems import Unphysical
 
@@ -261,8 +253,9 @@ def finish(
     except Unphysical as reason:
         fail([f"{', '.join(dict.fromkeys(table.file for table in tables))}: {reason}"], ExitStatus.WRONG_INPUT)
     sources = list(dict.fromkeys(table.source for table in tables))  # images may stand in one file
+    found = Calibrated(fit, common.axis, tuple(sources), points)
     if common.as_json:
-        click.echo(json.dumps(record(fit, common.axis, sources), indent=2, allow_nan=False))
+        click.echo(json.dumps(found.record, indent=2, allow_nan=False))
     else:
         click.echo("\n".join(calibration_text(fit, common.axis, tables)))
     plot_fit(common, lambda: _charts(fit, common.axis))
@@ -276,12 +269,12 @@ def finish(
         names = [_place(fit, tables[0], tables[0].source.name, at) for at in fit.outliers]
         written(common.report.parent, {common.report.name: fit_page(fit, common.axis, sources, names, points)})
     if common.write:
-        meaningless = doubts(fit, points)
+        meaningless = found.doubts
         if meaningless and not common.force:
             where = f"{common.scanner}: {common.axis}"
             advice = "nothing was written; correct the measurement, or write it all the same with --force"
             fail([*(f"{where}: {doubt}" for doubt in meaningless), f"{where}: {advice}"], ExitStatus.WRONG_INPUT)
-        _write(common, fit, tables, points, bool(meaningless))
+        _write(common, found)
     return ExitStatus.OK
 
 
@@ -305,27 +298,15 @@ def _place(fit: "Fit", table: "MeasuredTable | ScanImage", name: str, at: int) -
     return f"{name}:{table.lines[at]}" if isinstance(table, MeasuredTable) else name
 
 
-def _write(
-    common: Common, fit: "Fit", tables: "Sequence[MeasuredTable | ScanImage]", points: bool, forced: bool
-) -> None:
-    from tablegen.calibration.resonance import ResonanceFit
-    from tablegen.calibration.scanner_file import new_file, updated
-    from tablegen.calibration.summary import change
+def _write(common: Common, found: "Calibrated") -> None:
     from tablegen.problems import Rejected, Unphysical
 
     assert common.scanner is not None
     name = str(common.scanner)
-    sources = list(dict.fromkeys(table.source for table in tables))
-    response = Path()
-    beside: dict[str, bytes] = {}
-    if points and isinstance(fit, ResonanceFit):
-        response = common.scanner.with_name(f"{common.scanner.stem}_{common.axis}_response.csv")
-        beside[response.name] = _response(fit, response, sources)
+    path = common.scanner.resolve()
     try:
-        path = common.scanner.resolve()
-        text = read_text(path, CONFIGURATION) if path.exists() else new_file(path.stem, driver_of(common))
-        put = change(fit, sources, points, response.name, forced)
-        content = updated(text, name, common.axis, put).encode("utf-8")
+        driver = None if path.exists() else driver_of(common)
+        files = found.content(common.scanner, driver, force=True)
     except Rejected as rejected:
         fail(rejected.problems, ExitStatus.WRONG_INPUT)
     except Unphysical as reason:
@@ -333,22 +314,8 @@ def _write(
     except UnicodeDecodeError:
         fail([f"{name}: is not UTF-8"], ExitStatus.WRONG_INPUT)
     except OSError as error:
-        fail([f"{name}: {error.strerror or error}"], ExitStatus.WRONG_INPUT)
-    changed = written(response.parent, beside) if beside else []  # before the file that names it
-    changed += written(path.parent, {path.name: content})
-    click.echo(f"{name}: {common.axis}.{put.kind} {'written' if changed else 'up to date'}", err=common.as_json)
-
-
-def _response(fit: "ResonanceFit", path: Path, sources: "Sequence[Source]") -> bytes:
-    """The measured response as the scanner file names it; a file of somebody else is not written over."""
-    from tablegen.calibration.response_csv import MARK, response_csv
-    from tablegen.problems import Unphysical
-
-    try:
-        if path.exists() and not read_bytes(path, RESPONSE).startswith(MARK.encode("ascii")):
-            fail([f"{path}: was not written by tablegen calibrate; move it away"], ExitStatus.WRONG_INPUT)
-        return response_csv(fit, sources)
-    except Unphysical as reason:
-        fail([f"--points: {reason}"], ExitStatus.WRONG_INPUT)
-    except OSError as error:
-        fail([f"{path}: {error.strerror or error}"], ExitStatus.WRONG_INPUT)
+        fail([f"{error.filename or name}: {error.strerror or error}"], ExitStatus.WRONG_INPUT)
+    *beside, own = files
+    changed = written(common.scanner.parent, {one: files[one] for one in beside}) if beside else []  # it is named
+    changed += written(path.parent, {own: files[own]})
+    click.echo(f"{name}: {common.axis}.{found.kind} {'written' if changed else 'up to date'}", err=common.as_json)

@@ -16,7 +16,7 @@ from tablegen.cli.plot import PlottingCommand, check_plot, plot_option, put_plot
 from tablegen.cli.progress import Progress
 
 if TYPE_CHECKING:
-    from tablegen.correction.job import Choice, Images, OldScan
+    from tablegen.correction.job import Images
     from tablegen.correction.straight import StraightScan
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -268,39 +268,22 @@ def _targets(
 
 
 def _corrected(trace: Path, retrace: Path | None, options: dict[str, Any]) -> "tuple[StraightScan, Images]":
-    from tablegen.correction.job import by_fit, by_scan_file, by_scanner, read_scan
+    from tablegen.api.correct import choice_of, straight, taken_of
+    from tablegen.correction.job import read_scan
     from tablegen.problems import Rejected, Unphysical
 
     names = str(trace) if retrace is None else f"{trace}, {retrace}"
+    constants = options["pitch_nm"], options["lattice_nm"]
     try:
-        choice, taken = _choice(options), _taken(options)
+        choice, taken = choice_of(options), taken_of(options)
         images = read_scan(trace, retrace, choice)
-        if options["fit"]:
-            return by_fit(images, taken, options["pitch_nm"], options["lattice_nm"])[0], images
-        if options["scan"] is not None:
-            return by_scan_file(images, options["scan"], options["scanner"], taken), images
-        return by_scanner(images, options["scanner"], taken), images
+        return straight(images, options["scanner"], options["scan"], taken, *constants), images
     except Rejected as rejected:
         raise _Refused(rejected.problems) from None
     except Unphysical as reason:
         raise _Refused([f"{names}: {reason}"]) from None
     except OSError as error:
         raise _Refused([f"{error.filename or names}: {error.strerror or error}"]) from None
-
-
-def _choice(options: dict[str, Any]) -> "Choice":
-    from tablegen.correction.job import Choice
-
-    return Choice(**{name: options[name] for name in ("channel", "retrace_channel", "retrace_mirrored", "frame")})
-
-
-def _taken(options: dict[str, Any]) -> "OldScan":
-    from tablegen.correction.job import OldAxis, OldScan
-
-    keys = ("size_v", "size_nm", "offset_v", "turn", "window")
-    x, y = (OldAxis(**{key: options[f"{axis}{key}"] for key in keys}) for axis in ("", "slow_"))
-    rest = {key: options[key] for key in ("rate_hz", "lines", "delay_pixels")}
-    return OldScan(x=x, y=y, back=options["slow_back"], **rest)
 
 
 def _put(

@@ -14,10 +14,9 @@ from tablegen.cli.plot import check_plot, plot_option, put_plot
 from tablegen.cli.progress import Progress
 from tablegen.cli.refine_images import ImageArguments, image_options
 from tablegen.findings import of_remarks, worst_first
-from tablegen.reading import CONFIGURATION, read_text
 
 if TYPE_CHECKING:
-    from tablegen.calibration.table import MeasuredTable, Source
+    from tablegen.api.refine import RefinedScan
     from tablegen.refinement.round import Options, Round
     from tablegen.report.picture import PlottedCharts
 
@@ -144,10 +143,8 @@ def refine(
     files = images.names if trace is None else str(trace)
     with Progress() as progress:
         progress.now("reading and learning")
-        if trace is None:
-            found, sources, text = images.learn(scan, axis, options)
-        else:
-            found, sources, text = _learn(scan, trace, axis, triggered, options)
+        refined = images.learn(scan, axis, options) if trace is None else _learn(scan, trace, axis, triggered, options)
+    found, sources = refined.round, list(refined.sources)
     from tablegen.cli.refine_text import refine_record, refine_text
 
     name = found.setup.scan.name
@@ -159,45 +156,33 @@ def refine(
     if not as_json:
         for finding in worst_first(of_remarks(found.remarks)):
             click.echo(finding.line)
-    refused = found.worse or _learnt_before(scan, axis, found, sources, text)
+    refused = refined.refused
     if report is not None:
-        from tablegen.refinement.scan_file import rounds_of
         from tablegen.report.learnt import round_page
 
-        earlier = rounds_of(text, str(scan), axis) if found.line.layer is not None else []
-        written(report.parent, {report.name: round_page(found, name, sources, earlier, refused)})
+        written(report.parent, {report.name: round_page(found, name, sources, refined.earlier, refused)})
     if refused and not force:
         fail([f"{files}: {refused}"], ExitStatus.WRONG_INPUT)
     if write:
-        _write(scan, axis, found, sources, text, as_json)
+        _write(scan, axis, refined, as_json)
     return ExitStatus.OK
 
 
-def _learn(
-    scan: Path, trace: Path, axis: Literal["x", "y"], triggered: bool, options: "Options"
-) -> "tuple[Round, list[Source], str]":
-    """The round, where the trace came from, and the text of the scan file that was planned."""
-    from tablegen.config.load import load
+def _learn(scan: Path, trace: Path, axis: Literal["x", "y"], triggered: bool, options: "Options") -> "RefinedScan":
+    """The round; what is wrong ends the command."""
+    from dataclasses import asdict
+
+    from tablegen.api.refine import refine as learn
     from tablegen.problems import Rejected, Unphysical
-    from tablegen.refinement.round import refine as learn_from
 
     try:
-        setup = load(scan)
-        if axis == "y" and setup.scan.y.off:
-            raise Rejected([setup.scan_file.problem("y.motion", "'off' keeps y where it is: it has nothing to refine")])
-        text = read_text(scan, CONFIGURATION)
-        table = _read(trace, triggered)
-        from tablegen.calibration.columns import DISPLACEMENT, DRIVE, TIME
-
-        drive = None if triggered else table[DRIVE]
-        found = learn_from(setup, axis, table[TIME], table[DISPLACEMENT], drive, options)
+        return learn(scan, trace, axis=axis, triggered=triggered, **asdict(options))
     except Rejected as rejected:
         fail(rejected.problems, ExitStatus.WRONG_INPUT)
     except Unphysical as reason:
         fail([f"{trace}: {reason}"], ExitStatus.WRONG_INPUT)
     except OSError as error:
         fail([f"{scan}: {error.strerror or error}"], ExitStatus.WRONG_INPUT)
-    return found, [table.source], text
 
 
 def _charts(found: "Round") -> "PlottedCharts":
@@ -206,47 +191,16 @@ def _charts(found: "Round") -> "PlottedCharts":
     return round_charts(found, found.setup.scan.name)
 
 
-def _learnt_before(scan: Path, axis: str, found: "Round", sources: "list[Source]", text: str) -> str:
-    """Whether the layer of the file rests on these very files: they were recorded without what was learnt from them."""
-    from tablegen.refinement.scan_file import rounds_of
-
-    if found.line.layer is None:
-        return ""
-    rows = rounds_of(text, str(scan), axis)
-    if not any(source.sha256 in row for row in rows for source in sources):
-        return ""
-    what = "this trace" if len(sources) == 1 else "these images"
-    return f"[{axis}.refinement] was already learnt from {what}; build, upload and record again"
-
-
-def _read(trace: Path, triggered: bool) -> "MeasuredTable":
-    from tablegen.calibration.columns import DISPLACEMENT, DRIVE, TIME
-    from tablegen.calibration.table import read_table
-    from tablegen.problems import Problem, Rejected
-
-    table = read_table(trace, [TIME, DISPLACEMENT], [DRIVE])
-    if DRIVE not in table and not triggered:
-        why = "missing; or give --triggered if time 0 is a line start"
-        raise Rejected([Problem(table.file, int(table.lines[0]) - 1, DRIVE.name, why)])
-    return table
-
-
-def _write(scan: Path, axis: str, found: "Round", sources: "list[Source]", text: str, quiet: bool) -> None:
-    import msgspec
-
-    from tablegen.cli.refine_text import provenance
+def _write(scan: Path, axis: str, refined: "RefinedScan", quiet: bool) -> None:
     from tablegen.problems import Rejected
-    from tablegen.refinement.scan_file import with_layer
 
-    if found.refinement is None or not found.lesson.harmonics:
-        click.echo(f"{scan}: not changed", err=quiet)
-        return
-    plain = msgspec.json.decode(msgspec.json.encode(found.refinement))
-    values = {key: value for key, value in plain.items() if value is not None}  # as a file has it
     try:
         path = scan.resolve()
-        content = with_layer(text, str(scan), axis, values, provenance(found, sources)).encode("utf-8")
+        content = refined.content()
     except Rejected as rejected:
         fail(rejected.problems, ExitStatus.WRONG_INPUT)
+    if not content:
+        click.echo(f"{scan}: not changed", err=quiet)
+        return
     written(path.parent, {path.name: content})
     click.echo(f"{scan}: {axis}.refinement written; build, upload and record again", err=quiet)

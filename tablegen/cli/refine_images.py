@@ -16,7 +16,7 @@ from tablegen.cli.image_samples import NO_RETRACE, constant_options, sample_of
 from tablegen.reading import CONFIGURATION, read_text
 
 if TYPE_CHECKING:
-    from tablegen.calibration.table import Source
+    from tablegen.api.refine import RefinedScan
     from tablegen.refinement.round import Options, Round
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -67,8 +67,9 @@ class ImageArguments:
         if self.mismatch and self.knows_constant:
             raise click.UsageError("--mismatch is for a sample without a period; it has no constant")
 
-    def learn(self, scan: Path, axis: Literal["x", "y"], options: "Options") -> "tuple[Round, list[Source], str]":
-        """The round, where the images came from, and the text of the scan file that was planned."""
+    def learn(self, scan: Path, axis: Literal["x", "y"], options: "Options") -> "RefinedScan":
+        """The round; what is wrong ends the command."""
+        from tablegen.api.refine import RefinedScan
         from tablegen.config.load import load
         from tablegen.problems import Rejected, Unphysical
         from tablegen.refinement.image_round import refine_images, refine_mismatch
@@ -100,7 +101,7 @@ class ImageArguments:
             fail([f"{self.names}: {reason}"], ExitStatus.WRONG_INPUT)
         except OSError as error:
             fail([f"{scan}: {error.strerror or error}"], ExitStatus.WRONG_INPUT)
-        return found, sources, text
+        return RefinedScan(found, tuple(sources), scan, text)
 
 
 _OPTIONS: tuple[Callable[[Any], Any], ...] = (

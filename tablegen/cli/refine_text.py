@@ -162,26 +162,3 @@ def _measurement(found: Round, sources: Sequence[Source]) -> dict[str, Any]:
             "size_standard_error_nm": None if found.size is None else found.size.nm.standard_error,
         }
     raise TypeError(type(found).__name__)
-
-
-def provenance(found: Round, sources: Sequence[Source]) -> str:
-    """The line of the comment that says what a round rests on; no date."""
-    lesson = found.lesson
-    said = []
-    for source in sources:
-        name = source.name if source.name.isprintable() else ascii(source.name)
-        said.append(f"{name}, sha256 {source.sha256}")
-    if isinstance(found, TraceRound):
-        said.append(f"{found.displacement.periods:.4g} periods")
-    if isinstance(found, ImageRound):
-        said.append(f"{found.periods:.4g} periods in the line")
-    if isinstance(found, MismatchRound):
-        said.append("trace against retrace")
-    return ", ".join(
-        [
-            *said,
-            f"residual {lesson.before.rms_percent:.3g} % rms",
-            f"harmonics to {lesson.harmonics}",
-            f"gain {found.bound.gain:g}",
-        ]
-    )

@@ -101,14 +101,12 @@ def simulate(
     check_plot(plot, as_json)
     from msgspec.structs import replace
 
+    from tablegen.api.laboratory import Laboratory
     from tablegen.config.load import load
     from tablegen.problems import Rejected, Unphysical
     from tablegen.virtual import report
     from tablegen.virtual.own_run import own_axes
-    from tablegen.virtual.parameters import BUILT_IN, load_truth
     from tablegen.virtual.report import SimulationStage
-    from tablegen.virtual.scaling import scaled_to
-    from tablegen.virtual.scanner import VirtualScanner
 
     try:
         setup = load(scan)
@@ -126,13 +124,12 @@ def simulate(
     if calibrated:
         require("scipy", extra="calibrate", otherwise="; or give --no-calibration")
     try:
-        truth = load_truth(truth_file)
+        laboratory = Laboratory(truth_file, setup.scanner)
     except Rejected as faults:
         fail(faults.problems, ExitStatus.WRONG_INPUT)
-    scanner = VirtualScanner.of(truth)
-    if truth_file in BUILT_IN:
-        scanner, how = scaled_to(scanner, setup.scanner)
-        truth = replace(truth, name=f"{truth.name}, {how}" if how else truth.name)
+    scanner, truth = laboratory.scanner, laboratory.truth
+    if laboratory.scaled:
+        truth = replace(truth, name=f"{truth.name}, {laboratory.scaled}")
     with Progress() as progress:
         heading = "with the scanner file as it is"
         if own_axes(setup):

@@ -43,8 +43,8 @@ def basis(planned: PlannedScan) -> Section:
         blocks += _traces(line)
     blocks.append(
         Paragraph(
-            "The scanner file keeps how many points a fit had, what they leave, and which files they were. Standard "
-            "errors and outliers are what `tablegen calibrate` prints, and `--report` shows.",
+            "The scanner file keeps how many points a fit had, what they leave, which files they were, and standard "
+            "errors, which `tablegen compare` reads. `tablegen calibrate` prints outliers, and `--report` shows them.",
             "quiet",
         )
     )

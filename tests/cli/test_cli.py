@@ -22,7 +22,7 @@ from limits import PATIENCE_S
 
 from tablegen import __version__
 
-COMMANDS = ("build", "sweep", "check", "show", "report", "verify", "init", "paths", "schema")
+COMMANDS = ("build", "sweep", "check", "show", "report", "compare", "verify", "init", "paths", "schema")
 COMMANDS += ("upload", "status", "readback", "park", "trigger", "clear", "ports")
 OWN_FILES = [
     "annexin_200nm.c",
@@ -99,6 +99,7 @@ def test_help_names_every_command_and_every_exit_status() -> None:
         ("check", ("SCAN.TOML", "file:line: key: why")),
         ("show", ("SCAN.TOML", "--json", "--plot [FILE]", "--no-plot", "> is forward and < is backward")),
         ("report", ("SCAN.TOML|DIR", "--output FILE", "[default: report.html]", "--verified FILE", "--svg DIR")),
+        ("compare", ("A B", "--all", "--output FILE", "--json", "Exit status: 0 the same, 1 different, 2 wrong input")),
         (
             "verify",
             (

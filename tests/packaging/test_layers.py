@@ -32,6 +32,7 @@ LAYERS = (
     "virtual",
     "correction",
     "report",
+    "comparison",
     "api",
     "sweep",
     "cli",

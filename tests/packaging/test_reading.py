@@ -49,7 +49,7 @@ PARSED = {
     ("calibration/scanner_file.py", "tomlkit.parse"): "text that parse_toml has read",
     ("refinement/scan_file.py", "tomllib.loads"): "text that parse_toml has read",
     ("refinement/scan_file.py", "tomlkit.parse"): "text that parse_toml has read",
-    ("cli/refine.py", "msgspec.json.decode"): "what was encoded just before",
+    ("api/refine.py", "msgspec.json.decode"): "what was encoded just before",
     ("verification/worker.py", "json.loads"): "its own job and outcome",
     ("verification/bench.py", "json.loads"): "its own record",
 }

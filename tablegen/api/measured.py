@@ -1,0 +1,43 @@
+"""Measurements as scripts have them: the path of a CSV file, or arrays by the names of its columns."""
+
+from collections.abc import Mapping, Sequence
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from tablegen.calibration.columns import Column
+from tablegen.calibration.table import MeasuredTable, Source, read_table
+from tablegen.numerics.arrays import Floats
+from tablegen.problems import Problem, Rejected
+
+Measured = str | Path | Mapping[str, ArrayLike]
+VALUES = "values"  # what messages and comments call arrays that are of no file
+
+
+def table_of(data: Measured, needed: Sequence[Column], optional: Sequence[Column] = ()) -> MeasuredTable:
+    """The columns that are needed, and the optional ones that are there; of arrays in the first unit of each.
+
+    Raises ``Rejected`` with every fault.
+    """
+    if isinstance(data, str | Path):
+        return read_table(Path(data), needed, optional)
+    columns: dict[str, Floats] = {}
+    problems = [Problem(VALUES, 0, column.name, "missing") for column in needed if column.name not in data]
+    for column in [column for column in (*needed, *optional) if column.name in data]:
+        values = np.asarray(data[column.name], dtype=np.float64)
+        if values.ndim != 1 or not len(values):
+            problems.append(Problem(VALUES, 0, column.name, f"has the shape {values.shape}; it takes (n,)"))
+        elif not np.all((values > column.above) & (values < column.below)):
+            wrong = int(np.argmin((values > column.above) & (values < column.below)))
+            problems.append(Problem(VALUES, 0, f"{column.name}[{wrong}]", f"{values[wrong]:g} is no {column.quantity}"))
+        columns[column.name] = values
+    lengths = {len(values) for values in columns.values()}
+    if not problems and len(lengths) > 1:
+        problems.append(Problem(VALUES, 0, "", f"columns of different lengths: {', '.join(map(str, sorted(lengths)))}"))
+    if problems:
+        raise Rejected(problems)
+    content = b"".join(name.encode() + values.tobytes() for name, values in sorted(columns.items()))
+    source = Source(VALUES, sha256(content).hexdigest()[:16])
+    return MeasuredTable(VALUES, source, columns, np.arange(1, max(lengths) + 1))

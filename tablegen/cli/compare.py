@@ -1,0 +1,100 @@
+"""``tablegen compare``: two scans, builds or calibrations side by side."""
+
+import json
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from tablegen.cli.common import OutputFile, fail, written
+from tablegen.cli.exit_status import ExitStatus
+from tablegen.cli.plot import PlottingCommand, check_plot, plot_option, put_plot
+from tablegen.cli.progress import Progress
+
+if TYPE_CHECKING:
+    from tablegen.comparison.comparison import SideBySide
+    from tablegen.report.chart import Chart
+    from tablegen.report.picture import PlottedCharts
+
+_IN_TERMINAL = 6  # charts
+_path = click.Path(path_type=Path)
+
+
+@click.command(
+    cls=PlottingCommand,
+    short_help="Compare two scans, builds or calibrations.",
+    epilog="""\b
+Examples:
+  tablegen compare annexin_200nm.toml faster.toml
+  tablegen compare annexin_200nm.toml build               is the build of this scan?
+  tablegen compare scanner_may.toml scanner_june.toml     what has changed more than the errors?
+  tablegen compare scan.toml other.toml -o compare.html --plot compare.pdf
+
+\b
+Exit status: 0 the same, 1 different, 2 wrong input, 4 cannot write, 6 a library is missing.""",
+)
+@click.argument("a", type=_path, metavar="A")
+@click.argument("b", type=_path, metavar="B")
+@click.option("--all", "everything", is_flag=True, help="Also print what is the same.")
+@click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="Also write an HTML page with all charts.")
+@plot_option("A and B in the same charts, those that differ first,")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")
+def compare(a: Path, b: Path, everything: bool, output: Path | None, plot: Path | None, as_json: bool) -> int:
+    """Compare A and B, which are two scan files, two directories of builds, a scan file and a build, two scanner
+    files, or two operator files. Print each quantity that differs, the difference, and its percentage.
+
+    Of scanner files the standard errors are compared too, if `tablegen calibrate --write` wrote both: a parameter has
+    changed if it differs by more than twice the standard error of the difference.
+
+    A build contains neither the limits of its scan file nor the scanner file, so these are not compared with it.
+    """
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    if output is not None and output.suffix == ".toml":
+        raise click.UsageError(f"-o {output}: the page would replace a scan or a scanner file; give a name in .html")
+    check_plot(plot, as_json)
+    from tablegen.comparison.charts import comparison_charts
+
+    with Progress() as progress:
+        both = _read(a, b, progress)
+        charts = []
+        if output is not None or plot is not None:
+            progress.now("playing both and drawing")
+            charts = comparison_charts(both)
+    if as_json:
+        click.echo(json.dumps(both.record(everything), indent=2, allow_nan=False))
+    else:
+        from tablegen.cli.compare_text import compare_text
+
+        click.echo("\n".join(compare_text(both, everything)))
+    if charts:
+        put_plot(plot, lambda: _plotted(both, charts))
+    if output is not None:
+        from tablegen.comparison.page import comparison_page
+
+        written(output.parent, {output.name: comparison_page(both, charts)})
+    return ExitStatus.OK if both.same else ExitStatus.STALE
+
+
+def _plotted(both: "SideBySide", charts: "list[Chart]") -> "PlottedCharts":
+    """All in a file, what differs in it first; in the terminal only that, the first of them."""
+    from tablegen.comparison.charts import differing_charts
+    from tablegen.report.picture import PlottedCharts
+
+    first = differing_charts(charts)
+    rest = [chart for chart in charts if chart not in first]
+    heading = "A: {}, B: {}".format(*both.titles)
+    return PlottedCharts(heading, (*first, *rest), brief=tuple((first or charts)[:_IN_TERMINAL]))
+
+
+def _read(a: Path, b: Path, progress: Progress) -> "SideBySide":
+    from tablegen.comparison.comparison import compared
+    from tablegen.manifest.read import NotABuild
+    from tablegen.problems import Rejected, Unphysical
+
+    try:
+        return compared(a, b, progress.now)
+    except Rejected as rejected:
+        fail(rejected.problems, ExitStatus.WRONG_INPUT)
+    except (NotABuild, Unphysical) as error:
+        fail([error], ExitStatus.WRONG_INPUT)

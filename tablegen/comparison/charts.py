@@ -1,0 +1,149 @@
+"""A and B in the same charts: grey and dotted is A, green and solid is B, in every one of them."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from tablegen.comparison.comparison import SideBySide
+from tablegen.comparison.law_charts import law_charts
+from tablegen.comparison.operators import SIDES, ComparedOperator, Place, residuals
+from tablegen.comparison.overlay import overlaid
+from tablegen.compensation.operator.loop import POINTS
+from tablegen.manifest.fields import ManifestAxis
+from tablegen.numerics.arrays import Floats
+from tablegen.report.blocks import Charts as ChartsBlock
+from tablegen.report.blocks import Section
+from tablegen.report.chart import Chart, Mark
+from tablegen.report.errors import inside
+from tablegen.report.playing import PlayedAxis, played_axes
+from tablegen.report.subject import Subject, series_of
+
+_POINTS = 801
+_MOST_LOOPS = 4
+
+
+def comparison_charts(both: SideBySide) -> list[Chart]:
+    """Every chart of two sides; those that only one of them could have are left out."""
+    if both.a.subject is not None and both.b.subject is not None:
+        return [*_scans(both.a.subject, both.b.subject)]
+    found = [] if both.a.scanner is None or both.b.scanner is None else [*law_charts(both.a.scanner, both.b.scanner)]
+    for name in both.a.operators:
+        if name in both.b.operators:
+            found += _loops(name, both.a.operators[name], both.b.operators[name])
+    return found
+
+
+def differing_charts(charts: Sequence[Chart]) -> list[Chart]:
+    """Those in which A and B are not one curve."""
+    return [chart for chart in charts if not _alike(chart)]
+
+
+def _alike(chart: Chart) -> bool:
+    if len(chart.curves) == 1:  # a difference
+        return not np.any(chart.curves[0].y)
+    one, other = chart.curves
+    return all(
+        len(p) == len(q) and bool(np.allclose(p, q, rtol=1e-12, atol=0.0, equal_nan=True))
+        for p, q in ((one.x, other.x), (one.y, other.y))
+    )
+
+
+def _scans(a: Subject, b: Subject) -> Iterator[Chart]:
+    others = dict(b.axes)
+    for axis, one in a.axes:
+        other = others.get(axis)
+        if other is None:  # one of both is a line scan
+            continue
+        yield _drive(axis, one, other)
+        yield _apart(axis, one, other)
+        yield _spectrum(axis, one, other)
+    if a.planned is not None and b.planned is not None:
+        played = {one.axis: one for one in played_axes(b.planned)}
+        for first in played_axes(a.planned):
+            if first.axis in played:
+                yield from _errors(first, played[first.axis])
+
+
+def _drive(axis: str, a: ManifestAxis, b: ManifestAxis) -> Chart:
+    """A line of x or a frame of y, each over its own time."""
+    t = np.linspace(0.0, 1.0, _POINTS)
+    periods = [entry.line.rate_exact[1] / entry.line.rate_exact[0] for entry in (a, b)]
+    times, unit = (1e3, "ms") if max(periods) < 1.0 else (1.0, "s")
+    curves = [(times * period * t, _volts(entry, t)) for entry, period in zip((a, b), periods, strict=True)]
+    what = "line" if axis == "x" else "frame"
+    return overlaid(f"drive-{axis}", f"{axis} drive, one {what}", f"time [{unit}]", "drive at the piezo [V]", *curves)
+
+
+def _apart(axis: str, a: ManifestAxis, b: ManifestAxis) -> Chart:
+    """What an overlay of two drives that are alike cannot show."""
+    t = np.linspace(0.0, 1.0, _POINTS)
+    return overlaid(
+        f"apart-{axis}",
+        f"{axis} drive, B less A",
+        "time [periods]",
+        "drive at the piezo [V]",
+        None,
+        (t, _volts(b, t) - _volts(a, t)),
+    )
+
+
+def _volts(entry: ManifestAxis, t: Floats) -> Floats:
+    return entry.drive.v_offset + entry.drive.v_amplitude * (series_of(entry).value(t) - 0.5)
+
+
+def _spectrum(axis: str, a: ManifestAxis, b: ManifestAxis) -> Chart:
+    curves = []
+    for entry in (a, b):
+        series, rate = series_of(entry), entry.line.rate_exact[0] / entry.line.rate_exact[1]
+        volts = entry.drive.v_amplitude * np.hypot(series.a, series.b)
+        curves.append((rate * np.arange(1.0, series.harmonics + 1.0), 20.0 * np.log10(np.maximum(volts, 1e-9))))
+    title = f"{axis} harmonics of the drive"
+    return overlaid(f"spectrum-{axis}", title, "frequency [Hz]", "amplitude [dB of 1 V]", *curves, log_x=True)
+
+
+def _errors(a: PlayedAxis, b: PlayedAxis) -> Iterator[Chart]:
+    """Residual and scaling error on what each scanner file says of the scanner, as `tablegen report` plays them."""
+    one, other = (side.emitted or side.before for side in (a, b))
+    if one is None or other is None:
+        return
+    for side in SIDES:
+        if side not in one.directions or side not in other.directions:
+            continue
+        branches = [getattr(run.imaged, side) for run in (one, other)]
+        key, place, zero = f"{a.axis}-{side}", "position on the line", (Mark(0.0, "", "y"),)
+        residual, scaling = f"residual-{key}", f"scaling-{key}"
+        curves = [inside(branch) for branch in branches]
+        title = f"{a.axis} residual {side}, simulated"
+        yield overlaid(residual, title, place, "residual [% of the line]", *curves, marks=zero)
+        curves = [(branch.scaling_position, branch.scaling) for branch in branches]
+        title = f"{a.axis} scaling error {side}, simulated"
+        yield overlaid(scaling, title, place, "scaling error [%]", *curves, marks=zero)
+
+
+def _loops(name: str, a: ComparedOperator, b: ComparedOperator) -> Iterator[Chart]:
+    """Both branches of the largest lines at which either was measured, less a straight line."""
+    places = sorted({*a.places, *b.places}, reverse=True)
+    prefix = f"{name}-" if name else ""
+    drawn: list[Place] = []
+    for place in places:
+        loops = [operator.loop(place) for operator in (a, b)]
+        if None in loops or len(drawn) == _MOST_LOOPS:
+            continue
+        drawn.append(place)
+        both = [residuals(loop) for loop in loops if loop is not None]
+        share = np.arange(POINTS) / (POINTS - 1)
+        for at, side in enumerate(SIDES):
+            yield overlaid(
+                f"{prefix}loop-{len(drawn)}-{side}",
+                f"{f'{name} ' if name else ''}{side}, {place[0]:g} V at {place[1]:g} V",
+                "drive [share of the line's]",
+                "position less straight line [%]",
+                *((share, one[at]) for one in both),
+                marks=(Mark(0.0, "", "y"),),
+            )
+
+
+def chart_section(charts: Sequence[Chart]) -> Section:
+    """All of them, for a page."""
+    lead = "Drag across a chart to zoom, press Escape to come back; the arrow keys step along the curves."
+    return Section("charts", "A and B in one chart", (ChartsBlock(tuple(charts)),), lead)

@@ -1,0 +1,96 @@
+"""A and B together: their quantities in pairs, what differs, and what to know of it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from tablegen.comparison.difference import SURE, ComparedPair, pairs
+from tablegen.comparison.operators import operator_quantities
+from tablegen.comparison.side import WORDS, ComparedSide, folder_of, kind_of, read_side, together
+from tablegen.problems import Problem, Rejected
+
+
+@dataclass(frozen=True, eq=False)
+class SideBySide:
+    """Two sides that can be compared."""
+
+    a: ComparedSide
+    b: ComparedSide
+
+    @cached_property
+    def pairs(self) -> list[ComparedPair]:
+        """Every quantity of both."""
+        both = [list(side.quantities) for side in (self.a, self.b)]
+        for name in dict.fromkeys([*self.a.operators, *self.b.operators]):
+            found = [side.operators.get(name) for side in (self.a, self.b)]
+            places = sorted({place for one in found if one is not None for place in one.places})
+            for one, quantities in zip(found, both, strict=True):
+                if one is not None:
+                    quantities += operator_quantities(one, places, f"{name} " if name else "")
+        return pairs(both[0], both[1], of_scan="build" not in (self.a.kind, self.b.kind))
+
+    @cached_property
+    def differing(self) -> list[ComparedPair]:
+        """The quantities that are not the same."""
+        return [pair for pair in self.pairs if not pair.same]
+
+    @property
+    def titles(self) -> tuple[str, str]:
+        """What A and B are called: the names in the files, or those of the files where these are the same."""
+        a, b = self.a.title, self.b.title
+        return (a, b) if a != b else (self.a.path.name, self.b.path.name)
+
+    @property
+    def same(self) -> bool:
+        """Whether nothing differs, and every file of a build is as its manifest says."""
+        return not self.differing and not any(side.damaged for side in (self.a, self.b))
+
+    @property
+    def notes(self) -> list[str]:
+        """What to know of the numbers, in sentences."""
+        found = [*self.a.notes, *(note for note in self.b.notes if note not in self.a.notes)]
+        if "build" in (self.a.kind, self.b.kind):
+            found.append(
+                "a build has neither the keys and limits of the scan file nor the scanner file: these are not compared"
+            )
+        known = [pair for pair in self.pairs if pair.errors is not None]
+        if known:
+            more = sum(pair.errors is not None and pair.errors > SURE for pair in known)
+            found.append(
+                f"{more} of {len(known)} quantities with known standard errors differ by more than {SURE:g} of them; "
+                f"by chance alone one of twenty does"
+            )
+        elif self.a.kind == "scanner":
+            found.append(
+                "no standard errors are known of both: `tablegen calibrate --write` puts them into the scanner file"
+            )
+        return found
+
+    @property
+    def verdict(self) -> str:
+        """All of it in a sentence."""
+        if not self.differing:
+            damaged = "" if self.same else ", but files of a build are not as its manifest says"
+            return f"no difference in {len(self.pairs)} quantities{damaged}"
+        return f"{len(self.differing)} of {len(self.pairs)} quantities differ"
+
+    def record(self, everything: bool = False) -> dict[str, Any]:
+        """As plain data: what differs, or everything."""
+        sides = {name: {"path": str(side.path), "kind": side.kind} for name, side in (("a", self.a), ("b", self.b))}
+        rows = [pair.record() for pair in (self.pairs if everything else self.differing)]
+        return {**sides, "same": self.same, "compared": len(self.pairs), "notes": self.notes, "quantities": rows}
+
+
+def compared(a: Path, b: Path, tell: Callable[[str], None] = lambda _: None) -> SideBySide:
+    """Read both. Raises ``Rejected`` where one cannot be read or where the two are not alike, and ``NotABuild``."""
+    a, b = folder_of(a), folder_of(b)
+    kinds = kind_of(a), kind_of(b)
+    if not together(*kinds):
+        why = (
+            f"is {WORDS[kinds[1]]}, and {a} is {WORDS[kinds[0]]}; give two scans or builds, two scanner files, or two "
+            f"operator files"
+        )
+        raise Rejected([Problem(str(b), 0, "", why)])
+    return SideBySide(read_side(a, kinds[0], tell), read_side(b, kinds[1], tell))

@@ -1,0 +1,24 @@
+"""Two curves in a chart."""
+
+from typing import Any
+
+from tablegen.numerics.arrays import Floats
+from tablegen.report.chart import Chart, DrawnCurve, Role
+
+A_ROLE: Role = "before"
+B_ROLE: Role = "other"
+
+
+def overlaid(
+    key: str,
+    title: str,
+    x_label: str,
+    y_label: str,
+    a: tuple[Floats, Floats] | None,
+    b: tuple[Floats, Floats] | None,
+    **more: Any,
+) -> Chart:
+    """Curves of A and of B, as (x, y) each; ``more`` goes to the chart."""
+    sides: tuple[tuple[str, Role, tuple[Floats, Floats] | None], ...] = (("A", A_ROLE, a), ("B", B_ROLE, b))
+    curves = tuple(DrawnCurve(name, role, *curve) for name, role, curve in sides if curve is not None)
+    return Chart(key, title, x_label, y_label, curves, **more)

@@ -1,0 +1,59 @@
+"""What is compared of a scanner file: its parameters, with the standard errors that calibrations left beside them."""
+
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from math import isclose
+from pathlib import Path
+
+import msgspec
+
+from tablegen.comparison.quantity import ComparedQuantity, keys_of
+from tablegen.config.scanner import Scanner
+from tablegen.problems import Document
+from tablegen.reading import CONFIGURATION, read_text
+
+_MARK = "# standard errors: "
+_ENTRY = re.compile(r"([\w.\[\]]+) (\S+) \+- (\S+)$")
+_TABLE = re.compile(r"([xy])\.(size|offset|frequency|resonance|hysteresis\.branches\[\d+\])$")
+
+
+def scanner_quantities(file: Document, scanner: Scanner) -> list[ComparedQuantity]:
+    """Every value of a scanner file; with its standard error where `tablegen calibrate` wrote one.
+
+    An error belongs to the value that stands beside it in the comment. Where somebody edited the value since, its
+    error is not known.
+    """
+    errors, plain = dict(_errors(file)), msgspec.to_builtins(scanner)
+    found = [*keys_of("scanner", "", {key: value for key, value in plain.items() if key not in ("x", "y")})]
+    for axis in ("x", "y"):
+        for table, value in plain[axis].items():
+            section, key = (f"scanner, {axis} {table}", "") if isinstance(value, dict) else (f"scanner, {axis}", table)
+            for one in keys_of(section, key, value):
+                measured, error = errors.get(f"{axis}.{table}.{one.name}", (0.0, 0.0))
+                same = not isinstance(one.value, str) and isclose(one.value, measured, rel_tol=1e-8)
+                found.append(replace(one, error=error) if error > 0.0 and same else one)
+    return found
+
+
+def _errors(file: Document) -> Iterator[tuple[str, tuple[float, float]]]:
+    """Keys with the value and the standard error of the comments above their tables."""
+    if file.lines is None:
+        return
+    try:
+        rows = read_text(Path(file.name), CONFIGURATION).replace("\r\n", "\n").split("\n")
+    except (OSError, UnicodeDecodeError):  # it was read a moment ago
+        return
+    for key, line in file.lines.items():
+        if not _TABLE.match(key):
+            continue
+        at = line - 2  # of the row above
+        while at >= 0 and rows[at].strip().startswith("#"):
+            row = rows[at].strip()
+            at -= 1
+            for part in row.removeprefix(_MARK).split(", ") if row.startswith(_MARK) else ():
+                if entry := _ENTRY.match(part):
+                    try:
+                        yield f"{key}.{entry[1]}", (float(entry[2]), float(entry[3]))
+                    except ValueError:
+                        continue

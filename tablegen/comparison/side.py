@@ -1,0 +1,125 @@
+"""One side of a comparison: a scan file, a directory of a build, a scanner file, or an operator file."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from tablegen.certificate.certificate import broken_limits, certify
+from tablegen.comparison.operators import ComparedOperator
+from tablegen.comparison.quantity import ComparedQuantity
+from tablegen.comparison.scanners import scanner_quantities
+from tablegen.comparison.scans import scan_quantities
+from tablegen.config.load import load, load_scanner
+from tablegen.config.scanner import Scanner
+from tablegen.emit.formats import UnknownFormat
+from tablegen.emit.render import render
+from tablegen.manifest.format import MANIFEST
+from tablegen.planning.line_plan import make_plan
+from tablegen.problems import Problem, Rejected, Unphysical
+from tablegen.report.ranking import placed
+from tablegen.report.subject import PlannedScan, Subject, of_directory, of_scan
+from tablegen.toml import read_toml
+
+Kind = Literal["scan", "build", "scanner", "operator"]
+WORDS: dict[Kind, str] = {
+    "scan": "a scan file",
+    "build": "a directory of a build",
+    "scanner": "a scanner file",
+    "operator": "an operator file",
+}
+_NAMES = 4  # of damaged files that are named
+_TOGETHER = ({"scan", "build"}, {"scanner"}, {"operator"})
+
+
+@dataclass(frozen=True, eq=False)
+class ComparedSide:
+    """What was read: of scans and builds ``subject``, of scanner files ``scanner``, of both files ``operators``.
+
+    ``operators`` has those of a scanner file by axis, that of an operator file as "".
+    """
+
+    path: Path
+    kind: Kind
+    quantities: list[ComparedQuantity]
+    notes: tuple[str, ...] = ()
+    subject: Subject | None = None
+    scanner: Scanner | None = None
+    operators: dict[str, ComparedOperator] = field(default_factory=dict)
+
+    @property
+    def damaged(self) -> bool:
+        """Whether a file of a build is not as its manifest says."""
+        return self.subject is not None and any(state.wrong for state in self.subject.files)
+
+    @property
+    def title(self) -> str:
+        """The name within the file, or the file's."""
+        if self.subject is not None:
+            return self.subject.manifest.name
+        return self.scanner.name if self.scanner is not None else self.path.name
+
+
+def kind_of(path: Path) -> Kind:
+    """What a path is, by its content. Raises ``Rejected``."""
+    if path.is_dir():
+        return "build"
+    values, file = read_toml(path, str(path))
+    if "plays" in values and "lines" in values:
+        return "operator"
+    if "scanner" in values or "timing" in values:
+        return "scan"
+    if "v_max" in values:
+        return "scanner"
+    why = "is none of these: a scan file, a scanner file, an operator file, a directory of a build"
+    raise Rejected([Problem(file.name, 0, "", why)])
+
+
+def folder_of(path: Path) -> Path:
+    """A manifest stands for its directory."""
+    return path.parent if path.name == MANIFEST else path
+
+
+def together(a: Kind, b: Kind) -> bool:
+    """Whether two kinds can be compared."""
+    return any({a, b} <= kinds for kinds in _TOGETHER)
+
+
+def read_side(path: Path, kind: Kind, tell: Callable[[str], None] = lambda _: None) -> ComparedSide:
+    """Read one side; a scan is planned and certified. Raises ``Rejected`` and ``NotABuild``."""
+    if kind == "build":
+        subject = of_directory(path)
+        wrong = [state.name for state in subject.files if state.wrong]
+        names = ", ".join(wrong[:_NAMES]) + (" and others" if len(wrong) > _NAMES else "")
+        notes = (f"{path.name or path}: not as its manifest says: {names}",) if wrong else ()
+        return ComparedSide(path, kind, scan_quantities(subject), notes, subject)
+    if kind == "scan":
+        subject, broken = _planned(path, tell)
+        return ComparedSide(path, kind, scan_quantities(subject), broken, subject)
+    if kind == "operator":
+        return ComparedSide(path, kind, [], operators={"": ComparedOperator.read(path)})
+    scanner, file = load_scanner(path)
+    operators = {}
+    for axis in ("x", "y"):
+        table = getattr(scanner, axis).hysteresis
+        for name in () if table is None or table.model() != "operator" else table.files():
+            operators[axis] = ComparedOperator.read(path.parent / name)
+    return ComparedSide(path, kind, scanner_quantities(file, scanner), (), None, scanner, operators)
+
+
+def _planned(scan: Path, tell: Callable[[str], None]) -> tuple[Subject, tuple[str, ...]]:
+    """A scan as it would be built, and the limits that it exceeds; no remedies are tried. Raises ``Rejected``."""
+    tell("shaping the waveforms")
+    setup = load(scan)
+    plan = make_plan(setup)
+    tell("measuring every tick of a line and a frame")
+    certificates = certify(plan)
+    broken = tuple(
+        map(placed, broken_limits(plan, certificates, setup.scan_file, hardware_problem=setup.hardware_problem))
+    )
+    tell("writing the formats")
+    try:
+        files = render(plan, certificates, list(plan.formats))
+    except (UnknownFormat, Unphysical) as error:
+        raise Rejected([setup.scan_file.problem("emit.formats", str(error))]) from None
+    return of_scan(PlannedScan(setup, plan, certificates, broken), files), broken

@@ -1,0 +1,30 @@
+"""The comment above a layer: what a round rests on."""
+
+from collections.abc import Sequence
+
+from tablegen.calibration.table import Source
+from tablegen.refinement.image_round import ImageRound, MismatchRound
+from tablegen.refinement.round import Round, TraceRound
+
+
+def provenance(found: Round, sources: Sequence[Source]) -> str:
+    """The line of the comment that says what a round rests on; no date."""
+    lesson = found.lesson
+    said = []
+    for source in sources:
+        name = source.name if source.name.isprintable() else ascii(source.name)
+        said.append(f"{name}, sha256 {source.sha256}")
+    if isinstance(found, TraceRound):
+        said.append(f"{found.displacement.periods:.4g} periods")
+    if isinstance(found, ImageRound):
+        said.append(f"{found.periods:.4g} periods in the line")
+    if isinstance(found, MismatchRound):
+        said.append("trace against retrace")
+    return ", ".join(
+        [
+            *said,
+            f"residual {lesson.before.rms_percent:.3g} % rms",
+            f"harmonics to {lesson.harmonics}",
+            f"gain {found.bound.gain:g}",
+        ]
+    )
