@@ -10,6 +10,7 @@
 # make fuzz      a million inputs for the C link, with sanitizers, on from the kept corpus
 # make bench     what a build costs, against importing numpy
 # make figures   the pictures of the README and the docs
+# make site      the documentation as a site with a search, into build/site
 # make paper     the paper's numbers beside ours, into docs/paper
 # make check-python PYTHON=python3.13  `make check` under another Python, in an environment of its own
 # make clean     remove what these made
@@ -31,7 +32,7 @@ TOOLS := $(COMMON_TOOLS) $(HDL_TOOLS) $(FIRMWARE_TOOLS) cppcheck
 # they share is made once. OpenBLAS threads only spin beside the other processes.
 PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist worksteal
 
-.PHONY: demo lint check test test-rest test-all test-hdl test-long resources instructions link fuzz bench figures paper clean
+.PHONY: demo lint check test test-rest test-all test-hdl test-long resources instructions link fuzz bench figures site paper clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/installed
@@ -98,11 +99,15 @@ bench: $(VENV)/installed
 
 figures: $(VENV)/installed-plot
 	$(BIN)/python docs/figures/make_figures.py
+	$(BIN)/python docs/figures/make_readme.py
 	$(BIN)/python docs/figures/make_virtual.py
 	$(BIN)/python docs/figures/make_operator.py
 	$(BIN)/python docs/figures/make_correct.py
 	@.ci/system-packages chromium
 	$(BIN)/python docs/figures/make_report.py
+
+site: $(VENV)/installed-docs
+	$(BIN)/python docs/site/make_site.py build/site
 
 paper: $(VENV)/installed-plot
 	$(BIN)/python docs/make_paper.py
@@ -119,6 +124,10 @@ $(VENV)/installed-test: $(VENV)/installed
 
 $(VENV)/installed-plot: $(VENV)/installed
 	$(PIP) install --editable '.[images,plot]'
+	@touch $@
+
+$(VENV)/installed-docs: $(VENV)/installed
+	$(PIP) install --editable '.[docs]'
 	@touch $@
 
 # The Pythons that the package supports. `make test` runs the wheel under each further one that this machine has.
