@@ -24,6 +24,8 @@ DOCS = REPOSITORY / "docs"
 NOTEBOOKS = sorted((REPOSITORY / "examples" / "notebooks").glob("*.ipynb"))
 PICTURES = {".png", ".svg"}
 LINK = re.compile(r"(?<=\]\()(?![a-z]+:)([^)\s#]+)(?=[)#])")
+PAGE = re.compile(r"^(?:- |\| )\[(.*?)\]\((?![a-z]+:)([^)\s#]+\.md)\)", re.MULTILINE)
+SECTION = re.MULTILINE | re.DOTALL
 ORPHAN = "---\norphan: true\n---\n"
 LANGUAGES = {".h": "c", ".vh": "verilog", ".v": "verilog", ".c": "c", ".py": "python", ".toml": "toml", ".md": "text"}
 
@@ -44,6 +46,8 @@ def assemble(folder: Path) -> None:
         text = shown(target)
         if target == DOCS / "index.md":
             text += contents(text)
+        elif target.name == "README.md" and DOCS in target.parents:
+            text += contents_of_folder(text)
         written.write_text(("" if target in listed else ORPHAN) + relinked(target, text), "utf-8")
         new = {one for one in targets(target, text) if one not in seen and one.exists()}
         seen |= new
@@ -110,15 +114,22 @@ def listing(folder: Path) -> str:
 
 def contents(index: str) -> str:
     """The table of contents: a caption for each heading of the index, with the pages that it lists."""
-    parts = []
-    for section in re.split(r"^## ", index, flags=re.MULTILINE)[1:]:
-        title, _, rest = section.partition("\n")
-        pages = [link for link in LINK.findall(rest) if link.endswith(".md")]
-        parts.append("\n".join([f"\n```{{toctree}}\n:hidden:\n:caption: {title}\n", *dict.fromkeys(pages), "```\n"]))
+    sections = {title: PAGE.findall(rest) for title, rest in re.findall(r"^## (.*?)\n(.*?)(?=^## |\Z)", index, SECTION)}
     if NOTEBOOKS:
-        pages = [place(notebook) for notebook in NOTEBOOKS]
-        parts.append("\n".join(["\n```{toctree}\n:hidden:\n:caption: Notebooks\n", *pages, "```\n"]))
-    return "".join(parts)
+        sections["Notebooks"] = [(notebook.stem.replace("_", " "), place(notebook)) for notebook in NOTEBOOKS]
+    return "".join(toctree(pages, f":caption: {title}\n") for title, pages in sections.items())
+
+
+def contents_of_folder(readme: str) -> str:
+    """The pages of a folder, under the one that lists them."""
+    pages = [(title, page) for title, page in PAGE.findall(readme) if "/" not in page]
+    return toctree(pages) if pages else ""
+
+
+def toctree(pages: list[tuple[str, str]], caption: str = "") -> str:
+    """For Sphinx."""
+    rows = "".join(f"{title} <{page}>\n" for title, page in pages)
+    return f"\n```{{toctree}}\n:hidden:\n{caption}\n{rows}```\n"
 
 
 def main(site: Path) -> int:

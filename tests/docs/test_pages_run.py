@@ -13,6 +13,7 @@ PAGES = [
     "start/microscopist.md",
     "start/firmware.md",
     "start/fpga.md",
+    "shell.md",
     *sorted(str(path.relative_to(DOCS)) for path in DOCS.glob("howto/*.md")),
 ]
 
