@@ -1,8 +1,8 @@
 """The commands of a page of docs/, run in its order in one shell, and what the page shows of their output.
 
-Blocks in `sh` are run. Of blocks in `text` the lines that begin with "$ " are run, and what they print is compared:
+Blocks in `sh` are run, and those in `python`, each as a program. Of blocks in `text` the lines that begin with "$ " are run, and what they print is compared:
 numbers within a tenth, and "..." stands for any lines. A comment `<!-- file: NAME -->` before a block makes it a file,
-`<!-- not run: REASON -->` leaves it out. Any other language has to have one of both.
+`<!-- not run: REASON -->` leaves it out, and so does `<!-- tested: WHERE -->`. Any other language has to have one of both.
 """
 
 import os
@@ -40,12 +40,16 @@ def script_of(page: str) -> Script:
     steps: list[str | tuple[str, str] | Shown] = []
     left_out = []
     for kind, argument, language, text in _BLOCK.findall(page):
-        if kind == "not run":
-            left_out.append(argument)
+        if kind in {"not run", "tested"}:
+            left_out.append(f"{kind}: {argument}")
         elif kind == "file":
             steps.append((argument, text))
         elif language == "sh":
             steps.append(text)
+        elif language == "python":
+            steps.append(f"python - <<'END OF THE PROGRAM'\n{text}END OF THE PROGRAM")
+        elif language == "math":
+            continue
         elif language == "text":
             steps += _dialogue(text)
         else:
