@@ -1,8 +1,9 @@
 """The commands of a page of docs/, run in its order in one shell, and what the page shows of their output.
 
-Blocks in `sh` are run, and those in `python`, each as a program. Of blocks in `text` the lines that begin with "$ " are run, and what they print is compared:
-numbers within a tenth, and "..." stands for any lines. A comment `<!-- file: NAME -->` before a block makes it a file,
-`<!-- not run: REASON -->` leaves it out, and so does `<!-- tested: WHERE -->`. Any other language has to have one of both.
+Blocks in `sh` are run, and those in `python`, each as a program. Of blocks in `text` the lines that begin with "$ "
+are run, and what they print is compared: numbers within a tenth, and "..." stands for any lines. A comment
+`<!-- file: NAME -->` before a block makes it a file, `<!-- not run: REASON -->` leaves it out, and so does
+`<!-- tested: WHERE -->`. Any other language has to have one of these.
 """
 
 import os
