@@ -21,7 +21,8 @@ INTRODUCTION = """\
 This page lists all keys of the scan file and the scanner file. It is for everybody who writes these files. Start with
 the commented pair that `tablegen init` writes; [calibration](calibration.md) explains how to measure the values of the
 scanner file. `tablegen schema scan` and `tablegen schema scanner` print JSON Schema for editors.
-`python docs/make_configuration.py` writes this page from the types of both files.
+`python docs/make_configuration.py` writes this page from the types of both files. Converter and amplifier can stand in
+either file, for both axes or for one: [hardware](hardware.md) says which key counts.
 
 Voltages are at the piezo unless a key says otherwise. Units are part of every key. A key without a default may be left
 out if its meaning names an alternative ("or give"). Unknown keys are errors. In addition to the ranges below, a build

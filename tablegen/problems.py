@@ -83,7 +83,11 @@ class Problems:
 
     def add(self, document: Document, key: str, why: str) -> None:
         """Note one problem and go on."""
-        self.found.append(document.problem(key, why))
+        self.note(document.problem(key, why))
+
+    def note(self, problem: Problem) -> None:
+        """The same, of a problem that was made elsewhere."""
+        self.found.append(problem)
         if len(self.found) > MOST_PROBLEMS:
             raise Rejected(self.found)
 

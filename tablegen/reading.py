@@ -27,7 +27,7 @@ class Kind:
 # docs/inputs.md has this table.
 CONFIGURATION = Kind("a scan, scanner or operator file", 1 << 20)
 RESPONSE = Kind("a measured response", 16 << 20)
-MEASUREMENT = Kind("a CSV file of measurements", 512 << 20)
+MEASUREMENT = Kind("a file of measurements", 512 << 20)
 IMAGE = Kind("an image", 256 << 20)
 MANIFEST = Kind("a manifest", 8 << 20)
 BUILD_FILE = Kind("a file of a build", 512 << 20)

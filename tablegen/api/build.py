@@ -77,7 +77,9 @@ def build(
     wanted = _formats(setup, made, formats)
     progress("measuring every tick of a line and a frame")
     certificates = certify_plan(made)
-    if broken := broken_limits(made, certificates, setup.scan_file, partial(limit_advice, setup, made, certificates)):
+    if broken := broken_limits(
+        made, certificates, setup.scan_file, partial(limit_advice, setup, made, certificates), setup.hardware_problem
+    ):
         raise BrokenLimit(broken)
     built = Build(setup, made, certificates, [each.name for each in wanted], formats is not None)
     if out is not None:

@@ -10,6 +10,7 @@ from tablegen.calibration.estimate import Curve, Estimate, Fit
 from tablegen.calibration.growth import Growth, fit_growth
 from tablegen.calibration.trace import TraceFit, fit_trace
 from tablegen.compensation.hysteresis import BranchShape
+from tablegen.driver import Driver
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 
@@ -56,7 +57,7 @@ class HysteresisFit(Fit):
 
 def fit_hysteresis(
     traces: Sequence[Trace],
-    v_max: float,
+    v_max: Driver | float,
     rho: float = TYPICAL_RHO,
     settle_periods: int | None = None,
     drift_order: int | None = None,
@@ -66,22 +67,23 @@ def fit_hysteresis(
 
     ``rho`` is kept where a turn was measured at one amplitude only. Raises ``Unphysical``, with the trace's name.
     """
+    driver = Driver.of(v_max)
     fits: list[TraceFit] = []
     remarks: list[str] = []
     for trace in traces:
         try:
             fit = fit_trace(trace.time_s, trace.drive_v, trace.displacement_nm, settle_periods, drift_order, delay_s)
-            if fit.triangle.v_low < -0.02 * v_max or fit.triangle.v_high > 1.02 * v_max:
-                low, high = fit.triangle.v_low, fit.triangle.v_high
-                raise Unphysical(f"a drive of {low:.4g}..{high:.4g} V is outside the driver's 0..{v_max:g} V")
+            low, high = fit.triangle.v_low, fit.triangle.v_high
+            if driver.beyond(low, high) > 0.02 * driver.span:
+                raise Unphysical(f"a drive of {low:.4g}..{high:.4g} V is outside the driver's {driver}")
         except Unphysical as reason:
             raise Unphysical(f"{trace.name}: {reason}" if trace.name else str(reason)) from None
         fits.append(fit)
         remarks += [f"{trace.name}: {text}" if trace.name else text for text in _remarks(fit)]
-    return combined(fits, v_max, rho, remarks)
+    return combined(fits, driver.span, rho, remarks)
 
 
-def combined(fits: Sequence[AmplitudeFit], v_max: float, rho: float, remarks: Sequence[str]) -> HysteresisFit:
+def combined(fits: Sequence[AmplitudeFit], span: float, rho: float, remarks: Sequence[str]) -> HysteresisFit:
     """Amplitudes in any order -> (22) at each turn; remarks of the single ones come first. Raises ``Unphysical``."""
     remarks = list(remarks)
     groups: list[list[AmplitudeFit]] = []
@@ -93,7 +95,7 @@ def combined(fits: Sequence[AmplitudeFit], v_max: float, rho: float, remarks: Se
     branches = []
     for group in groups:
         group.sort(key=lambda fit: fit.v_scan)
-        v = np.array([fit.v_scan / v_max for fit in group])
+        v = np.array([fit.v_scan / span for fit in group])
         turn = float(np.mean([fit.turn.value for fit in group]))
         spread = float(np.sqrt(np.sum([fit.turn.standard_error**2 for fit in group])) / len(group))
         sides = []
@@ -104,7 +106,7 @@ def combined(fits: Sequence[AmplitudeFit], v_max: float, rho: float, remarks: Se
             except Unphysical as reason:
                 raise Unphysical(f"turn {turn:.4g}, {name}: {reason}") from None
             remarks += [f"turn {turn:.4g}, {name}: {text}" for text in sides[-1].remarks]
-        offsets = _offsets(group, v_max)
+        offsets = _offsets(group, span)
         if offsets:
             listed = ", ".join(f"{volts:g}" for volts in sorted(set(offsets)))
             remarks.append(
@@ -117,12 +119,12 @@ def combined(fits: Sequence[AmplitudeFit], v_max: float, rho: float, remarks: Se
         before_percent=100.0 * max(abs(side.beta.value) for fit in fits for side in (fit.forward, fit.backward)),
         remarks=tuple(dict.fromkeys(remarks)),
         outliers=(),
-        curves=tuple(_curves(branches, v_max)),
+        curves=tuple(_curves(branches, span)),
         branches=tuple(branches),
     )
 
 
-def _offsets(group: Sequence[AmplitudeFit], v_max: float) -> tuple[float, ...]:
+def _offsets(group: Sequence[AmplitudeFit], span: float) -> tuple[float, ...]:
     """The offset of each, those that are near each other as one.
 
     Empty where there is but one, and where no offset has two sizes: traces that all begin at 0 V say nothing of it.
@@ -132,7 +134,7 @@ def _offsets(group: Sequence[AmplitudeFit], v_max: float) -> tuple[float, ...]:
         return ()
     clusters = [[known[0]]]
     for volts in known[1:]:
-        if volts - clusters[-1][0] > OFFSET_TOLERANCE * v_max:
+        if volts - clusters[-1][0] > OFFSET_TOLERANCE * span:
             clusters.append([])
         clusters[-1].append(volts)
     means = {volts: float(f"{np.mean(cluster):.4g}") for cluster in clusters for volts in cluster}
@@ -175,7 +177,7 @@ def _remarks(fit: TraceFit) -> list[str]:
     return found
 
 
-def _curves(branches: Sequence[TurnFit], v_max: float) -> list[Curve]:
+def _curves(branches: Sequence[TurnFit], span: float) -> list[Curve]:
     """For each turn: the residual at the largest amplitude, figure 5a, and its growth, figure 5k."""
     curves: list[Curve] = []
     line = np.linspace(0.0, 1.0, 101)
@@ -186,6 +188,6 @@ def _curves(branches: Sequence[TurnFit], v_max: float) -> list[Curve]:
             v = np.array([fit.v_scan for fit in branch.traces])
             beta = np.array([getattr(fit, name).beta.value for fit in branch.traces])
             title = f"peak residual {name}, turn {branch.turn.value:.3g}"
-            fitted = (line * v_max, 100.0 * growth.beta(line))
+            fitted = (line * span, 100.0 * growth.beta(line))
             curves.append(Curve(title, "scan voltage [V]", "% of scan", (v, 100.0 * beta), fitted))
     return curves

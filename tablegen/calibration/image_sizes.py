@@ -11,6 +11,7 @@ from tablegen.calibration.estimate import ImageSize, LineSize
 from tablegen.calibration.image_line import ImageLine, fit_line, shows_turns
 from tablegen.calibration.image_scale import ASPECT_ERROR, DRIFT_ERROR, Cell, Grating, size_of_line
 from tablegen.compensation.size import SizeLaw
+from tablegen.driver import Driver
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 
@@ -64,13 +65,13 @@ class ImageSizes:
     remarks: tuple[str, ...]
 
 
-def sizes_of(images: Sequence[SampleImage], v_max: float, sample: KnownSample, taking: Taking) -> ImageSizes:
+def sizes_of(images: Sequence[SampleImage], v_max: Driver | float, sample: KnownSample, taking: Taking) -> ImageSizes:
     """Each image's line from turn to turn. Raises ``Unphysical``, with the image's name."""
     found: list[ImageSize] = []
     remarks: list[str] = []
     for image in images:
         try:
-            _check_drive(image, v_max)
+            _check_drive(image, Driver.of(v_max))
             line = fit_line(
                 image.trace,
                 image.retrace,
@@ -111,25 +112,25 @@ def sizes_of(images: Sequence[SampleImage], v_max: float, sample: KnownSample, t
     return ImageSizes(tuple(found), nm, errors, max(one.size.shared for one in found), tuple(remarks))
 
 
-def apparent_of(sizes: ImageSizes, law: SizeLaw, v_max: float, sample: KnownSample) -> tuple[Floats, Floats]:
+def apparent_of(sizes: ImageSizes, law: SizeLaw, driver: Driver | float, sample: KnownSample) -> tuple[Floats, Floats]:
     """How large the sample's constant looks in nm, were each line as long as the size law has it; and the errors.
 
     With a law that is right it looks as large as it is at the offset at which the law was measured.
     """
     constant = sample.cell.a_nm if sample.cell is not None else sample.grating.pitch_nm if sample.grating else 1.0
-    lawful = np.array([law.size_nm(one.v_scan / v_max) for one in sizes.images])
+    lawful = np.array([law.size_nm(one.v_scan / Driver.of(driver).span) for one in sizes.images])
     apparent = constant * lawful / sizes.nm
     return apparent, apparent * sizes.errors_nm / sizes.nm
 
 
-def _check_drive(image: SampleImage, v_max: float) -> None:
-    if not 0.0 < image.v_scan <= 1.02 * v_max:
-        raise Unphysical(f"a scan of {image.v_scan:g} V is outside the driver's 0..{v_max:g} V")
+def _check_drive(image: SampleImage, driver: Driver) -> None:
+    if not 0.0 < image.v_scan <= 1.02 * driver.span:
+        raise Unphysical(f"a scan of {image.v_scan:g} V is outside the driver's {driver}")
     if image.v_offset is not None:
         low, high = image.v_offset - 0.5 * image.v_scan, image.v_offset + 0.5 * image.v_scan
-        if low < -0.02 * v_max or high > 1.02 * v_max:
+        if driver.beyond(low, high) > 0.02 * driver.span:
             raise Unphysical(
-                f"a scan of {image.v_scan:g} V about {image.v_offset:g} V is outside the driver's 0..{v_max:g} V"
+                f"a scan of {image.v_scan:g} V about {image.v_offset:g} V is outside the driver's {driver}"
             )
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from tablegen.calibration.hysteresis import TYPICAL_RHO, HysteresisFit, combined
 from tablegen.calibration.image_fit import ImageFit, fit_pair
+from tablegen.driver import Driver
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 
@@ -27,7 +28,7 @@ class Pair:
 
 def fit_images(
     pairs: Sequence[Pair],
-    v_max: float,
+    v_max: Driver | float,
     rho: float = TYPICAL_RHO,
     turn: float = 0.5,
     window: tuple[float, float] = (0.0, 1.0),
@@ -38,12 +39,13 @@ def fit_images(
 
     ``rho`` is kept where there is one amplitude only. Raises ``Unphysical``, with the pair's name.
     """
+    driver = Driver.of(v_max)
     fits: list[ImageFit] = []
     remarks: list[str] = []
     for pair in pairs:
         try:
-            if not 0.0 < pair.v_scan <= 1.02 * v_max:
-                raise Unphysical(f"a scan of {pair.v_scan:g} V is outside the driver's 0..{v_max:g} V")
+            if not 0.0 < pair.v_scan <= 1.02 * driver.span:
+                raise Unphysical(f"a scan of {pair.v_scan:g} V is outside the driver's {driver}")
             fit = fit_pair(pair.trace, pair.retrace, pair.v_scan, turn, window, retrace_mirrored, delay_pixels)
         except Unphysical as reason:
             raise Unphysical(f"{pair.name}: {reason}" if pair.name else str(reason)) from None
@@ -62,7 +64,7 @@ def fit_images(
                 f"{more.v_scan:g} V have fewer periods in the line and less hysteresis than {less.v_scan:g} V; "
                 f"are the voltages those of their pairs?"
             )
-    return combined(fits, v_max, rho, remarks)
+    return combined(fits, driver.span, rho, remarks)
 
 
 def _remarks(fit: ImageFit) -> list[str]:

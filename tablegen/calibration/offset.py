@@ -7,8 +7,9 @@ import numpy as np
 from tablegen.calibration.estimate import Curve, Estimate, Fit
 from tablegen.calibration.least_squares import Solution, solve, with_errors
 from tablegen.calibration.outliers import outliers
-from tablegen.compensation.offset import OffsetLaw, normalised_offset
+from tablegen.compensation.offset import OffsetLaw
 from tablegen.compensation.size import SizeLaw
+from tablegen.driver import Driver
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 
@@ -18,7 +19,7 @@ _MIN_SCATTER = 1e-7  # relative scatter that is rounding of the file, not of the
 
 @dataclass(frozen=True, kw_only=True)
 class OffsetFit(Fit):
-    """The amplitude factors at 0 V and at v_max, dimensionless, and the apparent size at the centre in nm.
+    """The amplitude factors at v_min and at v_max, dimensionless, and the apparent size at the centre in nm.
 
     ``size_v`` is the scan voltage at which a size law made them factors of the drive, None where none did.
     """
@@ -32,7 +33,7 @@ class OffsetFit(Fit):
 def fit_offset(
     offset_v: Floats,
     apparent_nm: Floats,
-    v_max: float,
+    v_max: Driver | float,
     size_law: SizeLaw | None = None,
     size_v: float | None = None,
     errors_nm: Floats | None = None,
@@ -44,11 +45,12 @@ def fit_offset(
     sizes are R(V) / R(V / m). Without, they are taken for m itself, as ``OffsetLaw.fit`` does. ``errors_nm``, where
     they are known, are the sizes' weights, as in ``fit_size``. Raises ``Unphysical``.
     """
-    outside = (offset_v < 0.0) | (offset_v > v_max)
+    driver = Driver.of(v_max)
+    outside = (offset_v < driver.v_min) | (offset_v > driver.v_max)
     if outside.any():
         wrong = float(offset_v[outside][0])
-        raise Unphysical(f"an offset of {wrong:g} V is outside the driver's 0..{v_max:g} V; is v_max right?")
-    p = np.array([normalised_offset(v, v_max) for v in offset_v.tolist()])
+        raise Unphysical(f"an offset of {wrong:g} V is outside the driver's {driver}; is v_max right?")
+    p = np.array([driver.p(v) for v in offset_v.tolist()])
     law = OffsetLaw.fit(p.tolist(), apparent_nm.tolist())
     shape = _shape(p)
     factors = np.array([law.factor(one) for one in p.tolist()])
@@ -58,7 +60,7 @@ def fit_offset(
         """Apparent size, relative to that at m = 1."""
         if size_law is None or size_v is None:
             return m
-        v = size_v / v_max
+        v = size_v / driver.span
         return size_law.size_nm(v) / np.array([size_law.size_nm(v / one) for one in np.maximum(m, 0.1).tolist()])
 
     def solved(errors: Floats) -> Solution:
@@ -73,19 +75,19 @@ def fit_offset(
     centre = float(solution.values[2])
     expected = centre * looks(shape @ np.array([1.0, *solution.values[:2]]))
     found = outliers(solution.jacobian, solution.residuals, _MIN_SCATTER)
-    line = np.linspace(0.0, v_max, 101)
-    curve = looks(_shape(2.0 * line / v_max - 1.0) @ np.array([1.0, *solution.values[:2]]))
+    line = np.linspace(driver.v_min, driver.v_max, 101)
+    curve = looks(_shape(driver.p(line)) @ np.array([1.0, *solution.values[:2]]))
     return OffsetFit(
         points=len(p),
         residual_percent=100.0 * (apparent_nm / expected - 1.0),
         before_percent=float(np.max(np.abs(100.0 * (apparent_nm / centre - 1.0)))),
-        remarks=tuple(_remarks(p, solution)),
+        remarks=tuple(_remarks(p, solution, driver)),
         outliers=found,
         curves=(
             Curve(
                 "apparent size, relative",
                 "offset [V]",
-                "size / that at v_max / 2",
+                f"size / that at {driver.middle:g} V" if driver.v_min else "size / that at v_max / 2",
                 (offset_v, apparent_nm / centre),
                 (line, curve),
             ),
@@ -103,19 +105,20 @@ def _shape(p: Floats) -> Floats:
     return columns
 
 
-def _remarks(p: Floats, solution: Solution) -> list[str]:
+def _remarks(p: Floats, solution: Solution, driver: Driver) -> list[str]:
     remarks = []
     if solution.freedom == 0 and solution.known_errors:
         remarks.append("three points fit exactly: errors are those of the images alone; measure at two more offsets")
     elif solution.freedom == 0:
         remarks.append("three points fit exactly, so errors cannot be estimated; measure at two more offsets")
     low, high = float(np.min(p)), float(np.max(p))
-    for name, gap, volts in (("m_minus", low + 1.0, "0 V"), ("m_plus", 1.0 - high, "v_max")):
+    bottom = "v_min" if driver.v_min else "0 V"
+    for name, gap, volts in (("m_minus", low + 1.0, bottom), ("m_plus", 1.0 - high, "v_max")):
         if gap > 0.4:
             remarks.append(
                 f"{name} is extrapolated over {50.0 * gap:.0f} % of the range; measure at some 7 % from {volts}"
             )
     for name in ("m_minus", "m_plus"):
         if name in solution.undetermined:
-            remarks.append(f"{name} is not determined by these points; spread the offsets over most of 0..v_max")
+            remarks.append(f"{name} is not determined by these points; spread the offsets over most of {driver}")
     return remarks

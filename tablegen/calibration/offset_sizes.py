@@ -7,6 +7,7 @@ import numpy as np
 from tablegen.calibration.estimate import Fit
 from tablegen.calibration.offset import OffsetFit, fit_offset
 from tablegen.compensation.size import SizeLaw
+from tablegen.driver import Driver
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 
@@ -24,7 +25,7 @@ def fit_offset_sizes(
     offset_v: Floats,
     apparent_nm: Floats,
     size_v: Floats,
-    v_max: float,
+    v_max: Driver | float,
     size_law: SizeLaw,
     errors_nm: Floats | None = None,
 ) -> OffsetFit | OffsetSizesFit:
@@ -34,15 +35,16 @@ def fit_offset_sizes(
     show another. Of one scan voltage it is the fit of ``fit_offset``, as are ``errors_nm``. Raises ``Unphysical``.
     """
     volts = np.unique(size_v).tolist()
-    if volts[-1] > v_max:
-        raise Unphysical(f"a size_v of {volts[-1]:g} V is above v_max = {v_max:g} V")
+    driver = Driver.of(v_max)
+    if volts[-1] > driver.span:
+        raise Unphysical(f"a size_v of {volts[-1]:g} V is above {driver.full_scale}")
     fits: list[OffsetFit] = []
     residual, outliers, remarks = np.zeros(len(size_v)), [], []
     for one in volts:
         rows = np.flatnonzero(size_v == one)
         try:
             errors = None if errors_nm is None else errors_nm[rows]
-            fit = fit_offset(offset_v[rows], apparent_nm[rows], v_max, size_law, one, errors)
+            fit = fit_offset(offset_v[rows], apparent_nm[rows], driver, size_law, one, errors)
         except Unphysical as reason:
             raise Unphysical(f"images of {one:g} V: {reason}" if len(volts) > 1 else str(reason)) from None
         fits.append(fit)

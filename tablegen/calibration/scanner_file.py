@@ -14,6 +14,7 @@ from tablegen.calibration.hysteresis import TURN_TOLERANCE
 from tablegen.compensation.branch import LAW, MEASURED
 from tablegen.config.decode import decode
 from tablegen.config.scanner import Scanner
+from tablegen.driver import Driver
 from tablegen.problems import Problem, Problems, Rejected
 from tablegen.toml import parse_toml
 
@@ -38,12 +39,16 @@ class Change:
     provenance: Sequence[Sequence[str]] = ()
 
 
-def new_file(name: str, v_max: float) -> str:
+def new_file(name: str, driver: Driver | float) -> str:
     """A scanner file with nothing calibrated yet."""
     document = tomlkit.document()
     document["name"] = name
-    document["v_max"] = v_max
+    driver = Driver.of(driver)
+    document["v_max"] = driver.v_max
     document["v_max"].comment("V, maximum output of the piezo driver")
+    if driver.v_min:
+        document["v_min"] = driver.v_min
+        document["v_min"].comment("V, its minimum output")
     return tomlkit.dumps(document)
 
 

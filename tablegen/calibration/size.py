@@ -9,6 +9,7 @@ import numpy as np
 from tablegen.calibration.estimate import Curve, Estimate, Fit
 from tablegen.calibration.least_squares import Solution, solve, with_errors
 from tablegen.calibration.outliers import outliers
+from tablegen.driver import Driver
 from tablegen.figures import at_most
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
@@ -33,7 +34,7 @@ class SizeFit(Fit):
 def fit_size(
     drive_v: Floats,
     actual_nm: Floats,
-    v_max: float,
+    v_max: Driver | float,
     base_nm: float = 200.0,
     threshold: float | None = None,
     noise: Literal["relative", "absolute"] = "relative",
@@ -48,9 +49,10 @@ def fit_size(
     law by more than that. ``shared`` is a relative error that all sizes have together; it counts for k. Raises
     ``Unphysical``.
     """
-    v = drive_v / v_max
+    driver = Driver.of(v_max)
+    span, v = driver.span, drive_v / driver.span
     if float(np.max(v)) > 1.0:
-        raise Unphysical(f"a drive of {np.max(drive_v):g} V is above v_max = {v_max:g} V")
+        raise Unphysical(f"a drive of {np.max(drive_v):g} V is above {driver.full_scale}")
     if float(np.min(v)) <= 0.0:
         raise Unphysical(f"a drive of {np.min(drive_v):g} V is not a scan; drives are in volts peak to peak")
     different = len(np.unique(np.round(v, 9)))
@@ -61,13 +63,13 @@ def fit_size(
     weight = actual_nm if noise == "relative" else np.full(len(v), float(np.max(actual_nm)))
     kept = threshold if threshold is not None else TYPICAL_THRESHOLD
     remarks: list[str] = []
-    fit = _SizeModel(v, actual_nm, weight, v_max, base_nm)
+    fit = _SizeModel(v, actual_nm, weight, span, base_nm)
     free = fit.best_threshold() if threshold is None and different >= 4 else None
     solution = free or fit.solve(kept)
     if errors_nm is not None:
 
         def weighed(errors: Floats) -> Solution:
-            model = _SizeModel(v, actual_nm, errors, v_max, base_nm)
+            model = _SizeModel(v, actual_nm, errors, span, base_nm)
             return (model.best_threshold() if free is not None else None) or model.solve(kept)
 
         solution = with_errors(weighed, actual_nm, errors_nm)
@@ -84,16 +86,16 @@ def fit_size(
         raise Unphysical(
             f"beta = {beta.value:.4g} is at the edge of what (6) can be; are the drives peak to peak, and v_max right?"
         )
-    if base_nm > k.value * v_max:
+    if base_nm > k.value * span:
         raise Unphysical(
-            f"{base_nm:g} nm needs {base_nm / (k.value * v_max):.4g} of v_max; take a base size of "
-            f"{at_most(k.value * v_max)} nm or less"
+            f"{base_nm:g} nm needs {base_nm / (k.value * span):.4g} of v_max; take a base size of "
+            f"{at_most(k.value * span)} nm or less"
         )
     expected = fit.size(solution.values, v)
     at_base = fit.at_base(solution.values)
     remarks += _remarks(solution, v, at_base, base_nm, actual_nm)
     line = np.linspace(0.0, 1.0, 201)[1:]
-    linear = k.value * v_max
+    linear = k.value * span
     return SizeFit(
         points=len(v),
         residual_percent=100.0 * (actual_nm / expected - 1.0),
@@ -106,7 +108,7 @@ def fit_size(
                 "drive [V]",
                 "ratio",
                 (drive_v, actual_nm / (linear * v)),
-                (line * v_max, fit.size(solution.values, line) / (linear * line)),
+                (line * span, fit.size(solution.values, line) / (linear * line)),
             ),
         ),
         k_nm_per_v=k,

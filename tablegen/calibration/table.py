@@ -1,4 +1,4 @@
-"""CSV files of measurements: a header with units in the names, then numbers; every fault at its line and column."""
+"""Files of measurements: columns with units in their names; every fault at its line and column."""
 
 import hashlib
 import os
@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from tablegen.calibration.array_files import columns_of, is_array_file, numbers_of
 from tablegen.calibration.columns import Column, Conversion, Times
 from tablegen.calibration.csv_blocks import Block, blocks_of, plain_rows
 from tablegen.figures import shown_path
@@ -34,7 +35,10 @@ class Source:
 
 @dataclass(frozen=True)
 class MeasuredTable:
-    """Columns of numbers in the units of the fits, by name, and the line on which each row stands."""
+    """Columns of numbers in the units of the fits, by name, and the line on which each row stands.
+
+    The lines of numpy's files are their rows, from 1.
+    """
 
     file: str
     source: Source
@@ -54,11 +58,15 @@ class MeasuredTable:
 def read_table(path: Path, needed: Sequence[Column], optional: Sequence[Column] = ()) -> MeasuredTable:
     """Read the columns that are needed, and the optional ones that are there; others are passed over.
 
+    ``.npz`` and ``.npy`` are numpy's, with an array or a field a column; everything else is CSV with a header.
+
     Commas, semicolons or tabs separate, whichever the header has; with the latter two a decimal comma is understood.
     Lines that are blank or begin with # count for nothing. Raises ``Rejected`` with file, line and column.
     """
     name = shown_path(path)
     wanted = [*needed, *optional]
+    if is_array_file(path):
+        return _array_table(path, name, wanted, needed)
     digest = hashlib.sha256()
     reader: _Reader | None = None
     header_line = 0
@@ -80,6 +88,25 @@ def read_table(path: Path, needed: Sequence[Column], optional: Sequence[Column] 
     if not len(lines):
         raise Rejected([Problem(name, header_line, "", "no numbers follow the header")])
     return MeasuredTable(name, Source(path.name, digest.hexdigest()[:16]), columns, lines)
+
+
+def _array_table(path: Path, name: str, wanted: Sequence[Column], needed: Sequence[Column]) -> MeasuredTable:
+    content = file_content(path, name)
+    source = Source(path.name, hashlib.sha256(content).hexdigest()[:16])
+    arrays = columns_of(content, name)
+    del content  # an archive has it a second time
+    places = _places(name, 0, list(arrays), wanted, needed)
+    written = [numbers_of(list(arrays.values())[place[0]], name, place[3]) for place in places]
+    if len({len(column) for column in written}) > 1:
+        lengths = ", ".join(f"{place[3]} {len(column)}" for place, column in zip(places, written, strict=True))
+        raise Rejected([Problem(name, 0, "", f"its columns have different numbers of rows: {lengths}")])
+    if not written or not len(written[0]):
+        raise Rejected([Problem(name, 0, "", "has no numbers")])
+    reader = _Reader(name, ",", len(places), places)
+    columns = {place[1].name: reader.values(column, place) for place, column in zip(places, written, strict=True)}
+    reader.refuse()
+    lines = np.arange(1, len(written[0]) + 1, dtype=np.int64)
+    return MeasuredTable(name, source, columns, lines)
 
 
 _Place = tuple[int, Column, Conversion, str]  # where it stands, what it is, how it converts, how it is spelt
@@ -120,13 +147,28 @@ class _Reader:
             if self.full:
                 return
 
-    def columns(self) -> tuple[dict[str, Floats], Ints]:
-        """By name, and the line of every row. Raises ``Rejected`` with all that was wrong."""
+    def values(self, written: Floats, place: _Place) -> Floats:
+        """A column of numbers in the unit of the fits: at once if all are in range, otherwise one by one."""
+        found = _converted(written, place)
+        if found is None:
+            found = np.zeros(len(written))
+            for row, value in enumerate(written.tolist()):
+                found[row] = self._number(row + 1, repr(value), *place[1:])
+                if self.full:
+                    break
+        return found
+
+    def refuse(self) -> None:
+        """Raise ``Rejected`` with all that was wrong, if anything was."""
         if self.problems:
             found = self.problems[:_MAX_PROBLEMS]
             if self.full:
                 found.append(Problem(self._name, found[-1].line, "", "more faults follow; stopped"))
             raise Rejected(found)
+
+    def columns(self) -> tuple[dict[str, Floats], Ints]:
+        """By name, and the line of every row. Raises ``Rejected`` with all that was wrong."""
+        self.refuse()
         values = (np.frombuffer(known, dtype=np.float64) for known in self._values)
         columns = {place[1].name: each for place, each in zip(self._places, values, strict=True)}
         return columns, np.frombuffer(self._lines, dtype=np.int64)
@@ -179,7 +221,7 @@ def _places(
     name: str, line: int, header: list[str], wanted: Sequence[Column], needed: Sequence[Column]
 ) -> list[_Place]:
     header = [cell.lower() for cell in header]
-    if all(_is_number(cell) for cell in header):
+    if header and all(_is_number(cell) for cell in header):
         why = f"the first line has numbers; a header with {_list(needed)} has to stand above them"
         raise Rejected([Problem(name, line, "", why)])
     places: list[_Place] = []

@@ -79,10 +79,12 @@ def broken_limits(
     certificates: dict[str, Certificate],
     file: Document,
     advise: Callable[[str], str] = lambda _: "",
+    hardware_problem: Callable[[str, str, str], Problem] | None = None,
 ) -> list[Problem]:
     """The limits of the configuration that a certificate exceeds, each with a remedy.
 
-    ``advise`` adds to a scaling error of an axis ("x" or "y") what was tried against it.
+    ``advise`` adds to a scaling error of an axis ("x" or "y") what was tried against it. ``hardware_problem`` places
+    one of a key of an axis' amplifier; without it that stands in ``file``.
     """
     problems = []
     for axis, certificate in certificates.items():
@@ -90,7 +92,8 @@ def broken_limits(
             why = (
                 f"the {axis} axis steps by {certificate.largest_step} codes, above its guard of {certificate.max_step}"
             )
-            problems.append(file.problem("amplifier.max_slew_v_per_s", why))
+            key = "amplifier.max_slew_v_per_s"
+            problems.append(file.problem(key, why) if hardware_problem is None else hardware_problem(axis, key, why))
         limit = plan.limits.max_error_lsb
         if limit is not None and certificate.max_error_lsb > limit:
             why = f"the {axis} axis errs by up to {certificate.max_error_lsb:.4g} LSB, above {limit:g}; "

@@ -43,8 +43,8 @@ def doubts(line: LinePlan, certificate: Certificate) -> list[Doubt]:
         stroke = line.drive.v_amplitude * float(np.max(w) - np.min(w))
         here = f"{stroke:.3g} V about {line.drive.v_offset:.3g} V"
         text = (
-            f"the {axis} axis moves by {here}, {expected.distance:.2g} % of v_max from the nearest trace of its "
-            f"operator, so that little is known there; record a trace of {here}, and give it to "
+            f"the {axis} axis moves by {here}, {expected.distance:.2g} % of {line.drive.driver.unit} from the nearest "
+            f"trace of its operator, so that little is known there; record a trace of {here}, and give it to "
             "`tablegen calibrate operator` with the others"
         )
         found.append(Doubt("distance", text, expected.distance, FAR_PERCENT))

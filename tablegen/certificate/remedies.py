@@ -4,9 +4,11 @@ A change is searched for along one key at a time, and only along those that act 
 trials, so that the search ends soon where nothing helps.
 """
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from math import ceil, copysign, log2
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,22 +18,25 @@ from tablegen.certificate.certificate import scaling_errors
 from tablegen.certificate.excess import Cause, Excess, excess
 from tablegen.certificate.expected import expected_of
 from tablegen.certificate.line_errors import EmittedPeriod
+from tablegen.config.hardware import Place
 from tablegen.config.load import Setup
 from tablegen.config.schema import FastAxis
-from tablegen.figures import at_least, at_most
+from tablegen.figures import at_least, at_most, shown_path
 from tablegen.fixedpoint.phase import MAXIMUM_TICKS
 from tablegen.planning.line_plan import LinePlan, Plan, make_plan
 from tablegen.problems import Rejected
 
 _MOST_TRIALS = 6  # of one key
 _MARGIN = 1.1  # what a first guess allows for: errors of rounding do not scale exactly
-_HARDWARE = ("amplifier.", "dac.")
+_HARDWARE = re.compile(r"([xy]\.)?(amplifier|dac)\.")
+_SCANNER = "scanner:"  # before a key of the scanner file
 _MOST_BITS = 24
 _LONGEST_TABLE = 65536
 _MOST_HARMONICS = 256  # a fit of more takes seconds
 _MARGINS = (0.02, 0.05, 0.1, 0.15, 0.2)  # of the line, outside the imaging window
 
-Change = Mapping[str, Any]  # keys of the scan file to their values; None takes a key out
+# Keys of the scan file, or behind ``_SCANNER`` of the scanner file, to their values; None takes a key out.
+Change = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
@@ -78,7 +83,7 @@ def tried_on_operator(setup: Setup, plan: Plan, line: LinePlan, most: float, own
             return None
         more = {side: max(one.total, one.band_limit) for side, one in scaling_errors(changed_line).items() if own}
         left = max(figure.value + more.get(side, 0.0) for side, figure in expected.scaling.items())
-        return Remedy(_text(change), left, left <= most, _keeps_the_error(plan, other))
+        return Remedy(_text(setup, change), left, left <= most, _keeps_the_error(plan, other))
 
     return _tried(_other_bands(setup, plan, line), trial)
 
@@ -95,22 +100,25 @@ def _tried(ways: Iterable[Iterable[Change]], trial: Callable[[Change], Remedy | 
                 break
         if best is not None:
             remedies.append(best)
-            if best.enough and not best.text.startswith(_HARDWARE):
+            if best.enough and not _HARDWARE.match(best.text):
                 break
     return remedies
 
 
 def changed(setup: Setup, change: Change) -> Setup:
-    """The setup with other values at dotted keys of the scan file; the values are not checked."""
+    """The setup with other values at dotted keys of its files; the values are not checked."""
 
     def put(struct: Any, path: list[str], value: Any) -> Any:
         name, *rest = path
         return structs.replace(struct, **{name: put(getattr(struct, name), rest, value) if rest else value})
 
-    scan = setup.scan
+    scan, scanner = setup.scan, setup.scanner
     for key, value in change.items():
-        scan = put(scan, key.split("."), value)
-    return replace(setup, scan=scan)
+        if key.startswith(_SCANNER):
+            scanner = put(scanner, key.removeprefix(_SCANNER).split("."), value)
+        else:
+            scan = put(scan, key.split("."), value)
+    return replace(setup, scan=scan, scanner=scanner)
 
 
 def _trial(setup: Setup, plan: Plan, line: LinePlan, change: Change, most: float | None) -> Remedy | None:
@@ -120,7 +128,7 @@ def _trial(setup: Setup, plan: Plan, line: LinePlan, change: Change, most: float
         return None
     scaling = scaling_errors(other.x if line.axis == "x" else other.y)
     left = max(max(one.total, one.band_limit, abs(one.size)) for one in scaling.values())
-    return Remedy(_text(change), left, excess(scaling, most) is None, _keeps_the_error(plan, other))
+    return Remedy(_text(setup, change), left, excess(scaling, most) is None, _keeps_the_error(plan, other))
 
 
 def _planned(setup: Setup, change: Change) -> Plan | None:
@@ -130,8 +138,12 @@ def _planned(setup: Setup, change: Change) -> Plan | None:
         return None
 
 
-def _text(change: Change) -> str:
-    return " with ".join(f"{key} = {_value(value)}" for key, value in change.items() if value is not None)
+def _text(setup: Setup, change: Change) -> str:
+    def part(key: str, value: object) -> str:
+        name = f" in {shown_path(Path(Path(setup.scanner_file.name).name))}" if key.startswith(_SCANNER) else ""
+        return f"{key.removeprefix(_SCANNER)} = {_value(value)}{name}"
+
+    return " with ".join(part(key, value) for key, value in change.items() if value is not None)
 
 
 def _keeps_the_error(plan: Plan, other: Plan) -> bool:
@@ -158,31 +170,42 @@ def _against_quantisation(setup: Setup, plan: Plan, line: LinePlan, found: Exces
     length = len(table.words)
     if table.mode == "interpolated" and length < 64 * line.series.harmonics:
         yield ({f"{axis}.table.length": n} for n in (4 * length, 16 * length) if n <= _LONGEST_TABLE)
-    yield _amplifiers(setup, plan, found)
-    dac = setup.scan.dac
-    most = min(_MOST_BITS, dac.word_bits or _MOST_BITS)
-    yield ({"dac.bits": b} for b in range(dac.bits + bits, min(dac.bits + bits + 3, most + 1)))
+    yield _amplifiers(setup, plan, line, found)
+    hardware = [setup.hardware(one.axis) for one in plan.lines]
+    dac = setup.hardware(axis).dac
+    most = min(_MOST_BITS, *(one.dac.word_bits or _MOST_BITS for one in hardware))
+    places = _keys(place for one in hardware for place in one.where("dac.bits"))
+    yield (dict.fromkeys(places, b) for b in range(dac.bits + bits, min(dac.bits + bits + 3, most + 1)))
 
 
-def _amplifiers(setup: Setup, plan: Plan, found: Excess) -> Iterator[Change]:
-    """A gain that is as much lower as is needed, or as the drives of both axes allow, about the middle of them."""
-    dac, gain = setup.scan.dac, setup.scan.amplifier.gain
+def _keys(places: Iterable[Place]) -> list[str]:
+    """Keys of a change, each once."""
+    return list(dict.fromkeys(f"{_SCANNER if place.in_scanner else ''}{place.key}" for place in places))
+
+
+def _amplifiers(setup: Setup, plan: Plan, line: LinePlan, found: Excess) -> Iterator[Change]:
+    """A gain that is as much lower as is needed, or as the drives on this amplifier allow, about the middle of them."""
+    hardware = setup.hardware(line.axis)
+    dac, gain = hardware.dac, hardware.amplifier.gain
+    gains, biases = _keys(hardware.where("amplifier.gain")), _keys(hardware.where("amplifier.bias_v"))
     ends = []
-    for line in plan.lines:
-        words, output = line.program.words, line.program.output
-        codes = output.code(np.array([words.min(), words.max()]) << line.program.guard)
-        ends += [line.converter.v_zero + line.converter.v_per_code * code for code in codes.tolist()]
-        park_v = getattr(setup.scan, line.axis).park_v
-        ends.append(line.drive.v_offset if park_v is None else park_v)
+    for one in plan.lines:
+        its = setup.hardware(one.axis)
+        if not {*gains, *biases} & {*_keys(its.where("amplifier.gain")), *_keys(its.where("amplifier.bias_v"))}:
+            continue  # it has an amplifier of its own
+        words, output = one.program.words, one.program.output
+        codes = output.code(np.array([words.min(), words.max()]) << one.program.guard)
+        ends += [one.converter.v_zero + one.converter.v_per_code * code for code in codes.tolist()]
+        park_v = getattr(setup.scan, one.axis).park_v
+        ends.append(one.drive.v_offset if park_v is None else park_v)
     bottom, top = min(ends), max(ends)
-    highest = dac.v_max - (dac.v_max - dac.v_min) / float(1 << dac.bits)
-    tightest = float(at_least(1.01 * (top - bottom) / (highest - dac.v_min), 4))
+    tightest = float(at_least(1.01 * (top - bottom) / (dac.highest_v - dac.v_min), 4))
     wanted = float(at_most(abs(gain) / (_MARGIN * found.times), 2))
     for size in dict.fromkeys((max(wanted, tightest), max(0.7 * wanted, tightest))):
         if size < 0.99 * abs(gain):
-            one = float(f"{copysign(size, gain):.4g}")
-            bias_v = 0.5 * (bottom + top) - one * 0.5 * (dac.v_min + highest)
-            yield {"amplifier.gain": one, "amplifier.bias_v": float(f"{bias_v:.4g}")}
+            one_gain = float(f"{copysign(size, gain):.4g}")
+            bias_v = 0.5 * (bottom + top) - one_gain * 0.5 * (dac.v_min + dac.highest_v)
+            yield dict.fromkeys(gains, one_gain) | dict.fromkeys(biases, float(f"{bias_v:.4g}"))
 
 
 def _against_band_limit(setup: Setup, plan: Plan, line: LinePlan, found: Excess) -> Iterator[Iterator[Change]]:

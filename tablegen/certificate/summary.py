@@ -25,7 +25,7 @@ def drive_lines(line: LinePlan) -> list[tuple[str, str]]:
             f"{drive.size_nm:.6g} nm line, {drive.window_nm:.6g} nm window, at {drive.position_nm:.6g} nm",
         ),
         ("V_offset", f"{drive.v_offset:.6g} V   p = {drive.p_offset:+.4f}"),
-        ("V_scan", f"{drive.v_scan:.6g} V   {drive.v_scan_normalised:.6g} of v_max, (9) (12)"),
+        ("V_scan", f"{drive.v_scan:.6g} V   {drive.v_scan_normalised:.6g} of {drive.driver.unit}, (9) (12)"),
         ("m", f"{drive.m:.6f}   offset, (1)"),
         ("g", f"{drive.g:.6f}   frequency, (23)"),
         ("m g V_scan", f"{drive.v_amplitude:.6g} V peak to peak"),
@@ -190,6 +190,12 @@ def notes(plan: Plan) -> list[str]:
     return found
 
 
+def _volts(line: LinePlan) -> str:
+    """Said where the axes have converters or amplifiers of their own."""
+    zero, step = line.converter.v_zero, line.converter.v_per_code
+    return f"{zero:.6g} V {'-' if step < 0.0 else '+'} {abs(step):.6g} V c, at the piezo"
+
+
 def summary(plan: Plan, certificates: dict[str, Certificate]) -> list[str]:
     """The whole block, a list of lines of text."""
     schedule = plan.schedule
@@ -202,6 +208,8 @@ def summary(plan: Plan, certificates: dict[str, Certificate]) -> list[str]:
     for line in plan.lines:
         lines += ["", f"{line.axis} drive"]
         lines += [f"  {label:<18}{value}" for label, value in drive_lines(line)]
+        if plan.x.converter != plan.y.converter:
+            lines.append(f"  {'volts of code c':<18}{_volts(line)}")
         one = settles[line.axis]
         texts = [f"not known: there is no operator of {line.axis}"] if any(settles.values()) else []
         for i, text in enumerate(texts if one is None else settling_text(one)):

@@ -26,8 +26,9 @@ Exit status: 0 done, 2 wrong input, 4 cannot write, 6 a library is missing.""",
 def calibrate() -> None:
     """Fit the parameters of a scanner to measurements, in CSV files or images.
 
-    The header of a CSV file names the columns; each name contains the unit. Each command prints the parameters with
-    standard errors, and the scan error that remains. Outliers are reported, and never removed.
+    The header of a CSV file names the columns; each name contains the unit. In its place the commands take .npz files
+    of numpy, with an array a column. Each command prints the parameters with standard errors, and the scan error that
+    remains. Outliers are reported, and never removed.
 
     With --write, the command updates the scanner file, and adds a comment that names the data files and their SHA-256.
     Without --write, it changes no file. A fit that says nothing, such as a parameter below two standard errors, is not

@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from tablegen.cli.calibration_options import delay_of, delay_option, points_option, rho_option
-from tablegen.cli.calibration_run import Common, finish, full_scale, read_columns, shared_options
+from tablegen.cli.calibration_run import Common, driver_of, finish, read_columns, shared_options
 
 
 @click.command(short_help="Fit beta_max, rho, u_peak to sensor traces.")
@@ -55,6 +55,6 @@ def hysteresis(
 
     delay = delay_of(delay_s)
     tables = [read_columns(path, [TIME, DRIVE, DISPLACEMENT], [TRACE]) for path in data]
-    v_max = full_scale(common)
+    driver = driver_of(common)
     traces = [trace for table in tables for trace in split_traces(table)]
-    return finish(common, tables, lambda: fit_hysteresis(traces, v_max, rho, settle, drift, delay), points)
+    return finish(common, tables, lambda: fit_hysteresis(traces, driver, rho, settle, drift, delay), points)

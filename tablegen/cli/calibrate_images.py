@@ -13,7 +13,7 @@ from tablegen.cli.calibration_options import (
     turn_option,
     window_option,
 )
-from tablegen.cli.calibration_run import Common, finish, full_scale, shared_options
+from tablegen.cli.calibration_run import Common, driver_of, finish, shared_options
 from tablegen.cli.image_pairs import (
     CommandOfPairs,
     channel_option,
@@ -69,7 +69,7 @@ def images(
     from tablegen.calibration.images import Pair, fit_images
 
     read = [read_both(trace, retrace, channel, retrace_channel, frame) for _, trace, retrace in pairs]
-    v_max = full_scale(common)
+    driver = driver_of(common)
     taken = [
         Pair(
             " and ".join(dict.fromkeys((trace.source.name, retrace.source.name))), volts, trace.heights, retrace.heights
@@ -77,5 +77,5 @@ def images(
         for (volts, *_), (trace, retrace) in zip(pairs, read, strict=True)
     ]
     files = [image for both in read for image in both]
-    fit = partial(fit_images, taken, v_max, rho, turn, window, retrace_mirrored, delay_pixels)
+    fit = partial(fit_images, taken, driver, rho, turn, window, retrace_mirrored, delay_pixels)
     return finish(common, files, fit, points)

@@ -6,7 +6,7 @@ from typing import Any
 import click
 
 from tablegen.cli.calibration_options import optional_data
-from tablegen.cli.calibration_run import Common, finish, full_scale, read_columns, shared_options, size_law
+from tablegen.cli.calibration_run import Common, driver_of, finish, read_columns, shared_options, size_law
 from tablegen.cli.common import fail
 from tablegen.cli.exit_status import ExitStatus
 from tablegen.cli.image_samples import (
@@ -77,20 +77,20 @@ def offset(
         raise click.UsageError("give DATA.CSV, or images with --image VOLTS OFFSET_V TRACE [RETRACE]")
     refuse_sample(given)
     table = read_columns(data, [OFFSET, APPARENT], [SIZE])
-    v_max = full_scale(common)
+    driver = driver_of(common)
     if SIZE in table:
         if size_v is not None:
             raise click.UsageError(f"--size-v is for files without the column size_v; {table.file} has it")
-        law = size_law(common, v_max, f"the column size_v of {table.file}")
+        law = size_law(common, driver, f"the column size_v of {table.file}")
         return finish(
-            common, [table], lambda: fit_offset_sizes(table[OFFSET], table[APPARENT], table[SIZE], v_max, law)
+            common, [table], lambda: fit_offset_sizes(table[OFFSET], table[APPARENT], table[SIZE], driver, law)
         )
     of_file = None
     if size_v is not None:
-        of_file = size_law(common, v_max, "--size-v")
-        if not size_v <= v_max:
-            fail([f"--size-v {size_v:g} is above v_max = {v_max:g} V"], ExitStatus.WRONG_INPUT)
-    return finish(common, [table], lambda: fit_offset(table[OFFSET], table[APPARENT], v_max, of_file, size_v))
+        of_file = size_law(common, driver, "--size-v")
+        if not size_v <= driver.span:
+            fail([f"--size-v {size_v:g} is above {driver.full_scale}"], ExitStatus.WRONG_INPUT)
+    return finish(common, [table], lambda: fit_offset(table[OFFSET], table[APPARENT], driver, of_file, size_v))
 
 
 def _of_images(common: Common, images: tuple[tuple[float, float, Path, Path], ...], given: dict[str, Any]) -> int:
@@ -104,14 +104,14 @@ def _of_images(common: Common, images: tuple[tuple[float, float, Path, Path], ..
 
     sample, taking = sample_of(given), taking_of(given)
     read = [read_sample_image(size, offset, trace, retrace, given) for size, offset, trace, retrace in images]
-    v_max = full_scale(common)
-    law = size_law(common, v_max, "--image")
+    driver = driver_of(common)
+    law = size_law(common, driver, "--image")
     size_v, offset_v = (np.array([row[i] for row in images]) for i in (0, 1))
 
     def fit() -> OffsetFit | OffsetSizesFit:
-        found = sizes_of([image for image, _ in read], v_max, sample, taking)
-        apparent, errors = apparent_of(found, law, v_max, sample)
-        one = fit_offset_sizes(offset_v, apparent, size_v, v_max, law, errors)
+        found = sizes_of([image for image, _ in read], driver, sample, taking)
+        apparent, errors = apparent_of(found, law, driver, sample)
+        one = fit_offset_sizes(offset_v, apparent, size_v, driver, law, errors)
         return replace(one, images=found.images, remarks=found.remarks + one.remarks)
 
     return finish(common, [one for _, files in read for one in files], fit)

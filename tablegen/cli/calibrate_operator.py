@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tablegen.cli.calibration_options import delay_of, delay_option
-from tablegen.cli.calibration_run import Common, full_scale, in_file, read_columns, scanner_axis, shared_options
+from tablegen.cli.calibration_run import Common, driver_of, in_file, read_columns, scanner_axis, shared_options
 from tablegen.cli.common import fail, written
 from tablegen.cli.exit_status import ExitStatus
 from tablegen.cli.image_samples import (
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from tablegen.calibration.operator.fit import OperatorFit
     from tablegen.calibration.operator.periodic_line import PeriodicLine
     from tablegen.calibration.table import MeasuredTable
+    from tablegen.driver import Driver
 
 
 _MEASURES = "    rms   scaling  mismatch"
@@ -99,41 +100,41 @@ def operator(
         refuse_sample(given)
     tables = [read_columns(path, [TIME, DRIVE, DISPLACEMENT], [TRACE]) for path in data]
     pairs = [read_sample_image(v, at, trace, retrace, given) for v, at, _, trace, retrace in images]
-    v_max = full_scale(common)
-    response, offset_law = scanner_axis(common, v_max)
+    driver = driver_of(common)
+    response, offset_law = scanner_axis(common, driver)
     lines = []
     for table in tables:
         for trace in split_traces(table):
             try:
-                lines.append(periodic_line(trace, v_max))
+                lines.append(periodic_line(trace, driver))
             except Unphysical as reason:
                 fail([f"{table.file}: {trace.name}: {reason}"], ExitStatus.WRONG_INPUT)
     sources: list[MeasuredTable | ScanImage] = [*tables, *(one for _, files in pairs for one in files)]
     try:
         delay = fit_delay(lines, response) if wanted_delay is None else Estimate(wanted_delay)
         lines = [line.earlier(delay.value) for line in lines]
-        lines += _imaged(images, pairs, v_max, given)
+        lines += _imaged(images, pairs, driver, given)
         if (k := in_file(common, "size", "k_nm_per_v")) is not None:
-            check_size(lines, k * v_max, f"k_nm_per_v = {k:g} of {common.scanner}")
+            check_size(lines, k * driver.span, f"k_nm_per_v = {k:g} of {common.scanner}")
         with Progress() as progress:
             progress.now("fitting the families, with and without each trace")
             fit = fit_operator(lines, response, lambda centre: offset_law.factor(2.0 * centre - 1.0))
     except Unphysical as reason:
         fail([f"{', '.join(table.file for table in sources)}: {reason}"], ExitStatus.WRONG_INPUT)
-    further = next_trace(fit, lines, v_max)
+    further = next_trace(fit, lines, driver)
     if common.as_json:
         click.echo(json.dumps(_record(fit, lines, further, common.axis, sources, delay), indent=2, allow_nan=False))
     else:
-        click.echo("\n".join(_text(fit, lines, further, common.axis, v_max, delay)))
+        click.echo("\n".join(_text(fit, lines, further, common.axis, driver, delay)))
     if common.plot is not None:
         from tablegen.calibration.operator.figure import draw_operator
 
         kind: Any = common.plot.suffix[1:]
-        written(common.plot.parent, {common.plot.name: draw_operator(fit, lines, further, v_max, kind)})
+        written(common.plot.parent, {common.plot.name: draw_operator(fit, lines, further, driver, kind)})
     if common.report is not None:
-        written(common.report.parent, {common.report.name: _page(fit, lines, further, common.axis, v_max, sources)})
+        written(common.report.parent, {common.report.name: _page(fit, lines, further, common.axis, driver, sources)})
     if common.write:
-        _write(common, fit, sources, v_max, delay)
+        _write(common, fit, sources, driver, delay)
     return ExitStatus.OK
 
 
@@ -142,7 +143,7 @@ def _page(
     lines: "Sequence[PeriodicLine]",
     further: "NextTrace",
     axis: str,
-    v_max: float,
+    driver: "Driver",
     sources: "Sequence[MeasuredTable | ScanImage]",
 ) -> bytes:
     """The same as a page."""
@@ -152,7 +153,14 @@ def _page(
         (
             line.name,
             (
-                *(line.stroke * v_max, line.centre * v_max, line.rate_hz, left.rms, left.scaling, left.mismatch),
+                *(
+                    line.stroke * driver.span,
+                    driver.volts(line.centre),
+                    line.rate_hz,
+                    left.rms,
+                    left.scaling,
+                    left.mismatch,
+                ),
                 *(out.rms, out.scaling, out.mismatch, out.size),
             ),
         )
@@ -166,7 +174,7 @@ def _page(
 def _imaged(
     images: "tuple[tuple[float, float, float, Path, Path], ...]",
     pairs: "list[tuple[SampleImage, list[ScanImage]]]",
-    v_max: float,
+    driver: "Driver",
     given: dict[str, Any],
 ) -> "list[PeriodicLine]":
     """The lines of pairs of images; what is wrong with one ends the command."""
@@ -179,7 +187,7 @@ def _imaged(
     lines = []
     for (_, _, rate_hz, *_), (image, _) in zip(images, pairs, strict=True):
         try:
-            lines.append(imaged_line(image, rate_hz, v_max, sample, taking)[0])
+            lines.append(imaged_line(image, rate_hz, driver, sample, taking)[0])
         except Unphysical as reason:
             fail([f"{image.name}: {reason}"], ExitStatus.WRONG_INPUT)
     return lines
@@ -190,7 +198,7 @@ def _text(
     lines: "Sequence[PeriodicLine]",
     further: "NextTrace",
     axis: str,
-    v_max: float,
+    driver: "Driver",
     delay: "Estimate",
 ) -> list[str]:
     """What was found, what it leaves of every trace, and what to measure next."""
@@ -210,7 +218,7 @@ def _text(
     for line, left, without in zip(lines, fit.left, fit.left_out, strict=True):
         noise = 100.0 * line.noise_nm / float(line.displacement_nm.max() - line.displacement_nm.min())
         out.append(
-            f"{line.stroke * v_max:8.4g}  {line.centre * v_max:10.4g}  {line.rate_hz:9.4g}  {noise:9.2g}  "
+            f"{line.stroke * driver.span:8.4g}  {driver.volts(line.centre):10.4g}  {line.rate_hz:9.4g}  {noise:9.2g}  "
             f"{left.rms:5.2f}  {left.scaling:8.2f}  {left.mismatch:8.2f}   {without.rms:5.2f}  {without.scaling:8.2f}  "
             f"{without.mismatch:8.2f}  {without.size:+8.2f}  {line.name}"
         )
@@ -278,7 +286,7 @@ def _write(
     common: Common,
     fit: "OperatorFit",
     tables: "Sequence[MeasuredTable | ScanImage]",
-    v_max: float,
+    driver: "Driver",
     delay: "Estimate",
 ) -> None:
     """The operator's file, then the scanner file that names it."""
@@ -292,10 +300,10 @@ def _write(
     beside = common.scanner.with_name(f"{common.scanner.stem}_{common.axis}_operator.toml")
     sources = list(dict.fromkeys(f"from {t.source.name}, sha256 {t.source.sha256}" for t in tables))
     sources += [f"delay of the sensor: {delay.value:.6g} s"] if delay.value else []
-    content = operator_file(fit, common.axis, v_max, sources)
+    content = operator_file(fit, common.axis, driver, sources)
     try:
         path = common.scanner.resolve()
-        text = read_text(path, CONFIGURATION) if path.exists() else new_file(path.stem, v_max)
+        text = read_text(path, CONFIGURATION) if path.exists() else new_file(path.stem, driver)
         summary = f"operator of {len(fit.operator.lines)} traces, family {fit.family}"
         change = Change(
             "hysteresis", {"model": OperatorModel.model(), "file": beside.name}, provenance=[[summary, *sources]]

@@ -6,7 +6,7 @@ from typing import Any, Literal
 import click
 
 from tablegen.cli.calibration_options import optional_data
-from tablegen.cli.calibration_run import Common, finish, full_scale, in_file, read_columns, shared_options
+from tablegen.cli.calibration_run import Common, driver_of, finish, in_file, read_columns, shared_options
 from tablegen.cli.common import fail
 from tablegen.cli.exit_status import ExitStatus
 from tablegen.cli.image_samples import (
@@ -104,9 +104,9 @@ def size(
         )
     actual = table[ACTUAL] if ACTUAL in table else table[NOMINAL] * table[TRUE] / table[APPARENT]
     drive = table[DRIVE] if DRIVE in table else table[NOMINAL] / (k or 1.0)
-    v_max = full_scale(common)
+    driver = driver_of(common)
     base = base_nm or in_file(common, "size", "base_nm") or 200.0
-    return finish(common, [table], lambda: fit_size(drive, actual, v_max, base, threshold, noise))
+    return finish(common, [table], lambda: fit_size(drive, actual, driver, base, threshold, noise))
 
 
 def _of_images(
@@ -125,13 +125,13 @@ def _of_images(
 
     sample, taking = sample_of(given), taking_of(given)
     read = [read_sample_image(volts, None, trace, retrace, given) for volts, trace, retrace in images]
-    v_max = full_scale(common)
+    driver = driver_of(common)
     base = base_nm or in_file(common, "size", "base_nm") or 200.0
     drive = np.array([image.v_scan for image, _ in read])
 
     def fit() -> SizeFit:
-        found = sizes_of([image for image, _ in read], v_max, sample, taking)
-        law = fit_size(drive, found.nm, v_max, base, threshold, errors_nm=found.errors_nm, shared=found.shared)
+        found = sizes_of([image for image, _ in read], driver, sample, taking)
+        law = fit_size(drive, found.nm, driver, base, threshold, errors_nm=found.errors_nm, shared=found.shared)
         return replace(law, images=found.images, remarks=found.remarks + law.remarks)
 
     return finish(common, [one for _, files in read for one in files], fit)

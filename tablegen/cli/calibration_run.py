@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from tablegen.compensation.dynamics import Response
     from tablegen.compensation.offset import OffsetLaw
     from tablegen.compensation.size import SizeLaw
+    from tablegen.driver import Driver
 
 F = TypeVar("F", bound=Callable[..., Any])
 _REQUIRED_MODULES = ("scipy", "tomlkit")
@@ -37,6 +38,7 @@ class Common:
     axis: str
     scanner: Path | None
     v_max: float | None
+    v_min: float
     write: bool
     force: bool
     plot: Path | None
@@ -52,13 +54,20 @@ def shared_options(command: F) -> F:
             "--scanner",
             type=OutputFile(),
             metavar="FILE",
-            help="Scanner file. The command reads v_max from it.",
+            help="Scanner file. The command reads v_max and v_min from it.",
         ),
         click.option(
             "--v-max",
             type=click.FloatRange(min=1e-3, max=1e5),
             metavar="V",
             help="Full-scale voltage of the piezo driver in volts. Required without a scanner file.",
+        ),
+        click.option(
+            "--v-min",
+            type=click.FloatRange(min=-1e5, max=0.0),
+            default=0.0,
+            metavar="V",
+            help="Minimum output of the piezo driver in volts, if it is below 0.",
         ),
         click.option(
             "--write",
@@ -85,6 +94,7 @@ def shared_options(command: F) -> F:
         axis: str,
         scanner: Path | None,
         v_max: float | None,
+        v_min: float,
         write: bool,
         force: bool,
         plot: Path | None,
@@ -102,7 +112,7 @@ def shared_options(command: F) -> F:
             if plot.suffix not in (".png", ".svg", ".pdf"):
                 raise click.UsageError(f"--plot {plot}: the name has to end in .png, .svg or .pdf")
             require("matplotlib", extra="plot")
-        return command(common=Common(axis, scanner, v_max, write, force, plot, report, as_json), **rest)
+        return command(common=Common(axis, scanner, v_max, v_min, write, force, plot, report, as_json), **rest)
 
     run.__doc__, run.__name__ = command.__doc__, command.__name__
     for option in reversed(options):
@@ -151,19 +161,26 @@ def _scanner_values(common: Common) -> dict[str, Any]:
         fail(rejected.problems, ExitStatus.WRONG_INPUT)
 
 
-def full_scale(common: Common) -> float:
-    """v_max in V, of the scanner file, or as given where there is none."""
+def driver_of(common: Common) -> "Driver":
+    """The range of the scanner file, or as given where there is none."""
+    from tablegen.driver import Driver
+
     values = _scanner_values(common)
     found = values.get("v_max")
     if isinstance(found, int | float) and not isinstance(found, bool) and found > 0.0:
         if common.v_max is not None and common.v_max != found:
             fail([f"{common.scanner}: v_max: {found:g} there, and --v-max {common.v_max:g}"], ExitStatus.WRONG_INPUT)
-        return float(found)
+        low = values.get("v_min", 0.0)
+        if isinstance(low, bool) or not isinstance(low, int | float) or not low <= 0.0:
+            fail([f"{common.scanner}: v_min: not a voltage of 0 or less"], ExitStatus.WRONG_INPUT)
+        if common.v_min not in (0.0, low):
+            fail([f"{common.scanner}: v_min: {low:g} there, and --v-min {common.v_min:g}"], ExitStatus.WRONG_INPUT)
+        return Driver(float(found), float(low))
     if values:
         fail([f"{common.scanner}: v_max: missing, or not a voltage"], ExitStatus.WRONG_INPUT)
     if common.v_max is None:
         raise click.UsageError("give --scanner FILE, or --v-max V, the driver's maximum output")
-    return common.v_max
+    return Driver(common.v_max, common.v_min)
 
 
 def in_file(common: Common, kind: str, key: str) -> float | None:
@@ -174,7 +191,7 @@ def in_file(common: Common, kind: str, key: str) -> float | None:
     return float(values) if isinstance(values, int | float) and values > 0.0 else None
 
 
-def size_law(common: Common, v_max: float, source: str) -> "SizeLaw":
+def size_law(common: Common, driver: "Driver", source: str) -> "SizeLaw":
     """The size law of the scanner file, for ``source`` of scan voltages; the rest of the file may be incomplete."""
     from tablegen.planning.drive import size_law_of
     from tablegen.problems import Unphysical
@@ -183,7 +200,7 @@ def size_law(common: Common, v_max: float, source: str) -> "SizeLaw":
     if in_file(common, "size", "k_nm_per_v") is None:
         fail([f"{source} takes {path} of --scanner FILE; calibrate the size first"], ExitStatus.WRONG_INPUT)
     try:
-        return size_law_of(_tables(common, "size")[path], v_max)
+        return size_law_of(_tables(common, "size")[path], driver)
     except Unphysical as reason:
         fail([f"{common.scanner}: {path}: {reason}"], ExitStatus.WRONG_INPUT)
 
@@ -206,7 +223,7 @@ def _tables(common: Common, *names: str) -> dict[str, Any]:
     return tables
 
 
-def scanner_axis(common: Common, v_max: float) -> "tuple[Response | None, OffsetLaw]":
+def scanner_axis(common: Common, driver: "Driver") -> "tuple[Response | None, OffsetLaw]":
     """The dynamics of the scanner file, and its offset law for small scans; without them, none and a constant."""
     from tablegen.compensation.offset import OffsetLaw
     from tablegen.compensation.size import SizeLaw
@@ -219,8 +236,8 @@ def scanner_axis(common: Common, v_max: float) -> "tuple[Response | None, Offset
     resonance, offset, size = (tables.get(f"{common.axis}.{name}") for name in ("resonance", "offset", "size"))
     try:
         response = None if resonance is None else dynamics_of(resonance, common.scanner.parent)
-        law = SizeLaw(1.0, 0.0, 1.0) if size is None else size_law_of(size, v_max)
-        return response, OffsetLaw() if offset is None else offset_surface(offset, v_max, law).small
+        law = SizeLaw(1.0, 0.0, 1.0) if size is None else size_law_of(size, driver)
+        return response, OffsetLaw() if offset is None else offset_surface(offset, driver, law).small
     except Unphysical as reason:
         fail([f"{common.scanner}: {common.axis}: {reason}"], ExitStatus.WRONG_INPUT)
 
@@ -294,7 +311,7 @@ def _write(
         beside[response.name] = _response(fit, response, sources)
     try:
         path = common.scanner.resolve()
-        text = read_text(path, CONFIGURATION) if path.exists() else new_file(path.stem, full_scale(common))
+        text = read_text(path, CONFIGURATION) if path.exists() else new_file(path.stem, driver_of(common))
         put = change(fit, sources, points, response.name, forced)
         content = updated(text, name, common.axis, put).encode("utf-8")
     except Rejected as rejected:

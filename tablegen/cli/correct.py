@@ -60,7 +60,12 @@ Exit status: 0 done, 2 wrong input, 4 cannot write, 6 a library is missing, 130 
 @_number("--lattice-nm", "NM", "With --fit: constant of a hexagonal or square lattice, for size, height and shear.")
 @_number("--size-v", "V", "Scan voltage of the fast axis at the piezo, peak to peak.")
 @_number("--size-nm", "NM", "Instead of --size-v: scan size by the size calibration of the scanner file.")
-@_number("--offset-v", "V", "Offset voltage of the fast axis.  [default: half of v_max]", click.FloatRange(min=0.0))
+@_number(
+    "--offset-v",
+    "V",
+    "Offset voltage of the fast axis.  [default: the middle of the driver's range]",
+    click.FloatRange(-1e5, 1e5),
+)
 @_number("--rate-hz", "HZ", "Line rate; forward and backward make one line.  [default: that of the file]")
 @click.option(
     "--lines",
@@ -87,7 +92,7 @@ Exit status: 0 done, 2 wrong input, 4 cannot write, 6 a library is missing, 130 
 @_number("--slow-size-v", "V", "Scan voltage of the slow axis.  [default: as the fast axis]")
 @_number("--slow-size-nm", "NM", "Instead of --slow-size-v: its size.")
 @_number(
-    "--slow-offset-v", "V", "Offset voltage of the slow axis.  [default: as the fast axis]", click.FloatRange(min=0.0)
+    "--slow-offset-v", "V", "Offset voltage of the slow axis.  [default: as the fast axis]", click.FloatRange(-1e5, 1e5)
 )
 @_number(
     "--slow-turn",

@@ -119,7 +119,7 @@ def refine(
 
     \b
     1. Record several periods of the running scan with a displacement sensor in TRACE.CSV.
-       Columns: time_s, displacement_nm, drive_v.
+       Columns: time_s, displacement_nm, drive_v. A .npz of numpy has an array a column.
        Or take trace and retrace of a grating or a lattice: --images.
     2. Run this command with --write. It writes the correction to [AXIS.refinement] of SCAN.TOML.
     3. Build, upload, and record again. Two or three rounds are usually enough.

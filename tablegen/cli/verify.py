@@ -42,7 +42,8 @@ _CLOCKS_A_SECOND = 20_000  # that Icarus simulates, more or less
     "--sim",
     "simulator",
     type=click.Choice(("icarus", "verilator")),
-    help="Verilog simulator. verilator takes some seconds to compile, and then runs about 40 times as fast.  "
+    help="Verilog simulator. verilator takes some seconds to compile, and then runs about 40 times as fast. "
+    "It keeps the compiled model in ~/.cache/tablegen.  "
     "[default: icarus]",
 )
 @click.option(

@@ -9,6 +9,7 @@ from msgspec import Meta
 from tablegen.compensation.hysteresis import beta_at
 from tablegen.compensation.model import Parameters
 from tablegen.compensation.points import HysteresisPoint, OffsetRows, Residual, Rows, between_points, rows_of
+from tablegen.driver import Driver
 from tablegen.quantities import Normalised
 
 Decay = Annotated[float, Meta(ge=1e-6, le=100.0)]
@@ -71,12 +72,12 @@ class ResidualLaw:
     offsets: OffsetRows | None = None
 
     @classmethod
-    def of(cls, branch: Branch, v_max: float) -> "ResidualLaw":
+    def of(cls, branch: Branch, driver: Driver | float) -> "ResidualLaw":
         """As the scanner file has it."""
         if branch.points is not None and branch.points[0].offset_v is not None:
-            return cls(offsets=OffsetRows.of(branch.points, v_max))
+            return cls(offsets=OffsetRows.of(branch.points, driver))
         if branch.points is not None:
-            return cls(points=rows_of(branch.points, v_max))
+            return cls(points=rows_of(branch.points, Driver.of(driver).span))
         peak = 0.5 if branch.u_peak is None else branch.u_peak
         return cls(0.0 if branch.beta_max is None else branch.beta_max, branch.rho, peak)
 
@@ -85,28 +86,29 @@ class ResidualLaw:
         """Whether it is that of points."""
         return bool(self.points) or self.offsets is not None
 
-    def at(self, v: float, v_max: float, v_offset: float | None = None) -> tuple[float, float]:
-        """beta and u_peak at a normalised scan voltage, and at an offset in V (default: half of v_max).
+    def at(self, v: float, driver: Driver | float, v_offset: float | None = None) -> tuple[float, float]:
+        """beta and u_peak at a normalised scan voltage, and at an offset in V (default: the middle of the range).
 
         Raises ``Unphysical`` for a scan that is larger than what was measured, or far from its offsets.
         """
+        driver = Driver.of(driver)
         if self.offsets is not None:
-            return self.offsets.at(v, 0.5 if v_offset is None else v_offset / v_max, v_max)
+            return self.offsets.at(v, 0.5 if v_offset is None else driver.share(v_offset), driver)
         if self.points:
-            return between_points(self.points, v, v_max)
+            return between_points(self.points, v, driver.span)
         return beta_at(v, self.beta_max, self.rho), self.u_peak
 
 
 def residual_between(
-    one: Branch, other: Branch, share: float, v: float, v_max: float, v_offset: float
+    one: Branch, other: Branch, share: float, v: float, driver: Driver | float, v_offset: float
 ) -> tuple[float, float, float | None]:
     """beta and u_peak between two turns, and the beta_max that they come from where (22) gives both."""
-    left, right = ResidualLaw.of(one, v_max), ResidualLaw.of(other, v_max)
+    left, right = ResidualLaw.of(one, driver), ResidualLaw.of(other, driver)
     if not left.measured and not right.measured:
         beta_max, rho = _between(left.beta_max, right.beta_max, share), _between(left.rho, right.rho, share)
         law = ResidualLaw(beta_max, rho, _between(left.u_peak, right.u_peak, share))
-        return *law.at(v, v_max), beta_max
-    (beta_left, peak_left), (beta_right, peak_right) = left.at(v, v_max, v_offset), right.at(v, v_max, v_offset)
+        return *law.at(v, driver), beta_max
+    (beta_left, peak_left), (beta_right, peak_right) = left.at(v, driver, v_offset), right.at(v, driver, v_offset)
     return _between(beta_left, beta_right, share), _between(peak_left, peak_right, share), None
 
 

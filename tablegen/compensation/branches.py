@@ -106,7 +106,7 @@ class ByBranches(WithBranches, frozen=True):
             key = f"branches[{entries[left if share < 0.5 else right][0]}].{side}"
             found = None
             with wanted.at(f"{key}.points"):
-                found = residual_between(one, other, share, wanted.v, wanted.v_max, wanted.v_offset)
+                found = residual_between(one, other, share, wanted.v, wanted.driver, wanted.v_offset)
             if found is None:
                 continue
             beta, u_peak, beta_max = found
@@ -121,7 +121,7 @@ class ByBranches(WithBranches, frozen=True):
     def _check_amplitudes(self, wanted: WantedLine) -> None:
         for i, entry in enumerate(self.branches):
             for side, branch in entry.sides:
-                for key, why in beyond_driver(branch.points or [], wanted.v_max):
+                for key, why in beyond_driver(branch.points or [], wanted.driver):
                     wanted.problem(f"branches[{i}].{side}.{key}", why)
 
     def _shape(self, beta: float, beta_max: float | None, u_peak: float) -> Sweep:

@@ -16,6 +16,7 @@ import numpy as np
 from tablegen.compensation.dynamics import Response
 from tablegen.compensation.expectation import Expectation
 from tablegen.compensation.transient import Transient
+from tablegen.driver import Driver
 from tablegen.numerics.arrays import Bools, Floats, FloatsLike
 from tablegen.problems import Document, Problems, Unphysical
 from tablegen.waveform.series import FourierSeries
@@ -192,17 +193,18 @@ class WholeLine(LineShape):
 class WantedLine:
     """What a scan wants of the model of one axis, and where a fault is reported.
 
-    ``v`` is the normalised scan voltage V_scan / V_max, in [0, 1]; ``v_amplitude`` = m g V_scan, volts peak to peak at
+    ``v`` is the normalised scan voltage V_scan / V_max, in [0, 1], V_max the whole range of the
+    ``driver``; ``v_amplitude`` = m g V_scan, volts peak to peak at
     the piezo for w from 0 to 1; ``harmonics`` the highest that is played; ``both`` whether both directions image.
     ``response`` are the dynamics, whose inverse gives no harmonic more than ``max_boost_db``; ``factor_at`` is m of (1)
-    at an offset as a share of v_max, for small scans, ``rate_gain`` g of (23) at a rate in Hz, None where it is
-    not calibrated.
+    at an offset as a share of the driver's range, for small scans, ``rate_gain`` g of (23) at a rate in Hz, None
+    where it is not calibrated.
     """
 
     axis: str
     turn: float
     v: float
-    v_max: float
+    driver: Driver
     v_amplitude: float
     v_offset: float
     size_nm: float
@@ -218,6 +220,11 @@ class WantedLine:
     scan_file: Document
     scanner_file: Document
     problems: Problems
+
+    @property
+    def v_share(self) -> float:
+        """The offset as a share of the driver's range."""
+        return self.driver.share(self.v_offset)
 
     @contextmanager
     def at(self, key: str) -> Iterator[None]:

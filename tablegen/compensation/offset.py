@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tablegen.figures import at_most
+from tablegen.driver import Driver
+from tablegen.figures import at_least, at_most
 from tablegen.numerics.arrays import tree_sum
 from tablegen.numerics.linear import Cholesky
 from tablegen.problems import Unphysical
@@ -24,7 +25,9 @@ class OffsetLaw:
         vertex = -self.alpha / (2.0 * self.beta) if self.beta else 0.0
         lowest = min(self.factor(p) for p in (-1.0, 1.0, max(-1.0, min(1.0, vertex))))
         if lowest <= 0.0:
-            raise Unphysical(f"the amplitude factor falls to {lowest:.4g} inside [0, v_max]; it has to stay above 0")
+            raise Unphysical(
+                f"the amplitude factor falls to {lowest:.4g} inside the driver's range; it has to stay above 0"
+            )
 
     @classmethod
     def from_ends(cls, m_minus: float, m_plus: float) -> "OffsetLaw":
@@ -73,32 +76,34 @@ class OffsetLaw:
         """m(p), equation (1)."""
         return 1.0 + self.alpha * p + self.beta * p * p
 
-    def position_nm(self, v_offset: float, v_max: float, k_nm_per_v: float) -> float:
+    def position_nm(self, v_offset: float, driver: Driver | float, k_nm_per_v: float) -> float:
         """Position in nm above that at 0 V: the integral of the local slope k / m over the offset voltage."""
         if v_offset == 0.0:
             return 0.0
-        p = 2.0 * (v_offset * (np.arange(_SIMPSON_PANELS + 1) / _SIMPSON_PANELS)) / v_max - 1.0
+        p = Driver.of(driver).p(v_offset * (np.arange(_SIMPSON_PANELS + 1) / _SIMPSON_PANELS))
         slope = 1.0 / (1.0 + self.alpha * p + self.beta * p * p)
         weights = np.full(_SIMPSON_PANELS + 1, 2.0)
         weights[1::2] = 4.0
         weights[0] = weights[-1] = 1.0
         return k_nm_per_v * v_offset * float(tree_sum(weights * slope)) / (3.0 * _SIMPSON_PANELS)
 
-    def voltage_at(self, position_nm: float, v_max: float, k_nm_per_v: float) -> float:
+    def voltage_at(self, position_nm: float, driver: Driver | float, k_nm_per_v: float) -> float:
         """The offset voltage that gives a position; the inverse of ``position_nm``."""
-        reach = self.position_nm(v_max, v_max, k_nm_per_v)
-        if not 0.0 <= position_nm <= reach:
-            raise Unphysical(f"{position_nm:g} nm is outside the 0..{at_most(reach, 6)} nm that 0..{v_max:g} V reach")
-        v = v_max * position_nm / reach
+        driver = Driver.of(driver)
+        low, high = (self.position_nm(end, driver, k_nm_per_v) for end in (driver.v_min, driver.v_max))
+        if not low <= position_nm <= high:
+            reach = f"{at_least(low, 6)}..{at_most(high, 6)} nm that {driver} reach"
+            raise Unphysical(f"{position_nm:g} nm is outside the {reach}")
+        v = driver.v_min + driver.span * (position_nm - low) / (high - low)
         for _ in range(60):  # Newton on a smooth, increasing function; a bound, not a hope
-            error = self.position_nm(v, v_max, k_nm_per_v) - position_nm
-            step = error * self.factor(normalised_offset(v, v_max)) / k_nm_per_v
-            v = min(max(v - step, 0.0), v_max)
-            if abs(step) <= 1e-15 * v_max:
+            error = self.position_nm(v, driver, k_nm_per_v) - position_nm
+            step = error * self.factor(driver.p(v)) / k_nm_per_v
+            v = min(max(v - step, driver.v_min), driver.v_max)
+            if abs(step) <= 1e-15 * driver.span:
                 break
         return v
 
 
-def normalised_offset(v_offset: float, v_max: float) -> float:
-    """p = 2 V_offset / V_max - 1, equation (2)."""
-    return 2.0 * v_offset / v_max - 1.0
+def normalised_offset(v_offset: float, driver: Driver | float) -> float:
+    """p = 2 V_offset / V_max - 1, equation (2); with V_offset from v_min on, and V_max for the whole range."""
+    return Driver.of(driver).p(v_offset)

@@ -4,8 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from tablegen.compensation.offset import OffsetLaw, normalised_offset
+from tablegen.compensation.offset import OffsetLaw
 from tablegen.compensation.size import SizeLaw
+from tablegen.driver import Driver
 from tablegen.problems import Unphysical
 
 _ROUNDS = 40  # of a contraction that leaves a third of an error
@@ -56,17 +57,17 @@ def law_of_sizes(p: list[float], apparent: list[float], size: SizeLaw, v: float)
     return law
 
 
-def surface_of(points: Sequence[tuple[float, float, float]], size: SizeLaw, v_max: float) -> OffsetSurface:
+def surface_of(points: Sequence[tuple[float, float, float]], size: SizeLaw, driver: Driver | float) -> OffsetSurface:
     """The surface of (offset in V, apparent size in any unit, scan voltage of the image in V).
 
     The images of one scan voltage have to show one object. Raises ``Unphysical``.
     """
-    laws = []
+    driver, laws = Driver.of(driver), []
     for volts in sorted({size_v for _, _, size_v in points}):
-        p = [normalised_offset(at, v_max) for at, _, size_v in points if size_v == volts]
+        p = [driver.p(at) for at, _, size_v in points if size_v == volts]
         apparent = [seen for _, seen, size_v in points if size_v == volts]
         try:
-            laws.append((volts / v_max, law_of_sizes(p, apparent, size, volts / v_max)))
+            laws.append((volts / driver.span, law_of_sizes(p, apparent, size, volts / driver.span)))
         except Unphysical as reason:
             raise Unphysical(f"at a size_v of {volts:g} V: {reason}") from None
     return OffsetSurface(tuple(laws))

@@ -8,6 +8,7 @@ from typing import Annotated
 from msgspec import Meta
 
 from tablegen.compensation.model import Parameters
+from tablegen.driver import Driver
 from tablegen.figures import at_least, at_most
 from tablegen.problems import Unphysical
 from tablegen.quantities import Normalised, PositiveVolts, Volts
@@ -49,34 +50,37 @@ class OffsetRows:
     offsets: tuple[tuple[float, Rows], ...]
 
     @classmethod
-    def of(cls, points: Sequence[HysteresisPoint], v_max: float) -> "OffsetRows":
+    def of(cls, points: Sequence[HysteresisPoint], driver: Driver | float) -> "OffsetRows":
         """Points that all have an offset."""
+        driver = Driver.of(driver)
         groups: dict[float, list[HysteresisPoint]] = {}
         for point in points:
-            groups.setdefault((point.offset_v or 0.0) / v_max, []).append(point)
-        return cls(tuple((at, rows_of(groups[at], v_max)) for at in sorted(groups)))
+            groups.setdefault(driver.share(point.offset_v or 0.0), []).append(point)
+        return cls(tuple((at, rows_of(groups[at], driver.span)) for at in sorted(groups)))
 
-    def at(self, v: float, offset: float, v_max: float) -> tuple[float, float]:
-        """beta and u_peak at a normalised scan voltage and an offset, both shares of v_max.
+    def at(self, v: float, offset: float, driver: Driver | float) -> tuple[float, float]:
+        """beta and u_peak at a normalised scan voltage and an offset, both shares of the driver's range.
 
         Linear in the offset between two offsets that were measured, constant beyond the outermost. Raises
         ``Unphysical`` where the scan is too large, or too far off.
         """
-        first, last = self.offsets[0][0], self.offsets[-1][0]
+        driver = Driver.of(driver)
+        span, first, last = driver.span, self.offsets[0][0], self.offsets[-1][0]
         if not first - OFFSET_REACH - 1e-9 <= offset <= last + OFFSET_REACH + 1e-9:
-            low = at_least(max(first - OFFSET_REACH, 0.0) * v_max, 6)
-            high = at_most(min(last + OFFSET_REACH, 1.0) * v_max, 6)
+            low = at_least(driver.volts(max(first - OFFSET_REACH, 0.0)), 6)
+            high = at_most(driver.volts(min(last + OFFSET_REACH, 1.0)), 6)
             raise Unphysical(
-                f"measured at offsets of {first * v_max:g} to {last * v_max:g} V, which serves {low} to {high} V; this "
-                f"scan is at {offset * v_max:.6g} V; measure there, or leave offset_v away from all points"
+                f"measured at offsets of {driver.volts(first):g} to {driver.volts(last):g} V, which serves {low} to "
+                f"{high} V; this scan is at {driver.volts(offset):.6g} V; measure there, or leave offset_v "
+                "away from all points"
             )
         if offset <= first or len(self.offsets) == 1:
-            return between_points(self.offsets[0][1], v, v_max)
+            return between_points(self.offsets[0][1], v, span)
         for (low_at, left), (high_at, right) in pairwise(self.offsets):
             if offset <= high_at:
                 share = (offset - low_at) / (high_at - low_at)
-                return _between_offsets(left, right, share, v, v_max)
-        return between_points(self.offsets[-1][1], v, v_max)
+                return _between_offsets(left, right, share, v, span)
+        return between_points(self.offsets[-1][1], v, span)
 
 
 def _between_offsets(left: Rows, right: Rows, share: float, v: float, v_max: float) -> tuple[float, float]:
@@ -141,15 +145,15 @@ def twice(points: Sequence[HysteresisPoint]) -> list[tuple[str, str]]:
     return found
 
 
-def beyond_driver(points: Sequence[HysteresisPoint], v_max: float) -> list[tuple[str, str]]:
+def beyond_driver(points: Sequence[HysteresisPoint], driver: Driver) -> list[tuple[str, str]]:
     """No hysteresis can have been measured at more than the driver's range, but for the error of a voltage."""
     found = [
-        (f"points[{j}].size_v", f"{point.size_v:g} V is above v_max = {v_max:g} V")
+        (f"points[{j}].size_v", f"{point.size_v:g} V is above {driver.full_scale}")
         for j, point in enumerate(points)
-        if point.size_v > (1.0 + FULL_SCALE_TOLERANCE) * v_max
+        if point.size_v > (1.0 + FULL_SCALE_TOLERANCE) * driver.span
     ]
     return found + [
-        (f"points[{j}].offset_v", f"{point.offset_v:g} V is outside the driver's 0..{v_max:g} V")
+        (f"points[{j}].offset_v", f"{point.offset_v:g} V is outside the driver's {driver}")
         for j, point in enumerate(points)
-        if point.offset_v is not None and not 0.0 <= point.offset_v <= v_max
+        if point.offset_v is not None and driver.beyond(point.offset_v, point.offset_v) > 0.0
     ]

@@ -11,11 +11,12 @@ from msgspec import Struct
 
 from tablegen.compensation.model import Parameters
 from tablegen.config.decode import decode, meant
+from tablegen.config.hardware import AxisHardware, Place, check_hardware, hardware_of
 from tablegen.config.names import why_not_a_name
 from tablegen.config.scanner import Offset, Resonance, Scanner
-from tablegen.config.schema import MAXIMUM_NAME, Amplifier, BandLimit, Dac, FastAxis, Refinement, Scan, Table, Timing
+from tablegen.config.schema import MAXIMUM_NAME, BandLimit, FastAxis, Refinement, Scan, Table, Timing
 from tablegen.figures import shown_path
-from tablegen.problems import Document, Problems, Rejected
+from tablegen.problems import Document, Problem, Problems, Rejected
 from tablegen.quantities import MAXIMUM_FILE_NAME
 from tablegen.toml import read_toml
 
@@ -32,6 +33,24 @@ class Setup:
 
     def __repr__(self) -> str:
         return f"<tablegen setup {self.scan.name!r} on {self.scanner.name!r}, from {self.scan_file.name}>"
+
+    def hardware(self, axis: str) -> AxisHardware:
+        """Converter and amplifier of one axis ("x" or "y"), and where their keys stand."""
+        return hardware_of(self.scan, self.scanner, axis)
+
+    def hardware_problem(self, axis: str, key: str, why: str) -> Problem:
+        """A problem of a key of the hardware such as "amplifier.gain", at the place where that of the axis stands."""
+        place = self.hardware(axis).where(key)[0]
+        return (self.scanner_file if place.in_scanner else self.scan_file).problem(place.key, why)
+
+    def named(self, axis: str, key: str) -> str:
+        """How a message calls a key of the hardware such as "dac.bits": with the scanner file if it stands there."""
+        return self.placed(self.hardware(axis).where(key)[0])
+
+    def placed(self, place: Place) -> str:
+        """A key with its file, where that is not the scan file."""
+        name = shown_path(Path(Path(self.scanner_file.name).name))
+        return f"{place.key} of {name}" if place.in_scanner else place.key
 
     @property
     def files(self) -> list[Path]:
@@ -52,7 +71,7 @@ def load(path: str | Path) -> Setup:
     """
     path = Path(path)
     values, scan_file = read_toml(path, str(path))
-    if "v_max" in values and "dac" not in values:  # else every key of it is a fault, and none says this
+    if "v_max" in values and not _is_scan(values):  # else every key of it is a fault, and none says this
         why = f"this is a scanner file; give the scan file that names it, scanner = '{shown_path(Path(path.name))}'"
         raise Rejected([scan_file.problem("", why)])
     problems = Problems()
@@ -78,6 +97,7 @@ def load(path: str | Path) -> Setup:
         problems.add(scan_file, "scanner", f"{shown_path(scanner_path)} is a scan file, not a scanner file")
         raise Rejected(problems.found)
     scanner = decode(Scanner, scanner_values, scanner_file, problems, partial(_check, scanner_file, problems))
+    check_hardware(values, scanner_values, scan_file, scanner_file, problems)
     problems.stop_if_any()
     assert scan is not None
     assert scanner is not None
@@ -97,7 +117,7 @@ def load_scanner(path: str | Path) -> tuple[Scanner, Document]:
 
 
 def _is_scan(values: Mapping[str, Any]) -> bool:
-    return "dac" in values and "v_max" not in values
+    return "scanner" in values or "timing" in values or ("dac" in values and "v_max" not in values)
 
 
 def from_values(scan: Mapping[str, Any], scanner: Mapping[str, Any], folder: str | Path = ".") -> Setup:
@@ -111,7 +131,9 @@ def from_values(scan: Mapping[str, Any], scanner: Mapping[str, Any], folder: str
     built = decode(Scan, values, scan_file, problems, partial(_check, scan_file, problems))
     if isinstance(values["name"], str) and (why := why_not_a_name(values["name"])):
         problems.add(scan_file, "name", why)
-    its = decode(Scanner, _plain(scanner), scanner_file, problems, partial(_check, scanner_file, problems))
+    scanner_values = _plain(scanner)
+    its = decode(Scanner, scanner_values, scanner_file, problems, partial(_check, scanner_file, problems))
+    check_hardware(values, scanner_values, scan_file, scanner_file, problems)
     problems.stop_if_any()
     assert built is not None
     assert its is not None
@@ -193,10 +215,6 @@ def _check_response(key: str, written: Mapping[str, Any], file: Document, proble
 def _faults(built: Struct) -> list[tuple[str, str]]:
     """Keys of a table that contradict each other, and why."""
     match built:
-        case Dac():
-            return _dac_faults(built)
-        case Amplifier() if abs(built.gain) < 1e-4:
-            return [("gain", f"{built.gain:g} is no gain; at least 1e-4 in size is needed")]
         case FastAxis() if built.size_v is not None and built.size_of == "window":
             return [("size_of", "only a size in nm can be that of the window; size_v is the drive's")]
         case BandLimit():
@@ -226,15 +244,4 @@ def _offset_faults(offset: Offset) -> list[tuple[str, str]]:
     if any(point.size_v is not None for point in points):
         lacking = [i for i, point in enumerate(points) if point.size_v is None]
         found += [(f"points[{i}].size_v", "missing beside those of other points") for i in lacking]
-    return found
-
-
-def _dac_faults(dac: Dac) -> list[tuple[str, str]]:
-    found = []
-    if dac.v_max <= dac.v_min:
-        found.append(("v_max", f"{dac.v_max:.12g} V is not above v_min = {dac.v_min:.12g} V"))
-    elif dac.v_max - dac.v_min < 1e-3:
-        found.append(("v_max", f"{dac.v_max - dac.v_min:.3g} V above v_min is no range; at least 0.001 V is needed"))
-    if dac.word_bits is not None and dac.word_bits < dac.bits:
-        found.append(("word_bits", f"{dac.word_bits} is below bits = {dac.bits}; the code would not fit"))
     return found

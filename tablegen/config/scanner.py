@@ -8,6 +8,8 @@ from typing import Annotated
 from msgspec import Meta, Struct
 
 from tablegen.compensation.model import Hysteresis
+from tablegen.config.schema import Amplifier, Dac
+from tablegen.driver import Driver
 from tablegen.quantities import FileName, Hertz, Name, Nanometres, PositiveVolts, Volts
 
 Factor = Annotated[float, Meta(ge=0.1, le=10.0)]
@@ -28,7 +30,7 @@ class OffsetSize(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Amplitude factors of (1) at one scan voltage; `alpha` and `beta` are linear in the voltage between two."""
 
     size_v: Annotated[PositiveVolts, Meta(description="scan voltage V_scan of the images, at the piezo")]
-    m_minus: Annotated[Factor, Meta(description="amplitude factor at an offset of 0 V, of this size")]
+    m_minus: Annotated[Factor, Meta(description="amplitude factor at an offset of v_min, of this size")]
     m_plus: Annotated[Factor, Meta(description="amplitude factor at an offset of v_max, of this size")]
 
 
@@ -38,7 +40,7 @@ class Offset(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     Or `sizes`, where it depends on the scan size too; as with points of several `size_v`.
     """
 
-    m_minus: Annotated[Factor, Meta(description="amplitude factor at an offset of 0 V")] | None = None
+    m_minus: Annotated[Factor, Meta(description="amplitude factor at an offset of v_min")] | None = None
     m_plus: Annotated[Factor, Meta(description="amplitude factor at an offset of v_max")] | None = None
     alpha: Annotated[float, Meta(ge=-1.0, le=1.0, description="linear term of (1)")] | None = None
     beta: Annotated[float, Meta(ge=-1.0, le=1.0, description="quadratic term of (1)")] | None = None
@@ -107,6 +109,10 @@ class ScannerAxis(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     hysteresis: Hysteresis | None = None
     frequency: Frequency | None = None
     resonance: Resonance | None = None
+    dac: Annotated[Dac, Meta(description="The converter of this axis; its keys go before those of `[dac]`.")] = Dac()
+    amplifier: Annotated[
+        Amplifier, Meta(description="The amplifier of this axis; its keys go before those of `[amplifier]`.")
+    ] = Amplifier()
 
 
 class Scanner(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -114,7 +120,20 @@ class Scanner(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     name: Annotated[Name, Meta(description="name of the scanner in reports")]
     v_max: Annotated[
-        PositiveVolts, Meta(description="maximum output of the piezo driver; normalised voltages refer to it")
+        PositiveVolts,
+        Meta(description="maximum output of the piezo driver; normalised voltages refer to v_max - v_min"),
     ]
+    v_min: Annotated[
+        float, Meta(ge=-1e5, le=0.0, description="minimum output of the piezo driver; below 0 if it has both signs")
+    ] = 0.0
+    dac: Annotated[Dac, Meta(description="The converter of both axes, for every scan on this scanner.")] = Dac()
+    amplifier: Annotated[Amplifier, Meta(description="The amplifier of both axes, for every scan on this scanner.")] = (
+        Amplifier()
+    )
     x: ScannerAxis
     y: ScannerAxis
+
+    @property
+    def driver(self) -> Driver:
+        """Its range."""
+        return Driver(self.v_max, self.v_min)

@@ -105,7 +105,7 @@ class FastAxis(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         Meta(description="what `size_nm` measures: the whole line, or the imaging window"),
     ] = "line"
     offset_v: Annotated[Volts, Meta(description="offset voltage at the piezo; or give `offset_nm`")] | None = None
-    offset_nm: Annotated[float, Meta(ge=0.0, le=1e9, description="position relative to that at 0 V")] | None = None
+    offset_nm: Annotated[float, Meta(ge=-1e9, le=1e9, description="position relative to that at 0 V")] | None = None
     park_v: Annotated[Volts, Meta(description="voltage at the piezo after park; default: the offset")] | None = None
     turn: Annotated[
         Normalised, Meta(description="turning point: fraction of the period in which the axis moves forward")
@@ -125,28 +125,67 @@ class SlowAxis(FastAxis, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class Dac(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The converter. Code c gives v_min + (v_max - v_min) c / 2^bits."""
+    """The converter of both axes, or of one. Code c gives v_min + (v_max - v_min) c / 2^bits.
 
-    bits: Annotated[int, Meta(ge=8, le=24, description="resolution; the arithmetic uses straight codes 0..2^bits - 1")]
-    coding: Annotated[
-        Literal["offset-binary", "twos-complement"], Meta(description="coding of the word that is sent")
-    ] = "offset-binary"
-    v_min: Annotated[Volts, Meta(description="voltage at code 0")]
-    v_max: Annotated[Volts, Meta(description="voltage one LSB above the highest code")]
-    update_rate_hz: Annotated[float, Meta(ge=1.0, le=1e9, description="ticks per second, for both axes")]
-    align: Annotated[Literal["right", "left"], Meta(description="alignment of the code in the word that is sent")] = (
-        "right"
-    )
+    Each key may stand in the scan file or in the scanner file; ``config/hardware.py`` puts them together.
+    """
+
+    bits: (
+        Annotated[
+            int,
+            Meta(ge=8, le=24, description="required; resolution, one for both axes; straight codes 0..2^bits - 1"),
+        ]
+        | None
+    ) = None
+    coding: (
+        Annotated[
+            Literal["offset-binary", "twos-complement"],
+            Meta(description="coding of the word that is sent; default: offset-binary"),
+        ]
+        | None
+    ) = None
+    v_min: Annotated[Volts, Meta(description="required; lowest voltage, at code 0")] | None = None
+    v_max: Annotated[Volts, Meta(description="required; voltage one LSB above the highest")] | None = None
+    inverted: (
+        Annotated[
+            bool,
+            Meta(
+                description="complementary codes, every bit inverted: code 0 gives the highest voltage, the last "
+                "one v_min; default: false"
+            ),
+        ]
+        | None
+    ) = None
+    output: (
+        Annotated[
+            Literal["A", "B"],
+            Meta(description="output of a dual converter that drives this axis; default: A for x, B for y"),
+        ]
+        | None
+    ) = None
+    update_rate_hz: (
+        Annotated[float, Meta(ge=1.0, le=1e9, description="required; ticks per second, for both axes")] | None
+    ) = None
+    align: (
+        Annotated[
+            Literal["right", "left"],
+            Meta(description="alignment of the code in the word that is sent; default: right"),
+        ]
+        | None
+    ) = None
     word_bits: (
         Annotated[int, Meta(ge=8, le=32, description="bits of the word that is sent; default: `bits`")] | None
     ) = None
 
 
 class Amplifier(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Piezo voltage = gain * converter voltage + bias_v."""
+    """Piezo voltage = gain * converter voltage + bias_v; of both axes, or of one."""
 
-    gain: Annotated[float, Meta(ge=-1e4, le=1e4, description="gain of the amplifier; negative if it inverts")]
-    bias_v: Annotated[Volts, Meta(description="piezo voltage if the converter outputs 0 V")] = 0.0
+    gain: (
+        Annotated[float, Meta(ge=-1e4, le=1e4, description="required; gain of the amplifier; negative if it inverts")]
+        | None
+    ) = None
+    bias_v: Annotated[Volts, Meta(description="piezo voltage if the converter outputs 0 V; default: 0")] | None = None
     max_slew_v_per_s: Annotated[float, Meta(ge=1e-3, le=1e12, description="maximum slew rate at the piezo")] | None = (
         None
     )
@@ -219,8 +258,12 @@ class Scan(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     name: Annotated[Identifier, Meta(description="prefix of every emitted file and identifier")]
     scanner: Annotated[FileName, Meta(description="path of the scanner file, relative to the scan file")]
-    dac: Dac
-    amplifier: Amplifier
+    dac: Annotated[
+        Dac, Meta(description="The converter of both axes; keys that the scanner file has can be left out.")
+    ] = Dac()
+    amplifier: Annotated[
+        Amplifier, Meta(description="The amplifier of both axes; keys that the scanner file has can be left out.")
+    ] = Amplifier()
     timing: Timing
     x: FastAxis
     y: SlowAxis

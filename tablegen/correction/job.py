@@ -264,15 +264,15 @@ def _model(scanner: Path) -> ScannerModel:
 
 def _axis(model: ScannerModel, axis: Literal["x", "y"], taken: OldAxis, rate_hz: float) -> AxisScan:
     """A triangle."""
-    v_max = model.scanner.v_max
+    driver = model.scanner.driver
     size_v = taken.size_v
     if size_v is None and taken.size_nm is not None:
-        size_v = v_max * size_law_of(getattr(model.scanner, axis).size, v_max).voltage(taken.size_nm)
+        size_v = driver.span * size_law_of(getattr(model.scanner, axis).size, driver).voltage(taken.size_nm)
     if size_v is None:
         raise Unphysical(
             "the drive is not known; give --size-v, the scan voltage at the piezo, or --size-nm, or --scan"
         )
-    offset_v = 0.5 * v_max if taken.offset_v is None else taken.offset_v
+    offset_v = driver.middle if taken.offset_v is None else taken.offset_v
     return AxisScan(triangle(size_v, offset_v, taken.turn), rate_hz, taken.turn, taken.window)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from tablegen.compensation import models
 from tablegen.compensation.frequency import frequency_gain
 from tablegen.compensation.line import WantedLine
-from tablegen.compensation.offset import OffsetLaw, normalised_offset
+from tablegen.compensation.offset import OffsetLaw
 from tablegen.compensation.offset_sizes import OffsetSurface
 from tablegen.compensation.operator.settled import settled
 from tablegen.compensation.size import SizeLaw
@@ -23,7 +23,7 @@ from tablegen.problems import Document, Problems, Rejected, Unphysical
 _COUNT = 8192  # drives of a period
 _HARMONICS = 512  # on which creep and dynamics act
 _ROUNDS = 30  # of a contraction that leaves less than a tenth of an error
-_BEYOND = 1e-3  # of v_max: by how much a drive may leave the driver's range in its last digits
+_BEYOND = 1e-3  # of the driver's range: by how much a drive may leave the driver's range in its last digits
 
 Waveform = Callable[[Floats], Floats]  # of times in periods, 0 where the sweep there begins
 
@@ -76,20 +76,20 @@ class ScannerModel:
         Raises ``Rejected`` with the keys that do not serve, ``Unphysical`` for a drive that the driver cannot have.
         """
         its: ScannerAxis = getattr(self.scanner, axis)
-        v_max = self.scanner.v_max
+        driver = self.scanner.driver
         drive = scan.drive()
         low, high = float(np.min(drive)), float(np.max(drive))
         for volts in (low, high):
-            if not -_BEYOND * v_max <= volts <= (1.0 + _BEYOND) * v_max:
-                raise Unphysical(f"{axis}: {outside_driver(volts, v_max)}")
+            if driver.beyond(volts, volts) > _BEYOND * driver.span:
+                raise Unphysical(f"{axis}: {outside_driver(volts, driver)}")
         problems = Problems()
         size_law: SizeLaw | None = None
         with problems.at(self.file, f"{axis}.size.base_nm"):
-            size_law = size_law_of(its.size, v_max)
+            size_law = size_law_of(its.size, driver)
         surface = OffsetSurface.everywhere(OffsetLaw())
         if its.offset is not None and size_law is not None:
             with problems.at(self.file, f"{axis}.offset"):
-                surface = offset_surface(its.offset, v_max, size_law)
+                surface = offset_surface(its.offset, driver, size_law)
         gain, law = 1.0, its.frequency
         if law is not None:
             with problems.at(self.file, f"{axis}.frequency.alpha"):
@@ -100,14 +100,14 @@ class ScannerModel:
                 response = dynamics_of(its.resonance, self.folder)
         problems.stop_if_any()
         assert size_law is not None
-        amplitude, offset_v = (high - low) / v_max, float(np.mean(drive))
-        share = _scan_share(surface, normalised_offset(offset_v, v_max), gain, amplitude)
+        amplitude, offset_v = (high - low) / driver.span, float(np.mean(drive))
+        share = _scan_share(surface, driver.p(offset_v), gain, amplitude)
         hysteresis = models.get(models.UNCOMPENSATED)() if its.hysteresis is None else its.hysteresis
         wanted = WantedLine(
             axis=axis,
             turn=scan.turn,
             v=share,
-            v_max=v_max,
+            driver=driver,
             v_amplitude=high - low,
             v_offset=offset_v,
             size_nm=size_law.size_nm(share),
@@ -117,19 +117,19 @@ class ScannerModel:
             both=True,
             response=response,
             max_boost_db=0.0 if its.resonance is None else its.resonance.max_boost_db,
-            factor_at=lambda v: surface.small.factor(normalised_offset(v * v_max, v_max)),
+            factor_at=lambda v: surface.small.factor(driver.p(driver.volts(v))),
             rate_gain=None if law is None else lambda hz: frequency_gain(hz, law.alpha, law.reference_hz),
             folder=self.folder,
             scan_file=Document("the image", None),
             scanner_file=self.file,
             problems=problems,
         )
-        found = hysteresis.loop(wanted, low / v_max, high / v_max)
+        found = hysteresis.loop(wanted, driver.share(low), driver.share(high))
         problems.stop_if_any()
         if found is None:
             raise Rejected(problems.found)
         loop, creep = found
-        return settled(loop, drive / v_max, scan.rate_hz, creep, response, _HARMONICS)
+        return settled(loop, driver.share(drive), scan.rate_hz, creep, response, _HARMONICS)
 
 
 def _scan_share(surface: OffsetSurface, p: float, gain: float, amplitude: float) -> float:

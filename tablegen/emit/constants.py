@@ -67,6 +67,7 @@ def axis_constants(program: Program, harmonics: int) -> dict[str, int]:
         "DAC_WORD_BITS": output.word_bits,
         "DAC_TWOS_COMPLEMENT": int(output.coding == "twos-complement"),
         "DAC_LEFT_ALIGNED": int(output.align == "left"),
+        **({"DAC_OUTPUT": "AB".index(output.channel)} if output.channel else {}),
     }
 
 

@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 from math import ceil, floor
 
-from tablegen.config.schema import Amplifier, Dac
+from tablegen.config.hardware import AxisAmplifier, AxisDac
+from tablegen.driver import Driver
 from tablegen.fixedpoint.interpolation import guard_bits
 from tablegen.fixedpoint.output import UNIT_GAIN_BITS, Output
 from tablegen.fixedpoint.rounding import round_number
@@ -18,10 +19,14 @@ class Converter:
     bits: int
 
     @classmethod
-    def of(cls, dac: Dac, amplifier: Amplifier) -> "Converter":
-        """The chain of converter and amplifier; v_per_code has the sign of the amplifier's gain."""
+    def of(cls, dac: AxisDac, amplifier: AxisAmplifier) -> "Converter":
+        """The chain of converter and amplifier.
+
+        v_per_code has the sign of the amplifier's gain, and the other one where the converter's codes are inverted.
+        """
         lsb = (dac.v_max - dac.v_min) / float(1 << dac.bits)
-        return cls(amplifier.gain * dac.v_min + amplifier.bias_v, amplifier.gain * lsb, dac.bits)
+        first, step = (dac.highest_v, -lsb) if dac.inverted else (dac.v_min, lsb)
+        return cls(amplifier.gain * first + amplifier.bias_v, amplifier.gain * step, dac.bits)
 
     def code(self, volts: float) -> float:
         """The code, as a real number, of a voltage at the piezo."""
@@ -42,18 +47,18 @@ def fit_gain(amplitude: float, peak: float, bits: int, dac_bits: int) -> tuple[i
 
 
 def make_output(
-    dac: Dac,
+    dac: AxisDac,
     converter: Converter,
-    v_max: float,
+    driver: Driver,
     v_offset: float,
     v_park: float,
     bits: int,
     gain_word: int,
     max_step: int,
 ) -> Output:
-    """The output stage of one axis; the clamp keeps the piezo inside 0..v_max and the code inside the converter."""
+    """The output stage of one axis; the clamp keeps the piezo in the driver's range, the code in the converter's."""
     gain_q = UNIT_GAIN_BITS + bits + guard_bits(bits) - dac.bits
-    ends = sorted((converter.code(0.0), converter.code(v_max)))
+    ends = sorted((converter.code(driver.v_min), converter.code(driver.v_max)))
     # A millionth of a code forgives the last bits of the voltages, not the voltages.
     code_min, code_max = max(0, ceil(ends[0] - 1e-6)), min((1 << dac.bits) - 1, floor(ends[1] + 1e-6))
     return Output(
@@ -68,4 +73,5 @@ def make_output(
         coding=dac.coding,
         align=dac.align,
         word_bits=dac.word_bits if dac.word_bits is not None else dac.bits,
+        channel=dac.output or "",
     )

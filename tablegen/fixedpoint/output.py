@@ -17,7 +17,8 @@ class Output:
     """code = clamp(round((gain_word sample + offset_word) / 2^gain_q), code_min, code_max), ties up.
 
     Codes are straight binary, 0 at the converter's v_min; ``offset_word`` is the offset in codes with ``gain_q``
-    fraction bits, ``offset_code`` the nearest whole code to it.
+    fraction bits, ``offset_code`` the nearest whole code to it. ``channel`` is the output of a dual converter, A or B,
+    where the configuration says it; the arithmetic is the same on both.
     """
 
     gain_word: int
@@ -31,6 +32,7 @@ class Output:
     coding: str
     align: str
     word_bits: int
+    channel: str = ""
 
     @property
     def offset_code(self) -> int:

@@ -113,8 +113,14 @@ class ManifestTable(Struct):
     words: Annotated[list[Annotated[int, Meta(ge=-(1 << 23), lt=1 << 23)]], Meta(min_length=1, max_length=1 << 20)]
 
 
+CONVERTER_KEYS = ("v_zero", "v_per_code", "coding", "align", "word_bits")  # of an output: its converter and amplifier
+
+
 class ManifestOutput(Struct):
-    """The output stage, and volts of its codes."""
+    """The output stage, and volts of its codes; ``own_hardware`` of y where they are not those of x.
+
+    ``channel`` is the output of a dual converter, if that was said.
+    """
 
     gain_word: Number
     gain_q: Number
@@ -130,6 +136,8 @@ class ManifestOutput(Struct):
     coding: Literal["offset-binary", "twos-complement"]
     align: Literal["right", "left"]
     word_bits: Annotated[int, Meta(ge=8, le=32)]
+    own_hardware: bool = False
+    channel: Literal["", "A", "B"] = ""
 
 
 class ManifestFigure(Struct):
@@ -208,6 +216,7 @@ class ManifestAxis(Struct):
                 coding=output.coding,
                 align=output.align,
                 word_bits=output.word_bits,
+                channel=output.channel,
             ),
         )
 

@@ -172,6 +172,9 @@ def _wrong_axes(manifest: Manifest) -> list[str]:
         ):
             if not right:
                 wrong.append(f"axes.{name}.{why}")
+    channels = (manifest.axes.x.output.channel, manifest.axes.y.output.channel)
+    if channels not in (("", ""), ("A", "B"), ("B", "A")):
+        wrong.append(f"axes.x and axes.y are on outputs {channels[0]!r} and {channels[1]!r}")
     if manifest.axes.x.output.dac_bits != manifest.axes.y.output.dac_bits:
         wrong.append("axes.x and axes.y differ in output.dac_bits")
     return wrong

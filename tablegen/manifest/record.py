@@ -11,18 +11,18 @@ from tablegen.certificate.line_errors import Refined, ScalingError
 from tablegen.compensation.dynamics import capped_inverse
 from tablegen.compensation.expectation import Expectation, Figure
 from tablegen.device.schedule import Schedule, Window
+from tablegen.manifest.fields import CONVERTER_KEYS
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, Plan
 
 
 def plan_record(plan: Plan) -> dict[str, Any]:
     """Everything that decides what a device plays, as JSON-ready data: axes and schedule."""
-    return {
-        "name": plan.name,
-        "scanner": plan.scanner,
-        "sequence": _sequence(plan.schedule),
-        "axes": {line.axis: _axis(line) for line in plan.lines},
-    }
+    axes = {line.axis: _axis(line) for line in plan.lines}
+    x, y = axes["x"]["output"], axes["y"]["output"]
+    if any(x[key] != y[key] for key in CONVERTER_KEYS):
+        y["own_hardware"] = True
+    return {"name": plan.name, "scanner": plan.scanner, "sequence": _sequence(plan.schedule), "axes": axes}
 
 
 def certificate_record(certificate: Certificate) -> dict[str, Any]:
@@ -194,5 +194,6 @@ def _axis(line: LinePlan) -> dict[str, Any]:
             "coding": output.coding,
             "align": output.align,
             "word_bits": output.word_bits,
+            **({"channel": output.channel} if output.channel else {}),
         },
     }

@@ -9,13 +9,14 @@ from tablegen.compensation.dynamics import Response, SecondOrder
 from tablegen.compensation.frequency import frequency_gain
 from tablegen.compensation.line import AppliedBranch, LineShape, WantedLine
 from tablegen.compensation.model import Hysteresis
-from tablegen.compensation.offset import OffsetLaw, normalised_offset
+from tablegen.compensation.offset import OffsetLaw
 from tablegen.compensation.offset_sizes import OffsetSurface, surface_of
 from tablegen.compensation.response_file import read_response
 from tablegen.compensation.size import SizeLaw
 from tablegen.config.load import Setup
 from tablegen.config.scanner import Offset, Resonance, ScannerAxis, Size
 from tablegen.config.schema import FastAxis
+from tablegen.driver import Driver
 from tablegen.figures import at_most
 from tablegen.problems import Problems, Unphysical
 
@@ -30,7 +31,7 @@ class Drive:
     model names, and their SHA-256.
     """
 
-    v_max: float
+    driver: Driver
     v_offset: float
     position_nm: float
     size_nm: float
@@ -72,7 +73,7 @@ class Drive:
 
     def v_amplitude_at(self, v_offset: float) -> float:
         """What ``v_amplitude`` would be at another offset voltage."""
-        return self.offset_law.factor(normalised_offset(v_offset, self.v_max)) * self.g * self.v_scan
+        return self.offset_law.factor(self.driver.p(v_offset)) * self.g * self.v_scan
 
 
 def compensate(setup: Setup, axis: str, rate_hz: float, harmonics: int, problems: Problems) -> Drive | None:
@@ -82,28 +83,28 @@ def compensate(setup: Setup, axis: str, rate_hz: float, harmonics: int, problems
     """
     scan: FastAxis = getattr(setup.scan, axis)
     scanner: ScannerAxis = getattr(setup.scanner, axis)
-    v_max = setup.scanner.v_max
+    driver = setup.scanner.driver
     scan_file, scanner_file = setup.scan_file, setup.scanner_file
     before = len(problems.found)
 
     size_law = None
     with problems.at(scanner_file, f"{axis}.size.base_nm"):
-        size_law = size_law_of(scanner.size, v_max)
+        size_law = size_law_of(scanner.size, driver)
     surface = OffsetSurface.everywhere(OffsetLaw())
     if scanner.offset is not None and size_law is not None:
         _check_points(setup, axis, problems)
         with problems.at(scanner_file, f"{axis}.offset{'.points' if scanner.offset.points is not None else ''}"):
-            surface = offset_surface(scanner.offset, v_max, size_law)
+            surface = offset_surface(scanner.offset, driver, size_law)
 
-    v_offset = 0.5 * v_max
+    v_offset = driver.middle
     if scan.offset_v is not None:
         v_offset = scan.offset_v
         with problems.at(scan_file, f"{axis}.offset_v"):
-            if not 0.0 <= v_offset <= v_max:
-                raise Unphysical(outside_driver(v_offset, v_max))
+            if driver.beyond(v_offset, v_offset) > 0.0:
+                raise Unphysical(outside_driver(v_offset, driver))
     elif scan.offset_nm is not None:
         with problems.at(scan_file, f"{axis}.offset_nm"):
-            v_offset = surface.small.voltage_at(scan.offset_nm, v_max, scanner.size.k_nm_per_v)
+            v_offset = surface.small.voltage_at(scan.offset_nm, driver, scanner.size.k_nm_per_v)
 
     low, high = scan.band_limit.window
     v, size_nm = 0.0, 0.0
@@ -119,9 +120,9 @@ def compensate(setup: Setup, axis: str, rate_hz: float, harmonics: int, problems
                 raise Unphysical(f"its line of {reason}, a window of {window_nm} nm") from None
     elif size_law is not None and scan.size_v is not None:
         with problems.at(scan_file, f"{axis}.size_v"):
-            if scan.size_v > v_max:
-                raise Unphysical(f"{scan.size_v:g} V is above v_max = {v_max:g} V")
-            v = scan.size_v / v_max
+            if scan.size_v > driver.span:
+                raise Unphysical(f"{scan.size_v:g} V is above {driver.full_scale}")
+            v = scan.size_v / driver.span
             size_nm = size_law.size_nm(v)
 
     g = 1.0
@@ -129,7 +130,7 @@ def compensate(setup: Setup, axis: str, rate_hz: float, harmonics: int, problems
         with problems.at(scanner_file, f"{axis}.frequency.alpha"):
             g = frequency_gain(rate_hz, scanner.frequency.alpha, scanner.frequency.reference_hz)
 
-    p = normalised_offset(v_offset, v_max)
+    p = driver.p(v_offset)
     offset_law = surface.at(v)
     m = offset_law.factor(p)
     response, max_boost_db, law = None, 0.0, scanner.frequency
@@ -143,8 +144,8 @@ def compensate(setup: Setup, axis: str, rate_hz: float, harmonics: int, problems
         axis=axis,
         turn=scan.turn,
         v=v,
-        v_max=v_max,
-        v_amplitude=m * g * v * v_max,
+        driver=driver,
+        v_amplitude=m * g * v * driver.span,
         v_offset=v_offset,
         size_nm=size_nm,
         rate_hz=rate_hz,
@@ -153,7 +154,7 @@ def compensate(setup: Setup, axis: str, rate_hz: float, harmonics: int, problems
         both=scan.band_limit.directions == "both",
         response=response,
         max_boost_db=max_boost_db,
-        factor_at=lambda share: surface.small.factor(normalised_offset(share * v_max, v_max)),
+        factor_at=lambda share: surface.small.factor(driver.p(driver.volts(share))),
         rate_gain=None if law is None else lambda hz: frequency_gain(hz, law.alpha, law.reference_hz),
         folder=setup.scanner_folder,
         scan_file=scan_file,
@@ -170,12 +171,12 @@ def compensate(setup: Setup, axis: str, rate_hz: float, harmonics: int, problems
     if len(problems.found) > before or shape is None or size_law is None:
         return None
     return Drive(
-        v_max=v_max,
+        driver=driver,
         v_offset=v_offset,
-        position_nm=surface.small.position_nm(v_offset, v_max, scanner.size.k_nm_per_v),
+        position_nm=surface.small.position_nm(v_offset, driver, scanner.size.k_nm_per_v),
         size_nm=size_nm,
         window_nm=size_nm * (high - low),
-        v_scan=v * v_max,
+        v_scan=v * driver.span,
         v_scan_normalised=v,
         p_offset=p,
         m=m,
@@ -195,44 +196,43 @@ def compensate(setup: Setup, axis: str, rate_hz: float, harmonics: int, problems
     )
 
 
-def outside_driver(volts: float, v_max: float) -> str:
+def outside_driver(volts: float, driver: Driver) -> str:
     """Say that a voltage is outside the driver's range, and by how much."""
-    by = max(-volts, volts - v_max)
-    return f"{volts:.6g} V is outside the driver's 0..{v_max:g} V, by {by:.4g} V"
+    return f"{volts:.6g} V is outside the driver's {driver}, by {driver.beyond(volts, volts):.4g} V"
 
 
 def _check_points(setup: Setup, axis: str, problems: Problems) -> None:
     """No point can have been measured where the driver does not reach."""
-    v_max = setup.scanner.v_max
+    driver = setup.scanner.driver
     offset: Offset = getattr(setup.scanner, axis).offset
     for i, point in enumerate(offset.points or []):
-        if not 0.0 <= point.offset_v <= v_max:
+        if driver.beyond(point.offset_v, point.offset_v) > 0.0:
             key = f"{axis}.offset.points[{i}].offset_v"
-            problems.add(setup.scanner_file, key, outside_driver(point.offset_v, v_max))
+            problems.add(setup.scanner_file, key, outside_driver(point.offset_v, driver))
     sizes = [("points", i, point.size_v) for i, point in enumerate(offset.points or [])]
     sizes += [("sizes", i, entry.size_v) for i, entry in enumerate(offset.sizes or [])]
     for name, i, size_v in sizes:
-        if size_v is not None and size_v > v_max:
-            why = f"{size_v:g} V is above v_max = {v_max:g} V"
+        if size_v is not None and size_v > driver.span:
+            why = f"{size_v:g} V is above {driver.full_scale}"
             problems.add(setup.scanner_file, f"{axis}.offset.{name}[{i}].size_v", why)
 
 
-def size_law_of(size: Size, v_max: float) -> SizeLaw:
+def size_law_of(size: Size, driver: Driver) -> SizeLaw:
     """The law of a scanner file. Raises ``Unphysical``."""
-    return SizeLaw.calibrated(size.k_nm_per_v, v_max, size.beta, size.base_nm, size.v_threshold)
+    return SizeLaw.calibrated(size.k_nm_per_v, driver.span, size.beta, size.base_nm, size.v_threshold)
 
 
-def offset_surface(offset: Offset, v_max: float, size: SizeLaw) -> OffsetSurface:
+def offset_surface(offset: Offset, driver: Driver, size: SizeLaw) -> OffsetSurface:
     """m of a scanner file over offset and size; ``size`` serves points with ``size_v`` alone. Raises ``Unphysical``."""
     if offset.sizes is not None:
         entries = sorted(offset.sizes, key=lambda entry: entry.size_v)
-        laws = [(entry.size_v / v_max, OffsetLaw.from_ends(entry.m_minus, entry.m_plus)) for entry in entries]
+        laws = [(entry.size_v / driver.span, OffsetLaw.from_ends(entry.m_minus, entry.m_plus)) for entry in entries]
         return OffsetSurface(tuple(laws))
     if offset.points is not None:
         points = [(point.offset_v, point.apparent_nm, point.size_v or 0.0) for point in offset.points]
         if offset.points[0].size_v is not None:
-            return surface_of(points, size, v_max)
-        p = [normalised_offset(volts, v_max) for volts, _, _ in points]
+            return surface_of(points, size, driver)
+        p = [driver.p(volts) for volts, _, _ in points]
         return OffsetSurface.everywhere(OffsetLaw.fit(p, [apparent for _, apparent, _ in points]))
     if offset.m_minus is not None and offset.m_plus is not None:
         return OffsetSurface.everywhere(OffsetLaw.from_ends(offset.m_minus, offset.m_plus))

@@ -8,8 +8,10 @@ from math import ceil, copysign, floor
 
 import numpy as np
 
+from tablegen.config.hardware import AxisAmplifier, AxisDac
 from tablegen.config.load import Setup
-from tablegen.config.schema import Amplifier, Dac, FastAxis
+from tablegen.config.schema import FastAxis
+from tablegen.driver import Driver
 from tablegen.figures import at_least, at_most
 from tablegen.fixedpoint.converter import Converter
 from tablegen.fixedpoint.interpolation import guard_bits
@@ -32,10 +34,18 @@ class Feasibility:
         self._axis = axis
         self._problems = problems
         self._scan: FastAxis = getattr(setup.scan, axis)
+        self._hardware = setup.hardware(axis)
         self._steps = getattr(self._scan, "motion", "ramp") == "step"
 
     def _add(self, key: str, why: str) -> None:
         self._problems.add(self._setup.scan_file, key, why)
+
+    def _add_hardware(self, key: str, why: str) -> None:
+        """At a key such as "amplifier.gain", wherever the one of this axis stands."""
+        self._problems.note(self._setup.hardware_problem(self._axis, key, why))
+
+    def _named(self, key: str) -> str:
+        return self._setup.named(self._axis, key)
 
     def harmonics(self, rate: Fraction, period: int) -> int:
         """The highest harmonic to play of a rate in Hz, where the table advances ``period`` times a period."""
@@ -91,48 +101,48 @@ class Feasibility:
 
     def check_range(self, drive: Drive, converter: Converter, low: float, high: float) -> None:
         """The drive, for w from ``low`` to ``high``, has to stay inside the driver and inside the converter."""
-        self._check_park(drive.v_max, converter)
+        self._check_park(drive.driver, converter)
         down, up = drive.v_amplitude * (0.5 - low), drive.v_amplitude * (high - 0.5)
         bottom, top = drive.v_offset - down, drive.v_offset + up
-        outside = max(-bottom, top - drive.v_max)
-        if outside > 1e-9 * drive.v_max:
+        outside = drive.driver.beyond(bottom, top)
+        if outside > 1e-9 * drive.driver.span:
             self._add(
                 self._size_key,
                 f"the drive spans {bottom:.4f}..{top:.4f} V, {outside:.4g} V outside the driver's "
-                f"0..{drive.v_max:g} V; {_offsets_that_fit(drive, low, high)}, {self._size_that_fits(drive, down, up)}",
+                f"{drive.driver}; {_offsets_that_fit(drive, low, high)}, {self._size_that_fits(drive, down, up)}",
             )
             return
         ends = sorted((converter.code(bottom), converter.code(top)))
         last = (1 << converter.bits) - 1
         if ends[0] < -0.5 or ends[1] >= last + 0.5:
-            dac, amplifier = self._setup.scan.dac, self._setup.scan.amplifier
+            dac, amplifier = self._hardware.dac, self._hardware.amplifier
             volts = sorted((v - amplifier.bias_v) / amplifier.gain for v in (bottom, top))
-            highest = dac.v_max - (dac.v_max - dac.v_min) / float(last + 1)
-            beyond = max(dac.v_min - volts[0], volts[1] - highest)
-            self._add(
+            beyond = max(dac.v_min - volts[0], volts[1] - dac.highest_v)
+            self._add_hardware(
                 "amplifier.gain",
                 f"the {self._axis} drive of {bottom:.4f}..{top:.4f} V needs {volts[0]:.4f}..{volts[1]:.4f} V of the "
-                f"converter, {beyond:.4g} V beyond its {dac.v_min:g}..{highest:.6g} V; "
+                f"converter, {beyond:.4g} V beyond its {dac.v_min:g}..{dac.highest_v:.6g} V; "
                 f"{_amplifier_that_fits(dac, amplifier, bottom, top)} would carry it, or scan less",
             )
         if abs(ends[1] - ends[0]) < 2.0:
             self._add(
                 self._size_key,
                 f"the drive of {down + up:.4g} V is {ends[1] - ends[0]:.3g} codes of the converter, which cannot "
-                f"draw a line; scan more, or use more dac.bits or less amplifier.gain",
+                f"draw a line; scan more, or use more {self._named('dac.bits')} or less "
+                f"{self._named('amplifier.gain')}",
             )
 
     @property
     def _size_key(self) -> str:
         return f"{self._axis}.{'size_v' if self._scan.size_v is not None else 'size_nm'}"
 
-    def _check_park(self, v_max: float, converter: Converter) -> None:
+    def _check_park(self, driver: Driver, converter: Converter) -> None:
         """The park voltage has to be one that the driver and the converter reach."""
         park_v, key = self._scan.park_v, f"{self._axis}.park_v"
         if park_v is None:
             return
-        if not 0.0 <= park_v <= v_max:
-            self._add(key, outside_driver(park_v, v_max))
+        if driver.beyond(park_v, park_v) > 0.0:
+            self._add(key, outside_driver(park_v, driver))
             return
         last = (1 << converter.bits) - 1
         if not -0.5 <= converter.code(park_v) < last + 0.5:
@@ -141,13 +151,13 @@ class Feasibility:
 
     def _size_that_fits(self, drive: Drive, down: float, up: float) -> str:
         """The largest scan at this offset, as its key counts it."""
-        share = min(drive.v_offset / down, (drive.v_max - drive.v_offset) / up)
+        share = min((drive.v_offset - drive.driver.v_min) / down, (drive.driver.v_max - drive.v_offset) / up)
         if share < 1e-3:
             return "at this one nothing"
         v = 0.99 * share * drive.v_scan_normalised  # a smaller line has another shape, and overshoots a little more
         line_nm = drive.size_law.size_nm(v)
         if self._scan.size_v is not None:
-            return f"or at this offset about {at_most(v * drive.v_max, 3)} V"
+            return f"or at this offset about {at_most(v * drive.driver.span, 3)} V"
         if self._scan.size_of == "window":
             return f"or at this offset a window of about {at_most(line_nm * drive.window_nm / drive.size_nm, 3)} nm"
         return f"or at this offset a line of about {at_most(line_nm, 3)} nm"
@@ -162,10 +172,10 @@ class Feasibility:
         words = self._word_codes(drive, converter, largest, period)
         steepest = ceil(slope / v_per_code / period + words) + 1
         last = (1 << converter.bits) - 1
-        slew = self._setup.scan.amplifier.max_slew_v_per_s
+        slew = self._hardware.amplifier.max_slew_v_per_s
         if slew is None:
             return min(2 * steepest, last)
-        update_rate = self._setup.scan.dac.update_rate_hz
+        update_rate = self._hardware.dac.update_rate_hz
         allowed = min(floor(slew / update_rate / v_per_code), last)
         asked = slope * rate_hz
         if steepest <= allowed and (self._steps or asked <= slew):
@@ -180,11 +190,11 @@ class Feasibility:
         elif allowed <= 1.0 + words and asked < 0.9 * slew:
             # Room to round both sides, and for the line rate, which moves a little with it.
             fits = at_most(0.95 * (slew - asked) / ((3.0 + words) * v_per_code))
-            self._add(
+            self._add_hardware(
                 "amplifier.max_slew_v_per_s",
                 f"{slew:.6g} V/s are {slew / update_rate / v_per_code:.3g} codes of the {self._axis} axis in a tick, "
                 f"and a line needs {floor(words) + 2}; "
-                f"an update_rate_hz of about {fits}{finer} or more dac.bits would fit",
+                f"an update_rate_hz of about {fits}{finer} or more {self._named('dac.bits')} would fit",
             )
         else:
             usable = (allowed - 1.0 - words) * v_per_code * update_rate if allowed > 1.0 + words else 0.5 * slew
@@ -231,28 +241,29 @@ class Feasibility:
         return "timing.line_rate_hz", f"{at_most(timing.line_rate_hz / times, 5)} Hz"
 
 
-def _amplifier_that_fits(dac: Dac, amplifier: Amplifier, bottom: float, top: float) -> str:
+def _amplifier_that_fits(dac: AxisDac, amplifier: AxisAmplifier, bottom: float, top: float) -> str:
     """The amplifier that spreads the converter over a drive, and no further."""
-    highest = dac.v_max - (dac.v_max - dac.v_min) / float(1 << dac.bits)
-    gain = copysign(float(at_least(1.0001 * (top - bottom) / (highest - dac.v_min))), amplifier.gain)
-    bias_v = 0.5 * (bottom + top) - gain * 0.5 * (dac.v_min + highest)
+    gain = copysign(float(at_least(1.0001 * (top - bottom) / (dac.highest_v - dac.v_min))), amplifier.gain)
+    bias_v = 0.5 * (bottom + top) - gain * 0.5 * (dac.v_min + dac.highest_v)
     return f"a gain of {gain:g} with a bias_v of {bias_v:.6g} V"
 
 
 def _offsets_that_fit(drive: Drive, low: float, high: float) -> str:
     """At which offsets the drive stays inside the driver; its amplitude changes with the offset by (1)."""
 
+    driver = drive.driver
+
     def fits(v_offset: float) -> bool:
         amplitude = drive.v_amplitude_at(v_offset)
-        return amplitude * (0.5 - low) <= v_offset <= drive.v_max - amplitude * (high - 0.5)
+        return driver.v_min + amplitude * (0.5 - low) <= v_offset <= driver.v_max - amplitude * (high - 0.5)
 
-    grid = [drive.v_max * i / 1000 for i in range(1001)]
+    grid = [driver.v_min + driver.span * i / 1000 for i in range(1001)]
     good = [v for v in grid if fits(v)]
     if not good:
         least = min(drive.v_amplitude_at(v) for v in grid) * (high - low)
         return (
             f"it takes at least {at_least(least)} V, so that no offset fits"
-            if least > drive.v_max
+            if least > driver.span
             else "no offset fits"
         )
     # The nearest stretch of the grid without a gap.

@@ -73,7 +73,7 @@ class LinePlan:
 
     @property
     def codes_per_unit(self) -> float:
-        """Codes that w = 0 and w = 1 are apart; negative where the amplifier inverts."""
+        """Codes that w = 0 and w = 1 are apart; negative where the amplifier or the codes are inverted."""
         return self.drive.v_amplitude / self.converter.v_per_code
 
     def codes(self, start: int, stop: int) -> Ints:
@@ -175,7 +175,8 @@ def _line_plan(setup: Setup, axis: Literal["x", "y"], schedule: Schedule, proble
             at_piezo, held = _through_inverse(target, drive, float(rate))
     series = at_piezo.times(*hold_inverse(harmonics, period, steps=hold > 1))
 
-    converter = Converter.of(setup.scan.dac, setup.scan.amplifier)
+    hardware = setup.hardware(axis)
+    converter = Converter.of(hardware.dac, hardware.amplifier)
     w = series.on_grid(32 * harmonics)
     low, high = float(np.min(w)), float(np.max(w))
     largest = max(1.0, abs(2.0 * low - 1.0), abs(2.0 * high - 1.0))
@@ -190,7 +191,7 @@ def _line_plan(setup: Setup, axis: Literal["x", "y"], schedule: Schedule, proble
     amplitude = 0.5 * drive.v_amplitude / converter.v_per_code  # codes for 2 w - 1 = 1
     gain_word, scale = fit_gain(amplitude, peak, bits, converter.bits)
     park_v = drive.v_offset if scan.park_v is None else scan.park_v
-    output = make_output(setup.scan.dac, converter, drive.v_max, drive.v_offset, park_v, bits, gain_word, max_step)
+    output = make_output(hardware.dac, converter, drive.driver, drive.v_offset, park_v, bits, gain_word, max_step)
     fourier = encode(series.a0, series.a, series.b, scale)
     program = Program(RationalPhase(period), hold, scan.table.mode, bits, synthesize(fourier, length, bits), output)
     return LinePlan(

@@ -17,7 +17,7 @@ from tablegen.waveform.series import FourierSeries
 
 # How far a scan may be from the one at which a layer was learnt: docs/refine.md has what it is worth at the edges.
 AMPLITUDE_REACH = 0.05  # relative difference
-OFFSET_REACH = 0.05  # share of v_max
+OFFSET_REACH = 0.05  # share of the driver's range
 RATE_REACH = 0.2  # relative difference
 TURN_REACH = 0.02
 WINDOW_REACH = 0.02  # share of the line beyond the measured window
@@ -53,7 +53,7 @@ def learnt_layer(
     refinement = scan.refinement
     if refinement is None:
         return None
-    faults = _faults(refinement, scan, drive, rate_hz, setup.scanner.v_max)
+    faults = _faults(refinement, scan, drive, rate_hz, setup.scanner.driver.span)
     if len(refinement.a) > harmonics:
         why = f"{len(refinement.a)} harmonics, and the band limit passes {harmonics}"
         faults.append(("a", why))
@@ -69,17 +69,17 @@ def _remedy(axis: str) -> str:
     return f"remove [{axis}.refinement], build, and run tablegen refine on a new trace"
 
 
-def _faults(learnt: Refinement, scan: FastAxis, drive: Drive, rate_hz: float, v_max: float) -> list[tuple[str, str]]:
+def _faults(learnt: Refinement, scan: FastAxis, drive: Drive, rate_hz: float, span: float) -> list[tuple[str, str]]:
     """By which keys the scan is another one than that at which the layer was learnt."""
     faults = []
     if abs(drive.v_amplitude - learnt.v_amplitude) > AMPLITUDE_REACH * learnt.v_amplitude:
         by = 100.0 * (drive.v_amplitude / learnt.v_amplitude - 1.0)
         why = f"learnt at {learnt.v_amplitude:.6g} V, this scan drives {drive.v_amplitude:.6g} V"
         faults.append(("v_amplitude", f"{why}, {by:+.3g} % of it; up to {100 * AMPLITUDE_REACH:g} % are served"))
-    if abs(drive.v_offset - learnt.v_offset) > OFFSET_REACH * v_max:
+    if abs(drive.v_offset - learnt.v_offset) > OFFSET_REACH * span:
         why = f"learnt at {learnt.v_offset:.6g} V, this scan is at {drive.v_offset:.6g} V"
         by = drive.v_offset - learnt.v_offset
-        faults.append(("v_offset", f"{why}, {by:+.4g} V off; up to {OFFSET_REACH * v_max:g} V are served"))
+        faults.append(("v_offset", f"{why}, {by:+.4g} V off; up to {OFFSET_REACH * span:g} V are served"))
     if abs(rate_hz - learnt.rate_hz) > RATE_REACH * learnt.rate_hz:
         by = 100.0 * (rate_hz / learnt.rate_hz - 1.0)
         why = f"learnt at {learnt.rate_hz:.6g} Hz, this scan has {rate_hz:.6g} Hz"

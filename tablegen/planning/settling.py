@@ -56,7 +56,7 @@ def settling(axis: str, drive: Drive, schedule: Schedule) -> Settling | None:
     slowest_s = transients[0].measured_s
     return Settling(
         lines,
-        OFFSET_CHANGE * drive.v_max,
+        OFFSET_CHANGE * drive.driver.span,
         bound,
         after_offset,
         after_size,

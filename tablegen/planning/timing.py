@@ -25,7 +25,7 @@ def make_schedule(setup: Setup, problems: Problems) -> Schedule | None:
     scan = setup.scan
     timing = scan.timing
     before = len(problems.found)
-    rate = exact(scan.dac.update_rate_hz)
+    rate = exact(setup.hardware("x").dac.update_rate_hz)
     ticks = _line_ticks(setup, rate, problems)
     if len(problems.found) > before:
         return None

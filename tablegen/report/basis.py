@@ -76,12 +76,12 @@ def _comments(file: Document) -> Iterator[tuple[str, str, str]]:
 def _traces(line: LinePlan) -> list[Grid]:
     if not isinstance(line.drive.shape, OperatorLine):
         return []
-    v_max = line.drive.v_max
+    driver = line.drive.driver
     rows = tuple(
         row(
             Path(one.name).name,
-            f"{one.stroke * v_max:.4g}",
-            f"{one.centre * v_max:.4g}",
+            f"{one.stroke * driver.span:.4g}",
+            f"{driver.volts(one.centre):.4g}",
             f"{one.rate_hz:.4g}",
             *(f"{value:.2g}" for value in one.left_out[:3]),
             f"{one.left_out[3]:+.2g}",
@@ -94,6 +94,10 @@ def _traces(line: LinePlan) -> list[Grid]:
 
 def _values(setup: Setup) -> Iterator[tuple[str, str]]:
     yield "v_max", f"{setup.scanner.v_max:g} V"
+    if setup.scanner.v_min != 0.0:
+        yield "v_min", f"{setup.scanner.v_min:g} V"
+    for part in ("dac", "amplifier"):
+        yield from _flat(part, msgspec.to_builtins(getattr(setup.scanner, part)))
     for axis in ("x", "y"):
         yield from _flat(axis, msgspec.to_builtins(getattr(setup.scanner, axis)))
 

@@ -27,7 +27,7 @@ def corrections(subject: Subject) -> Section:
 def _steps(entry: ManifestAxis, line: LinePlan | None) -> list[tuple[TableCell, ...]]:
     drive, fourier, rows = entry.drive, entry.fourier, []
     if line is not None:
-        share = drive.size_nm / line.drive.size_law.size_nm(1e-6) * 1e-6 * line.drive.v_max
+        share = drive.size_nm / line.drive.size_law.size_nm(1e-6) * 1e-6 * line.drive.driver.span
         rows.append(row("asked for", "", "", f"{drive.size_nm:.6g} nm line, {share:.6g} V at the slope of small scans"))
         rows.append(row("size", "(9), (12)", f"{drive.v_scan / share:.5f}", f"V_scan = {drive.v_scan:.6g} V"))
     else:

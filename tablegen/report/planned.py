@@ -26,7 +26,9 @@ def planned_scan(
     tell("measuring every tick of a line and a frame")
     certificates = certify(plan)
     tell("looking for remedies")
-    broken = broken_limits(plan, certificates, setup.scan_file, partial(limit_advice, setup, plan, certificates))
+    broken = broken_limits(
+        plan, certificates, setup.scan_file, partial(limit_advice, setup, plan, certificates), setup.hardware_problem
+    )
     warnings = weighed(plan, certificates, scan_warnings(setup, plan, certificates))
     tell("writing the formats")
     try:

@@ -6,7 +6,7 @@ from tablegen.certificate.excess import LARGEST_PERCENT
 from tablegen.config.schema import Limits
 from tablegen.manifest.fields import ManifestAxis, ManifestCertificate, ManifestFigure
 from tablegen.report.blocks import Grid, Paragraph, Section, TableCell, row
-from tablegen.report.subject import Subject
+from tablegen.report.subject import PlannedScan, Subject
 from tablegen.report.words import figure
 
 _HEAD = ("", "figure", "limit", "")
@@ -16,9 +16,12 @@ def certificate(subject: Subject) -> Section:
     """A table an axis."""
     planned = subject.planned
     limits = Limits() if planned is None else planned.plan.limits
-    slew = None if planned is None else planned.setup.scan.amplifier.max_slew_v_per_s
     tables = [
-        Grid(f"{axis} axis, measured over all {entry.line.ticks} ticks", _HEAD, tuple(_rows(entry, limits, slew)))
+        Grid(
+            f"{axis} axis, measured over all {entry.line.ticks} ticks",
+            _HEAD,
+            tuple(_rows(entry, limits, _slew(planned, axis))),
+        )
         for axis, entry in subject.axes
     ]
     tables.append(_parts(subject))
@@ -36,6 +39,10 @@ def certificate(subject: Subject) -> Section:
         (*tables, Paragraph("Scaling errors without a limit of their own are marked above 1 %.", "quiet")),
         lead,
     )
+
+
+def _slew(planned: PlannedScan | None, axis: str) -> float | None:
+    return None if planned is None else planned.setup.hardware(axis).amplifier.max_slew_v_per_s
 
 
 def _rows(entry: ManifestAxis, limits: Limits, slew: float | None) -> list[tuple[TableCell, ...]]:

@@ -5,7 +5,7 @@ from fractions import Fraction
 import numpy as np
 
 from tablegen.compensation.models.operator import OperatorLine
-from tablegen.compensation.offset import OffsetLaw, normalised_offset
+from tablegen.compensation.offset import OffsetLaw
 from tablegen.compensation.offset_sizes import OffsetSurface
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.drive import offset_surface
@@ -42,7 +42,7 @@ def _axis(planned: PlannedScan, line: LinePlan) -> tuple[Chart, list[str]]:
             DrawnCurve(
                 "traces of the operator",
                 "backward",
-                np.array([trace.centre for trace in traces]) * drive.v_max,
+                drive.driver.volts(np.array([trace.centre for trace in traces])),
                 np.array([drive.size_law.size_nm(min(one / (drive.m * drive.g), 1.0)) for one in v.tolist()]),
                 "points",
             )
@@ -61,7 +61,7 @@ def _axis(planned: PlannedScan, line: LinePlan) -> tuple[Chart, list[str]]:
         "size of the line [nm]",
         tuple(curves),
         marks=(Mark(drive.v_offset, ""), Mark(drive.size_nm, "", "y")),
-        x_range=(0.0, drive.v_max),
+        x_range=(drive.driver.v_min, drive.driver.v_max),
         y_range=(0.0, top),
     )
     return chart, words
@@ -69,24 +69,24 @@ def _axis(planned: PlannedScan, line: LinePlan) -> tuple[Chart, list[str]]:
 
 def largest_sizes(planned: PlannedScan, line: LinePlan) -> tuple[Floats, Floats, str]:
     """Offsets in V, the largest line at each in nm, and what bounds it at this scan's offset."""
-    drive, v_max = line.drive, line.drive.v_max
+    drive, driver = line.drive, line.drive.driver
     w = line.series.on_grid(32 * line.series.harmonics)
     low, high = float(np.min(w)), float(np.max(w))
     ends = sorted(
         line.converter.v_zero + line.converter.v_per_code * code for code in (0, (1 << line.converter.bits) - 1)
     )
-    bottom, top = max(0.0, ends[0]), min(v_max, ends[1])
-    slew = planned.setup.scan.amplifier.max_slew_v_per_s
+    bottom, top = max(driver.v_min, ends[0]), min(driver.v_max, ends[1])
+    slew = planned.setup.hardware(line.axis).amplifier.max_slew_v_per_s
     fastest = np.inf if slew is None else slew / (line.series.peak_slope() * float(Fraction(line.rate)))
     surface = _surface(planned, line)
     v = np.linspace(0.0, 1.0, _SIZES)[1:]
     sizes = np.array([drive.size_law.size_nm(one) for one in v.tolist()])
     laws = [surface.at(one) for one in v.tolist()]
-    offsets = np.linspace(0.0, v_max, _OFFSETS)
+    offsets = np.linspace(driver.v_min, driver.v_max, _OFFSETS)
     largest = np.zeros(_OFFSETS)
     for i, offset in enumerate(offsets.tolist()):
-        p = normalised_offset(offset, v_max)
-        amplitude = np.array([law.factor(p) for law in laws]) * drive.g * v * v_max
+        p = driver.p(offset)
+        amplitude = np.array([law.factor(p) for law in laws]) * drive.g * v * driver.span
         room = min((offset - bottom) / max(0.5 - low, 1e-9), (top - offset) / max(high - 0.5, 1e-9), fastest)
         fits = amplitude <= room * (1.0 + 1e-9)
         largest[i] = float(sizes[fits][-1]) if fits[0] else 0.0
@@ -94,9 +94,9 @@ def largest_sizes(planned: PlannedScan, line: LinePlan) -> tuple[Floats, Floats,
         (drive.v_offset - bottom) / (0.5 - low), (top - drive.v_offset) / (high - 0.5)
     ):
         return offsets, largest, "The slew rate of the amplifier bounds it."
-    if bottom > 1e-3 * v_max or top < 0.999 * v_max:
-        return offsets, largest, f"The converter reaches {bottom:.4g}..{top:.4g} V of the driver's 0..{v_max:g} V."
-    return offsets, largest, f"The driver's 0..{v_max:g} V bound it."
+    if bottom > driver.volts(1e-3) or top < driver.volts(0.999):
+        return offsets, largest, f"The converter reaches {bottom:.4g}..{top:.4g} V of the driver's {driver}."
+    return offsets, largest, f"The driver's {driver} bound it."
 
 
 def _surface(planned: PlannedScan, line: LinePlan) -> OffsetSurface:
@@ -104,4 +104,4 @@ def _surface(planned: PlannedScan, line: LinePlan) -> OffsetSurface:
     axis = getattr(planned.setup.scanner, line.axis)
     if axis.offset is None:
         return OffsetSurface.everywhere(OffsetLaw())
-    return offset_surface(axis.offset, line.drive.v_max, line.drive.size_law)
+    return offset_surface(axis.offset, line.drive.driver, line.drive.size_law)

@@ -9,7 +9,7 @@ from tablegen.fixedpoint.interpolation import guard_bits
 from tablegen.fixedpoint.output import UNIT_GAIN_BITS
 from tablegen.fixedpoint.rounding import round_number
 from tablegen.fixedpoint.synthesis import FourierWords, encode, synthesize
-from tablegen.manifest.fields import Manifest, ManifestAxis
+from tablegen.manifest.fields import CONVERTER_KEYS, Manifest, ManifestAxis
 from tablegen.manifest.read import StoredBuild
 
 _RELATIVE = 1e-9  # of floats that went through JSON and a handful of operations
@@ -30,13 +30,22 @@ def wrong_derived(stored: StoredBuild) -> tuple[int, list[str]]:
         ("axes.y.drive.v_scan_normalised", _close(*ranges), f"of {ranges[1]:g} V, of x it is of {ranges[0]:g} V"),
         ("axes.y.line.requested_hz", _close(told, right), f"{told}, that of x makes it {right}"),
     ]
-    for key in ("v_zero", "v_per_code", "coding", "align", "word_bits"):
-        mine, other = getattr(y.output, key), getattr(x.output, key)
-        checks.append((f"axes.y.output.{key}", mine == other, f"{mine}, of x it is {other}"))
+    checks += _hardware(x, y)
     return len(checks), [f"{key} is {why}" for key, right, why in checks if not right]
 
 
 Found = list[tuple[str, bool, str]]
+
+
+def _hardware(x: ManifestAxis, y: ManifestAxis) -> Found:
+    """Converter and amplifier of y are those of x, unless the manifest says that they are not."""
+    pairs = [(key, getattr(y.output, key), getattr(x.output, key)) for key in CONVERTER_KEYS]
+    if y.output.own_hardware:
+        apart = any(mine != other for _, mine, other in pairs)
+        found: Found = [("axes.y.output.own_hardware", apart, "stated, and nothing of it differs from that of x")]
+    else:
+        found = [(f"axes.y.output.{key}", mine == other, f"{mine}, of x it is {other}") for key, mine, other in pairs]
+    return [*found, ("axes.x.output.own_hardware", not x.output.own_hardware, "stated, and only y can")]
 
 
 def _sequence(manifest: Manifest) -> Found:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from tablegen.installation import install_advice
+from tablegen.verification.model_cache import keep_model, kept_model, model_key
 
 SIMULATORS = ("icarus", "verilator")
 # What Icarus 11 is known to accept; Verilator needs the timing mode for the clock that the benches make in Verilog.
@@ -83,14 +84,24 @@ class Compiled:
             raise SimulationFailed(_tail(log)) from None
 
 
-def compile_design(simulator: str, design: Design, folder: Path) -> Compiled:
-    """Compile into ``folder``, which is made; ``build.log`` is written there."""
+def compile_design(simulator: str, design: Design, folder: Path, *, kept: bool = False) -> Compiled:
+    """Compile into ``folder``, which is made; ``build.log`` is written there.
+
+    With ``kept``, a model of Verilator is taken from the cache of compiled models, or put there. Its parameters then
+    must not name its folder.
+    """
     require(simulator)
     from cocotb_tools.runner import get_runner
 
     folder.mkdir(parents=True, exist_ok=True)
-    runner, log = get_runner(simulator), folder / "build.log"
+    runner, log, model, key = get_runner(simulator), folder / "build.log", folder / design.top, ""
     with _environment(simulator, folder):
+        if kept and simulator == "verilator":
+            arguments = _BUILD_ARGUMENTS[simulator]
+            key = model_key(design.sources, design.includes, design.parameters, design.top, *arguments)
+            if found := kept_model(key):
+                shutil.copy(found, model)
+                return Compiled(simulator, design.top, folder, runner)
         try:
             runner.build(
                 sources=[path.resolve() for path in design.sources],
@@ -104,6 +115,8 @@ def compile_design(simulator: str, design: Design, folder: Path) -> Compiled:
             )
         except (RuntimeError, SystemExit):
             raise SimulationFailed(_tail(log)) from None
+    if key:
+        keep_model(key, model)
     return Compiled(simulator, design.top, folder, runner)
 
 

@@ -29,7 +29,8 @@ module verify_bench #(
     parameter X_POWER_UP_CODE = 0, parameter Y_POWER_UP_CODE = 0
 );
 `include "{header}"
-    localparam WORD_BITS = {X}_DAC_WORD_BITS;
+    // Both words come over wires of the same length, the narrower one behind zeros.
+    localparam WORD_BITS = {X}_DAC_WORD_BITS > {Y}_DAC_WORD_BITS ? {X}_DAC_WORD_BITS : {Y}_DAC_WORD_BITS;
 
     stream_bench #(
         .SCRIPT(SCRIPT), .CAPTURE(CAPTURE), .STATES(STATES), .DAC_BITS({X}_DAC_BITS),
@@ -56,15 +57,17 @@ module verify_bench #(
     generate
         if (CONVERTERS) begin : converters
             wire clock = bench.clock, strobe = bench.strobe;
-            wire [WORD_BITS-1:0] x_word, y_word;
+            wire [{X}_DAC_WORD_BITS-1:0] x_own;
+            wire [{Y}_DAC_WORD_BITS-1:0] y_own;
+            wire [WORD_BITS-1:0] x_word = x_own, y_word = y_own;
             dac_coding #(
-                .BITS({X}_DAC_BITS), .WORD_BITS(WORD_BITS), .TWOS_COMPLEMENT({X}_DAC_TWOS_COMPLEMENT),
+                .BITS({X}_DAC_BITS), .WORD_BITS({X}_DAC_WORD_BITS), .TWOS_COMPLEMENT({X}_DAC_TWOS_COMPLEMENT),
                 .LEFT_ALIGNED({X}_DAC_LEFT_ALIGNED)
-            ) x_coding (.code(bench.x_code), .word(x_word));
+            ) x_coding (.code(bench.x_code), .word(x_own));
             dac_coding #(
-                .BITS({Y}_DAC_BITS), .WORD_BITS(WORD_BITS), .TWOS_COMPLEMENT({Y}_DAC_TWOS_COMPLEMENT),
+                .BITS({Y}_DAC_BITS), .WORD_BITS({Y}_DAC_WORD_BITS), .TWOS_COMPLEMENT({Y}_DAC_TWOS_COMPLEMENT),
                 .LEFT_ALIGNED({Y}_DAC_LEFT_ALIGNED)
-            ) y_coding (.code(bench.y_code), .word(y_word));
+            ) y_coding (.code(bench.y_code), .word(y_own));
 
             // Strobes that come late enough are sent to two serial converters.
             integer words, wires, last = -{spacing} - 1;  // the clock of the last strobe
@@ -140,11 +143,14 @@ def bench_text(content: Content, index_bits: tuple[int, int]) -> str:
     )
 
 
-def bench_parameters(folder: Path, script: str, capture: str, converters: bool) -> dict[str, int | str]:
-    """The files that the bench reads and writes, all in its folder; words and wires only with ``converters``."""
+def bench_parameters(script: str, capture: str, converters: bool) -> dict[str, int | str]:
+    """The files that the bench reads and writes in the folder of its run; words and wires only with ``converters``.
+
+    They are named from the folder in which the model runs, so that the model is the same wherever that is.
+    """
     names = {"SCRIPT": script, "CAPTURE": capture, "STATES": STATES, "WORDS": WORDS, "WIRES": WIRES}
-    files: dict[str, int | str] = {key: str(folder / name) for key, name in names.items()}
-    return {**files, "CONSTANTS": str(folder / CONSTANTS), "CONVERTERS": int(converters), "COUNT_BITS": COUNT_BITS}
+    files: dict[str, int | str] = {key: f"../{name}" for key, name in names.items()}
+    return {**files, "CONSTANTS": f"../{CONSTANTS}", "CONVERTERS": int(converters), "COUNT_BITS": COUNT_BITS}
 
 
 def different_constants(folder: Path, content: Content) -> list[str]:

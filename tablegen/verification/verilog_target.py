@@ -181,10 +181,10 @@ class SimulatedRun:
             "sources": [str(path) for path in (*sources, STREAM_BENCH, bench)],
             "includes": [str(sources[0].parent)],
             "parameters": {
-                **bench_parameters(folder, SCRIPT, CAPTURE, self.session.wired_ticks > 0),
+                **bench_parameters(SCRIPT, CAPTURE, self.session.wired_ticks > 0),
                 "X_POWER_UP_CODE": script.power_up[0],
                 "Y_POWER_UP_CODE": script.power_up[1],
-                **self.placement.parameters(harmonics, str(folder / _SINE)),
+                **self.placement.parameters(harmonics, f"../{_SINE}"),
             },
             "clocks": script.clocks,
         }
@@ -203,7 +203,8 @@ def play_job(folder: Path, job: dict[str, Any]) -> dict[str, Any]:
     """Compile and play the script that stands in ``folder``; in a process that can be ended. The bench's counters."""
     sources, includes = ([Path(path) for path in job[key]] for key in ("sources", "includes"))
     design = Design(sources, TOP, job["parameters"], includes)
-    return run_bench(compile_design(job["simulator"], design, folder / job["simulator"]), folder, job["clocks"])
+    compiled = compile_design(job["simulator"], design, folder / job["simulator"], kept=True)
+    return run_bench(compiled, folder, job["clocks"])
 
 
 def _memories(folder: Path, work: Path, stored: StoredBuild, placement: Placement) -> tuple[Memories | None, list[str]]:

@@ -66,11 +66,13 @@ def size_map(
     sizes: Sequence[float] = MAP_SIZES,
 ) -> Floats:
     """Error of the size in the image, in percent, a row an offset and a column a size, both as shares of full scale."""
-    v_max, k = setup.scanner.v_max, setup.scanner.x.size.k_nm_per_v
+    driver, k = setup.scanner.driver, setup.scanner.x.size.k_nm_per_v
     return np.array(
         [
             [
-                play_x(with_scan(setup, size_nm=share * k * v_max, offset_v=at * v_max), scanner).size_error_percent
+                play_x(
+                    with_scan(setup, size_nm=share * k * driver.span, offset_v=driver.volts(at)), scanner
+                ).size_error_percent
                 for share in sizes
             ]
             for at in offsets

@@ -58,11 +58,11 @@ def apparent_sizes(
     seed: int = 0,
     turn: float = 0.5,
 ) -> dict[str, Floats]:
-    """``offset_v``, ``apparent_nm``: how large an object looks in a scan of ``size_v``, calibrated at v_max / 2.
+    """``offset_v``, ``apparent_nm``: how large an object looks in a scan of ``size_v``, calibrated at the middle.
 
     ``noise`` is relative, rms.
     """
-    middle = triangle_size(axis, size_v, 0.5 * axis.v_max, rate_hz, turn)
+    middle = triangle_size(axis, size_v, axis.driver.middle, rate_hz, turn)
     ratios = [middle / triangle_size(axis, size_v, offset, rate_hz, turn) for offset in offsets_v]
     return {"offset_v": np.array(offsets_v, dtype=np.float64), "apparent_nm": true_nm * _noisy(ratios, noise, seed)}
 
@@ -77,8 +77,8 @@ def actual_sizes(
     seed: int = 0,
     turn: float = 0.5,
 ) -> dict[str, Floats]:
-    """``nominal_nm``, ``actual_nm``: sizes set with a linear k, and those reached; by default at v_max / 2."""
-    offset = 0.5 * axis.v_max if offset_v is None else offset_v
+    """``nominal_nm``, ``actual_nm``: sizes set with a linear k, and those reached; by default at the middle."""
+    offset = axis.driver.middle if offset_v is None else offset_v
     sizes = [triangle_size(axis, nominal / k_nm_per_v, offset, rate_hz, turn) for nominal in nominal_nm]
     return {"nominal_nm": np.array(nominal_nm, dtype=np.float64), "actual_nm": _noisy(sizes, noise, seed)}
 

@@ -102,7 +102,7 @@ class _Day:
         self._imaged = imaged
         self._axis, self._noise, self._seed = axis, noise, seed
         self._before: ScannerAxis = getattr(setup.scanner, name)
-        self._v_max = setup.scanner.v_max
+        self._driver = setup.scanner.driver
         self._turn: float = getattr(setup.scan, name).turn
         timing = setup.scan.timing
         self._rate_hz = timing.line_rate_hz if name == "x" else timing.line_rate_hz / timing.lines
@@ -124,7 +124,7 @@ class _Day:
                 resonance = self._resonance(self._before.resonance)
             except Unphysical:
                 if traces:  # of two reasons that of the hysteresis is told: without it there is nothing to correct
-                    fit_hysteresis(traces, self._v_max)
+                    fit_hysteresis(traces, self._driver)
                 raise
             # A build undoes this lag by the resonance; left in the loops, it would be undone by them once more.
             lag_s = 1.0 / (2.0 * pi * resonance.frequency_hz.value * resonance.quality.value)
@@ -132,7 +132,7 @@ class _Day:
         fits: dict[str, Fit] = {
             "offset": offset,
             "size": size,
-            "hysteresis": imaged or fit_hysteresis(traces, self._v_max, delay_s=delay_s),
+            "hysteresis": imaged or fit_hysteresis(traces, self._driver, delay_s=delay_s),
             "frequency": fit_frequency(gains["frequency_hz"], gains["gain"], self._reference_hz),
         }
         if resonance is not None:
@@ -158,15 +158,15 @@ class _Day:
     def _offset(self, size: SizeFit, sizes: Sequence[float]) -> Fit:
         """From images of one object, at five offsets each; of a large scan closer to the middle, so that it fits."""
         k, beta, threshold = size.k_nm_per_v.value, size.beta.value, size.v_threshold.value
-        law = SizeLaw.calibrated(k, self._v_max, beta, size.base_nm, threshold)
+        law = SizeLaw.calibrated(k, self._driver.span, beta, size.base_nm, threshold)
         found = []
         for share in sizes:
             room = min(1.0, OFFSET_ROOM * (1.0 - share) / (OFFSETS[-1] - OFFSETS[0])) if len(sizes) > 1 else 1.0
-            volts = [self._v_max * (0.5 + room * (offset - 0.5)) for offset in OFFSETS]
-            size_v = share * self._v_max
+            volts = [self._driver.volts(0.5 + room * (offset - 0.5)) for offset in OFFSETS]
+            size_v = share * self._driver.span
             if self._imaged:
                 taken = self._images([(size_v, offset) for offset in volts])
-                nm, errors = apparent_of(taken, law, self._v_max, SAMPLES_SEEN)
+                nm, errors = apparent_of(taken, law, self._driver, SAMPLES_SEEN)
                 found.append((np.array(volts), nm, np.full(len(volts), size_v), errors))
                 continue
             seen = apparent_sizes(
@@ -176,22 +176,22 @@ class _Day:
             found.append((seen["offset_v"], seen["apparent_nm"], np.full(len(volts), size_v), unknown))
         offset_v, apparent_nm, size_v_each, errors = (np.concatenate(column) for column in zip(*found, strict=True))
         known = errors if self._imaged else None
-        return fit_offset_sizes(offset_v, apparent_nm, size_v_each, self._v_max, law, known)
+        return fit_offset_sizes(offset_v, apparent_nm, size_v_each, self._driver, law, known)
 
     def _size(self) -> SizeFit:
         size = self._before.size
         if self._imaged:
-            drives = [share * self._v_max for share in IMAGED_SIZES]
-            taken = self._images([(volts, 0.5 * self._v_max) for volts in drives])
+            drives = [share * self._driver.span for share in IMAGED_SIZES]
+            taken = self._images([(volts, self._driver.middle) for volts in drives])
             return fit_size(
                 np.array(drives),
                 taken.nm,
-                self._v_max,
+                self._driver,
                 size.base_nm,
                 errors_nm=taken.errors_nm,
                 shared=taken.shared,
             )
-        nominal = [share * self._v_max * size.k_nm_per_v for share in SIZES]
+        nominal = [share * self._driver.span * size.k_nm_per_v for share in SIZES]
         found = actual_sizes(
             self._axis,
             nominal,
@@ -202,7 +202,7 @@ class _Day:
             turn=self._turn,
         )
         return fit_size(
-            found["nominal_nm"] / size.k_nm_per_v, found["actual_nm"], self._v_max, size.base_nm, None, "relative"
+            found["nominal_nm"] / size.k_nm_per_v, found["actual_nm"], self._driver, size.base_nm, None, "relative"
         )
 
     def _images(self, scans: Sequence[tuple[float, float]]) -> ImageSizes:
@@ -212,7 +212,7 @@ class _Day:
         """
         taken = []
         for volts, offset in scans:
-            sample = hexagonal(LATTICE_NM) if volts <= SMALL_IMAGE * self._v_max else grating(GRATING_NM)
+            sample = hexagonal(LATTICE_NM) if volts <= SMALL_IMAGE * self._driver.span else grating(GRATING_NM)
             random = np.random.default_rng(self._next())
             slope, drift = random.uniform(-IMAGE_SLOPE, IMAGE_SLOPE, 2), float(random.uniform(-1.0, 1.0)) * IMAGE_DRIFT
             tilted = _tilted(sample, slope)
@@ -227,17 +227,17 @@ class _Day:
                 seed=self._next(),
             )
             taken.append(SampleImage(f"{volts:g} V at {offset:g} V", volts, offset, trace, retrace))
-        return sizes_of(taken, self._v_max, SAMPLES_SEEN, Taking(turn=self._turn))
+        return sizes_of(taken, self._driver, SAMPLES_SEEN, Taking(turn=self._turn))
 
     def _traces(self, amplitudes: Sequence[float]) -> list[Trace]:
         traces = []
         for share in amplitudes:
-            volts = share * self._v_max
+            volts = share * self._driver.span
             rate = self._rate_at(volts)
             size_nm = volts * self._before.size.k_nm_per_v
             sensor = Sensor(noise_nm=self._noise * size_nm, seed=self._next())
             found = sensor_trace(
-                self._axis, volts, 0.5 * self._v_max, rate, PERIODS, SAMPLES, turn=self._turn, sensor=sensor
+                self._axis, volts, self._driver.middle, rate, PERIODS, SAMPLES, turn=self._turn, sensor=sensor
             )
             traces.append(Trace(f"{volts:g} V", found["time_s"], found["drive_v"], found["displacement_nm"]))
         return traces
@@ -246,13 +246,13 @@ class _Day:
         """The same from images: of a lattice where the line is short, of a grating where it is long."""
         pairs = []
         for share in amplitudes:
-            volts = share * self._v_max
+            volts = share * self._driver.span
             rate = self._rate_at(volts)
             sample = hexagonal(LATTICE_NM) if share <= SMALL_IMAGE else grating(GRATING_NM)
-            middle, seed = 0.5 * self._v_max, self._next()
+            middle, seed = self._driver.middle, self._next()
             trace, retrace = image_pair(self._axis, sample, volts, middle, rate, turn=self._turn, seed=seed)
             pairs.append(Pair(f"{volts:g} V", volts, trace, retrace))
-        return fit_images(pairs, self._v_max, turn=self._turn)
+        return fit_images(pairs, self._driver, turn=self._turn)
 
     def _rate_at(self, volts: float) -> float:
         """The rate, in Hz, with the scan's tip velocity, and no faster than the scan, as the paper does."""

@@ -89,7 +89,7 @@ def _axis(setup: Setup, name: str, line: LinePlan, seed: int, tell: Callable[[st
     table = _table(setup, name)
     assert isinstance(table, OperatorModel)
     found = operator_line(line)
-    operator, centre = found.operator, line.drive.v_offset / line.drive.v_max
+    operator, centre = found.operator, line.drive.driver.share(line.drive.v_offset)
     plants = [OwnAxis.departing(line, (seed, k)) for k in range(SEEDS)]
     rows = []
     for correction, model in (("uncompensated", models.UNCOMPENSATED), ("laws", _laws(table)), (table.model(),) * 2):

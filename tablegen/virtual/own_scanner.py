@@ -13,6 +13,7 @@ from tablegen.compensation.models.operator import OperatorLine
 from tablegen.compensation.operator.field import Field, Lengths, covariance
 from tablegen.compensation.operator.operator import Operator
 from tablegen.compensation.operator.settled import settled
+from tablegen.driver import Driver
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan
 
@@ -43,7 +44,7 @@ class OwnAxis:
 
     operator: Operator
     factor: float
-    v_max: float
+    driver: Driver
     response: Response | None
     harmonics: int
 
@@ -52,7 +53,7 @@ class OwnAxis:
         """At the offset and the rate of a line that was found on an operator; ``operator`` replaces that one."""
         shape = operator_line(line)
         drive = line.drive
-        return cls(operator or shape.operator, shape.factor, drive.v_max, drive.response, line.series.harmonics)
+        return cls(operator or shape.operator, shape.factor, drive.driver, drive.response, line.series.harmonics)
 
     @classmethod
     def departing(cls, line: LinePlan, seed: tuple[int, ...]) -> "OwnAxis":
@@ -67,7 +68,7 @@ class OwnAxis:
 
         Raises ``Unphysical`` where a departing branch would run backwards.
         """
-        u = volts / self.v_max
+        u = self.driver.share(volts)
         loop = self.operator.loop(float(np.min(u)), float(np.max(u)), self.factor, float(np.mean(u)))
         rate_hz = 1.0 / (len(u) * tick_s)
         return settled(loop, u, rate_hz, self.operator.creep, self.response, self.harmonics)

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from tablegen.config.scanner import Scanner, ScannerAxis
+from tablegen.driver import Driver
 from tablegen.numerics.arrays import Floats
 from tablegen.virtual.line_error import ideal_triangle
 from tablegen.virtual.scanner import VirtualAxis, VirtualScanner
@@ -35,18 +36,18 @@ def scaled_to(scanner: VirtualScanner, file: Scanner) -> tuple[VirtualScanner, s
     Frequencies stay. A scanner that goes as far as the file says within 5 % in both axes, over the same range, is
     returned as it is, with an empty text.
     """
-    axes = {name: _scaled(getattr(scanner, name), getattr(file, name), file.v_max) for name in ("x", "y")}
-    same_range = all(axis.v_max == file.v_max for axis in (scanner.x, scanner.y))
+    axes = {name: _scaled(getattr(scanner, name), getattr(file, name), file.driver) for name in ("x", "y")}
+    same_range = all(axis.driver == file.driver for axis in (scanner.x, scanner.y))
     if same_range and all(abs(axis.times - 1.0) <= _SAME for axis in axes.values()):
         return scanner, ""
     k = " and ".join(f"{getattr(file, name).size.k_nm_per_v:g} nm/V in {name}" for name in axes)
-    return VirtualScanner(scanner.name, **axes), f"scaled to 0..{file.v_max:g} V, {k}"
+    return VirtualScanner(scanner.name, **axes), f"scaled to {file.driver}, {k}"
 
 
-def _scaled(axis: VirtualAxis, file: ScannerAxis, v_max: float) -> ScaledAxis:
+def _scaled(axis: VirtualAxis, file: ScannerAxis, driver: Driver) -> ScaledAxis:
     """So that a slow triangle about the middle, of the volts that k gives ``base_nm``, moves ``base_nm``."""
-    share = min(file.size.base_nm / (file.size.k_nm_per_v * v_max), 1.0)
+    share = min(file.size.base_nm / (file.size.k_nm_per_v * driver.span), 1.0)
     drive = 0.5 + share * (ideal_triangle(_TICKS, 0.5) - 0.5)
     moved = float(np.ptp(axis.hysteresis.settled(drive)))
     kept: dict[str, Any] = {field.name: getattr(axis, field.name) for field in fields(axis)}
-    return ScaledAxis(**{**kept, "v_max": v_max}, times=file.size.k_nm_per_v * share * v_max / moved)
+    return ScaledAxis(**{**kept, "driver": driver}, times=file.size.k_nm_per_v * share * driver.span / moved)

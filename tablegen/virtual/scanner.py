@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from tablegen.driver import Driver
 from tablegen.numerics.arrays import Floats, FloatsLike
 from tablegen.virtual import parameters
 from tablegen.virtual.creep import logarithmic_creep
@@ -36,9 +37,9 @@ class HysteresisOperator(Protocol):
 
 @dataclass(frozen=True)
 class VirtualAxis:
-    """One axis. Displacements are in nm above the axis at rest at 0 V."""
+    """One axis. Displacements are in nm above the axis at rest at the driver's v_min."""
 
-    v_max: float
+    driver: Driver
     amplifier: Modes
     hysteresis: HysteresisOperator
     sensitivity: tuple[float, ...]
@@ -59,7 +60,7 @@ class VirtualAxis:
             resonance = side_by_side(resonance, second_order(other.frequency_hz, other.quality), other.share)
         remembered = axis.sensitivity_memory_s
         return cls(
-            v_max=v_max,
+            driver=Driver(v_max),
             amplifier=_STRAIGHT if amplifier.bandwidth_hz is None else low_pass(amplifier.bandwidth_hz),
             hysteresis=axis.hysteresis.operator(),
             sensitivity=tuple(axis.sensitivity),
@@ -109,11 +110,11 @@ class VirtualAxis:
         factor = self._sensitivity(mean_v)
         if self.memory is None:
             return np.asarray(factor * displacement, dtype=np.float64)
-        about = self.hysteresis.middle(np.clip(np.asarray(mean_v, dtype=np.float64) / self.v_max, 0.0, 1.0))
+        about = self.hysteresis.middle(np.clip(self.driver.share(np.asarray(mean_v, dtype=np.float64)), 0.0, 1.0))
         return np.asarray(about + factor * (displacement - about), dtype=np.float64)
 
     def _sensitivity(self, mean_v: FloatsLike) -> Floats:
-        return sensitivity(self.sensitivity, 2.0 * np.asarray(mean_v, dtype=np.float64) / self.v_max - 1.0)
+        return sensitivity(self.sensitivity, self.driver.p(np.asarray(mean_v, dtype=np.float64)))
 
     def _normalised(self, volts: Floats) -> Floats:
         """The drive, 0..1; the operator is made for no other.
@@ -121,9 +122,10 @@ class VirtualAxis:
         Rounded, since the last bits of a level that the amplifier holds would else be turning points.
         """
         low, high = float(np.min(volts)), float(np.max(volts))
-        if low < -1e-6 * self.v_max or high > (1.0 + 1e-6) * self.v_max:
-            raise ValueError(f"{low:g}..{high:g} V leaves the 0..{self.v_max:g} V of the virtual scanner")
-        return np.clip(np.rint(volts * (_DRIVE_LEVELS / self.v_max)) / _DRIVE_LEVELS, 0.0, 1.0)
+        driver = self.driver
+        if driver.beyond(low, high) > 1e-6 * driver.span:
+            raise ValueError(f"{low:g}..{high:g} V leaves the {driver} of the virtual scanner")
+        return np.clip(np.rint((volts - driver.v_min) * (_DRIVE_LEVELS / driver.span)) / _DRIVE_LEVELS, 0.0, 1.0)
 
 
 @dataclass(frozen=True)

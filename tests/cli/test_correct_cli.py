@@ -215,6 +215,8 @@ def test_wrong_input_is_named_and_nothing_is_written(lab: Path) -> None:
         (("trace.npy", "retrace.npy"), ("--scanner", "gone.toml", *DRIVE[2:]), "gone.toml"),
         (("trace.npy", "retrace.npy"), ("--scanner", "scan.toml", *DRIVE[2:]), "this is a scan file"),
         (("trace.npy", "retrace.npy"), (*DRIVE, "--offset-v", "20"), "is outside the driver's 0..100 V"),
+        (("trace.npy", "retrace.npy"), (*DRIVE, "--offset-v", "-5"), "x: -50 V is outside the driver's 0..100 V"),
+        (("trace.npy", "retrace.npy"), (*DRIVE, "--slow-offset-v", "-5"), "V is outside the driver's 0..100 V"),
         (("trace.npy", "retrace.npy"), (*DRIVE, "--turn", "0.9"), "the image: x.turn: 0.9 is 0.4 from the nearest"),
         (("trace.npy", "retrace.npy"), (*DRIVE, "--window", "0.9", "0.1"), "window"),
         (("retrace.npy", "trace.npy"), DRIVE, "exchanged"),

@@ -124,7 +124,11 @@ RANGES = [
     case("x.size_nm = 0", says="scan.toml:23: x.size_nm: 0 is below 1e-06"),
     case("x.size_nm = 2e9", says="scan.toml:23: x.size_nm: 2000000000 is above 1000000000"),
     case("- x.size_nm", "x.size_v = 0", says="scan.toml:23: x.size_v: 0 is below 0.001"),
-    case("- x.offset_v", "x.offset_nm = -1", says="scan.toml:23: x.offset_nm: -1 is below 0"),
+    case(
+        "- x.offset_v",
+        "x.offset_nm = -1",
+        says="scan.toml:23: x.offset_nm: -1 nm is outside the 0..980.98 nm that 0..100 V reach",
+    ),
     case("x.park_v = 2e5", says="scan.toml:23: x.park_v: 200000 is above 100000"),
     case("x.band_limit.window = [-0.1, 0.9]", says="scan.toml:30: x.band_limit.window[0]: -0.1 is below 0"),
     case("x.band_limit.window = [0.1, 1.1]", says="scan.toml:30: x.band_limit.window[1]: 1.1 is above 1"),
@@ -280,7 +284,7 @@ KEYS = [
     case("limits.max_error = 1", says="scan.toml:55: limits.max_error: unknown key; max_error_lsb is given as well"),
     case("- dac.bits", says="scan.toml:5: dac.bits: missing; this key is required"),
     case("- timing.lines", says="scan.toml:17: timing.lines: missing; this key is required"),
-    case("- [dac]", says="scan.toml:1: dac: missing; this table is required"),
+    case("- [dac]", says="scan.toml:1: dac: missing; this table is required, here or in the scanner file"),
     case("- [timing]", says="scan.toml:1: timing: missing; this table is required"),
     case("- name", says="scan.toml:1: name: missing; this key is required"),
     case("- scanner", says="scan.toml:1: scanner: missing; this key is required"),
@@ -856,7 +860,7 @@ HYSTERESIS = [
             "apparent_nm = 204 }"
         ),
         says=(
-            "scanner.toml:6: x.offset.points: the amplitude factor falls to -3.594 inside [0, v_max]; it has "
+            "scanner.toml:6: x.offset.points: the amplitude factor falls to -3.594 inside the driver's range; it has "
             "to stay above 0"
         ),
     ),
@@ -882,7 +886,10 @@ HYSTERESIS = [
     ),
     case(
         scanner=("- x.offset.m_minus", "- x.offset.m_plus", "x.offset.alpha = 0.9", "x.offset.beta = -0.5"),
-        says=("scanner.toml:5: x.offset: the amplitude factor falls to -0.4 inside [0, v_max]; it has to stay above 0"),
+        says=(
+            "scanner.toml:5: x.offset: the amplitude factor falls to -0.4 inside the driver's range; it has to stay "
+            "above 0"
+        ),
     ),
     case(
         "x.size_nm = 1350.0",
@@ -1341,7 +1348,8 @@ def test_every_fault_of_both_files_is_reported_in_one_run(here: Path) -> None:
     outcome = run("build", "scan.toml", "-o", "out")
     assert outcome.messages == [
         "scan.toml:2: name: 'wire' is a reserved word of C, C++, Verilog, SystemVerilog or VHDL",
-        "scan.toml:6: dac.hue: unknown key; known here: align, bits, coding, update_rate_hz, v_max, v_min, word_bits",
+        "scan.toml:6: dac.hue: unknown key; known here: align, bits, coding, inverted, output, update_rate_hz, v_max, "
+        "v_min, word_bits",
         "scan.toml:7: dac.bits: 30 is above 24",
         "scan.toml:14: amplifier.gain: nan is not a finite number",
         "scan.toml:18: timing.lines: missing; this key is required",

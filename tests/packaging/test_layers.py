@@ -14,7 +14,7 @@ PACKAGE = Path(tablegen.__file__).parent
 # From the lowest to the highest; a module imports from its own layer and from those before it.
 LAYERS = (
     "version problems interruption reading resources installation figures quantities toml",
-    "numerics",
+    "numerics driver",
     "waveform",
     "compensation",
     "config",

@@ -118,8 +118,11 @@ def test_a_whole_frame_verifies(short: Build) -> None:
 
 
 @pytest.mark.rest
-def test_verilator_finds_the_same(folder: Path) -> None:
-    """A wrong rounding, at the same first tick, and nothing else."""
+def test_verilator_finds_the_same(folder: Path, tmp_path: Path) -> None:
+    """A wrong rounding, at the same first tick, and nothing else; also after the same build was compiled and kept."""
+    for kept, made in ("first", True), ("second", False):
+        assert verify(folder, "--sim", "verilator", "--keep", tmp_path / kept).status == 0
+        assert (tmp_path / kept / "verilator" / "build.log").is_file() == made
     edit(folder / "dac_interpolator.v", "1'b1} + step", "1'b0} + step")
     outcome = verify(folder, "--sim", "verilator")
     assert outcome.status == 5

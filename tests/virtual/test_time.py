@@ -12,6 +12,7 @@ from fine_time import PARTS, followed, linear_setup, mismatch, staircase
 from numpy.typing import NDArray
 
 from tablegen.config.load import Setup
+from tablegen.driver import Driver
 from tablegen.planning import line_plan
 from tablegen.planning.line_plan import Plan, make_plan
 from tablegen.planning.windows import retrace_mismatch
@@ -39,7 +40,7 @@ SIZES = [
 
 def linear(resonance: Modes = STRAIGHT) -> VirtualAxis:
     """An axis of 10 nm/V, without hysteresis."""
-    return VirtualAxis(100.0, STRAIGHT, Preisach((1000.0,), ()), (1.0,), STRAIGHT, resonance)
+    return VirtualAxis(Driver(100.0), STRAIGHT, Preisach((1000.0,), ()), (1.0,), STRAIGHT, resonance)
 
 
 def planned(folder: Path, size: tuple[float, float, float, int, int], resonance: str = "") -> Plan:

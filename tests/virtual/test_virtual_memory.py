@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tablegen.driver import Driver
 from tablegen.virtual.experiments import apparent_sizes, frequency_response, triangle_size
 from tablegen.virtual.line_error import ideal_triangle
 from tablegen.virtual.modes import Modes, delayed, low_pass, second_order, side_by_side
@@ -52,7 +53,7 @@ def test_two_modes_add_up() -> None:
 def with_memory() -> VirtualAxis:
     """10 nm/V, half as much a volt more at the end of the range, and nothing else but the memory."""
     memory = low_pass(0.5 / (np.pi * TAU_S))
-    return VirtualAxis(100.0, STRAIGHT, Preisach((1000.0,), ()), (0.5,), STRAIGHT, STRAIGHT, memory)
+    return VirtualAxis(Driver(100.0), STRAIGHT, Preisach((1000.0,), ()), (0.5,), STRAIGHT, STRAIGHT, memory)
 
 
 def test_the_size_drifts_after_a_step_of_the_offset() -> None:
@@ -72,7 +73,7 @@ def test_the_size_drifts_after_a_step_of_the_offset() -> None:
     assert turned[:, ticks // 2] == pytest.approx(expected[1], abs=0.7)
     assert turned[-1, ticks // 2] - turned[-1, 0] == pytest.approx(100.0 * (1.0 + 0.5 * p[0, -1]), abs=1.0)
     # Negative control: without a memory the sensitivity is that of the whole drive's mean, at once.
-    plain = VirtualAxis(100.0, STRAIGHT, axis.hysteresis, axis.sensitivity, STRAIGHT, STRAIGHT)
+    plain = VirtualAxis(Driver(100.0), STRAIGHT, axis.hysteresis, axis.sensitivity, STRAIGHT, STRAIGHT)
     still = plain.follow(after, 1.0 / ticks).reshape(60, ticks)
     assert np.ptp(still[:, ticks // 2] - still[:, 0]) < 1e-9
 

@@ -1,12 +1,11 @@
 """Matrices of numbers: .npy files, and rows of text."""
 
 import re
-from io import BytesIO
-from math import prod
 
 import numpy as np
 
-from tablegen.calibration.image_formats.channel import MAX_PIXELS, Channel, first_line, loaded
+from tablegen.calibration.image_formats.channel import MAX_PIXELS, Channel, loaded
+from tablegen.calibration.npy import npy_array
 from tablegen.calibration.table import file_text, lines_of
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Problem, Rejected
@@ -18,22 +17,7 @@ def npy_channels(content: bytes, _: str) -> list[Channel]:
     """The images of a .npy file. Raises ``ValueError`` with what is wrong."""
     if content[:2] == b"PK":
         raise ValueError("is an .npz archive; save one array with numpy.save")
-    file = BytesIO(content)
-    try:
-        version = np.lib.format.read_magic(file)
-        read_header = {
-            (1, 0): np.lib.format.read_array_header_1_0,
-            (2, 0): np.lib.format.read_array_header_2_0,
-        }[version]
-        shape, by_columns, kind = read_header(file)
-        if kind.hasobject or kind.itemsize == 0 or len(shape) > 3 or min(shape, default=0) < 0:
-            raise ValueError("no array of numbers in up to three dimensions")
-        if prod(shape) * kind.itemsize > len(content) - file.tell():
-            raise ValueError(f"{len(content) - file.tell()} bytes are fewer than those of {prod(shape)} values")
-        flat = np.frombuffer(content, kind, prod(shape), file.tell())
-        array = flat.reshape(shape, order="F" if by_columns else "C")
-    except Exception as error:  # the header is read by the parser of Python, which raises whatever it meets
-        raise ValueError(f"is not a complete .npy file of numbers ({first_line(error)})") from None
+    array = npy_array(content)[0]
     if array.ndim == 3:
         return [loaded(number, "", image) for number, image in enumerate(array)]
     return [loaded(0, "", array)]

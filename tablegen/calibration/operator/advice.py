@@ -8,6 +8,7 @@ import numpy as np
 from tablegen.calibration.operator.fit import OperatorFit
 from tablegen.calibration.operator.periodic_line import PeriodicLine
 from tablegen.compensation.operator.field import covariance
+from tablegen.driver import Driver
 from tablegen.numerics.arrays import Floats
 
 _STROKES = np.arange(0.1, 1.0, 0.05)
@@ -27,7 +28,7 @@ class NextTrace:
     rate_hz: float | None
 
 
-def next_trace(fit: OperatorFit, lines: Sequence[PeriodicLine], v_max: float) -> NextTrace:
+def next_trace(fit: OperatorFit, lines: Sequence[PeriodicLine], driver: Driver | float) -> NextTrace:
     """The trace that helps most; ``rate_hz`` is another rate than that of all traces, where they have but one."""
     reach = [(s, c) for s in _STROKES for c in _CENTRES if 0.5 * s <= min(c, 1.0 - c) + 1e-9]
     unknown = _unknown(fit, np.array(reach))
@@ -35,7 +36,8 @@ def next_trace(fit: OperatorFit, lines: Sequence[PeriodicLine], v_max: float) ->
     rates = [line.rate_hz for line in lines]
     other = None if max(rates) > _DECADE * min(rates) else 10.0 * max(rates)
     stroke, centre = reach[best]
-    return NextTrace(stroke * v_max, centre * v_max, float(max(unknown[best], 0.0)), other)
+    driver = Driver.of(driver)
+    return NextTrace(stroke * driver.span, driver.volts(centre), float(max(unknown[best], 0.0)), other)
 
 
 def expected_rms(fit: OperatorFit, points: Floats) -> Floats:

@@ -7,13 +7,14 @@ from tablegen.calibration.image_line import fit_line
 from tablegen.calibration.image_scale import size_of_line
 from tablegen.calibration.image_sizes import KnownSample, SampleImage, Taking
 from tablegen.calibration.operator.periodic_line import PHASES, PeriodicLine
+from tablegen.driver import Driver
 from tablegen.problems import Unphysical
 
 _SPANNED = (0.05, 0.95)  # of each sweep: the rest is extrapolated, to 0.4 % of the line on the plants of the tests
 
 
 def imaged_line(
-    image: SampleImage, rate_hz: float, v_max: float, sample: KnownSample, taking: Taking
+    image: SampleImage, rate_hz: float, driver: Driver | float, sample: KnownSample, taking: Taking
 ) -> tuple[PeriodicLine, LineSize]:
     """The line of a triangle of ``v_scan`` about ``v_offset``, at ``rate_hz``, and its size.
 
@@ -24,9 +25,10 @@ def imaged_line(
         raise Unphysical("the retrace is missing: an operator needs both directions")
     if image.v_offset is None:
         raise Unphysical("the offset is missing: an operator is of the offset too")
+    driver = Driver.of(driver)
     low, high = image.v_offset - 0.5 * image.v_scan, image.v_offset + 0.5 * image.v_scan
-    if low < -0.02 * v_max or high > 1.02 * v_max:
-        raise Unphysical(f"a drive of {low:.4g}..{high:.4g} V is outside the driver's 0..{v_max:g} V")
+    if driver.beyond(low, high) > 0.02 * driver.span:
+        raise Unphysical(f"a drive of {low:.4g}..{high:.4g} V is outside the driver's {driver}")
     line = fit_line(
         image.trace, image.retrace, taking.turn, taking.window, taking.retrace_mirrored, taking.delay_pixels
     )
@@ -47,7 +49,7 @@ def imaged_line(
         image.name,
         rate_hz,
         line.geometry.rows,
-        (low + image.v_scan * drive) / v_max,
+        driver.share(low + image.v_scan * drive),
         nm * position,
         nm * float(np.sqrt(np.mean(error**2))),
         nm * float(np.ptp(bent)),

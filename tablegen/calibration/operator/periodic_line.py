@@ -8,6 +8,7 @@ from tablegen.calibration.hysteresis import Trace
 from tablegen.calibration.operator.plausible import check_record, check_repeats
 from tablegen.compensation.dynamics import Response
 from tablegen.compensation.operator.creep import LogarithmicCreep
+from tablegen.driver import Driver
 from tablegen.numerics.arrays import Bools, Floats
 from tablegen.problems import Unphysical
 
@@ -91,18 +92,19 @@ class PeriodicLine:
         return replace(self, displacement_nm=values)
 
 
-def periodic_line(trace: Trace, v_max: float) -> PeriodicLine:
+def periodic_line(trace: Trace, driver: Driver | float) -> PeriodicLine:
     """Average the periods of a trace: times ascending in s, drive at the piezo in V, displacement in nm.
 
     The first of three periods or more is left out. Raises ``Unphysical``, without the trace's name.
     """
     check_record(trace)
-    time, drive = trace.time_s, trace.drive_v / v_max
+    driver = Driver.of(driver)
+    time, drive = trace.time_s, driver.share(trace.drive_v)
     if len(time) < _MIN_SAMPLES or not np.all(np.diff(time) > 0.0):
         raise Unphysical(f"{len(time)} samples whose times ascend are needed, at least {_MIN_SAMPLES} a period")
     if np.min(drive) < -0.02 or np.max(drive) > 1.02:
         low, high = float(np.min(trace.drive_v)), float(np.max(trace.drive_v))
-        raise Unphysical(f"a drive of {low:.4g}..{high:.4g} V is outside the driver's 0..{v_max:g} V")
+        raise Unphysical(f"a drive of {low:.4g}..{high:.4g} V is outside the driver's {driver}")
     period = _period(time, drive)
     # Whole periods from the first sample on; the grid then begins at a minimum.
     periods = int((time[-1] - time[0]) / period + 1e-3)

@@ -14,6 +14,7 @@ from tablegen.compensation.operator.file import (
     PlaysTable,
     operator_text,
 )
+from tablegen.driver import Driver
 
 _HEAD = (
     "An operator of the piezo, written by tablegen calibrate operator; docs/operator.md says what the numbers are.",
@@ -21,7 +22,7 @@ _HEAD = (
 )
 
 
-def operator_file(fit: OperatorFit, axis: str, v_max: float, sources: Sequence[str] = ()) -> bytes:
+def operator_file(fit: OperatorFit, axis: str, driver: Driver | float, sources: Sequence[str] = ()) -> bytes:
     """The file's bytes; ``sources`` says where the traces came from, a line each."""
     operator, creep, lengths = fit.operator, fit.operator.creep, fit.operator.residual.lengths
     plays, loop = operator.family.plays, operator.family.bouc_wen or NO_BOUC_WEN
@@ -49,7 +50,8 @@ def operator_file(fit: OperatorFit, axis: str, v_max: float, sources: Sequence[s
     file = OperatorFile(
         version=VERSION,
         axis="x" if axis == "x" else "y",
-        v_max=v_max,
+        v_max=Driver.of(driver).v_max,
+        v_min=Driver.of(driver).v_min,
         centre=operator.centre,
         creep=CreepTable(
             loss_per_decade=creep.loss_per_decade,

@@ -21,6 +21,7 @@ from tablegen.compensation.operator.scan_line import Expected, Found, Wanted, fi
 from tablegen.compensation.operator.transient import after_offset, after_size
 from tablegen.compensation.operator.uncertainty import departures, of_formulas, of_places
 from tablegen.compensation.transient import Transient
+from tablegen.driver import Driver
 from tablegen.figures import shown_path
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Rejected, Unphysical
@@ -111,9 +112,9 @@ class OperatorModel(WithBranches, frozen=True, kw_only=True, tag="operator"):
         if operator is None:
             return None
         with wanted.at("file"):
-            _check_reach(operator, high - low, 0.5 * (low + high), wanted.v_max)
+            _check_reach(operator, high - low, 0.5 * (low + high), wanted.driver)
             here, factor = _at(operator, wanted)
-            return here.loop(low, high, factor, wanted.v_offset / wanted.v_max), here.creep
+            return here.loop(low, high, factor, wanted.v_share), here.creep
         return None
 
     def _read(self, wanted: WantedLine) -> Operator | None:
@@ -126,8 +127,10 @@ class OperatorModel(WithBranches, frozen=True, kw_only=True, tag="operator"):
             return None
         if file.axis != wanted.axis:
             wanted.problem("file", f"{self.file} is the operator of {file.axis}")
-        if abs(file.v_max - wanted.v_max) > 1e-6 * wanted.v_max:
-            wanted.problem("file", f"{self.file} was identified with v_max = {file.v_max:g} V, not {wanted.v_max:g} V")
+        for key in ("v_max", "v_min"):
+            its, ours = getattr(file, key), getattr(wanted.driver, key)
+            if abs(its - ours) > 1e-6 * wanted.driver.span:
+                wanted.problem("file", f"{self.file} was identified with {key} = {its:g} V, not {ours:g} V")
         return operator if len(wanted.problems.found) == before else None
 
     def described(self, line: LineShape) -> str:
@@ -137,7 +140,7 @@ class OperatorModel(WithBranches, frozen=True, kw_only=True, tag="operator"):
 
 def _at(operator: Operator, wanted: WantedLine) -> tuple[Operator, float]:
     """The operator at this rate, and the factor of its loops at this offset."""
-    factor = wanted.factor_at(wanted.v_offset / wanted.v_max) / wanted.factor_at(operator.centre)
+    factor = wanted.factor_at(wanted.v_share) / wanted.factor_at(operator.centre)
     operator = replace(operator, creep=operator.creep.down_to(wanted.rate_hz))
     if wanted.rate_gain is not None:  # (23) says what the rate does to the size; creep then only bends the line
         reference = operator.creep.reference_hz
@@ -147,7 +150,7 @@ def _at(operator: Operator, wanted: WantedLine) -> tuple[Operator, float]:
 
 
 def _line(operator: Operator, wanted: WantedLine) -> OperatorLine:
-    centre = wanted.v_offset / wanted.v_max
+    centre = wanted.v_share
     operator, factor = _at(operator, wanted)
     at_offset = wanted.factor_at(centre)
 
@@ -178,10 +181,10 @@ def _line(operator: Operator, wanted: WantedLine) -> OperatorLine:
     found = find_waveform(operator, line, start, through, None if response is None else dynamics)
     factor *= with_mean(found.mean)
     between = _BEND_UNKNOWN * found.grown
-    _check_reach(operator, found.stroke, found.centre, wanted.v_max)
+    _check_reach(operator, found.stroke, found.centre, wanted.driver)
     late = replace(operator, creep=operator.creep.down_to(_SLOWEST_HZ))  # for all that a few frames may last
     # w = 0 and 1 are the ends of the laws' amplitude everywhere else.
-    scale = found.v_amplitude * wanted.v_max / wanted.v_amplitude
+    scale = found.v_amplitude * wanted.driver.span / wanted.v_amplitude
     series = FourierSeries(0.5 + scale * (found.series.a0 - 0.5), scale * found.series.a, scale * found.series.b)
     return OperatorLine.of(
         series,
@@ -199,20 +202,21 @@ def _line(operator: Operator, wanted: WantedLine) -> OperatorLine:
     )
 
 
-def _check_reach(operator: Operator, stroke: float, centre: float, v_max: float) -> None:
+def _check_reach(operator: Operator, stroke: float, centre: float, driver: Driver) -> None:
     """Refuse what is far from everything that was measured."""
     largest = max(line.stroke for line in operator.lines)
     if stroke > largest + STROKE_REACH:
         raise Unphysical(
-            f"measured up to {largest * v_max:.4g} V, which serves scans up to "
-            f"{(largest + STROKE_REACH) * v_max:.4g} V; this one takes {stroke * v_max:.4g} V; "
+            f"measured up to {largest * driver.span:.4g} V, which serves scans up to "
+            f"{(largest + STROKE_REACH) * driver.span:.4g} V; this one takes {stroke * driver.span:.4g} V; "
             "measure a larger trace"
         )
     nearest = min((abs(line.centre - centre), line.centre) for line in operator.lines)
     if nearest[0] > CENTRE_REACH:
         raise Unphysical(
-            f"measured at an offset of {nearest[1] * v_max:.4g} V, which serves {CENTRE_REACH * v_max:.4g} V to either "
-            f"side; this scan is at {centre * v_max:.4g} V; measure a trace there"
+            f"measured at an offset of {driver.volts(nearest[1]):.4g} V, which serves "
+            f"{CENTRE_REACH * driver.span:.4g} V to either side; this scan is at {driver.volts(centre):.4g} V; "
+            "measure a trace there"
         )
 
 

@@ -86,11 +86,12 @@ class LineTable(_Table, frozen=True, kw_only=True):
 
 
 class OperatorFile(_Table, frozen=True, kw_only=True):
-    """The whole file. Strokes, centres and thresholds are shares of v_max."""
+    """The whole file. Strokes, centres and thresholds are shares of v_max - v_min."""
 
     version: int
     axis: Literal["x", "y"]
     v_max: Annotated[float, Meta(ge=1e-3, le=1e5)]
+    v_min: Annotated[float, Meta(ge=-1e5, le=0.0)] = 0.0
     centre: _Share
     creep: CreepTable
     plays: PlaysTable
@@ -180,7 +181,10 @@ def operator_text(file: OperatorFile, comments: Sequence[str]) -> str:
         return "[" + ", ".join(f"{value:.9g}" if value else "0.0" for value in _floats(values)) + "]"
 
     out = [*(f"# {line}" for line in comments), f"version = {file.version}", f'axis = "{file.axis}"']
-    out += [f"v_max = {float(file.v_max)!r}", f"centre = {_float(file.centre)}", "", "[creep]"]
+    out.append(f"v_max = {float(file.v_max)!r}")
+    if file.v_min != 0.0:
+        out.append(f"v_min = {float(file.v_min)!r}")
+    out += [f"centre = {_float(file.centre)}", "", "[creep]"]
     out += [f"{name} = {_float(getattr(file.creep, name))}" for name in file.creep.__struct_fields__]
     out += [
         "",

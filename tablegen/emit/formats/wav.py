@@ -1,4 +1,4 @@
-"""WAV of one frame: x left, y right, a sample a tick; for sound cards, and for whatever plays or shows them."""
+"""WAV of one frame: x left, y right, or output A left, a sample a tick; for sound cards, and whatever plays it."""
 
 import struct
 
@@ -26,8 +26,10 @@ class Wav(Format):
         require_short_frame(content)
         bits = 16 if max(axis.program.output.dac_bits for axis in content.axes) <= 16 else 32
         rate = _rate(content, bits // 8 * _CHANNELS)
-        x, y = (_samples(content, axis, bits) for axis in content.axes)
-        return {f"{content.name}.wav": _file(np.column_stack([x, y]), rate, bits)}
+        axes = sorted(content.axes, key=lambda axis: axis.program.output.channel)  # x is the left one unless it is on B
+        return {
+            f"{content.name}.wav": _file(np.column_stack([_samples(content, axis, bits) for axis in axes]), rate, bits)
+        }
 
 
 FORMAT = Wav()

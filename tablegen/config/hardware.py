@@ -1,0 +1,256 @@
+"""The converter and the amplifier of each axis, put together from the keys of the scanner file and of the scan file.
+
+The hardware belongs to the instrument: in the scanner file ``[x.dac]`` goes before ``[dac]``, which serves both axes.
+``[dac]`` of the scan file serves both axes too; what both files say has to be the same.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple, TypeAlias
+
+from tablegen.config.decode import decode, meant
+from tablegen.config.scanner import Scanner
+from tablegen.config.schema import Amplifier, Dac, Scan
+from tablegen.problems import Document, Problems
+
+_AXES = ("x", "y")
+_KINDS: Mapping[str, type[Dac] | type[Amplifier]] = {"dac": Dac, "amplifier": Amplifier}
+_REQUIRED = {"dac": ("bits", "v_min", "v_max", "update_rate_hz"), "amplifier": ("gain",)}
+
+
+class Place(NamedTuple):
+    """A key or a table of one of the two files."""
+
+    in_scanner: bool
+    key: str
+
+
+_Tables: TypeAlias = Mapping[Place, Dac | Amplifier]
+
+
+@dataclass(frozen=True, slots=True)
+class AxisDac:
+    """The converter of one axis; fields as the keys of ``Dac``, ``word_bits`` None where it is that of ``bits``.
+
+    ``output`` is None on both axes where neither says it.
+    """
+
+    bits: int
+    v_min: float
+    v_max: float
+    update_rate_hz: float
+    coding: Literal["offset-binary", "twos-complement"] = "offset-binary"
+    inverted: bool = False
+    output: Literal["A", "B"] | None = None
+    align: Literal["right", "left"] = "right"
+    word_bits: int | None = None
+
+    @property
+    def highest_v(self) -> float:
+        """The highest voltage in V, one LSB below ``v_max``."""
+        return self.v_max - (self.v_max - self.v_min) / float(1 << self.bits)
+
+
+@dataclass(frozen=True, slots=True)
+class AxisAmplifier:
+    """The amplifier of one axis; fields as the keys of ``Amplifier``."""
+
+    gain: float
+    bias_v: float = 0.0
+    max_slew_v_per_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class AxisHardware:
+    """Converter and amplifier of one axis; ``places`` says where keys such as "dac.bits" stand: once, or in both files.
+
+    Both files then say the same.
+    """
+
+    dac: AxisDac
+    amplifier: AxisAmplifier
+    places: Mapping[str, tuple[Place, ...]]
+
+    def where(self, key: str) -> tuple[Place, ...]:
+        """Where "amplifier.bias_v" stands, or would stand: beside the required keys of its table."""
+        if key in self.places:
+            return self.places[key]
+        part, name = key.split(".")
+        beside = self.places[f"{part}.{_REQUIRED[part][0]}"]
+        return tuple(Place(place.in_scanner, f"{place.key.rsplit('.', 1)[0]}.{name}") for place in beside)
+
+
+def hardware_of(scan: Scan, scanner: Scanner, axis: str) -> AxisHardware:
+    """The hardware of one axis ("x" or "y") of files that were checked."""
+    tables: dict[Place, Dac | Amplifier] = {}
+    for part in _KINDS:
+        tables[Place(False, part)] = getattr(scan, part)
+        tables[Place(True, part)] = getattr(scanner, part)
+        tables[Place(True, f"{axis}.{part}")] = getattr(getattr(scanner, axis), part)
+    return _put_together(tables, axis)
+
+
+def _put_together(tables: _Tables, axis: str) -> AxisHardware:
+    values: dict[str, dict[str, Any]] = {part: {} for part in _KINDS}
+    places: dict[str, tuple[Place, ...]] = {}
+    for part, kind in _KINDS.items():
+        for name in kind.__struct_fields__:
+            found = _places(tables, axis, part, name)
+            if found:
+                values[part][name] = getattr(tables[found[0]], name)
+                places[f"{part}.{name}"] = tuple(Place(table.in_scanner, f"{table.key}.{name}") for table in found)
+    return AxisHardware(AxisDac(**values["dac"]), AxisAmplifier(**values["amplifier"]), places)
+
+
+def _places(tables: _Tables, axis: str, part: str, name: str) -> list[Place]:
+    """The tables that say a key of one axis: of the scan file, and the first one of the scanner file."""
+    scans, own, common = Place(False, part), Place(True, f"{axis}.{part}"), Place(True, part)
+    given = [place for place in (scans, own, common) if getattr(tables[place], name) is not None]
+    return given[:2] if given[:1] == [scans] else given[:1]
+
+
+def check_hardware(
+    scan: Mapping[str, Any],
+    scanner: Mapping[str, Any],
+    scan_file: Document,
+    scanner_file: Document,
+    problems: Problems,
+) -> None:
+    """Note what the values of both files say of the hardware together; faults of single keys were noted before."""
+    written: dict[Place, Any] = {}
+    for part in _KINDS:
+        written[Place(False, part)] = scan.get(part, {})
+        written[Place(True, part)] = scanner.get(part, {})
+        for axis in _AXES:
+            its = scanner.get(axis)
+            written[Place(True, f"{axis}.{part}")] = its.get(part, {}) if isinstance(its, dict) else {}
+    if not all(isinstance(table, dict) for table in written.values()):
+        return
+    files = {False: scan_file, True: scanner_file}
+    missing = _missing(written)
+    for place, why in missing:
+        problems.add(files[place.in_scanner], place.key, why)
+    tables: dict[Place, Dac | Amplifier] = {}
+    for place, table in written.items():
+        kind = _KINDS[place.key.rsplit(".", 1)[-1]]
+        decoded = decode(kind, table, files[place.in_scanner], Problems(), lambda *_: None)
+        if decoded is not None:
+            tables[place] = decoded
+    if missing or len(tables) < len(written):
+        return
+    if contradictions := _contradictions(tables, scanner_file):
+        for key, why in contradictions:
+            problems.add(scan_file, key, why)
+        return
+    both = {axis: _put_together(tables, axis) for axis in _AXES}
+    for hardware in both.values():
+        for key, why in _faults(hardware):
+            place = hardware.where(key)[0]
+            problems.add(files[place.in_scanner], place.key, why)
+    for key, why in _apart(both["x"], both["y"], files):
+        place = both["y"].where(key)[0]
+        problems.add(files[place.in_scanner], place.key, why)
+
+
+def _missing(written: Mapping[Place, Mapping[str, Any]]) -> list[tuple[Place, str]]:
+    """Required keys that no file has, for one axis or for both; not those that an unknown key was meant to be."""
+    found: list[tuple[Place, str]] = []
+    for part, kind in _KINDS.items():
+        scans, common = written[Place(False, part)], written[Place(True, part)]
+        own = {axis: written[Place(True, f"{axis}.{part}")] for axis in _AXES}
+        if not any((scans, common, *own.values())):
+            found.append((Place(False, part), "missing; this table is required, here or in the scanner file"))
+            continue
+        known = [*kind.__struct_fields__]
+        for name in _REQUIRED[part]:
+            lacking = [
+                axis
+                for axis in _AXES
+                if not any(
+                    name == key or (key not in known and name in meant(key, known))
+                    for table in (scans, common, own[axis])
+                    for key in table
+                )
+            ]
+            if lacking and scans and len(lacking) == len(_AXES):
+                found.append((Place(False, f"{part}.{name}"), "missing; this key is required"))
+            elif lacking and len(lacking) == len(_AXES) and common:
+                found.append((Place(True, f"{part}.{name}"), "missing; this key is required, here or in the scan file"))
+            else:
+                why = f"missing; this key is required, here or in [{part}]"
+                found += [(Place(True, f"{axis}.{part}.{name}"), why) for axis in lacking]
+    return found
+
+
+def _contradictions(tables: _Tables, scanner_file: Document) -> list[tuple[str, str]]:
+    """Keys of the scan file that the scanner file says in another way."""
+    found = {}
+    for part, kind in _KINDS.items():
+        for name in kind.__struct_fields__:
+            for axis in _AXES:
+                places = _places(tables, axis, part, name)
+                values = [getattr(tables[place], name) for place in places]
+                if len(set(values)) > 1:
+                    theirs = f"{places[1].key}.{name}"
+                    line = scanner_file.line_of(theirs)
+                    at = f"{scanner_file.name}:{line}" if line else scanner_file.name
+                    found[f"{part}.{name}", theirs] = (
+                        f"{_shown(values[0])}, and {theirs} is {_shown(values[1])} at {at}; the scanner file's is that "
+                        "of the instrument: remove this key, or correct the other"
+                    )
+    return [(key, why) for (key, _), why in found.items()]
+
+
+def _faults(hardware: AxisHardware) -> list[tuple[str, str]]:
+    """Keys of one axis that contradict each other, and why."""
+    dac, gain, found = hardware.dac, hardware.amplifier.gain, []
+    if dac.v_max <= dac.v_min:
+        found.append(("dac.v_max", f"{dac.v_max:.12g} V is not above v_min = {dac.v_min:.12g} V"))
+    elif dac.v_max - dac.v_min < 1e-3:
+        why = f"{dac.v_max - dac.v_min:.3g} V above v_min is no range; at least 0.001 V is needed"
+        found.append(("dac.v_max", why))
+    if dac.word_bits is not None and dac.word_bits < dac.bits:
+        found.append(("dac.word_bits", f"{dac.word_bits} is below bits = {dac.bits}; the code would not fit"))
+    if abs(gain) < 1e-4:
+        found.append(("amplifier.gain", f"{gain:g} is no gain; at least 1e-4 in size is needed"))
+    return found
+
+
+def _apart(x: AxisHardware, y: AxisHardware, files: Mapping[bool, Document]) -> list[tuple[str, str]]:
+    """Keys of y in which both axes have to be alike, and are not."""
+    found = []
+    if x.dac.bits != y.dac.bits:
+        few, many = sorted((x.dac.bits, y.dac.bits))
+        found.append(
+            (
+                "dac.bits",
+                f"{y.dac.bits} of y, and {_place_text(x, 'dac.bits', files)} is {x.dac.bits} of x; the device computes "
+                f"codes of as many bits for both axes: give bits = {few} to both, and to the one of {many} bits "
+                f"word_bits = {many} with align = 'left' as well, which sends them as its upper bits",
+            )
+        )
+    if x.dac.update_rate_hz != y.dac.update_rate_hz:
+        found.append(
+            (
+                "dac.update_rate_hz",
+                f"{y.dac.update_rate_hz:.12g} of y, and {_place_text(x, 'dac.update_rate_hz', files)} is "
+                f"{x.dac.update_rate_hz:.12g} of x; both axes move on the same ticks: give it once, in [dac]",
+            )
+        )
+    outputs = (x.dac.output, y.dac.output)
+    if outputs not in ((None, None), ("A", "B"), ("B", "A")):
+        said = " and ".join(f"{axis} is on {one or 'none'}" for axis, one in zip("xy", outputs, strict=True))
+        found.append(("dac.output", f"{said}; give one axis 'A' and the other 'B', or none of them"))
+    return found
+
+
+def _place_text(hardware: AxisHardware, key: str, files: Mapping[bool, Document]) -> str:
+    place = hardware.where(key)[0]
+    line = files[place.in_scanner].line_of(place.key)
+    return f"{place.key} at line {line}" if line else place.key
+
+
+def _shown(value: object) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return f"{value:.12g}" if isinstance(value, float) else repr(value)
