@@ -16,6 +16,7 @@ EXAMPLES = FOLDER.parents[1] / "examples"
 SCANS = {
     "HS-AFM": EXAMPLES / "gallery" / "hs_afm" / "scan.toml",
     "large range": EXAMPLES / "gallery" / "large_range" / "scan.toml",
+    "tube": EXAMPLES / "tube_5um.toml",
     "closed-loop stage": EXAMPLES / "gallery" / "closed_loop" / "scan.toml",
 }
 HEAD = (
@@ -55,7 +56,7 @@ def draw(path: Path, target: Path) -> None:
     for number, part in enumerate(parts):
         whole.paste(part, (number * width, 0))
     whole.thumbnail((1350, 1000))
-    whole.quantize(64).save(target, optimize=True)
+    whole.quantize(256).save(target, optimize=True)
 
 
 def picture(name: str) -> Path:
