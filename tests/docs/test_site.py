@@ -1,5 +1,6 @@
 """The documentation site: built without a warning, whole, searched and read without a request to anybody."""
 
+import json
 import os
 import re
 import shutil
@@ -107,6 +108,31 @@ def test_the_search_finds_a_word_without_a_network(site: Path, tmp_path: Path, w
     done = loaded(tmp_path, (site / "search.html").as_uri() + f"?q={word}", "--dump-dom")
     (results,) = re.findall(r'<div id="search-results">(.*?)</div>', done.stdout, re.DOTALL)
     assert ("glossary.html" in results) == there
+
+
+def test_a_notebook_becomes_a_page(tmp_path: Path) -> None:
+    """Its text, its code, and what was stored of its outputs."""
+    sys.path.insert(0, str(REPOSITORY / "docs" / "site"))
+    try:
+        from notebook import as_markdown
+    finally:
+        sys.path.pop(0)
+    outputs = [
+        {"output_type": "stream", "name": "stdout", "text": ["4\n"]},
+        {"output_type": "display_data", "data": {"image/png": "iVBORw0KGgo=\n", "text/plain": ["<Figure>"]}},
+        {"output_type": "execute_result", "data": {"text/plain": ["5"]}},
+    ]
+    cells = [
+        {"cell_type": "markdown", "source": ["# Title\n", "Text."]},
+        {"cell_type": "code", "source": ["print(2 + 2)"], "outputs": outputs},
+        {"cell_type": "code", "source": [], "outputs": []},
+    ]
+    path = tmp_path / "a.ipynb"
+    path.write_text(json.dumps({"cells": cells}), "utf-8")
+    shown = as_markdown(path)
+    assert shown.startswith("# Title\nText.\n\n```python\nprint(2 + 2)\n```\n\n```text\n4\n```\n\n<img alt=")
+    assert "data:image/png;base64,iVBORw0KGgo=" in shown
+    assert shown.endswith("```text\n5\n```\n")
 
 
 # Negative controls
