@@ -12,7 +12,7 @@ from tablegen.compensation import models
 from tablegen.compensation.model import Hysteresis
 from tablegen.config.describe import model_fields, purposes
 from tablegen.config.scanner import Scanner
-from tablegen.config.schema import Scan
+from tablegen.config.schema import WrittenScan
 
 PAGE = Path(__file__).with_name("configuration.md")
 INTRODUCTION = """\
@@ -29,13 +29,66 @@ out if its meaning names an alternative ("or give"). Unknown keys are errors. In
 checks that the drive stays within the range of the driver and the converter, and the slew rate within that of the
 amplifier. It also checks that a line and a table can carry the harmonics, and that the hysteresis is in the range in
 which its model holds. Numbers in parentheses, such as (17), are equations of the paper.
+
+## An image in words
+
+A scan of 512 x 512 pixels over 2 um at 1 Hz lines is written as it is said:
+
+```toml
+name = "two_um"
+scanner = "scanner.toml"
+image_um = 2.0                   # or image_nm; or [x, y]
+
+[timing]
+pixels = 512
+image_lines = 512
+frame = "flyback"                # or "up-down"
+line_rate_hz = 1.0               # or frame_rate_hz, speed_um_per_s, speed_mm_per_s
+
+[x]
+offset_v = 50.0
+
+[y]
+like = "x"
+```
+
+tablegen solves for the periods. `build` and `show` print what was chosen, in lines that begin with `chosen:`.
+
+- `image_nm` is what the imaging windows span. The lines are longer by their turnarounds: 2 um in a window of 0.1 to 0.9
+  need lines of 2.5 um. Unless `[x.band_limit] window` is given, the window of x moves by up to 0.025 at each end, so
+  that a pixel is a whole number of ticks at the line rate that was asked for.
+- `image_lines` are the lines of the image. The line periods in which y turns round and flies back are added to them:
+  about a tenth of the way up, and with `"flyback"` a twentieth of the frame more. `lines` counts line periods instead:
+  with 512 of them, `turn = 0.5` and a window of 0.1 to 0.9, 204 lines are imaged on the way up and 204 on the way down.
+- `frame = "flyback"`: every image goes up, and y flies back. `frame = "up-down"`: images are taken on the way up and on
+  the way down, each with all `image_lines`. Without `frame`, `turn` and `directions` of y hold; their defaults are
+  those of `"up-down"`.
+- A frame is one period of y. With `"up-down"` it has two images, so `frame_rate_hz = 1` gives two images a second.
+- `speed_um_per_s` and `speed_mm_per_s` are the speed of the tip along the forward line, inside the window.
+- Keys with `um` are those with `nm`, in micrometres: 0.3 um are 300 nm, to the last bit.
+
+Words and other keys that say the same are refused: the message names both keys, their lines and the remedy.
+
+```text
+scan.toml:23: x.size_nm: image_nm on line 3 sets the size of both axes already, as that of the imaging windows; leave
+out one of the two
+```
+
+**`[y] like = "x"`** gives y all that x has, in the scan file and in the scanner file. Keys that y writes itself go
+before that, also those that say the same in another way: beside `size_v` of y, `size_nm` of x does not count. What was
+learnt on x, `[x.refinement]`, stays with x; with `frame`, the turn and directions of x do too. A fault of a key that y
+has from x is reported at the line in `[x]`.
+
+**A line scan** has `motion = "off"` in `[y]`: x runs, and y rests at its `offset_v` or `offset_nm`. All lines of a
+frame are imaged, and y has no size, turn, band limit or table. `verify`, `upload` and the sequencers treat it as any
+other scan: the table of y holds zeros. `simulate` does not play line scans.
 """
 
 
 def page() -> str:
     """The whole page."""
     parts = [INTRODUCTION]
-    for title, kind in (("Scan file", Scan), ("Scanner file", Scanner)):
+    for title, kind in (("Scan file", WrittenScan), ("Scanner file", Scanner)):
         parts += [f"## {title}\n", *_tables(types.type_info(kind), "", {})]
     return "\n".join(parts)
 
@@ -114,6 +167,10 @@ def _accepts(kind: types.Type) -> str:
             return "text"
         case types.BoolType():
             return "`true`, `false`"
+        case types.ListType():
+            count = kind.min_length if kind.min_length == kind.max_length else None
+            inner = _accepts(_plain(kind.item_type)[0])
+            return f"[{', '.join([inner] * count)}]" if count else f"array: {inner}"
         case types.TupleType():
             return f"[{', '.join(_accepts(_plain(t)[0]) for t in kind.item_types)}]"
     raise NotImplementedError(kind)

@@ -1,6 +1,6 @@
 """What is wrong with an input, where it stands, and how all of it is reported at once."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -53,11 +53,15 @@ class Rejected(Exception):
 class Document:
     """A TOML file as the user named it, and the line on which each of its keys stands.
 
-    ``lines`` is None for values that stand in no file.
+    ``lines`` is None for values that stand in no file. ``said`` has the keys that follow from others: the key that was
+    written in place of each, and the factor from the one's value to the other's; ``inherited`` the keys that an axis
+    takes from another one, each with the key that is written.
     """
 
     name: str
     lines: dict[str, int] | None = field(default_factory=dict)
+    said: Mapping[str, tuple[str, float]] = field(default_factory=dict)
+    inherited: Mapping[str, str] = field(default_factory=dict)
 
     def line_of(self, key: str) -> int:
         """The line of a key such as ``x.hysteresis.branches[0].turn``; of what encloses it if it is not written."""
@@ -71,8 +75,18 @@ class Document:
         return 1
 
     def problem(self, key: str, why: str) -> Problem:
-        """A problem of this document's key."""
-        return Problem(self.name, self.line_of(key), key, why)
+        """A problem of this document's key, told at the key that was written in its place."""
+        asked, (key, _) = key, self.as_said(key)
+        if asked[1:2] == "." and key[1:2] != ".":  # a key for both axes
+            why = f"{asked[0]}: {why}"
+        other = self.inherited.get(key)
+        if other is not None:
+            why = f"{why}; {key.split('.')[0]} has it from {other} by like"
+        return Problem(self.name, self.line_of(other or key), key, why)
+
+    def as_said(self, key: str) -> tuple[str, float]:
+        """The key that was written in place of this one, and the factor to its value; itself where it was written."""
+        return self.said.get(key, (key, 1.0))
 
 
 class Problems:

@@ -146,6 +146,11 @@ class Build:
         return "\n".join(summary(self.plan, self.certificates))
 
     @property
+    def choices(self) -> tuple[str, ...]:
+        """What was chosen for what the scan file says of the image, in sentences; empty where it says all itself."""
+        return self.setup.choices
+
+    @property
     def notes(self) -> list[str]:
         """What to know before the image is trusted, in sentences."""
         return notes(self.plan)
@@ -193,7 +198,7 @@ class Build:
         worst = max(self.certificates.values(), key=lambda one: one.scaling_error_percent)
         errors = f"error up to {worst.max_error_lsb:.3f} LSB, scaling error {worst.scaling_error_percent:.3g} %"
         head = first.replace("<tablegen plan", "<tablegen build")
-        volts = ", ".join(f"{line.axis}: {line.drive.v_amplitude:.6g} V" for line in self.plan.lines)
+        volts = ", ".join(f"{line.axis}: {line.drive.v_amplitude:.6g} V" for line in self.plan.moving)
         found = [f"  warning: {text}\n" for text in brief_warnings(self.plan, self.certificates)]
         return f"{head}\n  {errors} peak to peak\n{''.join(found)}  {volts}; formats {', '.join(self.formats)}>"
 

@@ -26,7 +26,7 @@ def build_html(plan: Plan, certificates: dict[str, Certificate]) -> str:
         f"<p><b>{escape(title)}</b>, {schedule.lines} lines a frame, {escape(rate(schedule.frame_rate))} frames</p>"
     ]
     parts += [f"<p><b>warning</b>: {escape(text)}</p>" for text in brief_warnings(plan, certificates)]
-    for line in plan.lines:
+    for line in plan.moving:
         t = np.linspace(0.0, 1.0, _POINTS)
         volts = line.drive.v_offset + line.drive.v_amplitude * (line.series.value(t) - 0.5)
         parts.append("<div>")

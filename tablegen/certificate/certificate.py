@@ -25,7 +25,8 @@ from tablegen.problems import Document, Problem
 class Certificate:
     """The error budget of one axis. Codes and LSB are the converter's; dB are of power, relative to the scan's.
 
-    ``refinement`` is what the layer of ``tablegen refine`` moves, where there is one; it is not counted as an error.
+    An axis at rest has no scaling errors and no cutoff. ``refinement`` is what the layer of ``tablegen refine`` moves,
+    where there is one; it is not counted as an error.
     ``expected`` is what the scanner should do with the line; everything else is of the waveform.
     """
 
@@ -40,7 +41,7 @@ class Certificate:
     largest_step: int
     max_step: int
     peak_slew_v_per_s: float
-    beyond_cutoff_db: float
+    beyond_cutoff_db: float | None
     at_resonance_db: float | None
     refinement: dict[str, Refined] | None = None
     expected: Expectation | None = None
@@ -48,12 +49,12 @@ class Certificate:
     @property
     def scaling_error_percent(self) -> float:
         """The worst of both directions; ripple shorter than a chord counts in full."""
-        return max(self._own(side) for side in self.scaling)
+        return max((self._own(side) for side in self.scaling), default=0.0)
 
     @property
     def size_error_percent(self) -> float:
         """The worst of both directions, with its sign."""
-        return max((error.size for error in self.scaling.values()), key=abs)
+        return max((error.size for error in self.scaling.values()), key=abs, default=0.0)
 
     @property
     def scaling_on_scanner(self) -> tuple[str, float, float] | None:
@@ -155,6 +156,7 @@ def _certify(line: LinePlan) -> Certificate:
     played, output = EmittedPeriod(line), line.program.output
     codes, lengths, ticks = played.runs.codes, played.runs.lengths, line.program.ticks
     mean, square = played.error_moments()
+    resting = line.drive.resting
     levels = codes - float(output.offset_code)
     levels -= float(np.sum(lengths * levels)) / ticks
     levels *= levels
@@ -171,7 +173,7 @@ def _certify(line: LinePlan) -> Certificate:
         largest_step=int(np.max(np.abs(codes - np.roll(codes, 1)))),
         max_step=output.max_step,
         peak_slew_v_per_s=line.drive.v_amplitude * line.series.peak_slope() * float(line.rate),
-        beyond_cutoff_db=10.0 * log10(max(square - mean * mean, 1e-30) / power),
+        beyond_cutoff_db=None if resting else 10.0 * log10(max(square - mean * mean, 1e-30) / power),
         at_resonance_db=power_at_resonance_db(line, played.runs, power),
         refinement=None
         if line.layer is None
@@ -190,7 +192,9 @@ def _scaling(line: LinePlan, played: EmittedPeriod) -> dict[str, ScalingError]:
 
 
 def _directions(line: LinePlan) -> dict[str, Sweep]:
-    """The branches that image."""
+    """The branches that image; none of an axis at rest."""
     shape = line.drive.shape
+    if line.drive.resting:
+        return {}
     both = {"forward": shape.forward, "backward": shape.backward}
     return both if line.band_limit.directions == "both" else {"forward": shape.forward}

@@ -1,8 +1,8 @@
 """How far apart a pixel of the trace and of the retrace are, from ticks alone, in words, and which lines have none."""
 
+from tablegen.config.frame import exact
 from tablegen.device.schedule import MAXIMUM_LINE_TICKS
 from tablegen.planning.line_plan import Plan
-from tablegen.planning.timing import exact
 from tablegen.planning.windows import matching_lines, retrace_mismatch
 
 _MAX_PIXELS_APART = 0.25  # of a pixel; more is a warning

@@ -139,9 +139,13 @@ def _planned(setup: Setup, change: Change) -> Plan | None:
 
 
 def _text(setup: Setup, change: Change) -> str:
-    def part(key: str, value: object) -> str:
+    """The change as its keys and values would be written in the files."""
+
+    def part(key: str, value: Any) -> str:
         name = f" in {shown_path(Path(Path(setup.scanner_file.name).name))}" if key.startswith(_SCANNER) else ""
-        return f"{key.removeprefix(_SCANNER)} = {_value(value)}{name}"
+        written, factor = setup.scan_file.as_said(key)
+        shown = _value(value if factor == 1.0 else factor * value)
+        return f"{written.removeprefix(_SCANNER)} = {shown}{name}"
 
     return " with ".join(part(key, value) for key, value in change.items() if value is not None)
 

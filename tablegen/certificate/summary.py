@@ -19,6 +19,11 @@ _GRID = 32  # points per period of the highest harmonic
 def drive_lines(line: LinePlan) -> list[tuple[str, str]]:
     """What is applied to an axis, factor by factor: label and value."""
     drive, output = line.drive, line.program.output
+    if drive.resting:
+        return [
+            ("rests", f"at {drive.v_offset:.6g} V, {drive.position_nm:.6g} nm"),
+            ("offset", f"code {output.offset_code}"),
+        ]
     rows = [
         (
             "scan",
@@ -106,8 +111,9 @@ def certificate_lines(certificate: Certificate) -> list[tuple[str, str]]:
             "step",
             f"at most {c.largest_step} of {c.max_step} codes a tick; {c.peak_slew_v_per_s:.4g} V/s at the piezo",
         ),
-        ("beyond cutoff", f"{c.beyond_cutoff_db:.1f} dB" + _resonance(c)),
     ]
+    if c.beyond_cutoff_db is not None:
+        rows.append(("beyond cutoff", f"{c.beyond_cutoff_db:.1f} dB" + _resonance(c)))
     return rows
 
 
@@ -162,7 +168,7 @@ def _windows(plan: Plan) -> list[str]:
 
 def notes(plan: Plan) -> list[str]:
     """What a user should know before trusting the image, in sentences."""
-    schedule, found = plan.schedule, []
+    schedule, found, resting = plan.schedule, [], plan.y.drive.resting
     per_pixel = schedule.pixel_ticks
     if per_pixel.denominator != 1:
         whole = [n for n in (int(per_pixel), int(per_pixel) + 1) if n > 0]
@@ -176,7 +182,7 @@ def notes(plan: Plan) -> list[str]:
     found.append(
         f"a frame images {schedule.pixels} x {schedule.up.count}"
         + (f" + {schedule.down.count}" if schedule.down.count else "")
-        + f" pixels: the lines inside the window of y, of {schedule.lines} a frame"
+        + (" pixels: y rests" if resting else f" pixels: the lines inside the window of y, of {schedule.lines} a frame")
     )
     for line in plan.lines:
         settles = settling(line.axis, line.drive, schedule)
@@ -185,7 +191,7 @@ def notes(plan: Plan) -> list[str]:
                 f"{line.axis} drifts by more than {settles.bound_nm:.3g} nm a frame after the {schedule.settle_lines} "
                 f"settle_lines that follow a change of offset of {settles.offset_v:.4g} V or a smaller scan"
             )
-        if not line.drive.hysteresis.compensates:
+        if not line.drive.hysteresis.compensates and not line.drive.resting:
             found.append(f"hysteresis of {line.axis} is not compensated: the scanner file has no model for it")
     return found
 

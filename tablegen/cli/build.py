@@ -127,6 +127,10 @@ def build(
         from tablegen.cli.tables import certificate_table
 
         click.echo("\n".join(certificate_table(built.plan, built.certificates)))
+        if built.choices:
+            click.echo()
+        for choice in built.choices:
+            click.echo(f"chosen: {choice}")
         click.echo(f"\n{output}: {_state(built, changed)}")
         if removed:
             click.echo(f"{output}: removed files of an earlier build: {_few(removed)}")

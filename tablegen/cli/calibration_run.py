@@ -150,13 +150,14 @@ def within(table: "MeasuredTable", from_hz: float, to_hz: float) -> "MeasuredTab
 
 def _scanner_values(common: Common) -> dict[str, Any]:
     """What the scanner file says now; nothing where it is to be made."""
+    from tablegen.config.like import inherited
     from tablegen.problems import Rejected
     from tablegen.toml import read_toml
 
     if common.scanner is None or (common.write and not common.scanner.exists()):
         return {}
     try:
-        return read_toml(common.scanner, str(common.scanner))[0]
+        return inherited(*read_toml(common.scanner, str(common.scanner)))[0]
     except Rejected as rejected:
         fail(rejected.problems, ExitStatus.WRONG_INPUT)
 
@@ -208,11 +209,12 @@ def size_law(common: Common, driver: "Driver", source: str) -> "SizeLaw":
 def _tables(common: Common, *names: str) -> dict[str, Any]:
     """These tables of the axis as the scanner file has them, by path; a fault in one of them ends the command."""
     from tablegen.config.decode import decode
+    from tablegen.config.like import inherited
     from tablegen.config.scanner import Scanner
     from tablegen.problems import Problems
     from tablegen.toml import read_toml
 
-    values, document = read_toml(common.scanner, str(common.scanner))  # type: ignore[arg-type]
+    values, document = inherited(*read_toml(common.scanner, str(common.scanner)))  # type: ignore[arg-type]
     tables: dict[str, Any] = {}
     problems = Problems()
     decode(Scanner, values, document, problems, lambda _kind, key, _values, built: tables.update({key: built}))

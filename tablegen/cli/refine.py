@@ -190,6 +190,8 @@ def _learn(
 
     try:
         setup = load(scan)
+        if axis == "y" and setup.scan.y.off:
+            raise Rejected([setup.scan_file.problem("y.motion", "'off' keeps y where it is: it has nothing to refine")])
         text = read_text(scan, CONFIGURATION)
         table = _read(trace, triggered)
         from tablegen.calibration.columns import DISPLACEMENT, DRIVE, TIME

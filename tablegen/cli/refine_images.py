@@ -87,6 +87,8 @@ class ImageArguments:
         found: Round
         try:
             setup = load(scan)
+            if setup.scan.y.off:
+                raise Rejected([setup.scan_file.problem("y.motion", "'off' makes a line scan, which takes no images")])
             text = read_text(scan, CONFIGURATION)
             if self.mismatch:
                 found = refine_mismatch(setup, axis, heights, options, taken)

@@ -23,9 +23,9 @@ def schema(kind: str) -> None:
 
     from tablegen.config.describe import json_schema
     from tablegen.config.scanner import Scanner
-    from tablegen.config.schema import Scan
+    from tablegen.config.schema import WrittenScan
 
-    described = json_schema(Scan if kind == "scan" else Scanner)
+    described = json_schema(WrittenScan if kind == "scan" else Scanner)
     described = {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": f"tablegen {kind}",

@@ -38,9 +38,11 @@ def show(scan: Path, as_json: bool, formats: tuple[str, ...], plot: bool) -> Non
         tell(text, bold=bool(text) and not text.startswith(" "))
     if plot:
         unicode = "utf" in (getattr(sys.stdout, "encoding", None) or "").lower()
-        for line in plan.lines:
+        for line in plan.moving:
             click.echo()
             click.echo("\n".join(plots(line, unicode)))
     click.echo()
+    for choice in built.choices:
+        click.echo(f"chosen: {choice}")
     for note in built.notes:
         click.echo(f"note: {note}")

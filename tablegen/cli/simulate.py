@@ -118,6 +118,11 @@ def simulate(
         setup = load(scan)
     except Rejected as faults:
         fail(faults.problems, ExitStatus.WRONG_INPUT)
+    if setup.scan.y.off:
+        fail(
+            [setup.scan_file.problem("y.motion", "'off' makes a line scan, and frames alone are simulated")],
+            ExitStatus.WRONG_INPUT,
+        )
     if _plays_own(context, setup, truth_file):
         _simulate_own(setup, seed, as_json)
         return

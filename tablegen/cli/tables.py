@@ -35,6 +35,11 @@ def certificate_table(plan: Plan, certificates: dict[str, Certificate]) -> list[
                 f"{start}   {side:<9}  {error.uncompensated:13.2f}  {error.total:7.3f}  {error.band_limit:10.4f}  "
                 f"{error.size:+.3f}  {step}".rstrip()
             )
+        if line.drive.resting:
+            step = f"{certificate.largest_step}/{certificate.max_step}"
+            lines.append(
+                f"{line.axis:<4}  rests at {line.drive.v_offset:.6g} V, code {certificate.lowest_code}; {step}"
+            )
     for line in plan.lines:
         for side, moved in (certificates[line.axis].refinement or {}).items():
             lines.append(

@@ -47,6 +47,9 @@ class _Decoder:
                 return self._any(kind.type, value, key)
             case types.UnionType():  # in the schema "something or None", and TOML has no null; or a number or a word
                 some = [t for t in kind.types if not isinstance(t, types.NoneType)]
+                arrays = [t for t in some if isinstance(_bare(t), types.ListType)]
+                if arrays and len(some) > 1:  # a number, or an array of them
+                    return self._any(next(t for t in some if (t in arrays) == isinstance(value, list)), value, key)
                 words = [word for t in some if isinstance(t, types.LiteralType) for word in t.values]
                 if len(some) > 1 and isinstance(value, str):
                     wrong = f"{_shown(value)} is not a number, nor {' or '.join(map(repr, words))}"
@@ -175,6 +178,10 @@ class _Decoder:
         if kind.max_length is not None and len(value) > kind.max_length:
             return self._wrong(key, f"{len(value)} characters are too many, at most {kind.max_length} are taken")
         return value
+
+
+def _bare(kind: types.Type) -> types.Type:
+    return _bare(kind.type) if isinstance(kind, types.Metadata) else kind
 
 
 def meant(name: str, known: Any) -> list[str]:

@@ -8,8 +8,13 @@ from msgspec.json import schema_components
 
 from tablegen.compensation import models
 from tablegen.compensation.model import Hysteresis
+from tablegen.config.scanner import SlowScannerAxis
+from tablegen.config.schema import WrittenTiming
+from tablegen.config.words import RATES
 
 _MODEL_KEY = "model"
+# Keys of which one has to be given, and no two, by the table.
+_ONE_OF = {WrittenTiming.__name__: (("lines", "image_lines"), RATES)}
 
 
 def purposes() -> str:
@@ -50,5 +55,16 @@ def json_schema(kind: type[Struct]) -> dict[str, Any]:
             **components[Hysteresis.__name__],
             "properties": {**merged, _MODEL_KEY: model},
             "required": sorted(required),
+        }
+    for name, ways in _ONE_OF.items():
+        if name in components:
+            groups = [{"oneOf": [{"required": [key]} for key in way]} for way in ways]
+            components[name] = {**components[name], "allOf": groups}
+    slow = components.get(SlowScannerAxis.__name__)
+    if slow is not None:  # what y has from x is not required of it
+        rest = {key: value for key, value in slow.items() if key != "required"}
+        components[SlowScannerAxis.__name__] = {
+            **rest,
+            "anyOf": [{"required": ["like"]}, {"required": slow["required"]}],
         }
     return {**root, "$defs": components}

@@ -10,7 +10,7 @@ from typing import Any, Literal, NamedTuple, TypeAlias
 
 from tablegen.config.decode import decode, meant
 from tablegen.config.scanner import Scanner
-from tablegen.config.schema import Amplifier, Dac, Scan
+from tablegen.config.schema import Amplifier, Dac, WrittenScan
 from tablegen.problems import Document, Problems
 
 _AXES = ("x", "y")
@@ -80,7 +80,7 @@ class AxisHardware:
         return tuple(Place(place.in_scanner, f"{place.key.rsplit('.', 1)[0]}.{name}") for place in beside)
 
 
-def hardware_of(scan: Scan, scanner: Scanner, axis: str) -> AxisHardware:
+def hardware_of(scan: WrittenScan, scanner: Scanner, axis: str) -> AxisHardware:
     """The hardware of one axis ("x" or "y") of files that were checked."""
     tables: dict[Place, Dac | Amplifier] = {}
     for part in _KINDS:

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -12,9 +12,20 @@ from msgspec import Struct
 from tablegen.compensation.model import Parameters
 from tablegen.config.decode import decode, meant
 from tablegen.config.hardware import AxisHardware, Place, check_hardware, hardware_of
+from tablegen.config.like import inherited, told_once
 from tablegen.config.names import why_not_a_name
 from tablegen.config.scanner import Offset, Resonance, Scanner
-from tablegen.config.schema import MAXIMUM_NAME, BandLimit, FastAxis, Refinement, Scan, Table, Timing
+from tablegen.config.schema import (
+    MAXIMUM_NAME,
+    BandLimit,
+    FastAxis,
+    Refinement,
+    Scan,
+    Table,
+    WrittenScan,
+    WrittenTiming,
+)
+from tablegen.config.words import IMAGES, OFFSETS, RATES, SIZES, check_words, solved
 from tablegen.figures import shown_path
 from tablegen.problems import Document, Problem, Problems, Rejected
 from tablegen.quantities import MAXIMUM_FILE_NAME
@@ -23,13 +34,17 @@ from tablegen.toml import read_toml
 
 @dataclass(frozen=True, repr=False)
 class Setup:
-    """A scan, the scanner it runs on, and where each of their keys stands."""
+    """A scan, the scanner it runs on, and where each of their keys stands.
+
+    ``choices`` says in sentences what was chosen for what the scan file says of the image.
+    """
 
     scan: Scan
     scanner: Scanner
     scan_file: Document
     scanner_file: Document
     scanner_folder: Path
+    choices: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         return f"<tablegen setup {self.scan.name!r} on {self.scanner.name!r}, from {self.scan_file.name}>"
@@ -75,7 +90,8 @@ def load(path: str | Path) -> Setup:
         why = f"this is a scanner file; give the scan file that names it, scanner = '{shown_path(Path(path.name))}'"
         raise Rejected([scan_file.problem("", why)])
     problems = Problems()
-    scan = decode(Scan, values, scan_file, problems, partial(_check, scan_file, problems))
+    values, scan_file = inherited(values, scan_file)
+    scan = decode(WrittenScan, values, scan_file, problems, partial(_check, values, scan_file, problems))
     name = values.get("name")
     if isinstance(name, str) and 0 < len(name) <= MAXIMUM_NAME and (fault := why_not_a_name(name)):
         problems.add(scan_file, "name", fault)
@@ -96,12 +112,34 @@ def load(path: str | Path) -> Setup:
     if _is_scan(scanner_values):
         problems.add(scan_file, "scanner", f"{shown_path(scanner_path)} is a scan file, not a scanner file")
         raise Rejected(problems.found)
-    scanner = decode(Scanner, scanner_values, scanner_file, problems, partial(_check, scanner_file, problems))
+    scanner_values, scanner_file = inherited(scanner_values, scanner_file)
+    check = partial(_check, scanner_values, scanner_file, problems)
+    scanner = decode(Scanner, scanner_values, scanner_file, problems, check)
     check_hardware(values, scanner_values, scan_file, scanner_file, problems)
+    return _setup(scan, scanner, values, scan_file, scanner_file, scanner_path.parent, problems)
+
+
+def _setup(
+    written: WrittenScan | None,
+    scanner: Scanner | None,
+    values: Mapping[str, Any],
+    scan_file: Document,
+    scanner_file: Document,
+    folder: Path,
+    problems: Problems,
+) -> Setup:
+    """The setup of what was decoded. Raises ``Rejected`` where there are ``problems``."""
+    for file in (scan_file, scanner_file):
+        told_once(problems, file)
     problems.stop_if_any()
-    assert scan is not None
+    assert written is not None
     assert scanner is not None
-    return Setup(scan, scanner, scan_file, scanner_file, scanner_path.parent)
+    update_rate_hz = hardware_of(written, scanner, "x").dac.update_rate_hz
+    found = solved(written, update_rate_hz, values, scan_file, problems)
+    problems.stop_if_any()
+    assert found is not None
+    assert scanner is not None
+    return Setup(found.scan, scanner, replace(scan_file, said=found.said), scanner_file, folder, found.choices)
 
 
 def load_scanner(path: str | Path) -> tuple[Scanner, Document]:
@@ -110,7 +148,9 @@ def load_scanner(path: str | Path) -> tuple[Scanner, Document]:
     if _is_scan(values):
         raise Rejected([file.problem("", "this is a scan file; give the scanner file that it names")])
     problems = Problems()
-    scanner = decode(Scanner, values, file, problems, partial(_check, file, problems))
+    values, file = inherited(values, file)
+    scanner = decode(Scanner, values, file, problems, partial(_check, values, file, problems))
+    told_once(problems, file)
     problems.stop_if_any()
     assert scanner is not None
     return scanner, file
@@ -126,18 +166,16 @@ def from_values(scan: Mapping[str, Any], scanner: Mapping[str, Any], folder: str
     ``name`` is "scan" unless given, ``scanner`` of the scan is not needed. A response that the scanner names is looked
     for in ``folder``. Raises ``Rejected`` as ``load`` does, with "scan" and "scanner" for the names of files.
     """
-    values: dict[str, Any] = {"name": "scan", "scanner": "values", **_plain(scan)}
-    scan_file, scanner_file, problems = Document("scan", None), Document("scanner", None), Problems()
-    built = decode(Scan, values, scan_file, problems, partial(_check, scan_file, problems))
+    values, scan_file = inherited({"name": "scan", "scanner": "values", **_plain(scan)}, Document("scan", None))
+    scanner_values, scanner_file = inherited(_plain(scanner), Document("scanner", None))
+    problems = Problems()
+    built = decode(WrittenScan, values, scan_file, problems, partial(_check, values, scan_file, problems))
     if isinstance(values["name"], str) and (why := why_not_a_name(values["name"])):
         problems.add(scan_file, "name", why)
-    scanner_values = _plain(scanner)
-    its = decode(Scanner, scanner_values, scanner_file, problems, partial(_check, scanner_file, problems))
+    check = partial(_check, scanner_values, scanner_file, problems)
+    its = decode(Scanner, scanner_values, scanner_file, problems, check)
     check_hardware(values, scanner_values, scan_file, scanner_file, problems)
-    problems.stop_if_any()
-    assert built is not None
-    assert its is not None
-    return Setup(built, its, scan_file, scanner_file, Path(folder))
+    return _setup(built, its, values, scan_file, scanner_file, Path(folder), problems)
 
 
 def _plain(value: Any) -> Any:
@@ -149,19 +187,32 @@ def _plain(value: Any) -> Any:
     return [_plain(item) for item in value] if isinstance(value, list | tuple) else value
 
 
-def _check(file: Document, problems: Problems, kind: type, key: str, written: Mapping[str, Any], built: Any) -> None:
-    """What the types and ranges of single keys cannot say: of a table as written, and as built where that went well."""
-    if issubclass(kind, FastAxis):
-        for names in (("size_nm", "size_v"), ("offset_v", "offset_nm")):
-            _at_most_one(names, key, written, file, problems)
-            # An unknown key that was meant to be one of them is reported as such.
-            known = [*kind.__struct_fields__]
-            if not any(name in names or {*names} & {*_unknown(name, known)} for name in written):
-                problems.add(file, key, f"missing; give {' or '.join(names)}")
+def _check(
+    values: Mapping[str, Any],
+    file: Document,
+    problems: Problems,
+    kind: type,
+    key: str,
+    written: Mapping[str, Any],
+    built: Any,
+) -> None:
+    """What the types and ranges of single keys cannot say: of a table as written, and as built where that went well.
+
+    ``values`` is the whole file.
+    """
+    if kind is WrittenScan:
+        _at_most_one(IMAGES, key, written, file, problems)
+        check_words(written, file, problems)
+    elif issubclass(kind, FastAxis):
+        _check_axis(kind, key, any(name in values for name in IMAGES), written, file, problems)
     elif kind is BandLimit:
         _at_most_one(("harmonics", "cutoff_hz"), key, written, file, problems)
-    elif kind is Timing:
+    elif kind is WrittenTiming:
         _at_most_one(("ticks_per_line", "ticks_per_pixel"), key, written, file, problems)
+        for names in (("lines", "image_lines"), RATES):
+            _at_most_one(names, key, written, file, problems)
+            if not _any_of(names, written, kind):
+                problems.add(file, f"{key}.{names[0]}", f"missing; give {' or '.join(names)}")
     elif kind is Offset:
         _check_ways(key, written, file, problems)
     elif kind is Resonance:
@@ -174,16 +225,34 @@ def _check(file: Document, problems: Problems, kind: type, key: str, written: Ma
             problems.add(file, f"{key}.{name}", why)
 
 
+def _check_axis(
+    kind: type, key: str, image: bool, written: Mapping[str, Any], file: Document, problems: Problems
+) -> None:
+    """A size and an offset, each said once; the size of an ``image``, which stands elsewhere, does for one."""
+    resting = written.get("motion") == "off"  # which needs no size
+    for names in (OFFSETS,) if resting else (SIZES, OFFSETS):
+        _at_most_one(names, key, written, file, problems)
+        if not (_any_of(names, written, kind) or (names is SIZES and image)):
+            first, second = (name for name in names if not name.endswith("_um"))
+            problems.add(file, key, f"missing; give {first} or {second}")
+
+
+def _any_of(names: tuple[str, ...], written: Mapping[str, Any], kind: type) -> bool:
+    """Whether one of them is there; an unknown key that was meant to be one of them is reported as such."""
+    known = [*kind.__struct_fields__]  # type: ignore[attr-defined]
+    return any(name in names or {*names} & {*_unknown(name, known)} for name in written)
+
+
 def _unknown(name: str, known: list[str]) -> list[str]:
     return [] if name in known else meant(name, known)
 
 
 def _at_most_one(
-    names: tuple[str, str], key: str, written: Mapping[str, Any], file: Document, problems: Problems
+    names: tuple[str, ...], key: str, written: Mapping[str, Any], file: Document, problems: Problems
 ) -> None:
-    first, second = names
-    if first in written and second in written:
-        problems.add(file, f"{key}.{second}", f"{first} is given as well; keep one of the two")
+    first, *others = [name for name in names if name in written] or [""]
+    for other in others:
+        problems.add(file, f"{key}.{other}" if key else other, f"{first} is given as well; keep one of the two")
 
 
 def _check_ways(key: str, written: Mapping[str, Any], file: Document, problems: Problems) -> None:

@@ -3,7 +3,7 @@
 What ``[x.hysteresis]`` takes stands with the models, in ``compensation/models/``.
 """
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
 
@@ -115,6 +115,14 @@ class ScannerAxis(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     ] = Amplifier()
 
 
+class SlowScannerAxis(ScannerAxis, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Calibration of the slow axis."""
+
+    like: (
+        Annotated[Literal["x"], Meta(description="y takes all tables of `[x]`; its own keys go before them")] | None
+    ) = None
+
+
 class Scanner(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A calibrated scanner."""
 
@@ -131,7 +139,7 @@ class Scanner(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         Amplifier()
     )
     x: ScannerAxis
-    y: ScannerAxis
+    y: SlowScannerAxis
 
     @property
     def driver(self) -> Driver:

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
 
-from tablegen.quantities import FileName, Hertz, Nanometres, Normalised, PositiveVolts, Volts
+from tablegen.quantities import FileName, Hertz, Micrometres, Nanometres, Normalised, PositiveVolts, Volts
 
 # Short enough to leave room for what is appended; reserved words are refused beside it, see ``why_not_a_name``.
 MAXIMUM_NAME = 48
@@ -98,7 +98,10 @@ class Refinement(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class FastAxis(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The axis that moves once a line."""
 
-    size_nm: Annotated[Nanometres, Meta(description="scan size; or give `size_v`")] | None = None
+    size_nm: (
+        Annotated[Nanometres, Meta(description="scan size; or give `size_v`, or `image_nm` of the scan")] | None
+    ) = None
+    size_um: Annotated[Micrometres, Meta(description="the same in micrometres")] | None = None
     size_v: Annotated[PositiveVolts, Meta(description="scan voltage V_scan at the piezo, before m and g")] | None = None
     size_of: Annotated[
         Literal["line", "window"],
@@ -106,6 +109,7 @@ class FastAxis(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     ] = "line"
     offset_v: Annotated[Volts, Meta(description="offset voltage at the piezo; or give `offset_nm`")] | None = None
     offset_nm: Annotated[float, Meta(ge=-1e9, le=1e9, description="position relative to that at 0 V")] | None = None
+    offset_um: Annotated[float, Meta(ge=-1e6, le=1e6, description="the same in micrometres")] | None = None
     park_v: Annotated[Volts, Meta(description="voltage at the piezo after park; default: the offset")] | None = None
     turn: Annotated[
         Normalised, Meta(description="turning point: fraction of the period in which the axis moves forward")
@@ -118,10 +122,25 @@ class FastAxis(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 class SlowAxis(FastAxis, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The axis that moves once a frame."""
 
+    like: (
+        Annotated[
+            Literal["x"],
+            Meta(description="y takes all keys of `[x]` but `refinement`; its own keys go before them"),
+        ]
+        | None
+    ) = None
     motion: Annotated[
-        Literal["ramp", "step"],
-        Meta(description="ramp: moves on every tick; step: moves once per line, at its start"),
+        Literal["ramp", "step", "off"],
+        Meta(
+            description="ramp: moves on every tick; step: moves once per line, at its start; off: rests at its offset, "
+            "for line scans"
+        ),
     ] = "ramp"
+
+    @property
+    def off(self) -> bool:
+        """Whether it rests."""
+        return self.motion == "off"
 
 
 class Dac(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -191,14 +210,56 @@ class Amplifier(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     )
 
 
-class Timing(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class WrittenTiming(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Pixels, lines and rates."""
 
     pixels: Annotated[int, Meta(ge=1, le=65536, description="pixels per line and direction, over the imaging window")]
-    lines: Annotated[int, Meta(ge=1, le=65536, description="line periods per frame")]
-    line_rate_hz: Annotated[
-        float, Meta(ge=1e-3, le=1e6, description="lines per second; forward and backward make one line")
-    ]
+    image_lines: (
+        Annotated[
+            int,
+            Meta(
+                ge=1,
+                le=32768,
+                description="lines of the image; line periods for the turnarounds of y are added to them",
+            ),
+        ]
+        | None
+    ) = None
+    lines: Annotated[int, Meta(ge=1, le=65536, description="line periods per frame; or give `image_lines`")] | None = (
+        None
+    )
+    frame: (
+        Annotated[
+            Literal["flyback", "up-down"],
+            Meta(
+                description="flyback: every image goes up, and y flies back; up-down: images on the way up and down. "
+                "Sets `y.turn`, `y.band_limit.directions` and, unless it is given, `y.band_limit.window`"
+            ),
+        ]
+        | None
+    ) = None
+    line_rate_hz: (
+        Annotated[
+            float,
+            Meta(
+                ge=1e-3,
+                le=1e6,
+                description="lines per second; forward and backward make one line; or give `frame_rate_hz` or a speed",
+            ),
+        ]
+        | None
+    ) = None
+    frame_rate_hz: (
+        Annotated[
+            float, Meta(ge=1e-9, le=1e6, description="frames per second; a frame is one period of y: up and back")
+        ]
+        | None
+    ) = None
+    speed_um_per_s: (
+        Annotated[float, Meta(ge=1e-6, le=1e9, description="speed of the tip along the forward line, in the window")]
+        | None
+    ) = None
+    speed_mm_per_s: Annotated[float, Meta(ge=1e-9, le=1e6, description="the same in mm/s")] | None = None
     ticks_per_line: (
         Annotated[int, Meta(ge=8, le=1 << 24, description="ticks of a line; default: the nearest to the line rate")]
         | None
@@ -213,6 +274,13 @@ class Timing(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
             description="lines after a change during which valid is low; auto: by the operators of x, of y or of both"
         ),
     ] = 2
+
+
+class Timing(WrittenTiming, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Pixels, lines and rates, solved: line periods and line rate."""
+
+    lines: int
+    line_rate_hz: float
 
 
 class Limits(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -253,19 +321,42 @@ class Emit(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     header_only: Annotated[bool, Meta(description="C: put the tables into the header instead of a .c file")] = False
 
 
-class Scan(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class WrittenScan(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One scan."""
 
     name: Annotated[Identifier, Meta(description="prefix of every emitted file and identifier")]
     scanner: Annotated[FileName, Meta(description="path of the scanner file, relative to the scan file")]
+    image_nm: (
+        Annotated[
+            Nanometres | Annotated[list[Nanometres], Meta(min_length=2, max_length=2)],
+            Meta(description="size of the image, or [x, y]: what the imaging windows span; in place of sizes of axes"),
+        ]
+        | None
+    ) = None
+    image_um: (
+        Annotated[
+            Micrometres | Annotated[list[Micrometres], Meta(min_length=2, max_length=2)],
+            Meta(description="the same in micrometres"),
+        ]
+        | None
+    ) = None
     dac: Annotated[
         Dac, Meta(description="The converter of both axes; keys that the scanner file has can be left out.")
     ] = Dac()
     amplifier: Annotated[
         Amplifier, Meta(description="The amplifier of both axes; keys that the scanner file has can be left out.")
     ] = Amplifier()
-    timing: Timing
+    timing: WrittenTiming
     x: FastAxis
     y: SlowAxis
     limits: Limits = Limits()
     emit: Emit = Emit()
+
+
+class Scan(WrittenScan, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """One scan as it is planned: ``config/words.py`` has solved what was written for sizes, lines and rates.
+
+    Sizes stand at the axes, ``timing`` has line periods and a line rate, ``y`` its turn and its window.
+    """
+
+    timing: Timing

@@ -228,6 +228,8 @@ def by_scan_file(images: Images, scan: Path, scanner: Path | None, taken: OldSca
     model = (
         ScannerModel(setup.scanner, setup.scanner_file, setup.scanner_folder) if scanner is None else _model(scanner)
     )
+    if plan.y.drive.resting:
+        raise Rejected([setup.scan_file.problem("y.motion", "'off' makes a line scan, whose rows are one line of x")])
     part = plan.schedule.down if taken.back else plan.schedule.up
     rows, _ = images.shape
     if rows != part.count:

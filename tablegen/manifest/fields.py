@@ -179,7 +179,7 @@ class ManifestCertificate(Struct):
 
 
 class ManifestAxis(Struct):
-    """One axis of a manifest."""
+    """One axis of a manifest; one without a size rests at its offset."""
 
     drive: ManifestDrive
     line: ManifestLine
@@ -187,6 +187,11 @@ class ManifestAxis(Struct):
     table: ManifestTable
     output: ManifestOutput
     certificate: ManifestCertificate
+
+    @property
+    def resting(self) -> bool:
+        """Whether it states that it does not move."""
+        return self.drive.size_nm == 0.0
 
     @property
     def fourier_words(self) -> Ints:

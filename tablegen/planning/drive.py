@@ -15,10 +15,13 @@ from tablegen.compensation.response_file import read_response
 from tablegen.compensation.size import SizeLaw
 from tablegen.config.load import Setup
 from tablegen.config.scanner import Offset, Resonance, ScannerAxis, Size
-from tablegen.config.schema import FastAxis
+from tablegen.config.schema import FastAxis, SlowAxis
 from tablegen.driver import Driver
 from tablegen.figures import at_most
 from tablegen.problems import Problems, Unphysical
+
+# An axis at rest plays w = 1/2 throughout; gain and table refer to so small a share of v_max.
+RESTING_SHARE = 2.0**-24
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,11 @@ class Drive:
     max_boost_db: float
     line_at: Callable[[float], LineShape | None] = field(compare=False, repr=False)
     model_files: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def resting(self) -> bool:
+        """Whether the axis stays at its offset: w is 1/2 throughout, and the line has no size."""
+        return self.size_nm == 0.0
 
     @property
     def model(self) -> str:
@@ -107,8 +115,11 @@ def compensate(setup: Setup, axis: str, rate_hz: float, harmonics: int, problems
             v_offset = surface.small.voltage_at(scan.offset_nm, driver, scanner.size.k_nm_per_v)
 
     low, high = scan.band_limit.window
-    v, size_nm = 0.0, 0.0
-    if size_law is not None and scan.size_nm is not None:
+    resting = isinstance(scan, SlowAxis) and scan.off
+    v, size_nm = (RESTING_SHARE if resting else 0.0), 0.0
+    if resting:
+        pass
+    elif size_law is not None and scan.size_nm is not None:
         with problems.at(scan_file, f"{axis}.size_nm"):
             size_nm = scan.size_nm / (high - low) if scan.size_of == "window" else scan.size_nm
             try:
@@ -126,7 +137,7 @@ def compensate(setup: Setup, axis: str, rate_hz: float, harmonics: int, problems
             size_nm = size_law.size_nm(v)
 
     g = 1.0
-    if scanner.frequency is not None:
+    if scanner.frequency is not None and not resting:
         with problems.at(scanner_file, f"{axis}.frequency.alpha"):
             g = frequency_gain(rate_hz, scanner.frequency.alpha, scanner.frequency.reference_hz)
 
@@ -134,12 +145,14 @@ def compensate(setup: Setup, axis: str, rate_hz: float, harmonics: int, problems
     offset_law = surface.at(v)
     m = offset_law.factor(p)
     response, max_boost_db, law = None, 0.0, scanner.frequency
-    if scanner.resonance is not None:
+    if scanner.resonance is not None and not resting:
         max_boost_db = scanner.resonance.max_boost_db
         key = f"{axis}.resonance.response" if scanner.resonance.response is not None else f"{axis}.resonance"
         with problems.at(scanner_file, key):
             response = dynamics_of(scanner.resonance, setup.scanner_folder)
-    hysteresis = models.get(models.UNCOMPENSATED)() if scanner.hysteresis is None else scanner.hysteresis
+    uncompensated = scanner.hysteresis is None or resting
+    hysteresis = models.get(models.UNCOMPENSATED)() if uncompensated else scanner.hysteresis
+    assert hysteresis is not None
     wanted = WantedLine(
         axis=axis,
         turn=scan.turn,

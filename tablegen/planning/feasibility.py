@@ -107,7 +107,7 @@ class Feasibility:
         outside = drive.driver.beyond(bottom, top)
         if outside > 1e-9 * drive.driver.span:
             self._add(
-                self._size_key,
+                self._size_key if not drive.resting else f"{self._axis}.offset_v",
                 f"the drive spans {bottom:.4f}..{top:.4f} V, {outside:.4g} V outside the driver's "
                 f"{drive.driver}; {_offsets_that_fit(drive, low, high)}, {self._size_that_fits(drive, down, up)}",
             )
@@ -124,7 +124,7 @@ class Feasibility:
                 f"converter, {beyond:.4g} V beyond its {dac.v_min:g}..{dac.highest_v:.6g} V; "
                 f"{_amplifier_that_fits(dac, amplifier, bottom, top)} would carry it, or scan less",
             )
-        if abs(ends[1] - ends[0]) < 2.0:
+        if abs(ends[1] - ends[0]) < 2.0 and not drive.resting:
             self._add(
                 self._size_key,
                 f"the drive of {down + up:.4g} V is {ends[1] - ends[0]:.3g} codes of the converter, which cannot "
@@ -238,7 +238,11 @@ class Feasibility:
             return "timing.ticks_per_line", f"{ceil(times * timing.ticks_per_line)} ticks_per_line"
         if timing.ticks_per_pixel is not None:
             return "timing.ticks_per_pixel", f"{ceil(times * timing.ticks_per_pixel)} ticks_per_pixel"
-        return "timing.line_rate_hz", f"{at_most(timing.line_rate_hz / times, 5)} Hz"
+        written, factor = self._setup.scan_file.as_said("timing.line_rate_hz")
+        slower = at_most(factor * timing.line_rate_hz / times, 5)
+        if factor == 1.0:
+            return "timing.line_rate_hz", f"{slower} Hz"
+        return "timing.line_rate_hz", f"{written.rpartition('.')[2]} = {slower}"
 
 
 def _amplifier_that_fits(dac: AxisDac, amplifier: AxisAmplifier, bottom: float, top: float) -> str:

@@ -60,6 +60,8 @@ class LinePlan:
     def __repr__(self) -> str:
         table = f"{self.program.mode} table of {len(self.program.words)} x {self.program.bits} bits"
         volts = f"{self.drive.v_amplitude:.6g} V about {self.drive.v_offset:.6g} V"
+        if self.drive.resting:
+            return f"{self.axis}: rests at {self.drive.v_offset:.6g} V"
         return f"{self.axis}: {volts}, {self.series.harmonics} harmonics, {table}"
 
     @property
@@ -103,6 +105,11 @@ class Plan:
     def lines(self) -> tuple[LinePlan, LinePlan]:
         """Both axes, fast first."""
         return self.x, self.y
+
+    @property
+    def moving(self) -> tuple[LinePlan, ...]:
+        """The axes that move: of a line scan x alone."""
+        return tuple(line for line in self.lines if not line.drive.resting)
 
     @property
     def program(self) -> DualProgram:
@@ -165,7 +172,8 @@ def _line_plan(setup: Setup, axis: Literal["x", "y"], schedule: Schedule, proble
         return None
     target = None
     with problems.at(file, f"{axis}.band_limit.harmonics"):
-        target = band_limited(drive.shape, scan.band_limit, harmonics, layer)
+        flat = FourierSeries(0.5, np.zeros(1), np.zeros(1))
+        target = flat if drive.resting else band_limited(drive.shape, scan.band_limit, harmonics, layer)
     if target is None:
         return None
     at_piezo: FourierSeries = target

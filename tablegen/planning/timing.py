@@ -6,6 +6,7 @@ All of it is decided in exact fractions: a window edge at 0.1 of the line is 1/1
 from fractions import Fraction
 from math import ceil, floor, gcd
 
+from tablegen.config.frame import exact, lines_inside
 from tablegen.config.load import Setup
 from tablegen.config.schema import FastAxis, Timing
 from tablegen.device.schedule import MAXIMUM_LINE_TICKS, Schedule, Window
@@ -13,11 +14,6 @@ from tablegen.figures import at_least, at_most
 from tablegen.fixedpoint.phase import MAXIMUM_TICKS
 from tablegen.planning.windows import line_windows
 from tablegen.problems import Problems
-
-
-def exact(value: float) -> Fraction:
-    """The decimal fraction that a float of a configuration was written as."""
-    return Fraction(repr(value))
 
 
 def make_schedule(setup: Setup, problems: Problems) -> Schedule | None:
@@ -32,7 +28,9 @@ def make_schedule(setup: Setup, problems: Problems) -> Schedule | None:
     low, high = (exact(edge) for edge in scan.x.band_limit.window)
     both = scan.x.band_limit.directions == "both"
     forward, backward = line_windows(exact(scan.x.turn), low, high, both, ticks, timing.pixels)
-    up, down = _lines_inside(scan.y, timing.lines)
+    limit = scan.y.band_limit
+    inside = lines_inside(scan.y.turn, limit.window, limit.directions == "both", timing.lines)
+    up, down = (Window(*lines) for lines in inside)
     _check_pixels(setup, rate, ticks, forward, backward, problems)
     _check_lines(setup, up, down, problems)
     if len(problems.found) > before:
@@ -87,11 +85,12 @@ def _line_ticks(setup: Setup, rate: Fraction, problems: Problems) -> int:
             fits = "take more of them" if ticks < 8 else f"at most {most} fit" if most else "take fewer pixels"
         problems.add(file, key, f"a line of {shown} ticks is outside 8..{MAXIMUM_LINE_TICKS}; {fits}")
     elif ticks * timing.lines > MAXIMUM_TICKS:
+        what = "lines" if file.as_said("timing.lines")[0] == "timing.lines" else "line periods"
         problems.add(
             file,
             "timing.lines",
-            f"{timing.lines} lines of {ticks} ticks are {ticks * timing.lines} ticks a frame, above {MAXIMUM_TICKS}; "
-            f"at most {MAXIMUM_TICKS // ticks} lines fit",
+            f"{timing.lines} {what} of {ticks} ticks are {ticks * timing.lines} ticks a frame, above {MAXIMUM_TICKS}; "
+            f"at most {MAXIMUM_TICKS // ticks} {what} fit",
         )
     return ticks
 
@@ -148,18 +147,3 @@ def _longer_line(timing: Timing, rate: Fraction, ticks: int, needed: int) -> str
 def _width(axis: FastAxis) -> Fraction:
     low, high = axis.band_limit.window
     return exact(high) - exact(low)
-
-
-def _lines_inside(axis: FastAxis, lines: int) -> tuple[Window, Window]:
-    """The lines that lie inside the window of y, going up and coming back; a line lasts from its number to the next."""
-    low, high = (exact(edge) for edge in axis.band_limit.window)
-    turn = exact(axis.turn)
-
-    def between(begin: Fraction, end: Fraction) -> Window:
-        first = ceil(begin * lines)
-        return Window(first, max(floor(end * lines) - first, 0))
-
-    up = between(turn * low, turn * high)
-    if axis.band_limit.directions == "forward":
-        return up, Window(0, 0)
-    return up, between(turn + (1 - turn) * (1 - high), turn + (1 - turn) * (1 - low))

@@ -36,6 +36,11 @@ def asked(subject: Subject) -> Section:
         ]
         if planned is not None:
             rows += _settles(planned.plan.x if axis == "x" else planned.plan.y, subject)
+    if planned is not None:
+        rows += [row("" if i else "chosen", "", text) for i, text in enumerate(planned.setup.choices)]
+    y = subject.manifest.axes.y
+    if y.resting:
+        rows.append(row("y", "off", f"rests at {y.drive.v_offset:.6g} V, code {y.output.offset_code}"))
     return Section(
         "asked", "What was asked for, and what will be played", (Grid("", ("", "asked", "played"), tuple(rows)),)
     )

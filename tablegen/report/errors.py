@@ -15,10 +15,10 @@ from tablegen.virtual.simulation import AxisRun
 SIDES: tuple[Role, Role] = ("forward", "backward")
 
 
-def errors(planned: PlannedScan, axes: tuple[PlayedAxis, PlayedAxis]) -> Section:
+def errors(planned: PlannedScan, axes: tuple[PlayedAxis, ...]) -> Section:
     """Residual and scaling error of both axes."""
     charts, rows, words = [], [], []
-    for line, played in zip(planned.plan.lines, axes, strict=True):
+    for line, played in zip(planned.plan.moving, axes, strict=True):
         for correction in played.corrections:
             charts += _charts(line, correction)
             rows.append(_row(played.axis, correction))

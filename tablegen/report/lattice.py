@@ -16,8 +16,10 @@ _ROWS = 9.0  # of the lattice across the picture
 _CONTRAST = 1.35
 
 
-def lattice(planned: PlannedScan, axes: tuple[PlayedAxis, PlayedAxis]) -> Section | None:
+def lattice(planned: PlannedScan, axes: tuple[PlayedAxis, ...]) -> Section | None:
     """Trace and retrace, without and with the corrections; None where nothing could be played."""
+    if len(axes) < 2:  # a line scan makes no image
+        return None
     x, y = axes
     pairs = [
         (name, one, other)
@@ -50,7 +52,7 @@ def lattice(planned: PlannedScan, axes: tuple[PlayedAxis, PlayedAxis]) -> Sectio
     )
 
 
-def _remark(axes: tuple[PlayedAxis, PlayedAxis]) -> str:
+def _remark(axes: tuple[PlayedAxis, ...]) -> str:
     both = " Both pictures have the corrections of offset, size and rate."
     if all(one.on_operator for one in axes):
         return "What the operator is wrong by is not in the picture; the certificate has it as uncertainty." + both

@@ -13,7 +13,7 @@ from tablegen.report.subject import PlannedScan, Subject, series_of
 _POINTS = 601
 
 
-def lines(subject: Subject, axes: tuple[PlayedAxis, PlayedAxis] | None) -> Section:
+def lines(subject: Subject, axes: tuple[PlayedAxis, ...] | None) -> Section:
     """One line of x and one frame of y; of a directory the drive alone."""
     charts = []
     for at, (axis, entry) in enumerate(subject.axes):

@@ -96,14 +96,13 @@ class PlayedAxis:
         return first.run if first is not None and first.name == "uncompensated" else None
 
 
-def played_axes(planned: PlannedScan) -> tuple[PlayedAxis, PlayedAxis]:
-    """Both axes."""
-    x, y = planned.plan.lines
+def played_axes(planned: PlannedScan) -> tuple[PlayedAxis, ...]:
+    """The axes that move."""
     setup = without_refinement(planned.setup)
     plain = planned.plan if setup is planned.setup else make_plan(setup)
     others = {model: _planned(setup, model) for model in _models(planned)}
-    found = [_played(line, bare, others) for line, bare in zip((x, y), plain.lines, strict=True)]
-    return found[0], found[1]
+    both = zip(planned.plan.moving, plain.moving, strict=True)
+    return tuple(_played(line, bare, others) for line, bare in both)
 
 
 def without_refinement(setup: Setup) -> Setup:

@@ -63,8 +63,12 @@ class Subject:
 
     @property
     def axes(self) -> tuple[tuple[Literal["x", "y"], ManifestAxis], ...]:
-        """Both axes with their names, the fast one first."""
-        return ("x", self.manifest.axes.x), ("y", self.manifest.axes.y)
+        """The axes that move with their names, the fast one first."""
+        both: tuple[tuple[Literal["x", "y"], ManifestAxis], ...] = (
+            ("x", self.manifest.axes.x),
+            ("y", self.manifest.axes.y),
+        )
+        return tuple(one for one in both if not one[1].resting)
 
 
 def series_of(axis: ManifestAxis) -> FourierSeries:

@@ -20,7 +20,7 @@ _SIZES = 241
 
 def usable(planned: PlannedScan) -> Section:
     """A chart an axis."""
-    found = [_axis(planned, line) for line in planned.plan.lines]
+    found = [_axis(planned, line) for line in planned.plan.moving]
     words = [word for _, words in found for word in words]
     return Section(
         "usable",

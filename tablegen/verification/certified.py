@@ -126,9 +126,12 @@ class PlayedPeriod:
             "largest_step": int(np.max(np.abs(codes - np.roll(codes, 1)))),
             "max_step": output.max_step,
             "peak_slew_v_per_s": axis.drive.v_amplitude * slope * rate_hz,
-            "beyond_cutoff_db": 10.0 * log10(max(square - mean * mean, _LEAST_POWER) / power),
+            "beyond_cutoff_db": self._beyond_cutoff(square - mean * mean, power),
             "at_resonance_db": self._at_resonance(rate_hz, power),
         }
+
+    def _beyond_cutoff(self, square: float, power: float) -> float | None:
+        return None if self.axis.resting else 10.0 * log10(max(square, _LEAST_POWER) / power)
 
     def _at_resonance(self, rate_hz: float, power: float) -> float | None:
         resonance, ticks = self.axis.drive.resonance, self.program.ticks

@@ -121,6 +121,9 @@ def _axis(manifest: Manifest, name: str, axis: ManifestAxis) -> Found:
         0.0 < left < 1.0 + _RELATIVE for left in fourier.held_factors
     )
     found.append(("fourier.held_factors", held, "not a share for each of the held harmonics"))
+    if axis.resting:
+        flat = fourier.a0 == 0.5 and not any(fourier.a) and not any(fourier.b)
+        found.append(("drive.size_nm", flat, "0, and the waveform moves"))
     if fourier.target is not None:
         target = len(fourier.target.a) == len(fourier.target.b) == fourier.harmonics
         found.append(("fourier.target", target, f"not of {fourier.harmonics} harmonics"))

@@ -162,7 +162,9 @@ def reached(axis: ManifestAxis) -> ManifestSeries:
 
 
 def scaling_figures(axis: ManifestAxis, period: PlayedPeriod) -> dict[str, dict[str, float]]:
-    """The parts of the scaling error of each direction that is imaged, in percent."""
+    """The parts of the scaling error of each direction that is imaged, in percent; none of an axis at rest."""
+    if axis.resting:
+        return {}
     sides = ("forward", "backward") if axis.fourier.directions == "both" else ("forward",)
     return {side: _direction(axis, period, side) for side in sides}
 

@@ -217,7 +217,8 @@ KEYS = [
     case(
         "wholly_different = 1",
         says=(
-            "scan.toml:1: wholly_different: unknown key; known here: amplifier, dac, emit, limits, name, "
+            "scan.toml:1: wholly_different: unknown key; known here: amplifier, dac, emit, image_nm, image_um, "
+            "limits, name, "
             "scanner, timing, x, y"
         ),
     ),
@@ -226,7 +227,8 @@ KEYS = [
         "- [limits]",
         '+ ["we.ird \\"key\\""]\na = 1',
         says=(
-            'scan.toml:54: "we.ird \\"key\\"": unknown key; known here: amplifier, dac, emit, limits, name, '
+            'scan.toml:54: "we.ird \\"key\\"": unknown key; known here: amplifier, dac, emit, image_nm, '
+            "image_um, limits, name, "
             "scanner, timing, x, y"
         ),
     ),
@@ -261,7 +263,7 @@ KEYS = [
         says="scan.toml:23: x.size: unknown key; did you mean size_nm or size_v? (units are part of the name)",
     ),
     case(
-        "- x.size_nm", "x.size_um = 0.2", says="scan.toml:23: x.size_um: unknown key; did you mean size_nm or size_v?"
+        "- x.size_nm", "x.size_pm = 0.2", says="scan.toml:23: x.size_pm: unknown key; did you mean size_nm or size_v?"
     ),
     case("- x.size_nm", "x.siez_nm = 200.0", says="scan.toml:23: x.siez_nm: unknown key; did you mean size_nm?"),
     case(
@@ -272,8 +274,8 @@ KEYS = [
     case(
         "x.motion = 'step'",
         says=(
-            "scan.toml:23: x.motion: unknown key; known here: band_limit, offset_nm, offset_v, park_v, "
-            "refinement, size_nm, size_of, size_v, table, turn"
+            "scan.toml:23: x.motion: unknown key; known here: band_limit, offset_nm, offset_um, offset_v, "
+            "park_v, refinement, size_nm, size_of, size_um, size_v, table, turn"
         ),
     ),
     case(
@@ -283,7 +285,7 @@ KEYS = [
     ),
     case("limits.max_error = 1", says="scan.toml:55: limits.max_error: unknown key; max_error_lsb is given as well"),
     case("- dac.bits", says="scan.toml:5: dac.bits: missing; this key is required"),
-    case("- timing.lines", says="scan.toml:17: timing.lines: missing; this key is required"),
+    case("- timing.lines", says="scan.toml:17: timing.lines: missing; give lines or image_lines"),
     case("- [dac]", says="scan.toml:1: dac: missing; this table is required, here or in the scanner file"),
     case("- [timing]", says="scan.toml:1: timing: missing; this table is required"),
     case("- name", says="scan.toml:1: name: missing; this key is required"),
@@ -346,7 +348,7 @@ CHOICES = [
         says="scan.toml:31: x.band_limit.directions: 'backward' is not one of 'both', 'forward'",
     ),
     case("x.table.mode = 'cubic'", says="scan.toml:34: x.table.mode: 'cubic' is not one of 'direct', 'interpolated'"),
-    case("y.motion = 'jump'", says="scan.toml:39: y.motion: 'jump' is not one of 'ramp', 'step'"),
+    case("y.motion = 'jump'", says="scan.toml:39: y.motion: 'jump' is not one of 'off', 'ramp', 'step'"),
     case(
         scanner="x.hysteresis.model = 'preisach'",
         says="scanner.toml:16: x.hysteresis.model: 'preisach' is not one of "
@@ -1352,7 +1354,7 @@ def test_every_fault_of_both_files_is_reported_in_one_run(here: Path) -> None:
         "v_min, word_bits",
         "scan.toml:7: dac.bits: 30 is above 24",
         "scan.toml:14: amplifier.gain: nan is not a finite number",
-        "scan.toml:18: timing.lines: missing; this key is required",
+        "scan.toml:18: timing.lines: missing; give lines or image_lines",
         "scan.toml:23: x.size_v: size_nm is given as well; keep one of the two",
         "scan.toml:26: x.turn: 1.5 is not below 1",
         "scan.toml:35: x.table.mode: 'cubic' is not one of 'direct', 'interpolated'",

@@ -30,4 +30,4 @@ def test_a_scan_file_is_no_scanner(pair: Path) -> None:
     path.write_text(path.read_text("utf-8").replace('"scanner.toml"', '"annexin_200nm.toml"'), "utf-8")
     outcome = run("check", path)
     assert (outcome.status, outcome.out) == (2, "")
-    assert outcome.err == f"{path}:3: scanner: {path} is a scan file, not a scanner file\n"
+    assert outcome.err == f"{path}:4: scanner: {path} is a scan file, not a scanner file\n"

@@ -71,7 +71,8 @@ def packages(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """What the tree builds."""
     folder = tmp_path_factory.mktemp("tree")
-    python(folder, "-m", "tablegen", "build", EXAMPLE, "-o", "out")
+    python(folder, "-m", "tablegen", "init", "scan")
+    python(folder, "-m", "tablegen", "build", f"scan/{EXAMPLE.name}", "-o", "out")
     return folder / "out"
 
 

@@ -22,7 +22,6 @@ ALLOWED = {
     ("emit/write.py", "os.fdopen"): "what it has just made, to write it",
     ("emit/directory_lock.py", "os.open"): "a directory, to lock it",
     ("emit/render.py", "read_bytes"): "the runtime, which ships with the package",
-    ("cli/init.py", "read_bytes"): "the examples, which ship with the package",
     ("verification/worker.py", "open"): "its own log",
     ("verification/worker.py", "read_text"): "its own log and outcome",
     ("verification/bench.py", "read_text"): "its own record",

@@ -45,10 +45,11 @@ def test_installed_wheel_builds_what_the_tree_builds(installed: Path, tmp_path: 
     assert Path(where.strip()).is_relative_to(installed)
     python(tmp_path, "-m", "tablegen", "init", "scan", path=installed)
     python(tmp_path, "-m", "tablegen", "build", f"scan/{EXAMPLE.name}", "-o", "wheel", path=installed)
-    python(tmp_path, "-m", "tablegen", "build", EXAMPLE, "-o", "tree")
+    python(tmp_path, "-m", "tablegen", "init", "own")
+    python(tmp_path, "-m", "tablegen", "build", f"own/{EXAMPLE.name}", "-o", "tree")
     wheel, tree = ({path.name: path.read_bytes() for path in (tmp_path / name).iterdir()} for name in ("wheel", "tree"))
     assert wheel == tree
-    assert (tmp_path / "scan" / EXAMPLE.name).read_bytes() == EXAMPLE.read_bytes()
+    assert (tmp_path / "scan" / EXAMPLE.name).read_bytes() == (tmp_path / "own" / EXAMPLE.name).read_bytes()
 
 
 def test_installed_wheel_verifies_a_build(installed: Path, tmp_path: Path) -> None:
