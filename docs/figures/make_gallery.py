@@ -17,6 +17,7 @@ SCANS = {
     "HS-AFM": EXAMPLES / "gallery" / "hs_afm" / "scan.toml",
     "large range": EXAMPLES / "gallery" / "large_range" / "scan.toml",
     "tube": EXAMPLES / "tube_5um.toml",
+    "line": EXAMPLES / "gallery" / "line" / "scan.toml",
     "closed-loop stage": EXAMPLES / "gallery" / "closed_loop" / "scan.toml",
 }
 HEAD = (
@@ -30,8 +31,8 @@ def rows(name: str, path: Path) -> list[str]:
     """What the certificate says of each axis."""
     build = tablegen.build(path)
     found = []
-    for axis in ("x", "y"):
-        line, certificate = getattr(build.plan, axis), build.certificates[axis]
+    for line in build.plan.moving:
+        axis, certificate = line.axis, build.certificates[line.axis]
         errors = ", ".join(
             f"{side}: {one.uncompensated:.1f} -> {one.total:.2f}" for side, one in certificate.scaling.items()
         )
