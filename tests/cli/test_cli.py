@@ -22,7 +22,7 @@ from limits import PATIENCE_S
 
 from tablegen import __version__
 
-COMMANDS = ("build", "check", "show", "report", "verify", "init", "paths", "schema")
+COMMANDS = ("build", "sweep", "check", "show", "report", "verify", "init", "paths", "schema")
 COMMANDS += ("upload", "status", "readback", "park", "trigger", "clear", "ports")
 OWN_FILES = [
     "annexin_200nm.c",
@@ -85,7 +85,7 @@ def test_help_names_every_command_and_every_exit_status() -> None:
     for command in COMMANDS:
         assert re.search(rf"^  {command} +\S.*\.$", shown, re.MULTILINE), command
     statuses = "0 done|1 output is stale|2 wrong input|3 a limit|4 cannot write|5 a build|6 a simulator|130 interrupted"
-    statuses += "|7 no port|8 no answer|9 refused|10 link lost"
+    statuses += "|7 no port|8 no answer|9 refused|10 link lost|11 some scans"
     for status in statuses.split("|"):
         assert status in shown
     assert run("-h").out == shown

@@ -24,6 +24,7 @@ LAYERS = (
     "certificate",
     "manifest",
     "emit",
+    "library",
     "link",
     "verification",
     "calibration",
@@ -32,6 +33,7 @@ LAYERS = (
     "correction",
     "report",
     "api",
+    "sweep",
     "cli",
     "__main__",
 )
