@@ -10,6 +10,9 @@
 # make fuzz      a million inputs for the C link, with sanitizers, on from the kept corpus
 # make bench     what a build costs, against importing numpy
 # make figures   the pictures of the README and the docs
+# make site      the documentation as a site with a search, into build/site
+# make man       the manual pages of all commands, into build/man
+# make reference the pages of commands, keys and Python, into docs
 # make paper     the paper's numbers beside ours, into docs/paper
 # make check-python PYTHON=python3.13  `make check` under another Python, in an environment of its own
 # make clean     remove what these made
@@ -21,7 +24,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 
 # What the sets of tests compile, simulate, prove and synthesise with; tests/README.md tells the sets.
 CHECK_TOOLS := gcc iverilog
-COMMON_TOOLS := $(CHECK_TOOLS) make g++ clang libclang-rt-dev cmake ninja-build srecord chromium
+COMMON_TOOLS := $(CHECK_TOOLS) make g++ clang libclang-rt-dev cmake ninja-build srecord chromium groff man-db
 HDL_TOOLS := make g++ iverilog yosys nextpnr-ice40 z3
 FIRMWARE_TOOLS := gcc-arm-none-eabi qemu-system-arm gcc-avr avr-libc simavr gcc-riscv64-unknown-elf gcc-mips-linux-gnu \
     libc6-dev-mips-cross qemu-user \
@@ -31,7 +34,7 @@ TOOLS := $(COMMON_TOOLS) $(HDL_TOOLS) $(FIRMWARE_TOOLS) cppcheck
 # they share is made once. OpenBLAS threads only spin beside the other processes.
 PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist worksteal
 
-.PHONY: demo lint check test test-rest test-all test-hdl test-long resources instructions link fuzz bench figures paper clean
+.PHONY: demo lint check test test-rest test-all test-hdl test-long resources instructions link fuzz bench figures site man reference paper clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/installed
@@ -98,11 +101,22 @@ bench: $(VENV)/installed
 
 figures: $(VENV)/installed-plot
 	$(BIN)/python docs/figures/make_figures.py
+	$(BIN)/python docs/figures/make_readme.py
 	$(BIN)/python docs/figures/make_virtual.py
 	$(BIN)/python docs/figures/make_operator.py
 	$(BIN)/python docs/figures/make_correct.py
 	@.ci/system-packages chromium
 	$(BIN)/python docs/figures/make_report.py
+
+site: $(VENV)/installed-docs
+	$(BIN)/python docs/site/make_site.py build/site
+
+man: $(VENV)/installed
+	$(BIN)/python docs/make_man.py build/man
+
+reference: $(VENV)/installed
+	$(BIN)/python docs/make_configuration.py
+	$(BIN)/python docs/make_reference.py
 
 paper: $(VENV)/installed-plot
 	$(BIN)/python docs/make_paper.py
@@ -119,6 +133,10 @@ $(VENV)/installed-test: $(VENV)/installed
 
 $(VENV)/installed-plot: $(VENV)/installed
 	$(PIP) install --editable '.[images,plot]'
+	@touch $@
+
+$(VENV)/installed-docs: $(VENV)/installed
+	$(PIP) install --editable '.[docs]'
 	@touch $@
 
 # The Pythons that the package supports. `make test` runs the wheel under each further one that this machine has.

@@ -20,20 +20,33 @@ from tablegen.planning.line_plan import make_plan
 from tablegen.problems import Rejected
 
 README = (REPOSITORY / "README.md").read_text(encoding="utf-8")
+BUILDING = (REPOSITORY / "docs" / "building.md").read_text(encoding="utf-8")
+ACCURACY = (REPOSITORY / "docs" / "accuracy.md").read_text(encoding="utf-8")
 
 
-def block(command: str) -> str:
-    """The text block of the README that starts with a command, without that command."""
-    found = re.search(r"```text\n\$ " + re.escape(command) + r"\n(.*?)```", README, re.DOTALL)
-    assert found, f"the README shows no {command!r}"
+def block(command: str, page: str = BUILDING) -> str:
+    """The text block of a page that starts with a command, without that command."""
+    found = re.search(r"```text\n\$ " + re.escape(command) + r"\n(.*?)```", page, re.DOTALL)
+    assert found, f"the page shows no {command!r}"
     return found[1]
+
+
+def test_the_readme_and_the_page_have_the_same_files() -> None:
+    """What a build writes stands in both."""
+    rows = [
+        [line.replace("docs/", "") for line in text.splitlines() if re.match(r"\| `(?:NAME|dac_|manifest)", line)]
+        for text in (README, BUILDING)
+    ]
+    assert rows[0] == rows[1]
+    assert len(rows[0]) == 7
 
 
 def test_the_build_prints_what_the_readme_shows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "examples").symlink_to(REPOSITORY / "examples")
     monkeypatch.chdir(tmp_path)
     result = CliRunner().invoke(cli, ["build", "examples/annexin_200nm.toml", "-o", "build/demo"])
-    assert result.stdout == block("tablegen build examples/annexin_200nm.toml -o build/demo")
+    for page in (README, BUILDING):
+        assert result.stdout == block("tablegen build examples/annexin_200nm.toml -o build/demo", page)
 
 
 def test_the_errors_are_what_the_readme_shows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -60,7 +73,7 @@ def test_the_warning_is_what_the_readme_shows(tmp_path: Path, monkeypatch: pytes
 
 def test_the_accuracy_table_is_measured(tmp_path: Path) -> None:
     rows = re.findall(
-        r"^\| (\d+) \| (\d+) words of (\d+) bits[^|]*\|([^|]*)\|([^|]*)\|([^|]*)\|([^|]*)\|$", README, re.M
+        r"^\| (\d+) \| (\d+) words of (\d+) bits[^|]*\|([^|]*)\|([^|]*)\|([^|]*)\|([^|]*)\|$", ACCURACY, re.M
     )
     assert len(rows) == 5
     for dac, length, bits, x_error, y_error, x_scaling, y_scaling in rows:
@@ -90,7 +103,7 @@ def same(shown: str, measured: float) -> bool:
 def test_the_band_limit_tables_are_measured() -> None:
     page = (REPOSITORY / "docs" / "waveform.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| (\d+) \| ([\d.]+) \| ([\d.]+) \| ([\d.]+) \| (\d+) \| (\d+) \|$", page, re.M)
-    short = re.findall(r"^\| (\d+) \| ([\d.]+) \| ([\d.]+) \| ([\d.]+) \|$", README, re.M)
+    short = re.findall(r"^\| (\d+) \| ([\d.]+) \| ([\d.]+) \| ([\d.]+) \|$", ACCURACY, re.M)
     assert [row[0] for row in rows] == ["8", "16", "21", "32", "64"]
     assert [row[0] for row in short] == ["16", "21", "32"]
     for harmonics, *shown in [*rows, *short]:
@@ -107,7 +120,7 @@ def test_uncompensated_errors_are_measured(tmp_path: Path) -> None:
     for branch in (SECTION_8.forward, SECTION_8.backward):
         slope = 1.0 / branch.slope(branch.inverse(x))
         found.append(100.0 * float(slope.max() - slope.min()) / float(np.interp(0.5, x, slope)))
-    text = " ".join(README.split())
+    text = " ".join(ACCURACY.split())
     assert f"any correction has {found[0]:.0f} forward and {found[1]:.0f} backward" in text
     certificates = certify(make_plan(load(write_pair(tmp_path))))
     x_scaling, y_scaling = certificates["x"].scaling, certificates["y"].scaling

@@ -66,14 +66,14 @@ def test_the_limits_are_those_of_the_code() -> None:
     assert f"more than {100 * periodic_line._BACKWARDS:g} % in the middle of a sweep" in WORDS
 
 
-def test_the_readme_has_the_numbers_of_the_page() -> None:
-    readme = " ".join((REPOSITORY / "README.md").read_text("utf-8").split())
+def test_the_summary_has_the_numbers_of_the_page() -> None:
+    shown = " ".join((REPOSITORY / "docs" / "accuracy.md").read_text("utf-8").split())
     for plant in ("many plays", "Bouc-Wen"):
         for line in ("laws", "operator, six traces"):
             (row,) = re.findall(rf"^\| {plant} \| 50 V \| {line} \| (.*) \|$", PAGE, re.MULTILINE)
             _, (mean, worst), (mean_apart, worst_apart), _ = CELL.findall(row)
             told = f"{float(mean):.1f} ({float(worst):.1f})", f"{float(mean_apart):.2f} ({float(worst_apart):.2f})"
-            assert f"{told[0]} | {told[1]}" in readme, (plant, line, told)
+            assert f"{told[0]} | {told[1]}" in shown, (plant, line, told)
 
 
 @pytest.mark.common

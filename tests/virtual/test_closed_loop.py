@@ -64,7 +64,7 @@ def test_a_calibrated_line_is_as_straight_as_the_papers(calibration: Calibration
 
 
 def test_a_line_on_the_scanner_of_another_family(example: Setup) -> None:
-    """Its branches are not those of (17): the paper's result is missed twofold, as README and page say."""
+    """Its branches are not those of (17): the paper's result is missed twofold, as both pages say."""
     duhem = VirtualScanner.of(load_truth("duhem"))
     sharp = with_scan(example, size_v=50.0, rate_hz=SHARP_RATE_HZ, band_limit=SHARP)
     whole = with_scan(calibrate(sharp, duhem).setup, size_v=100.0)
@@ -73,7 +73,7 @@ def test_a_line_on_the_scanner_of_another_family(example: Setup) -> None:
     assert triangle["backward"][0] > 8.2
     assert [round(calibrated[side][0], 1) for side in ("forward", "backward")] == [0.8, 1.8]
     assert [round(calibrated[side][1]) for side in ("forward", "backward")] == [10, 11]
-    for page in ("README.md", "docs/virtual.md"):
+    for page in ("docs/accuracy.md", "docs/virtual.md"):
         text = (REPOSITORY / page).read_text("utf-8")
         assert re.search(r"0\.8 %.*1\.8 %", text, re.DOTALL), page
 
@@ -131,7 +131,7 @@ def test_the_map_of_sizes_is_within_one_percent(calibration: Calibration, exampl
 
 
 def test_the_map_of_another_plant_is_not(example: Setup, monkeypatch: pytest.MonkeyPatch) -> None:
-    """One percent is the default scanner's own: it was made so that one m serves every size. README and page say so."""
+    """One percent is the default scanner's own: it was made so that one m serves every size. Both pages say so."""
     scan = with_scan(example, size_v=20.0, rate_hz=100.0)
 
     def worst(make: Callable[[Truth], Truth], *sizes: float) -> float:
@@ -141,7 +141,7 @@ def test_the_map_of_another_plant_is_not(example: Setup, monkeypatch: pytest.Mon
 
     assert 4.25 < worst(same_numbers, 0.02) < 5.0
     assert 1.0 < worst(uniform_density, 0.02) < 2.0
-    for page in ("README.md", "docs/virtual.md"):
+    for page in ("docs/accuracy.md", "docs/virtual.md"):
         assert "up to 5 % wrong near the" in " ".join((REPOSITORY / page).read_text("utf-8").split()), page
     assert 3.0 < worst(same_numbers, 0.06) < 3.6
     monkeypatch.setattr(laboratory, "OFFSET_SIZE", 0.06)  # offsets from images of the size that is scanned

@@ -1,0 +1,45 @@
+"""docs/troubleshooting.md: its messages are those of the program, and so are its statuses."""
+
+import re
+
+import pytest
+from building import REPOSITORY
+from click.testing import CliRunner
+
+from tablegen.cli import cli
+from tablegen.cli.exit_status import ExitStatus
+
+PAGE = (REPOSITORY / "docs" / "troubleshooting.md").read_text("utf-8")
+SOURCES = {path: path.read_text("utf-8") for path in sorted((REPOSITORY / "tablegen").rglob("*.py"))}
+TOLD = re.findall(r"^\| `([^`]+)`(?: and `[^`]+` refused| in a row of the table)? \|", PAGE, re.MULTILINE)
+
+
+def joined(text: str) -> str:
+    """A source with literals that go on in the next line put together."""
+    return re.sub(r"[\"']\s*\n\s*f?[\"']", "", text)
+
+
+ALL = "\n".join(map(joined, SOURCES.values()))
+
+
+@pytest.mark.parametrize("message", TOLD)
+def test_the_program_says_it(message: str) -> None:
+    assert message in ALL
+
+
+def test_a_message_that_nothing_says_is_found() -> None:
+    assert len(TOLD) == len(re.findall(r"^\| `", PAGE, re.MULTILINE)) > 40
+    assert "the flux capacitor is empty" not in ALL
+
+
+def test_the_statuses_are_those_of_the_program() -> None:
+    table = PAGE[PAGE.index("## Exit statuses") : PAGE.index("## The image")]
+    found: set[int] = set()
+    for low, high in re.findall(r"^\| (\d+)(?: to (\d+))? \|", table, re.MULTILINE):
+        found |= set(range(int(low), int(high or low) + 1))
+    assert found == {int(status) for status in ExitStatus}
+    told = CliRunner().invoke(cli, ["--help"]).output
+    rows = dict(re.findall(r"^\| (\d+) \| (.*?)(?:;.*)? \|$", table, re.MULTILINE))
+    helped = dict(re.findall(r"^ +(\d+) (.*)$", told, re.MULTILINE))
+    for status in ("0", "2", "3", "4", "6", "130"):
+        assert rows[status].replace("the ", "") == helped[status].replace("the ", "")
