@@ -134,4 +134,6 @@ def _size_key(setup: Setup, line: LinePlan) -> str:
 def _band_key(setup: Setup, line: LinePlan) -> str:
     axis = line.axis
     scan = getattr(setup.scan, axis)
+    if scan.band_limit.max_scaling_error_percent is not None:
+        return f"{axis}.band_limit.max_scaling_error_percent"
     return f"{axis}.band_limit.{'harmonics' if scan.band_limit.cutoff_hz is None else 'cutoff_hz'}"

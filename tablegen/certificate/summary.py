@@ -65,7 +65,8 @@ def _hold(line: LinePlan) -> str:
 
 def _method(line: LinePlan) -> str:
     low, high = line.band_limit.window
-    return f"{line.band_limit.method} {low:g}..{high:g} {line.band_limit.directions}"
+    kept = "" if line.kept_percent is None else f", gentlest at {line.kept_percent:.3g} %"
+    return f"{line.band_limit.method} {low:g}..{high:g} {line.band_limit.directions}{kept}"
 
 
 def _asked(line: LinePlan) -> str:
@@ -114,7 +115,15 @@ def certificate_lines(certificate: Certificate) -> list[tuple[str, str]]:
     ]
     if c.beyond_cutoff_db is not None:
         rows.append(("beyond cutoff", f"{c.beyond_cutoff_db:.1f} dB" + _resonance(c)))
+    if c.peak_acceleration is not None:
+        rows.append(("acceleration", f"at most {c.peak_acceleration:.4g} of the line a period squared{_optimum(c)}"))
     return rows
+
+
+def _optimum(c: Certificate) -> str:
+    if c.optimum is None or c.peak_acceleration is None:
+        return ""
+    return f", {c.peak_acceleration / c.optimum:.3f} of the optimum {c.optimum:.4g}"
 
 
 def expected_lines(expectation: Expectation) -> list[str]:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tablegen.cli.common import format_option, planned, rendered, scan_argument
+from tablegen.cli.common import format_option, planned, rendered, require, scan_argument
 from tablegen.cli.plot import PlottingCommand, check_plot, in_terminal, plot_option, put_plot
 from tablegen.cli.terminal import tell
 
@@ -19,7 +19,12 @@ if TYPE_CHECKING:
 @click.option("--json", "as_json", is_flag=True, help="Print manifest.json instead of text.")
 @format_option
 @plot_option("drive, correction and expected error", by_default=True)
-def show(scan: Path, as_json: bool, formats: tuple[str, ...], plot: Path | None, no_plot: bool) -> None:
+@click.option(
+    "--optimum",
+    is_flag=True,
+    help="Add the least peak acceleration that any waveform of this scaling error could have. Needs scipy.",
+)
+def show(scan: Path, as_json: bool, formats: tuple[str, ...], plot: Path | None, no_plot: bool, optimum: bool) -> None:
     """Show drive, rates, accuracy and plots of a scan. Writes no file.
 
     In the plots > is forward and < is backward; the axis is doubled where the image is taken.
@@ -33,6 +38,10 @@ def show(scan: Path, as_json: bool, formats: tuple[str, ...], plot: Path | None,
     Exit status: 0 done, 2 wrong input, 3 a limit of the certificate is exceeded.
     """
     check_plot(plot, as_json)
+    if optimum:
+        if as_json:
+            raise click.UsageError("The manifest has no optimum: leave out --json or --optimum.")
+        require("scipy", extra="calibrate")
     built = planned(scan, list(formats) or None)
     if as_json:
         click.echo(rendered(built)["manifest.json"], nl=False)
@@ -40,7 +49,17 @@ def show(scan: Path, as_json: bool, formats: tuple[str, ...], plot: Path | None,
         return
     plan = built.plan
     tell(f"{plan.name} on {plan.scanner!r}", bold=True)
-    for text in built.summary.splitlines():
+    lines = built.summary.splitlines()
+    if optimum:
+        from tablegen.certificate.certificate import Certificate
+        from tablegen.certificate.optimum import with_optimum
+        from tablegen.certificate.summary import summary
+
+        found: dict[str, Certificate] = {
+            line.axis: with_optimum(line, built.certificates[line.axis]) for line in plan.lines
+        }
+        lines = summary(plan, found)
+    for text in lines:
         tell(text, bold=bool(text) and not text.startswith(" "))
     click.echo()
     put_plot(plot, lambda: _charts(built, plot), by_default=not no_plot)

@@ -11,6 +11,7 @@ from tablegen.config.load import Scanners, Setup, assembled, read_scan_file
 from tablegen.config.names import why_not_a_name
 from tablegen.config.schema import MAXIMUM_NAME
 from tablegen.config.settings import MOST_VALUES, Setting, given
+from tablegen.config.words import IMAGES, OFFSETS, RATES, SIZES
 from tablegen.problems import Document, Problem, Rejected
 
 
@@ -82,10 +83,12 @@ def variants(
     set_by = {setting.key: setting.origin for setting in chosen}
     for entry, base, lines, differs in _bases(entries, values, file):
         for combination in product(*(setting.values for setting in chosen)):
-            own, told = base, dict(differs)
+            given_here: dict[str, Any] = {}
+            told = dict(differs)
             for setting, value in zip(chosen, combination, strict=True):
-                own = _merged(own, _nested(setting.parts, value))
+                given_here = _merged(given_here, _nested(setting.parts, value))
                 told[setting.key] = value
+            own = _over(base, given_here)
             name = _name(entry or library, list(zip(labels, combination, strict=True)), len(found), total)
             own = {**own, "name": name}
             found.append(Variant(name, told, path, own, VariedDocument(file.name, lines, set_by=set_by), scanners))
@@ -132,7 +135,47 @@ def _bases(
         prefix = f"scans[{at}]."
         own = {key.removeprefix(prefix): line for key, line in lines.items() if key.startswith(prefix)}
         differs = {key: value for key, value in _flat(entry) if key != "name"}
-        yield entry["name"], _merged(values, entry), {**lines, **own}, differs
+        yield entry["name"], _over(values, entry), {**lines, **own}, differs
+
+
+def _alternatives() -> dict[str, list[str]]:
+    """Keys by the key that says the same otherwise: setting the one takes the others out of the file."""
+    sizes = {axis: [f"{axis}.{name}" for name in SIZES] for axis in ("x", "y")}
+    groups = [sizes["x"], sizes["y"], list(IMAGES)]
+    groups += [[f"{axis}.{name}" for name in OFFSETS] for axis in ("x", "y")]
+    groups += [[f"{axis}.band_limit.{name}" for name in ("harmonics", "cutoff_hz")] for axis in ("x", "y")]
+    groups += [[f"timing.{name}" for name in names] for names in (RATES, ("lines", "image_lines"))]
+    groups += [["timing.ticks_per_line", "timing.ticks_per_pixel"]]
+    found = {key: [other for other in group if other != key] for group in groups for key in group}
+    for image in IMAGES:
+        found[image] += [*sizes["x"], *sizes["y"]]
+    for size in [*sizes["x"], *sizes["y"]]:
+        found[size] += IMAGES
+    return found
+
+
+_ALTERNATIVES = _alternatives()
+
+
+def _over(values: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
+    """Values with others over them; what these say otherwise is no longer among them."""
+    set_keys = {key for key, _ in _flat(more)}
+    for key in set_keys:
+        for other in _ALTERNATIVES.get(key, ()):
+            if other not in set_keys:
+                values = _without(values, other.split("."))
+    return _merged(values, more)
+
+
+def _without(values: Mapping[str, Any], parts: Sequence[str]) -> Mapping[str, Any]:
+    first, *rest = parts
+    inner = values.get(first)
+    if first not in values or (rest and not isinstance(inner, Mapping)):
+        return values
+    if not rest:
+        return {key: value for key, value in values.items() if key != first}
+    assert isinstance(inner, Mapping)
+    return {**values, first: _without(inner, rest)}
 
 
 def _merged(values: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:

@@ -45,13 +45,14 @@ def _steps(entry: ManifestAxis, line: LinePlan | None) -> list[tuple[TableCell, 
         text = text if applied else "not compensated"
         rows.append(row(f"hysteresis {side}", equation, f"{branch.beta:+.5f}", text))
     rate = entry.line.rate_exact[0] / entry.line.rate_exact[1]
-    low, high = fourier.window
+    (low, high), kept = fourier.window, fourier.max_scaling_error_percent
     rows.append(
         row(
             "band limit",
             fourier.band_limit,
             f"{fourier.harmonics}",
-            f"harmonics, up to {hertz(fourier.harmonics * rate)}; straight over {low:g}..{high:g} {fourier.directions}",
+            f"harmonics, up to {hertz(fourier.harmonics * rate)}; straight over {low:g}..{high:g} {fourier.directions}"
+            + (f"; least acceleration at {kept:g} % of scaling error" if kept is not None else ""),
         )
     )
     if fourier.refinement is not None:

@@ -52,6 +52,14 @@ CASES: dict[str, tuple[dict[str, str], dict[str, str], str, str, str, str]] = {
         "the band limit",
         "x.band_limit.harmonics",
     ),
+    "a large error allowed": (
+        {"x.band_limit.max_scaling_error_percent": "2.5"},
+        {},
+        "x",
+        "x.band_limit.max_scaling_error_percent",
+        "the band limit",
+        "x.band_limit.max_scaling_error_percent",
+    ),
     "low cutoff": (
         {"y.band_limit.harmonics": "", "y.band_limit.cutoff_hz": "10.0"},
         {},

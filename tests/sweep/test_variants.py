@@ -102,6 +102,23 @@ def test_a_library_that_cannot_be_is_refused_as_a_whole(tmp_path: Path, scans: s
         variants(write_library(tmp_path, scans))
 
 
+def test_what_is_set_takes_the_place_of_what_says_the_same(tmp_path: Path) -> None:
+    """In the words of `tablegen init`, whose y is like x, and in those of axes."""
+    assert run("init", tmp_path).status == 0
+    path = tmp_path / "annexin_200nm.toml"
+    (size,) = variants(path, {"x.size_nm": [150]})
+    assert (size.setup.scan.x.size_nm, size.setup.scan.y.size_nm) == (150, 150)
+    (image,) = variants(path, {"image_um": [0.1], "timing.frame_rate_hz": [1.0], "x.offset_nm": [400]})
+    assert "image_nm" not in image.values
+    assert image.setup.scan.x.offset_v is None
+    (written,) = variants(write_pair(tmp_path, BASE), {"image_nm": [120]})
+    assert "size_nm" not in written.values["x"]
+    assert "size_nm" not in written.values["y"]
+    (both,) = variants(path, {"image_nm": [120], "x.size_nm": [150]})
+    with pytest.raises(Rejected):
+        assert both.setup, "what is set twice is not chosen between"
+
+
 @pytest.mark.parametrize("key", ["name", "scans"])
 def test_names_are_not_set(tmp_path: Path, key: str) -> None:
     with pytest.raises(Rejected, match="names follow from what is"):
