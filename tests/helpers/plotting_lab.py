@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from calibrating import AMPLITUDES, DRIVES, FREQUENCIES, OFFSETS, RESPONSE, Scanner, actual, apparent, grating
 from correcting import old_frame, save_pair
-from editing import write_pair
+from editing import SCAN, write_pair
 from foreign_plants import SIX, ForeignPlant, ManyPlays, record
 from operator_files import operator_file, write_operator_scan
 from refining import play, scanner, sensed
@@ -20,6 +20,7 @@ _PAIR = ("--pair", "100", "t100.npy", "r100.npy")
 # By command: its words; all of them take --plot FILE.
 PLOTTING: dict[str, tuple[str, ...]] = {
     "show": ("show", "scan.toml"),
+    "show of a line": ("show", "line.toml"),
     "build": ("build", "scan.toml", "-o", "out", "-q"),
     "simulate": ("simulate", "scan.toml", "--no-calibration"),
     "simulate own": ("simulate", "own/scan.toml"),
@@ -49,6 +50,8 @@ REPORTING: dict[str, tuple[str, ...]] = {
 def make_lab(folder: Path) -> None:
     """Scans, measurements and images."""
     write_pair(folder)
+    line = SCAN.split("\n[y]\n")[0].replace("lines = 200 ", "image_lines = 7")
+    (folder / "line.toml").write_text(f"{line}\n[y]\nmotion = 'off'\noffset_v = 40.0\n", "utf-8")
     own = folder / "own"
     own.mkdir()
     write_operator_scan(own, operator_file(), "- [limits]")

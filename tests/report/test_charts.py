@@ -73,7 +73,7 @@ def test_no_command_that_plots_is_left_out() -> None:
                 yield f"{before}{name}", one
 
     found = {name for name, one in commands(cli) if any("--plot" in option.opts for option in one.params)}
-    assert found == set(PLOTTING) - {"simulate own"}
+    assert found == set(PLOTTING) - {"simulate own", "show of a line"}
     assert {"show", "build", "refine", "simulate", "correct"} < found
     assert sum(name.startswith("calibrate") for name in found) == 7
 
