@@ -28,6 +28,8 @@ class Certificate:
     An axis at rest has no scaling errors and no cutoff. ``refinement`` is what the layer of ``tablegen refine`` moves,
     where there is one; it is not counted as an error.
     ``expected`` is what the scanner should do with the line; everything else is of the waveform.
+    ``peak_acceleration`` is that of the target, of the line a period squared, where the waveform was made for the
+    least; ``optimum`` the least of any, where ``certificate.optimum`` has worked it out.
     """
 
     ticks: int
@@ -45,6 +47,8 @@ class Certificate:
     at_resonance_db: float | None
     refinement: dict[str, Refined] | None = None
     expected: Expectation | None = None
+    peak_acceleration: float | None = None
+    optimum: float | None = None
 
     @property
     def scaling_error_percent(self) -> float:
@@ -143,6 +147,8 @@ def _foreseen(certificate: Certificate, limit: float) -> str:
 def _remedy(line: LinePlan, parts: ScalingError) -> str:
     axis = line.axis
     largest = max(parts.band_limit, parts.quantisation, parts.model)
+    if largest == parts.band_limit and line.kept_percent is not None:
+        return f"most of it is the band limit: a lower {axis}.band_limit.max_scaling_error_percent"
     if largest == parts.band_limit:
         return f"most of it is the band limit: more {axis}.band_limit.harmonics, a narrower window or method = 'window'"
     if largest == parts.model:
@@ -179,6 +185,7 @@ def _certify(line: LinePlan) -> Certificate:
         if line.layer is None
         else {side: refined(line, side, branch) for side, branch in _directions(line).items()},
         expected=certified_expectation(line, played),
+        peak_acceleration=None if line.kept_percent is None else line.target.peak_acceleration(),
     )
 
 

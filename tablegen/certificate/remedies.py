@@ -234,7 +234,10 @@ def _other_bands(setup: Setup, plan: Plan, line: LinePlan) -> Iterator[Iterator[
         most = min(most, len(line.program.words) // 2 - 1)
     more = [min(harmonics << i, most) for i in range(1, _MOST_TRIALS + 1)]
     counts = [n for n in dict.fromkeys(more) if n > harmonics]
-    if limit.cutoff_hz is None:
+    if line.kept_percent is not None:  # more harmonics would be gentler, and leave the same error
+        errors = [float(at_most(line.kept_percent / (1 << i), 3)) for i in range(1, _MOST_TRIALS + 1)]
+        yield ({f"{axis}.band_limit.max_scaling_error_percent": error} for error in errors)
+    elif limit.cutoff_hz is None:
         yield ({f"{axis}.band_limit.harmonics": n} for n in counts)
     else:
         yield ({f"{axis}.band_limit.cutoff_hz": float(at_least(float(n * line.rate), 6))} for n in counts)

@@ -19,6 +19,7 @@ from tablegen.compensation.transient import Transient
 from tablegen.driver import Driver
 from tablegen.numerics.arrays import Bools, Floats, FloatsLike
 from tablegen.problems import Document, Problems, Unphysical
+from tablegen.waveform.gentle_fit import AllowedError
 from tablegen.waveform.series import FourierSeries
 
 _GRID = 1025  # points on which a sweep is inverted first
@@ -93,6 +94,21 @@ class LineShape:
     @property
     def waveform(self) -> FourierSeries | None:
         """The band-limited waveform, where the model itself makes it; None leaves it to ``band_limit`` of the scan."""
+        return None
+
+    @property
+    def kept_percent(self) -> float | None:
+        """The scaling error that ``waveform`` was made for, where that was ``WantedLine.allowed``."""
+        return None
+
+    @property
+    def learnt_line(self) -> "LineShape":
+        """The line that the piezo follows straight, where ``waveform`` keeps an error beside that."""
+        return self
+
+    @property
+    def beside_learnt_percent(self) -> float | None:
+        """The scaling error of ``waveform`` beside ``learnt_line``."""
         return None
 
     @property
@@ -198,7 +214,8 @@ class WantedLine:
     the piezo for w from 0 to 1; ``harmonics`` the highest that is played; ``both`` whether both directions image.
     ``response`` are the dynamics, whose inverse gives no harmonic more than ``max_boost_db``; ``factor_at`` is m of (1)
     at an offset as a share of the driver's range, for small scans, ``rate_gain`` g of (23) at a rate in Hz, None
-    where it is not calibrated.
+    where it is not calibrated. ``allowed`` is the scaling error in the window that may be left for the sake of
+    less acceleration: a model that makes the whole waveform itself keeps it, where it is not None.
     """
 
     axis: str
@@ -220,6 +237,7 @@ class WantedLine:
     scan_file: Document
     scanner_file: Document
     problems: Problems
+    allowed: AllowedError | None = None
 
     @property
     def v_share(self) -> float:

@@ -324,6 +324,13 @@ def _faults(built: Struct) -> list[tuple[str, str]]:
                 return [("window", f"[{low:g}, {high:g}] does not ascend")]
             if high - low < 0.01:
                 return [("window", f"[{low:.12g}, {high:.12g}] is narrower than 0.01 of the line")]
+            if built.method != "window":
+                keys = {
+                    "max_scaling_error_percent": built.max_scaling_error_percent is not None,
+                    "harmonics": built.harmonics == "fewest",
+                }
+                why = f"method = '{built.method}' keeps no scaling error; take method = 'window'"
+                return [(key, why) for key, given in keys.items() if given]
         case Table() if built.mode == "interpolated" and built.length is not None:
             lower = 1 << (built.length.bit_length() - 1)
             if built.length != lower:

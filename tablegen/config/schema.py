@@ -42,8 +42,24 @@ class BandLimit(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     ] = "window"
     harmonics: (
         Annotated[
-            int,
-            Meta(ge=1, le=512, description="highest harmonic of the rate; default 32 unless `cutoff_hz` is given"),
+            Annotated[int, Meta(ge=1, le=512)] | Literal["fewest"],
+            Meta(
+                description="highest harmonic of the rate; fewest: as few as the error allows; default 32 unless "
+                "`cutoff_hz` is given"
+            ),
+        ]
+        | None
+    ) = None
+    max_scaling_error_percent: (
+        Annotated[
+            float,
+            Meta(
+                ge=0.001,
+                le=10.0,
+                description="window: the least acceleration at the piezo that keeps this scaling error of the waveform,"
+                " peak to peak in the imaging window; alone: 32 harmonics, or as many as it takes. Default without "
+                "`harmonics` and `cutoff_hz`: what the converter's steps leave",
+            ),
         ]
         | None
     ) = None

@@ -101,6 +101,7 @@ class ManifestFourier(Struct):
     held_factors: list[float] = []
     target: ManifestSeries | None = None
     refinement: ManifestSeries | None = None
+    max_scaling_error_percent: Annotated[float, Meta(gt=0.0, le=10.0)] | None = None
 
 
 class ManifestTable(Struct):
@@ -176,6 +177,7 @@ class ManifestCertificate(Struct):
     scaling_error_percent: dict[str, dict[str, float]] | None = None
     refinement_percent: dict[str, dict[str, float]] | None = None
     expected: ManifestExpected | None = None
+    peak_acceleration: float | None = None
 
 
 class ManifestAxis(Struct):

@@ -30,8 +30,10 @@ def certificate_record(certificate: Certificate) -> dict[str, Any]:
     record: dict[str, Any] = {
         name: _figure(getattr(certificate, name))
         for name in certificate.__dataclass_fields__
-        if name not in ("scaling", "refinement", "expected")
+        if name not in ("scaling", "refinement", "expected", "peak_acceleration", "optimum")
     }
+    if certificate.peak_acceleration is not None:
+        record["peak_acceleration"] = _bound(certificate.peak_acceleration)
     record["max_error_lsb"] = _bound(certificate.max_error_lsb)
     record["scaling_error_percent"] = _sides(certificate.scaling)
     if certificate.refinement is not None:
@@ -169,6 +171,7 @@ def _axis(line: LinePlan) -> dict[str, Any]:
             "a0_word": line.fourier.a0,
             "a_words": line.fourier.a.tolist(),
             "b_words": line.fourier.b.tolist(),
+            **({} if line.kept_percent is None else {"max_scaling_error_percent": line.kept_percent}),
             **_followed(line),
             **_layer(line),
         },

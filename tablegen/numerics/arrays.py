@@ -40,6 +40,16 @@ def _tree_sum(values: Floats) -> Floats:
     return padded[..., 0]
 
 
+def folded_sum(values: Floats) -> Floats:
+    """As ``tree_sum``, in another order that every machine shares, and in place: ``values`` is written over."""
+    count = values.shape[-1]
+    while count > 1:
+        half = (count + 1) // 2
+        values[..., : count - half] += values[..., half:count]
+        count = half
+    return values[..., 0].copy()
+
+
 def merged(*ascending: Ints) -> Ints:
     """The values of ascending arrays, each once, ascending. numpy hashes for its union, which is far slower here."""
     values = np.concatenate(ascending)

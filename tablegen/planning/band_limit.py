@@ -5,7 +5,10 @@ import numpy as np
 from tablegen.compensation.line import LineShape
 from tablegen.config.schema import BandLimit
 from tablegen.numerics.turns import sinc
+from tablegen.planning.enough_harmonics import straightness
+from tablegen.problems import Unphysical
 from tablegen.waveform.closed_form import fourier_series
+from tablegen.waveform.gentle_fit import AllowedError, gentlest
 from tablegen.waveform.refined import RefinedShape
 from tablegen.waveform.series import FourierSeries
 from tablegen.waveform.window_fit import fit_window
@@ -32,3 +35,20 @@ def band_limited(
         sigma = sinc(np.arange(1, harmonics + 1) / (harmonics + 1))
         series = FourierSeries(series.a0, series.a * sigma, series.b * sigma)
     return series if layer is None else series.plus(layer)
+
+
+def gently_limited(
+    shape: LineShape, limit: BandLimit, harmonics: int, layer: FourierSeries | None, allowed: AllowedError
+) -> tuple[FourierSeries, float | None]:
+    """The line of least acceleration that keeps an error, and that error in percent.
+
+    One that is not firm, and that the harmonics cannot keep, is given up: then it is ``band_limited``, and None.
+    Raises ``Unreachable`` where a firm one cannot be kept.
+    """
+    if shape.waveform is None:
+        try:
+            return gentlest(straightness(shape, limit, layer), harmonics, allowed.percent), allowed.percent
+        except Unphysical:
+            if allowed.firm:
+                raise
+    return band_limited(shape, limit, harmonics, layer), shape.kept_percent

@@ -19,7 +19,10 @@ from tablegen.config.scanner import Offset, Resonance, ScannerAxis, Size
 from tablegen.config.schema import FastAxis, SlowAxis
 from tablegen.driver import Driver
 from tablegen.figures import at_most
+from tablegen.fixedpoint.converter import Converter
+from tablegen.planning.allowed_error import allowed_error
 from tablegen.problems import Problems, Unphysical
+from tablegen.waveform.gentle_fit import AllowedError
 
 # An axis at rest plays w = 1/2 throughout; gain and table refer to so small a share of v_max.
 RESTING_SHARE = 2.0**-24
@@ -32,7 +35,8 @@ class Drive:
     ``v_scan`` is from (9)/(12), before ``m`` of (1) and ``g`` of (23). The amplitude played is m g v_scan, peak to
     peak, for w from 0 to 1. ``position_nm`` is that of the offset, above the one at 0 V. ``line_at`` is the line that
     the model makes at another normalised scan voltage, None where it makes none; ``model_files`` has the files that the
-    model names, and their SHA-256.
+    model names, and their SHA-256. ``harmonics`` is the highest that is played, ``allowed`` the scaling error that may
+    be left for less acceleration.
     """
 
     driver: Driver
@@ -53,6 +57,8 @@ class Drive:
     response: Response | None
     max_boost_db: float
     line_at: Callable[[float], LineShape | None] = field(compare=False, repr=False)
+    harmonics: int
+    allowed: AllowedError | None
     model_files: tuple[tuple[str, str], ...] = ()
 
     @property
@@ -85,10 +91,12 @@ class Drive:
         return self.offset_law.factor(self.driver.p(v_offset)) * self.g * self.v_scan
 
 
-def compensate(setup: Setup, axis: str, rate_hz: float, harmonics: int, problems: Problems) -> Drive | None:
+def compensate(
+    setup: Setup, axis: str, rate_hz: float, harmonics: Callable[[AllowedError | None], int], problems: Problems
+) -> Drive | None:
     """Apply the scanner's calibration to one axis ("x" or "y") at its rate; None where ``problems`` grew.
 
-    ``harmonics`` is the highest that is played.
+    ``harmonics`` gives the highest that is played, where so much of a scaling error is allowed.
     """
     scan: FastAxis = getattr(setup.scan, axis)
     scanner: ScannerAxis = getattr(setup.scanner, axis)
@@ -154,16 +162,21 @@ def compensate(setup: Setup, axis: str, rate_hz: float, harmonics: int, problems
     uncompensated = scanner.hysteresis is None or resting
     hysteresis = models.get(models.UNCOMPENSATED)() if uncompensated else scanner.hysteresis
     assert hysteresis is not None
+    v_amplitude = m * g * v * driver.span
+    hardware = setup.hardware(axis)
+    codes = abs(v_amplitude / Converter.of(hardware.dac, hardware.amplifier).v_per_code)
+    allowed = None if resting else allowed_error(scan.band_limit, setup.scan.limits, codes)
+    most = harmonics(allowed)
     wanted = WantedLine(
         axis=axis,
         turn=scan.turn,
         v=v,
         driver=driver,
-        v_amplitude=m * g * v * driver.span,
+        v_amplitude=v_amplitude,
         v_offset=v_offset,
         size_nm=size_nm,
         rate_hz=rate_hz,
-        harmonics=harmonics,
+        harmonics=most,
         window=(low, high),
         both=scan.band_limit.directions == "both",
         response=response,
@@ -174,6 +187,7 @@ def compensate(setup: Setup, axis: str, rate_hz: float, harmonics: int, problems
         scan_file=scan_file,
         scanner_file=scanner_file,
         problems=problems,
+        allowed=allowed,
     )
 
     shape = hysteresis.line(wanted)
@@ -198,6 +212,8 @@ def compensate(setup: Setup, axis: str, rate_hz: float, harmonics: int, problems
         response=response,
         max_boost_db=max_boost_db,
         line_at=partial(_line_at, hysteresis, wanted),
+        harmonics=most,
+        allowed=allowed,
         model_files=tuple(
             (Path(name).name, digest)
             for name, digest in zip(hysteresis.files(), hysteresis.contents(setup.scanner_folder), strict=True)

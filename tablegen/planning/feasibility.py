@@ -16,6 +16,7 @@ from tablegen.figures import at_least, at_most
 from tablegen.fixedpoint.converter import Converter
 from tablegen.fixedpoint.interpolation import guard_bits
 from tablegen.planning.drive import Drive, outside_driver
+from tablegen.planning.enough_harmonics import MOST_HARMONICS, chosen_by_build
 from tablegen.problems import Problems
 from tablegen.waveform.series import FourierSeries
 
@@ -51,7 +52,9 @@ class Feasibility:
         """The highest harmonic to play of a rate in Hz, where the table advances ``period`` times a period."""
         limit = self._scan.band_limit
         key = f"{self._axis}.band_limit.harmonics"
-        harmonics = DEFAULT_HARMONICS if limit.harmonics is None else limit.harmonics
+        harmonics = limit.harmonics if isinstance(limit.harmonics, int) else DEFAULT_HARMONICS
+        if chosen_by_build(limit):
+            harmonics = min(harmonics, self.most_harmonics(period))
         if limit.cutoff_hz is not None:
             key = f"{self._axis}.band_limit.cutoff_hz"
             harmonics = floor(Fraction(repr(limit.cutoff_hz)) / rate)
@@ -74,6 +77,13 @@ class Feasibility:
             fits = self._carried(carried, rate)
             self._add(key, f"{harmonics} harmonics are too many; a table of {length} words carries {carried}{fits}")
         return harmonics
+
+    def most_harmonics(self, period: int) -> int:
+        """The most that the build chooses where it finds the number; at least 1."""
+        carried = min((period - 1) // 2, MOST_HARMONICS)
+        if self._scan.table.mode == "interpolated":
+            carried = min(carried, (self._scan.table.length or DEFAULT_LENGTH) // 2 - 1)
+        return max(carried, 1)
 
     def _carried(self, harmonics: int, rate: Fraction) -> str:
         """Which cutoff passes so many, where one was asked for."""

@@ -13,18 +13,27 @@ from tablegen.config.load import Setup
 from tablegen.config.schema import DEFAULT_FORMATS, BandLimit, FastAxis, Limits, SlowAxis
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.schedule import Schedule
+from tablegen.figures import at_least
 from tablegen.fixedpoint.converter import Converter, fit_gain, make_output
 from tablegen.fixedpoint.phase import RationalPhase
 from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.synthesis import FourierWords, encode, synthesize
 from tablegen.numerics.arrays import Floats, Ints
-from tablegen.planning.band_limit import band_limited
+from tablegen.planning.band_limit import band_limited, gently_limited
 from tablegen.planning.drive import Drive, compensate
+from tablegen.planning.enough_harmonics import (
+    EnoughHarmonics,
+    chosen_by_build,
+    plain_line,
+    straightness,
+    with_remedies,
+)
 from tablegen.planning.feasibility import DEFAULT_HARMONICS, Feasibility
 from tablegen.planning.refinement_layer import learnt_layer
 from tablegen.planning.settling import settle_lines
 from tablegen.planning.timing import make_schedule
 from tablegen.problems import Problems
+from tablegen.waveform.gentle_fit import AllowedError, Unreachable
 from tablegen.waveform.series import FourierSeries
 
 # Peaks are rounded up to this grid before they enter the scale: it then does not depend on the last bit of a maximum.
@@ -39,7 +48,8 @@ class LinePlan:
     piezo for that: each harmonic divided by the dynamics; ``held_harmonics`` are those at which the boost limit held
     that back. ``series`` is the w that is played, ahead of that by the converter's hold: the code of advance k of N is
     that of ``series`` at k / N. ``layer`` is what of the target was learnt from a measurement, and lies over the
-    model's shape.
+    model's shape. ``kept_percent`` is the scaling error for which the target has the least acceleration, None where it
+    has another band limit.
     """
 
     axis: Literal["x", "y"]
@@ -56,6 +66,7 @@ class LinePlan:
     fourier: FourierWords
     program: Program
     layer: FourierSeries | None = None
+    kept_percent: float | None = None
 
     def __repr__(self) -> str:
         table = f"{self.program.mode} table of {len(self.program.words)} x {self.program.bits} bits"
@@ -127,8 +138,8 @@ def make_plan(setup: Setup) -> Plan:
     if schedule is None:
         # The rest is examined at the rates asked for, so that its problems are reported in the same run.
         line_rate = setup.scan.timing.line_rate_hz
-        compensate(setup, "x", line_rate, DEFAULT_HARMONICS, problems)
-        compensate(setup, "y", line_rate / setup.scan.timing.lines, DEFAULT_HARMONICS, problems)
+        compensate(setup, "x", line_rate, lambda _: DEFAULT_HARMONICS, problems)
+        compensate(setup, "y", line_rate / setup.scan.timing.lines, lambda _: DEFAULT_HARMONICS, problems)
         problems.stop_if_any()
         raise AssertionError("a schedule fails with a problem")  # pragma: no cover
     x = _line_plan(setup, "x", schedule, problems)
@@ -163,17 +174,36 @@ def _line_plan(setup: Setup, axis: Literal["x", "y"], schedule: Schedule, proble
     feasible = Feasibility(setup, axis, problems)
     harmonics = feasible.harmonics(rate, period)
     length = feasible.table_length(period)
-    drive = compensate(setup, axis, float(rate), harmonics, problems)
+    limit, most = scan.band_limit, feasible.most_harmonics(period)
+    key = f"{axis}.band_limit.{'harmonics' if limit.max_scaling_error_percent is None else 'max_scaling_error_percent'}"
+    learnt = 1 if scan.refinement is None else len(scan.refinement.a)
+    choice = EnoughHarmonics(limit, harmonics, min(learnt, most), most) if chosen_by_build(limit) else None
+
+    def for_straight_line(allowed: AllowedError | None) -> int:
+        with problems.at(file, key):
+            if choice is not None and allowed is not None:
+                return choice.of(straightness(plain_line(scan.turn), limit), allowed)
+        return harmonics
+
+    drive = compensate(setup, axis, float(rate), for_straight_line, problems)
     if drive is None or len(problems.found) > before:
         return None
+    harmonics = drive.harmonics
+    if choice is not None and drive.allowed is not None and drive.shape.waveform is None:
+        with problems.at(file, key):
+            harmonics = choice.of(straightness(drive.shape, limit), drive.allowed)
 
     layer = learnt_layer(setup, axis, drive, float(rate), harmonics, problems)
     if len(problems.found) > before:
         return None
-    target = None
-    with problems.at(file, f"{axis}.band_limit.harmonics"):
-        flat = FourierSeries(0.5, np.zeros(1), np.zeros(1))
-        target = flat if drive.resting else band_limited(drive.shape, scan.band_limit, harmonics, layer)
+    target, kept = None, None
+    with problems.at(file, key):
+        if drive.resting:
+            target = FourierSeries(0.5, np.zeros(1), np.zeros(1))
+        elif drive.allowed is None:
+            target = band_limited(drive.shape, limit, harmonics, layer)
+        else:
+            target, kept = _gentle(drive, limit, harmonics, layer, most, float(rate))
     if target is None:
         return None
     at_piezo: FourierSeries = target
@@ -217,7 +247,24 @@ def _line_plan(setup: Setup, axis: Literal["x", "y"], schedule: Schedule, proble
         fourier=fourier,
         program=program,
         layer=layer,
+        kept_percent=kept,
     )
+
+
+def _gentle(
+    drive: Drive, limit: BandLimit, harmonics: int, layer: FourierSeries | None, most: int, rate_hz: float
+) -> tuple[FourierSeries, float | None]:
+    """Least acceleration at the allowed error. Raises ``Unphysical`` with what would fit."""
+    assert drive.allowed is not None
+    try:
+        return gently_limited(drive.shape, limit, harmonics, layer, drive.allowed)
+    except Unreachable as reason:
+
+        def named(n: int) -> str:
+            return f"{n} harmonics" if limit.cutoff_hz is None else f"cutoff_hz = {at_least(n * rate_hz, 6)}"
+
+        straight = straightness(drive.shape, limit, layer)
+        raise with_remedies(reason, straight, drive.allowed.percent, harmonics, most, named) from None
 
 
 def _through_inverse(target: FourierSeries, drive: Drive, rate_hz: float) -> tuple[FourierSeries, tuple[int, ...]]:

@@ -62,6 +62,8 @@ def _rows(entry: ManifestAxis, limits: Limits, slew: float | None) -> list[tuple
         rows.append(_bounded("largest step", found.largest_step, output.max_step, "codes a tick"))
     if found.peak_slew_v_per_s is not None:
         rows.append(_bounded("steepest slope at the piezo", found.peak_slew_v_per_s, slew, "V/s"))
+    if found.peak_acceleration is not None:
+        rows.append(row("largest acceleration", f"{found.peak_acceleration:.4g} of the line a period squared", "", ""))
     for name, room in (("below", found.headroom_low), ("above", found.headroom_high)):
         if room is not None:
             tone, sign = ("good", "\u2713 within") if room >= 0 else ("bad", "\u2717 outside")

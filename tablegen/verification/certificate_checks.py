@@ -10,7 +10,9 @@ from tablegen.verification.certified import PlayedPeriod, different_figures
 from tablegen.verification.checks import Check
 from tablegen.verification.directory import some
 from tablegen.verification.expectations import wrong_expectations
-from tablegen.verification.scaling import knows, refinement_figures, scaling_figures
+from tablegen.verification.scaling import knows, peak_acceleration, refinement_figures, scaling_figures
+
+_ROUNDED = 1.0 + 1e-9  # the target is worked out again from what is played
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,9 @@ def _check(name: str, axis: ManifestAxis, stored: StoredBuild, same_version: boo
     period = PlayedPeriod(axis)
     schedule = stored.program.schedule
     found = period.figures(float(schedule.line_rate if name == "x" else schedule.frame_rate))
+    gentle = axis.fourier.max_scaling_error_percent is not None
+    if gentle or axis.certificate.peak_acceleration is not None:
+        found["peak_acceleration"] = peak_acceleration(axis) if gentle else None
     told = {key: getattr(axis.certificate, key) for key in found}
     wrong, count = different_figures(told, found, period.is_whole), len(found)
     if same_version and knows(axis.drive.model):
@@ -58,6 +63,9 @@ def _check(name: str, axis: ManifestAxis, stored: StoredBuild, same_version: boo
             for side, figures in (sides or {}).items():
                 count += len(figures)
                 wrong += different_figures(stated[side], figures, period.is_whole, f"{key}.{side}.")
+                most = axis.fourier.max_scaling_error_percent
+                if key == "scaling_error_percent" and most is not None and figures["band_limit"] > most * _ROUNDED:
+                    wrong.append(f"fourier.max_scaling_error_percent is {most}, {side} has {figures['band_limit']:.6g}")
     if same_version:
         wrong += wrong_expectations(axis)
     step = found["largest_step"]

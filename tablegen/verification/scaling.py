@@ -14,11 +14,12 @@ import numpy as np
 from tablegen.manifest.fields import ManifestAxis, ManifestBranch, ManifestSeries
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import shortened
-from tablegen.verification.certified import PlayedPeriod, at, played_series
+from tablegen.verification.certified import PlayedPeriod, at, on_grid, played_series
 
 CHORD = 0.05  # share of the line
 OPERATOR = "operator"  # the model whose waveform was found, not worked out of an equation
 _POINTS = 16, 513  # per harmonic, and beside them, over the window
+_ACCELERATION_POINTS = 32  # per harmonic
 _GRID = 4097  # points on which a branch is inverted first
 
 
@@ -150,6 +151,11 @@ def followed(axis: ManifestAxis) -> ManifestSeries:
     program = axis.program
     response = hold_response(axis.fourier.harmonics, program.phase.ticks, program.hold > 1)
     return _times(played_series(axis), *response)
+
+
+def peak_acceleration(axis: ManifestAxis) -> float:
+    """max |w''| of what the piezo is to follow, per period squared."""
+    return float(np.max(np.abs(on_grid(followed(axis), _ACCELERATION_POINTS * axis.fourier.harmonics, 2))))
 
 
 def reached(axis: ManifestAxis) -> ManifestSeries:

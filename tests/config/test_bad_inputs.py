@@ -340,6 +340,48 @@ CHOICES = [
     case("dac.align = 'middle'", says="scan.toml:6: dac.align: 'middle' is not one of 'left', 'right'"),
     case("x.size_of = 'frame'", says="scan.toml:23: x.size_of: 'frame' is not one of 'line', 'window'"),
     case(
+        "x.band_limit.harmonics = 'few'",
+        says="scan.toml:29: x.band_limit.harmonics: 'few' is not a number, nor 'fewest'",
+    ),
+    case(
+        "x.band_limit.max_scaling_error_percent = 0.0",
+        says="scan.toml:28: x.band_limit.max_scaling_error_percent: 0 is below 0.001",
+    ),
+    case(
+        "x.band_limit.max_scaling_error_percent = 11.0",
+        says="scan.toml:28: x.band_limit.max_scaling_error_percent: 11 is above 10",
+    ),
+    case(
+        "x.band_limit.method = 'lanczos'",
+        "x.band_limit.max_scaling_error_percent = 0.1",
+        says="scan.toml:28: x.band_limit.max_scaling_error_percent: method = 'lanczos' keeps no scaling error; take "
+        "method = 'window'",
+    ),
+    case(
+        "x.band_limit.method = 'truncate'",
+        "x.band_limit.harmonics = 'fewest'",
+        says="scan.toml:29: x.band_limit.harmonics: method = 'truncate' keeps no scaling error; take method = 'window'",
+    ),
+    case(
+        "x.band_limit.max_scaling_error_percent = 0.1",
+        "x.band_limit.harmonics = 16",
+        says="scan.toml:28: x.band_limit.max_scaling_error_percent: 16 harmonics leave 0.621 % of scaling error in "
+        "this window; allow that much, or take 21 harmonics",
+    ),
+    case(
+        "x.band_limit.max_scaling_error_percent = 0.1",
+        "x.band_limit.window = [0.0, 1.0]",
+        says="scan.toml:28: x.band_limit.max_scaling_error_percent: 32 harmonics leave 217 % of scaling error in this "
+        "window; image a narrower one",
+    ),
+    case(
+        "x.band_limit.max_scaling_error_percent = 0.1",
+        "- x.band_limit.harmonics",
+        "x.band_limit.window = [0.0, 1.0]",
+        says="scan.toml:28: x.band_limit.max_scaling_error_percent: an end of the line is imaged, where it turns; "
+        "image a narrower window",
+    ),
+    case(
         "x.band_limit.method = 'boxcar'",
         says="scan.toml:28: x.band_limit.method: 'boxcar' is not one of 'lanczos', 'truncate', 'window'",
     ),

@@ -90,6 +90,19 @@ SCANS: dict[str, Variant] = {
         {**NO_LIMITS, "x.size_nm": 413.7, "x.offset_v": 46.3},
         {"x.hysteresis": {"model": "operator", "file": "x_operator.toml"}},
     ),
+    "gentle": Variant(
+        {
+            **NO_LIMITS,
+            "x.band_limit.max_scaling_error_percent": 0.23,
+            "x.band_limit.directions": "forward",  # the way back then swings, and the range is held
+            "x.band_limit.harmonics": "fewest",
+            "y.band_limit.harmonics": REMOVED,
+        }
+    ),
+    "gentle operator": Variant(
+        {**NO_LIMITS, "x.size_nm": 413.7, "x.offset_v": 46.3, "x.band_limit.max_scaling_error_percent": 1.7},
+        {"x.hysteresis": {"model": "operator", "file": "x_operator.toml"}},
+    ),
 }
 
 

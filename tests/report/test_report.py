@@ -332,6 +332,14 @@ b = [0.0, 1e-4, 0.0]"""
     assert "refine 1: trace.csv, 5 periods" in read.said
 
 
+def test_the_least_acceleration_is_shown(tmp_path: Path) -> None:
+    path = write_pair(tmp_path, edited(SCAN, "x.band_limit.max_scaling_error_percent = 0.3"))
+    content, read = report(path)
+    well_formed(content, read)
+    assert read.said.count("least acceleration at 0.3 % of scaling error") == 1
+    assert read.said.count("of the line a period squared") == 1
+
+
 def test_a_picture_of_stored_blocks() -> None:
     """By the chunks of the format; the pixels come back, also where they fill more than a block."""
     heights = np.random.default_rng(0).random((300, 301))

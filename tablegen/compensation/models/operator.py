@@ -15,6 +15,7 @@ from tablegen.compensation.hysteresis import BranchShape
 from tablegen.compensation.line import LineShape, WantedLine, WholeLine
 from tablegen.compensation.operator.creep import LogarithmicCreep
 from tablegen.compensation.operator.file import read_operator
+from tablegen.compensation.operator.gentle_line import Gentle, gentlest_waveform
 from tablegen.compensation.operator.loop import Loop
 from tablegen.compensation.operator.operator import Operator
 from tablegen.compensation.operator.scan_line import Expected, Found, Wanted, find_waveform
@@ -44,7 +45,9 @@ class OperatorLine(WholeLine):
     ``uncertainty`` is what the operator may be wrong by at this stroke, centre and rate, at ``LEVEL_PERCENT``;
     ``distance`` is that of stroke or centre to the nearest trace, of v_max. ``operator`` is that of this rate,
     ``factor`` that of its loops at the mean of this drive, and ``between`` which share of the size is uncertain since
-    its turns are not even about that mean; ``after`` is what follows a change of offset and one of size.
+    its turns are not even about that mean; ``after`` is what follows a change of offset and one of size. ``kept`` is
+    the scaling error, percent, for which it is the gentlest waveform ``beside`` the one that was ``learnt``; they are
+    None where that is the waveform.
     """
 
     expected: Expected
@@ -54,6 +57,24 @@ class OperatorLine(WholeLine):
     factor: float
     between: float
     after: tuple[Transient, Transient]
+    kept: float | None = None
+    learnt: FourierSeries | None = None
+    beside: float | None = None
+
+    @property
+    def beside_learnt_percent(self) -> float | None:
+        """What of ``kept`` the learnt waveform leaves for the sake of acceleration."""
+        return self.beside
+
+    @property
+    def learnt_line(self) -> LineShape:
+        """What was learnt before acceleration was traded for error."""
+        return self if self.learnt is None else WholeLine.of(self.learnt, self.turn)
+
+    @property
+    def kept_percent(self) -> float | None:
+        """What was allowed, and kept."""
+        return self.kept
 
     @property
     def transients(self) -> tuple[Transient, Transient]:
@@ -149,7 +170,7 @@ def _at(operator: Operator, wanted: WantedLine) -> tuple[Operator, float]:
     return operator, factor
 
 
-def _line(operator: Operator, wanted: WantedLine) -> OperatorLine:
+def _line(operator: Operator, wanted: WantedLine) -> OperatorLine | None:
     centre = wanted.v_share
     operator, factor = _at(operator, wanted)
     at_offset = wanted.factor_at(centre)
@@ -179,13 +200,30 @@ def _line(operator: Operator, wanted: WantedLine) -> OperatorLine:
     straight = LineShape(wanted.turn, BranchShape(), BranchShape())
     start = fit_window(straight, wanted.harmonics, wanted.window, wanted.both)
     found = find_waveform(operator, line, start, through, None if response is None else dynamics)
+    gentle: Gentle | None = None
+    if wanted.allowed is not None:
+        try:
+            gentle = gentlest_waveform(
+                operator, line, found, wanted.allowed.percent, through, None if response is None else dynamics
+            )
+            found = gentle.found
+        except Unphysical as reason:
+            if wanted.allowed.firm:
+                wanted.problems.add(
+                    wanted.scan_file, f"{wanted.axis}.band_limit.max_scaling_error_percent", str(reason)
+                )
+                return None
     factor *= with_mean(found.mean)
     between = _BEND_UNKNOWN * found.grown
     _check_reach(operator, found.stroke, found.centre, wanted.driver)
     late = replace(operator, creep=operator.creep.down_to(_SLOWEST_HZ))  # for all that a few frames may last
     # w = 0 and 1 are the ends of the laws' amplitude everywhere else.
     scale = found.v_amplitude * wanted.driver.span / wanted.v_amplitude
-    series = FourierSeries(0.5 + scale * (found.series.a0 - 0.5), scale * found.series.a, scale * found.series.b)
+
+    def scaled(series: FourierSeries) -> FourierSeries:
+        return FourierSeries(0.5 + scale * (series.a0 - 0.5), scale * series.a, scale * series.b)
+
+    series = scaled(found.series)
     return OperatorLine.of(
         series,
         wanted.turn,
@@ -195,6 +233,9 @@ def _line(operator: Operator, wanted: WantedLine) -> OperatorLine:
         operator=operator,
         factor=factor,
         between=between,
+        kept=None if gentle is None or wanted.allowed is None else wanted.allowed.percent,
+        learnt=None if gentle is None else scaled(gentle.learnt),
+        beside=None if gentle is None else gentle.beside_percent,
         after=(
             after_offset(late, found.stroke, found.centre, factor, wanted.turn, 1.0 / wanted.rate_hz),
             after_size(late, found.stroke, found.centre, factor, wanted.turn, 1.0 / wanted.rate_hz),

@@ -86,12 +86,17 @@ class Found:
 
 
 def find_waveform(
-    operator: Operator, wanted: Wanted, start: FourierSeries, inverse: ThroughInverse, dynamics: Linear | None
+    operator: Operator,
+    wanted: Wanted,
+    start: FourierSeries,
+    inverse: ThroughInverse,
+    dynamics: Linear | None,
+    learn: bool = True,
 ) -> Found:
     """The waveform that the operator follows straight, from ``start`` on, in the harmonics of that.
 
-    Coefficients are multiples of 2^-40. Raises ``Unphysical`` where it does not converge, or is larger than the driver
-    or the operator reach.
+    Without ``learn`` the waveform is ``start``, and only its amplitude is found. Coefficients are multiples of 2^-40.
+    Raises ``Unphysical`` where it does not converge, or is larger than the driver or the operator reach.
     """
     learner = _Learner(operator, wanted, start.harmonics, inverse, dynamics)
     series, amplitude = start, learner.first_amplitude()
@@ -109,7 +114,8 @@ def find_waveform(
             return Found(_rounded(series), amplitude, expected, stroke, at, mean, played.loop.grown(mean), turn)
         before = inside
         amplitude *= wanted.size_nm / line[0]
-        series = series.plus(learner.correction(played, amplitude, line))
+        if learn:
+            series = series.plus(learner.correction(played, amplitude, line))
     raise Unphysical(
         f"the waveform did not settle within {_ROUNDS} rounds on the operator; a smaller scan, a lower line rate or "
         "fewer harmonics may"

@@ -1,0 +1,200 @@
+"""The least bound that linear maps can be held within: an interior point method in basic operations of a fixed order.
+
+Minimise v over y and v subject to |R y - f| <= h + r v for the rows R of every part. It is the predictor and corrector
+of Mehrotra (SIAM J. Optim. 2, 575, 1992) for the upper and the lower side of each row, with slacks s and multipliers l:
+a step solves the normal equations of sum R^T (l / s) R. A solution within some percent of the optimum takes 8 to 15.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from math import isfinite
+from typing import Protocol
+
+import numpy as np
+
+from tablegen.numerics.arrays import Floats, tree_sum
+from tablegen.numerics.linear import Cholesky
+
+_MOST_STEPS = 60
+_REGULAR = 1e-14  # of each pivot; keeps the factorisation going where multipliers are 1e14 apart
+_NEAR = 0.98  # of the way to the nearest wall
+_FEASIBLE = 1e-9  # of a bound: what a row may be outside of it by at the end
+_FEASIBLE_DUAL = 1e-3  # the residual of the multipliers, whose sum is 1
+
+
+class Rows(Protocol):
+    """A linear map of unknowns (n,) to (m,)."""
+
+    def times(self, y: Floats) -> Floats:
+        """R y."""
+
+    def transposed(self, z: Floats) -> Floats:
+        """R^T z."""
+
+    def gram(self, diagonal: Floats) -> Floats:
+        """R^T diag R, (n, n)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Within:
+    """|R y - target| <= fixed + share v; ``target`` is (m,)."""
+
+    rows: Rows
+    target: Floats
+    fixed: float
+    share: float
+
+
+@dataclass(frozen=True, eq=False)
+class Least:
+    """The unknowns, the bound that they keep, and one that none keeps, up to the residual of the last step."""
+
+    y: Floats
+    bound: float
+    below: float
+    steps: int
+    settled: bool
+
+
+def least_bound(
+    parts: Sequence[Within], start: Floats, gap: float, reached: Callable[[float], bool] = lambda v: False
+) -> Least:
+    """Minimise v from y = ``start`` on, until it is within the share ``gap`` of the optimum, or ``reached(v)``."""
+    state = _State(parts, start)
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # what contradicts itself ends so
+        return _least(state, gap, reached)
+
+
+def _least(state: "_State", gap: float, reached: Callable[[float], bool]) -> Least:
+    for step in range(_MOST_STEPS + 1):
+        kept, below = state.bounds()
+        done = state.inside and (reached(kept) or (state.dual and kept - below <= gap * kept))
+        if done or step == _MOST_STEPS or not state.advance():
+            return Least(state.y, kept, below, step, done)
+    raise AssertionError("the last step returns")  # pragma: no cover
+
+
+class _Stack:
+    """The rows of all parts, one above the other."""
+
+    def __init__(self, parts: Sequence[Within]) -> None:
+        self._rows = [part.rows for part in parts]
+        self._ends = [len(part.target) for part in parts]
+        self.target = np.concatenate([part.target for part in parts])
+        self.fixed, self.share = (
+            np.concatenate([np.full(len(part.target), value) for part, value in zip(parts, values, strict=True)])
+            for values in ([part.fixed for part in parts], [part.share for part in parts])
+        )
+
+    def times(self, y: Floats) -> Floats:
+        return np.concatenate([rows.times(y) for rows in self._rows])
+
+    def transposed(self, z: Floats) -> Floats:
+        first, *others = [rows.transposed(of) for rows, of in self._split(z)]
+        for other in others:
+            first = first + other
+        return first
+
+    def gram(self, diagonal: Floats) -> Floats:
+        first, *others = [rows.gram(of) for rows, of in self._split(diagonal)]
+        for other in others:
+            first += other
+        return first
+
+    def _split(self, z: Floats) -> Iterator[tuple[Rows, Floats]]:
+        begin = 0
+        for rows, count in zip(self._rows, self._ends, strict=True):
+            yield rows, z[begin : begin + count]
+            begin += count
+
+
+class _State:
+    """y and v; slacks and multipliers of both sides of each row, upper and lower, (2, m)."""
+
+    def __init__(self, parts: Sequence[Within], start: Floats) -> None:
+        self._rows, self.y = _Stack(parts), np.array(start, dtype=np.float64)
+        self._far = self._rows.times(self.y) - self._rows.target
+        moves = self._rows.share > 0.0
+        need = (np.abs(self._far[moves]) - self._rows.fixed[moves]) / self._rows.share[moves]
+        self.v = 1.1 * max(float(np.max(need)), 1e-12)
+        # What is outside its bound gets a slack of its own; the lack is made good on the way.
+        self._slack = np.maximum(self._room(), 1e-3 * self._widths())
+        weight = 1.0 / self._slack
+        self._multiplier = weight / _sum(self._rows.share * weight)
+
+    def _widths(self) -> Floats:
+        return self._rows.fixed + self._rows.share * self.v
+
+    def _room(self) -> Floats:
+        return np.stack([self._widths() - self._far, self._widths() + self._far])
+
+    @property
+    def inside(self) -> bool:
+        """Whether every row keeps its bound."""
+        return bool(np.all(np.abs(self._room() - self._slack) <= _FEASIBLE * self._widths()))
+
+    @property
+    def dual(self) -> bool:
+        """Whether the multipliers prove that there is no lower bound than ``bounds`` says."""
+        y, v = self._residual()
+        return max(float(np.max(np.abs(y))), abs(v)) < _FEASIBLE_DUAL
+
+    def _residual(self) -> tuple[Floats, float]:
+        one = self._multiplier
+        return -self._rows.transposed(one[0] - one[1]), _sum(self._rows.share * one) - 1.0
+
+    def bounds(self) -> tuple[float, float]:
+        """v, and v less the gap."""
+        return self.v, self.v - _sum(self._slack * self._multiplier)
+
+    def advance(self) -> bool:
+        """One predictor and corrector; False where it goes no further in working precision."""
+        rows, slack, one, size = self._rows, self._slack, self._multiplier, len(self.y)
+        weight = one / slack
+        matrix = np.zeros((size + 1, size + 1))
+        matrix[:size, :size] = rows.gram(weight[0] + weight[1])
+        matrix[:size, size] = matrix[size, :size] = -rows.transposed(rows.share * (weight[0] - weight[1]))
+        matrix[size, size] = _sum(rows.share * rows.share * weight)
+        diagonal = np.arange(size + 1)
+        matrix[diagonal, diagonal] *= 1.0 + _REGULAR
+        try:
+            factor = Cholesky(matrix)
+        except ArithmeticError:
+            return False
+        lack, residual = self._room() - slack, self._residual()
+
+        def step(complement: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+            """Of (y, v), of the rows, of slacks and of multipliers, where their products change by ``complement``."""
+            pull = (complement - one * lack) / slack
+            right = np.append(residual[0] - rows.transposed(pull[0] - pull[1]), residual[1] + _sum(rows.share * pull))
+            solution = factor.solve(right)
+            moved, wider = rows.times(solution[:size]), rows.share * solution[size]
+            slacks = np.stack([wider - moved, wider + moved]) + lack
+            return solution, moved, slacks, (complement - one * slacks) / slack
+
+        products = slack * one
+        mean = _sum(products) / products.size
+        _, _, slacks, ones = step(-products)
+        ahead, up = _reach(slack, slacks), _reach(one, ones)
+        after = _sum((slack + ahead * slacks) * (one + up * ones)) / products.size
+        if not (mean > 0.0 and isfinite(after)):  # what contradicts itself has no other end
+            return False
+        ratio = after / mean
+        solution, moved, slacks, ones = step(ratio * ratio * ratio * mean - products - slacks * ones)
+        ahead, up = _NEAR * _reach(slack, slacks), _NEAR * _reach(one, ones)
+        self.y = self.y + ahead * solution[:size]
+        self.v += ahead * float(solution[size])
+        self._far = self._far + ahead * moved
+        self._slack = slack + ahead * slacks
+        self._multiplier = one + up * ones
+        return True
+
+
+def _sum(values: Floats) -> float:
+    return float(tree_sum(values.reshape(-1)))
+
+
+def _reach(values: Floats, steps: Floats) -> float:
+    """How much of the steps can be taken until a value is 0; at most 1."""
+    shrinking = steps < 0.0
+    return min(1.0, float(np.min(values[shrinking] / -steps[shrinking], initial=1.0)))

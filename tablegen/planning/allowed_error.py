@@ -1,0 +1,22 @@
+"""The scaling error that a waveform may have for the sake of less acceleration: as asked, or what does not show."""
+
+from tablegen.config.schema import BandLimit, Limits
+from tablegen.waveform.gentle_fit import AllowedError
+
+CHORD = 0.05  # share of the line over which the certificate measures emitted integers
+_UNLIMITED_PERCENT = 1.0  # the error that nobody is told of
+
+
+def allowed_error(limit: BandLimit, limits: Limits, codes: float) -> AllowedError | None:
+    """The error of one axis whose drive is ``codes`` of the converter from w = 0 to 1; None asks for no error.
+
+    Where neither harmonics nor an error are asked for it is what rounding to codes leaves: up to half a code at
+    either end of a chord, with either sign. It is then at most half of what the limits of the scan leave.
+    """
+    if limit.max_scaling_error_percent is not None:
+        return AllowedError(limit.max_scaling_error_percent, True)
+    chosen = limit.harmonics is None or limit.harmonics == "fewest"
+    if limit.method != "window" or limit.cutoff_hz is not None or not chosen or not codes > 0.0:
+        return None
+    most = 0.5 * min(limits.max_scaling_error_percent or _UNLIMITED_PERCENT, _UNLIMITED_PERCENT)
+    return AllowedError(min(100.0 * 2.0 / (CHORD * codes), most), limit.harmonics == "fewest")
