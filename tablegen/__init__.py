@@ -6,8 +6,9 @@ From a scan file to arrays and files in two lines::
     plot(scan.x.time_s, scan.x.volts)               # numpy arrays of one line, a value a tick
 
 What is public stands in ``tablegen.__all__`` and docs/python.md: ``load``, ``plan``, ``certify`` and ``build`` make a
-scan, ``read_build`` and ``verify`` take one from its directory, ``Device`` talks to an instrument. Everything else may
-change. Names are loaded when they are first used, so that importing tablegen costs nothing.
+scan, ``variants`` and ``build_many`` many, ``read_build`` and ``verify`` take one from its directory, ``Device`` talks
+to an instrument. Everything else may change. Names are loaded when they are first used, so that importing tablegen
+costs nothing.
 """
 
 from importlib import import_module
@@ -17,9 +18,11 @@ from tablegen.version import __version__
 
 if TYPE_CHECKING:
     from tablegen.api.build import BrokenLimit, Build, build, certify, load, plan
+    from tablegen.api.many import BuildOutcome, build_many, variants
     from tablegen.api.samples import Samples
     from tablegen.certificate.certificate import Certificate
     from tablegen.config.load import Setup
+    from tablegen.config.variants import Variant
     from tablegen.emit.content import Content
     from tablegen.emit.format import Format
     from tablegen.emit.write import CannotWrite
@@ -38,6 +41,8 @@ _HOMES = {
     "plan": "tablegen.api.build",
     "certify": "tablegen.api.build",
     "build": "tablegen.api.build",
+    "build_many": "tablegen.api.many",
+    "variants": "tablegen.api.many",
     "read_build": "tablegen.manifest.read",
     "verify": "tablegen.verification.run",
     "Device": "tablegen.link.device",
@@ -46,6 +51,8 @@ _HOMES = {
     "Certificate": "tablegen.certificate.certificate",
     "Build": "tablegen.api.build",
     "Samples": "tablegen.api.samples",
+    "BuildOutcome": "tablegen.api.many",
+    "Variant": "tablegen.config.variants",
     "StoredBuild": "tablegen.manifest.read",
     "Report": "tablegen.verification.build",
     "Format": "tablegen.emit.format",
@@ -65,6 +72,8 @@ __all__ = [  # noqa: RUF022 - in the order in which they are used
     "plan",
     "certify",
     "build",
+    "variants",
+    "build_many",
     "read_build",
     "verify",
     "Device",
@@ -73,6 +82,8 @@ __all__ = [  # noqa: RUF022 - in the order in which they are used
     "Certificate",
     "Build",
     "Samples",
+    "Variant",
+    "BuildOutcome",
     "StoredBuild",
     "PreparedScan",
     "Report",

@@ -48,6 +48,9 @@ class Rejected(Exception):
             self.problems.append(Problem(last.file, last.line, "", f"more faults than these {MOST_PROBLEMS}; stopped"))
         super().__init__("\n".join(map(str, self.problems)))
 
+    def __reduce__(self) -> tuple[type["Rejected"], tuple[list[Problem]]]:
+        return type(self), (self.problems,)  # what was raised in another process arrives with its problems
+
 
 @dataclass(frozen=True)
 class Document:

@@ -7,14 +7,16 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from tablegen.certificate.certificate import Certificate, broken_limits
 from tablegen.certificate.certificate import certify as certify_plan
+from tablegen.certificate.scan_findings import scan_findings
 from tablegen.certificate.scan_warnings import brief_warnings, limit_advice, scan_warnings
-from tablegen.certificate.summary import notes, summary
+from tablegen.certificate.summary import summary
 from tablegen.config.load import Setup, from_values
 from tablegen.config.load import load as load_files
 from tablegen.emit.format import Format
 from tablegen.emit.formats import UnknownFormat, chosen
 from tablegen.emit.render import render, runtime_files
 from tablegen.emit.write import leftover_files, outdated_files, write_files
+from tablegen.findings import Finding
 from tablegen.planning.line_plan import Plan, make_plan
 from tablegen.problems import Problem, Rejected, Unphysical
 
@@ -152,8 +154,13 @@ class Build:
 
     @property
     def notes(self) -> list[str]:
-        """What to know before the image is trusted, in sentences."""
-        return notes(self.plan)
+        """What to know before the image is trusted, in sentences: what spoils it first, small print last."""
+        return [one.text for one in self.findings]
+
+    @property
+    def findings(self) -> list[Finding]:
+        """The same with weights and percentages of the scan, the worst first."""
+        return scan_findings(self.plan, self.certificates)
 
     @cached_property
     def warnings(self) -> list[str]:

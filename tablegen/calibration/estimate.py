@@ -2,7 +2,9 @@
 
 from dataclasses import dataclass
 from math import isfinite, nan
+from typing import Literal
 
+from tablegen.findings import Remark
 from tablegen.numerics.arrays import Floats
 
 
@@ -29,13 +31,19 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Curve:
-    """Points and the fitted line through them, for a plot; as (x, y)."""
+    """Points and the fitted line through them, for a plot; as (x, y). Labels contain the unit.
+
+    ``backward`` has the first points of the backward direction, measured and fitted, where a curve has both directions;
+    ``direction`` is that of a curve that has one.
+    """
 
     title: str
     x_label: str
     y_label: str
     measured: tuple[Floats, Floats]
     fitted: tuple[Floats, Floats]
+    backward: tuple[int, int] | None = None
+    direction: Literal["forward", "backward", ""] = ""
 
 
 @dataclass(frozen=True)
@@ -82,7 +90,7 @@ class Fit:
     points: int
     residual_percent: Floats
     before_percent: float
-    remarks: tuple[str, ...]
+    remarks: tuple[Remark, ...]
     outliers: tuple[int, ...]
     curves: tuple[Curve, ...]
     images: tuple[ImageSize, ...] = ()

@@ -8,6 +8,7 @@ import numpy as np
 from tablegen.calibration.estimate import Curve, Estimate, Fit
 from tablegen.calibration.least_squares import few_points, solve
 from tablegen.calibration.outliers import outliers
+from tablegen.findings import Remark, spoils
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 
@@ -30,12 +31,14 @@ def fit_frequency(frequency_hz: Floats, gain: Floats, reference_hz: float | None
     ``reference_hz`` is the rate at which the scan size was calibrated, a choice and nothing that could be
     fitted; without it the lowest frequency. Raises ``Unphysical``.
     """
-    remarks = []
+    remarks: list[Remark] = []
     if len(np.unique(frequency_hz)) < 2:
         raise Unphysical("one frequency does not determine alpha; measure over two decades")
     if reference_hz is None:
         reference_hz = float(np.min(frequency_hz))
-        remarks.append(f"the reference is the lowest frequency, {reference_hz:g} Hz; give that of the size calibration")
+        remarks.append(
+            Remark(f"the reference is the lowest frequency, {reference_hz:g} Hz; give that of the size calibration")
+        )
     decades = np.log10(frequency_hz / reference_hz)
     scale = float(np.mean(gain))
 
@@ -52,19 +55,22 @@ def fit_frequency(frequency_hz: Floats, gain: Floats, reference_hz: float | None
                 f"the gain rises by {-100.0 * alpha.value:.3g} % a decade, where (23) has it fall; leave out what "
                 f"is near the resonance (--to-hz), above a tenth of it"
             )
-        remarks.append("the gain does not fall with frequency; alpha is set to 0")
+        remarks.append(Remark("the gain does not fall with frequency; alpha is set to 0"))
         alpha = Estimate(0.0, alpha.standard_error)
     if alpha.value > _LARGEST_ALPHA:
         raise Unphysical(f"alpha = {alpha.value:.3g} is not a loss of a few percent per decade; are these gains?")
     expected = solution.values[1] * scale * (1.0 - raw * decades)
     if solution.freedom == 0:
-        remarks.append("two points fit exactly, so errors cannot be estimated; measure more frequencies")
+        remarks.append(Remark("two points fit exactly, so errors cannot be estimated; measure more frequencies"))
     if "alpha" in solution.undetermined:
-        remarks.append("alpha is not determined by these points; measure over two decades or more")
+        remarks.append(spoils("alpha is not determined by these points; measure over two decades or more"))
     if _rises(frequency_hz, solution.residuals, solution.jacobian):
         remarks.append(
-            "the gain bends up towards high frequencies, as below a resonance; leave those out (--to-hz), what is "
-            "above a tenth of the resonance"
+            spoils(
+                "the gain bends up towards high frequencies, as below a resonance; leave those out (--to-hz), what is "
+                "above a tenth of the resonance",
+                float(np.max(np.abs(100.0 * (gain / expected - 1.0)))),
+            )
         )
     line = np.geomspace(float(np.min(frequency_hz)), float(np.max(frequency_hz)), 101)
     fitted = 1.0 - raw * np.log10(line / reference_hz)
@@ -75,7 +81,7 @@ def fit_frequency(frequency_hz: Floats, gain: Floats, reference_hz: float | None
         before_percent=float(np.max(np.abs(100.0 * (measured - 1.0)))),
         remarks=tuple(remarks),
         outliers=outliers(solution.jacobian, solution.residuals, _MIN_SCATTER),
-        curves=(Curve("gain", "log10 of Hz", "gain", (np.log10(frequency_hz), measured), (np.log10(line), fitted)),),
+        curves=(Curve("gain", "frequency [Hz]", "gain [ratio]", (frequency_hz, measured), (line, fitted)),),
         alpha=alpha,
         reference_hz=reference_hz,
         gain=Estimate(height.value * scale, height.standard_error * scale),

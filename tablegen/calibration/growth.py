@@ -11,6 +11,7 @@ from tablegen.calibration.branch import MeasuredBranch
 from tablegen.calibration.estimate import Estimate
 from tablegen.calibration.least_squares import few_points, solve
 from tablegen.compensation.models import UNCOMPENSATED
+from tablegen.findings import Remark, spoils
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 
@@ -36,7 +37,7 @@ class Growth:
     beta_max: Estimate
     rho: Estimate
     u_peak: Estimate
-    remarks: tuple[str, ...]
+    remarks: tuple[Remark, ...]
     off_errors: float = 0.0
     off_share: float = 0.0
 
@@ -50,7 +51,7 @@ def fit_growth(v: Floats, branches: Sequence[MeasuredBranch], rho: float) -> Gro
 
     ``rho`` is kept where the amplitudes do not determine it. Raises ``Unphysical``.
     """
-    remarks: list[str] = []
+    remarks: list[Remark] = []
     beta = np.array([branch.beta.value for branch in branches])
     error = np.maximum([branch.beta.standard_error for branch in branches], _LEAST_BETA_ERROR)
     found = None
@@ -61,10 +62,12 @@ def fit_growth(v: Floats, branches: Sequence[MeasuredBranch], rho: float) -> Gro
         steep = _steepest(v, beta, error, rho)
         found = _height(v, beta, error, steep or rho, remarks)
         remarks.append(
-            f"the residual hardly grows with the amplitude: rho is only known to be large, {steep:g} was taken"
+            Remark(f"the residual hardly grows with the amplitude: rho is only known to be large, {steep:g} was taken")
             if steep
-            else f"rho is not determined by these amplitudes and was left at {rho:g}; it takes two or "
-            f"more, best from 0.2 to 1 of v_max"
+            else spoils(
+                f"rho is not determined by these amplitudes and was left at {rho:g}; it takes two or "
+                f"more, best from 0.2 to 1 of v_max"
+            )
         )
     beta_max, estimate = found
     if beta_max.value <= 0.0 and np.all(beta > -_NOISE_LIMIT_ERRORS * error):
@@ -76,14 +79,16 @@ def fit_growth(v: Floats, branches: Sequence[MeasuredBranch], rho: float) -> Gro
         )
     top = float(np.max(v))
     if top < 0.6:
-        remarks.append(f"beta_max is extrapolated from {top:.2g} of v_max; it holds up to about there")
+        remarks.append(spoils(f"beta_max is extrapolated from {top:.2g} of v_max; it holds up to about there"))
     missed = beta_max.value * _share(v, estimate.value) - beta
     off_errors = sqrt(float(np.sum((missed / error) ** 2)) / freedom)
     off_share = sqrt(float(np.sum(missed**2)) / freedom) / float(np.max(np.abs(beta)))
     return Growth(beta_max, estimate, _peak(branches, beta, error, remarks), tuple(remarks), off_errors, off_share)
 
 
-def _both(v: Floats, beta: Floats, error: Floats, rho: float, remarks: list[str]) -> tuple[Estimate, Estimate] | None:
+def _both(
+    v: Floats, beta: Floats, error: Floats, rho: float, remarks: list[Remark]
+) -> tuple[Estimate, Estimate] | None:
     """beta_max and rho, or None where rho stays open."""
 
     def residuals(x: Floats) -> Floats:
@@ -95,7 +100,8 @@ def _both(v: Floats, beta: Floats, error: Floats, rho: float, remarks: list[str]
     value, spread = found.values, np.sqrt(np.diag(found.unit_covariance))
     if not 2e-6 < value[1] < _LARGEST_RHO or not spread[1] < _OPEN_RHO:
         return None
-    spread = spread * sqrt(_variance(found.residuals, found.freedom, "(22) misses the measured residuals", remarks))
+    what, percent = "(22) misses the measured residuals", _percent(found.residuals * error)
+    spread = spread * sqrt(_variance(found.residuals, found.freedom, what, remarks, percent))
     return Estimate(float(value[0]), float(spread[0])), Estimate(float(value[1]), float(spread[1]))
 
 
@@ -114,16 +120,17 @@ def _steepest(v: Floats, beta: Floats, error: Floats, rho: float) -> float | Non
     return float(f"{grid[best]:.3g}") if cost(rho) - costs[best] > _CHI2_LIMIT * spread else None
 
 
-def _height(v: Floats, beta: Floats, error: Floats, rho: float, remarks: list[str]) -> tuple[Estimate, Estimate]:
+def _height(v: Floats, beta: Floats, error: Floats, rho: float, remarks: list[Remark]) -> tuple[Estimate, Estimate]:
     """beta_max alone."""
     share = _share(v, rho) / error
     value = float(share @ (beta / error)) / float(share @ share)
     left = value * share - beta / error
-    variance = _variance(left, len(v) - 1, f"(22) with rho = {rho:g} misses the measured residuals", remarks)
+    what = f"(22) with rho = {rho:g} misses the measured residuals"
+    variance = _variance(left, len(v) - 1, what, remarks, _percent(left * error))
     return Estimate(value, sqrt(variance / float(share @ share))), Estimate(rho)
 
 
-def _peak(branches: Sequence[MeasuredBranch], beta: Floats, error: Floats, remarks: list[str]) -> Estimate:
+def _peak(branches: Sequence[MeasuredBranch], beta: Floats, error: Floats, remarks: list[Remark]) -> Estimate:
     """The mean of u_peak over the amplitudes, each weighted by its error: the paper finds it the same at all."""
     seen = [branch.u_peak for branch, b, e in zip(branches, beta, error, strict=True) if b > _NOISE_LIMIT_ERRORS * e]
     if not seen:
@@ -135,18 +142,25 @@ def _peak(branches: Sequence[MeasuredBranch], beta: Floats, error: Floats, remar
     left = (value - mean) / spread
     low, high = float(np.min(value)), float(np.max(value))
     what = f"u_peak differs from amplitude to amplitude, {low:.3g} to {high:.3g}, where the scanner file has one,"
-    variance = _variance(left, len(seen) - 1, what, remarks)
-    if variance > 1.0:
-        remarks[-1] += "; --points writes it as measured, or leave out amplitudes that you do not scan with"
+    more = "; --points writes it as measured, or leave out amplitudes that you do not scan with"
+    variance = _variance(left, len(seen) - 1, what, remarks, more=more)
     return Estimate(mean, sqrt(variance / float(np.sum(weight))))
 
 
-def _variance(left: Floats, freedom: int, what: str, remarks: list[str]) -> float:
+def _percent(missed: Floats) -> float:
+    """What is missed of the scan, rms."""
+    return 100.0 * sqrt(float(np.mean(missed**2)))
+
+
+def _variance(
+    left: Floats, freedom: int, what: str, remarks: list[Remark], percent: float = 0.0, more: str = ""
+) -> float:
     """1 where errors explain what is left; otherwise by how much they have to be widened, which is remarked."""
     total = float(left @ left)
     if freedom < 1 or chdtrc(freedom, total) > _SIGNIFICANCE_LEVEL:
         return 1.0
-    remarks.append(f"{what} by {sqrt(total / freedom):.3g} times their standard errors; these were widened")
+    text = f"{what} by {sqrt(total / freedom):.3g} times their standard errors; these were widened{more}"
+    remarks.append(spoils(text, percent))
     return total / freedom * few_points(freedom) ** 2
 
 

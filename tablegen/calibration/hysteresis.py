@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -11,8 +12,11 @@ from tablegen.calibration.growth import Growth, fit_growth
 from tablegen.calibration.trace import TraceFit, fit_trace
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.driver import Driver
+from tablegen.findings import Remark, spoils
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
+
+_SIDES: tuple[Literal["forward", "backward"], ...] = ("forward", "backward")
 
 TYPICAL_RHO = 1.5  # the paper's backward scan, and the default of the scanner file
 OFFSET_TOLERANCE = 0.02  # of v_max: offsets that differ by less are one
@@ -69,7 +73,7 @@ def fit_hysteresis(
     """
     driver = Driver.of(v_max)
     fits: list[TraceFit] = []
-    remarks: list[str] = []
+    remarks: list[Remark] = []
     for trace in traces:
         try:
             fit = fit_trace(trace.time_s, trace.drive_v, trace.displacement_nm, settle_periods, drift_order, delay_s)
@@ -79,11 +83,11 @@ def fit_hysteresis(
         except Unphysical as reason:
             raise Unphysical(f"{trace.name}: {reason}" if trace.name else str(reason)) from None
         fits.append(fit)
-        remarks += [f"{trace.name}: {text}" if trace.name else text for text in _remarks(fit)]
+        remarks += [text.under(trace.name) for text in _remarks(fit)]
     return combined(fits, driver.span, rho, remarks)
 
 
-def combined(fits: Sequence[AmplitudeFit], span: float, rho: float, remarks: Sequence[str]) -> HysteresisFit:
+def combined(fits: Sequence[AmplitudeFit], span: float, rho: float, remarks: Sequence[Remark]) -> HysteresisFit:
     """Amplitudes in any order -> (22) at each turn; remarks of the single ones come first. Raises ``Unphysical``."""
     remarks = list(remarks)
     groups: list[list[AmplitudeFit]] = []
@@ -105,12 +109,12 @@ def combined(fits: Sequence[AmplitudeFit], span: float, rho: float, remarks: Seq
                 _check_shape(sides[-1], float(v[-1]))
             except Unphysical as reason:
                 raise Unphysical(f"turn {turn:.4g}, {name}: {reason}") from None
-            remarks += [f"turn {turn:.4g}, {name}: {text}" for text in sides[-1].remarks]
+            remarks += [text.under(f"turn {turn:.4g}, {name}") for text in sides[-1].remarks]
         offsets = _offsets(group, span)
         if offsets:
             listed = ", ".join(f"{volts:g}" for volts in sorted(set(offsets)))
             remarks.append(
-                f"turn {turn:.4g}: (22) is one for the offsets of {listed} V; --points writes them by offset"
+                Remark(f"turn {turn:.4g}: (22) is one for the offsets of {listed} V; --points writes them by offset")
             )
         branches.append(TurnFit(Estimate(turn, spread), sides[0], sides[1], tuple(group), offsets))
     return HysteresisFit(
@@ -148,32 +152,42 @@ def _check_shape(growth: Growth, v: float) -> None:
     BranchShape.harmonic(float(growth.beta(np.array(v))), growth.u_peak.value)
 
 
-def _remarks(fit: TraceFit) -> list[str]:
-    found = []
+def _remarks(fit: TraceFit) -> list[Remark]:
+    found: list[Remark] = []
     if fit.triangle.departure > _MAX_DRIVE_DEPARTURE:
         found.append(
-            f"the drive departs from a triangle by {100.0 * fit.triangle.departure:.2g} % rms; "
-            "the fit assumes a triangle"
+            spoils(
+                f"the drive departs from a triangle by {100.0 * fit.triangle.departure:.2g} % rms; "
+                "the fit assumes a triangle",
+                100.0 * fit.triangle.departure,
+            )
         )
     if fit.inverted:
-        found.append("the displacement falls where the drive rises; its sign was inverted")
+        found.append(Remark("the displacement falls where the drive rises; its sign was inverted"))
     worst = float(np.max(np.abs(fit.residual_percent)))
     if worst > _POOR_FIT_PERCENT:
         found.append(
-            f"the harmonic model leaves {worst:.2g} % of the scan; is the drive the triangle itself, the delay of the "
-            f"sensor known, and the record settled?"
+            spoils(
+                f"the harmonic model leaves {worst:.2g} % of the scan; is the drive the triangle itself, the delay of "
+                f"the sensor known, and the record settled?",
+                worst,
+            )
         )
     if fit.correlated > 3.0:
         found.append(
-            f"residuals are correlated over {fit.correlated:.0f} samples: besides noise, they contain what "
-            f"model and drift do not describe; standard errors were widened by {fit.correlated**0.5:.2g}"
+            Remark(
+                f"residuals are correlated over {fit.correlated:.0f} samples: besides noise, they contain what "
+                f"model and drift do not describe; standard errors were widened by {fit.correlated**0.5:.2g}"
+            )
         )
     if fit.strays:
         shown = ", ".join(str(i + 1) for i in fit.strays[:5]) + (", ..." if len(fit.strays) > 5 else "")
-        found.append(f"{len(fit.strays)} samples are far off the curve (number {shown}); they were kept")
+        found.append(Remark(f"{len(fit.strays)} samples are far off the curve (number {shown}); they were kept"))
     for name, side in (("forward", fit.forward), ("backward", fit.backward)):
         if side.u_peak.standard_error > 0.1:
-            found.append(f"u_peak {name} is not determined by this trace; average more periods or drive it further")
+            found.append(
+                spoils(f"u_peak {name} is not determined by this trace; average more periods or drive it further")
+            )
     return found
 
 
@@ -183,11 +197,12 @@ def _curves(branches: Sequence[TurnFit], span: float) -> list[Curve]:
     line = np.linspace(0.0, 1.0, 101)
     for branch in branches:
         curves += branch.traces[-1].curves
-        for name in ("forward", "backward"):
+        for name in _SIDES:
             growth: Growth = getattr(branch, name)
             v = np.array([fit.v_scan for fit in branch.traces])
             beta = np.array([getattr(fit, name).beta.value for fit in branch.traces])
             title = f"peak residual {name}, turn {branch.turn.value:.3g}"
             fitted = (line * span, 100.0 * growth.beta(line))
-            curves.append(Curve(title, "scan voltage [V]", "% of scan", (v, 100.0 * beta), fitted))
+            label = "peak residual [% of the scan]"
+            curves.append(Curve(title, "scan voltage [V]", label, (v, 100.0 * beta), fitted, None, name))
     return curves

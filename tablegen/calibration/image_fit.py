@@ -165,10 +165,11 @@ def _positions(
         lines.append((geometry.place, columns, at, x + off, 0.5 * (at[1:] + at[:-1]), stretch))
     expected = 2 * BINS - 6
     misfit = beyond / expected if chdtrc(expected, beyond) < _MISFIT_SIGNIFICANCE else 1.0
+    backward = len(lines[0][2]), len(lines[0][0])
     residual = Curve(
-        "position less that of a straight line, against the normalised drive",
-        "drive",
-        "% of scan",
+        "residual against the drive",
+        "drive [share of the sweep]",
+        "position less a straight line [% of the scan]",
         (
             np.concatenate([at for _, _, at, *_ in lines]),
             np.concatenate([100.0 * (x - at) for _, _, at, x, *_ in lines]),
@@ -177,11 +178,12 @@ def _positions(
             np.concatenate([place for place, *_ in lines]),
             np.concatenate([100.0 * (c.x - o - p) for o, (p, c, *_) in zip(model.off, lines, strict=True)]),
         ),
+        backward,
     )
     period = Curve(
         "local period less that of an undistorted image",
-        "x of the image",
-        "%",
+        "x of the image [share]",
+        "stretch of the period [%]",
         (
             np.concatenate([middle for *_, middle, _ in lines]),
             np.concatenate([100.0 * (1.0 / stretch - 1.0) for *_, stretch in lines]),
@@ -190,5 +192,6 @@ def _positions(
             np.concatenate([place for place, *_ in lines]),
             np.concatenate([100.0 * (1.0 / c.steep - 1.0) for _, c, *_ in lines]),
         ),
+        (len(lines[0][4]), backward[1]),
     )
     return np.concatenate(residuals), (scaling[0], scaling[1]), (residual, period), max(misfit, 1.0), clean

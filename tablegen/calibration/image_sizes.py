@@ -12,6 +12,7 @@ from tablegen.calibration.image_line import ImageLine, fit_line, shows_turns
 from tablegen.calibration.image_scale import ASPECT_ERROR, DRIFT_ERROR, Cell, Grating, size_of_line
 from tablegen.compensation.size import SizeLaw
 from tablegen.driver import Driver
+from tablegen.findings import Remark, spoils
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 
@@ -62,13 +63,13 @@ class ImageSizes:
     nm: Floats
     errors_nm: Floats
     shared: float
-    remarks: tuple[str, ...]
+    remarks: tuple[Remark, ...]
 
 
 def sizes_of(images: Sequence[SampleImage], v_max: Driver | float, sample: KnownSample, taking: Taking) -> ImageSizes:
     """Each image's line from turn to turn. Raises ``Unphysical``, with the image's name."""
     found: list[ImageSize] = []
-    remarks: list[str] = []
+    remarks: list[Remark] = []
     for image in images:
         try:
             _check_drive(image, Driver.of(v_max))
@@ -95,7 +96,7 @@ def sizes_of(images: Sequence[SampleImage], v_max: Driver | float, sample: Known
                 100.0 * gap,
             )
         )
-        remarks += [f"{image.name}: {text}" for text in _remarks(line, size)]
+        remarks += [text.under(image.name) for text in _remarks(line, size)]
     for one, other in combinations(images, 2):
         if one.trace.shape == other.trace.shape and np.array_equal(one.trace, other.trace):
             raise Unphysical(f"{other.name}: the image is that of {one.name}; each drive needs one of its own")
@@ -103,9 +104,11 @@ def sizes_of(images: Sequence[SampleImage], v_max: Driver | float, sample: Known
     bars = any(not isfinite(one.size.aspect) for one in found)
     if bars and sample.grating is not None and sample.grating.angle_deg is None:
         remarks.append(
-            f"the angle of the bars is that of the rows, for a frame as high as its pixels, its file or --aspect say "
-            f"within {100.0 * ASPECT_ERROR:.0f} %, and a drift of some {100.0 * DRIFT_ERROR:.0f} % of the line; "
-            f"--angle-deg gives it where it is known"
+            Remark(
+                f"the angle of the bars is that of the rows, for a frame as high as its pixels, its file or --aspect "
+                f"say within {100.0 * ASPECT_ERROR:.0f} %, and a drift of some {100.0 * DRIFT_ERROR:.0f} % of the "
+                f"line; --angle-deg gives it where it is known"
+            )
         )
     nm = np.array([one.size.nm.value for one in found])
     errors = np.array([one.size.nm.standard_error for one in found])
@@ -156,26 +159,29 @@ def _groups(found: Sequence[ImageSize]) -> list[tuple[float, list[ImageSize]]]:
     return [(v, sorted((one for one in found if one.v_scan == v), key=lambda one: one.v_offset or 0.0)) for v in volts]
 
 
-def _remarks(line: ImageLine, size: LineSize) -> list[str]:
-    found = []
+def _remarks(line: ImageLine, size: LineSize) -> list[Remark]:
+    found: list[Remark] = []
     if not shows_turns(line.geometry):
-        found.append("the turns are not in the image; the ends of the line are extrapolated")
+        found.append(spoils("the turns are not in the image; the ends of the line are extrapolated"))
     if not line.both:
-        found.append("without a retrace nothing shows whether columns were cropped, or are late")
+        found.append(Remark("without a retrace nothing shows whether columns were cropped, or are late"))
     if line.widened > 3.0:
-        found.append(f"standard errors were widened by {line.widened:.3g}, for what is not only noise")
+        found.append(Remark(f"standard errors were widened by {line.widened:.3g}, for what is not only noise"))
     if line.explained < 0.5:
-        found.append(f"{100.0 * line.explained:.0f} % of the contrast is periodic, the rest noise, debris or defects")
+        found.append(
+            Remark(f"{100.0 * line.explained:.0f} % of the contrast is periodic, the rest noise, debris or defects")
+        )
     if size.nm.standard_error > _LOOSE_SHARE * size.nm.value:
-        found.append("the size is uncertain by more than a percent; scan more periods, or average")
+        percent = 100.0 * size.nm.standard_error / size.nm.value
+        found.append(spoils("the size is uncertain by more than a percent; scan more periods, or average", percent))
     finest = (
         line.geometry.columns
         / (line.geometry.window[1] - line.geometry.window[0])
         / float(np.max(np.abs(line.waves[:, 0])))
     )
     if finest < _MIN_PIXELS_PER_PERIOD:
-        found.append(f"a period has {finest:.2g} pixels; scan less, or take more pixels")
+        found.append(Remark(f"a period has {finest:.2g} pixels; scan less, or take more pixels"))
     if line.strays:
         shown = ", ".join(str(i + 1) for i in line.strays[:5]) + (", ..." if len(line.strays) > 5 else "")
-        found.append(f"{len(line.strays)} lines differ from the others (row {shown}); they were kept")
+        found.append(Remark(f"{len(line.strays)} lines differ from the others (row {shown}); they were kept"))
     return found

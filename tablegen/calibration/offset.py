@@ -10,6 +10,7 @@ from tablegen.calibration.outliers import outliers
 from tablegen.compensation.offset import OffsetLaw
 from tablegen.compensation.size import SizeLaw
 from tablegen.driver import Driver
+from tablegen.findings import Remark, spoils
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 
@@ -87,7 +88,7 @@ def fit_offset(
             Curve(
                 "apparent size, relative",
                 "offset [V]",
-                f"size / that at {driver.middle:g} V" if driver.v_min else "size / that at v_max / 2",
+                f"size / that at {f'{driver.middle:g} V' if driver.v_min else 'v_max / 2'} [ratio]",
                 (offset_v, apparent_nm / centre),
                 (line, curve),
             ),
@@ -105,20 +106,24 @@ def _shape(p: Floats) -> Floats:
     return columns
 
 
-def _remarks(p: Floats, solution: Solution, driver: Driver) -> list[str]:
-    remarks = []
+def _remarks(p: Floats, solution: Solution, driver: Driver) -> list[Remark]:
+    remarks: list[Remark] = []
     if solution.freedom == 0 and solution.known_errors:
-        remarks.append("three points fit exactly: errors are those of the images alone; measure at two more offsets")
+        remarks.append(
+            Remark("three points fit exactly: errors are those of the images alone; measure at two more offsets")
+        )
     elif solution.freedom == 0:
-        remarks.append("three points fit exactly, so errors cannot be estimated; measure at two more offsets")
+        remarks.append(Remark("three points fit exactly, so errors cannot be estimated; measure at two more offsets"))
     low, high = float(np.min(p)), float(np.max(p))
     bottom = "v_min" if driver.v_min else "0 V"
     for name, gap, volts in (("m_minus", low + 1.0, bottom), ("m_plus", 1.0 - high, "v_max")):
         if gap > 0.4:
             remarks.append(
-                f"{name} is extrapolated over {50.0 * gap:.0f} % of the range; measure at some 7 % from {volts}"
+                spoils(f"{name} is extrapolated over {50.0 * gap:.0f} % of the range; measure at some 7 % from {volts}")
             )
     for name in ("m_minus", "m_plus"):
         if name in solution.undetermined:
-            remarks.append(f"{name} is not determined by these points; spread the offsets over most of {driver}")
+            remarks.append(
+                spoils(f"{name} is not determined by these points; spread the offsets over most of {driver}")
+            )
     return remarks

@@ -8,6 +8,7 @@ from tablegen.calibration.estimate import Fit
 from tablegen.calibration.offset import OffsetFit, fit_offset
 from tablegen.compensation.size import SizeLaw
 from tablegen.driver import Driver
+from tablegen.findings import Remark
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 
@@ -50,13 +51,15 @@ def fit_offset_sizes(
         fits.append(fit)
         residual[rows] = fit.residual_percent
         outliers += rows[list(fit.outliers)].tolist()
-        remarks += [f"images of {one:g} V: {remark}" for remark in fit.remarks]
+        remarks += [remark.under(f"images of {one:g} V") for remark in fit.remarks]
     if len(fits) == 1:
         return fits[0]
     if volts[-1] < _WIDE * volts[0]:
         remarks.append(
-            f"scan voltages of {volts[0]:g} to {volts[-1]:g} V hardly tell how m changes with the size; "
-            f"take some further apart"
+            Remark(
+                f"scan voltages of {volts[0]:g} to {volts[-1]:g} V hardly tell how m changes with the size; "
+                f"take some further apart"
+            )
         )
     return OffsetSizesFit(
         points=len(size_v),

@@ -8,6 +8,7 @@ import numpy as np
 from tablegen.calibration.estimate import Curve, Estimate, Fit
 from tablegen.calibration.least_squares import Solution, solve
 from tablegen.calibration.outliers import outliers
+from tablegen.findings import Remark, spoils
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 
@@ -40,14 +41,15 @@ def fit_resonance(frequency_hz: Floats, gain: Floats, phase_deg: Floats | None =
     needed = 4 if phase_deg is None else 2
     if len(np.unique(f)) < needed:
         raise Unphysical(f"{len(np.unique(f))} frequencies do not determine a resonance; measure 20 or more around it")
-    phase, remarks = None, []
+    phase = None
+    remarks: list[Remark] = []
     if phase_deg is None:
-        remarks.append("without phase_deg the delay is not determined; delay_s is set to 0")
+        remarks.append(Remark("without phase_deg the delay is not determined; delay_s is set to 0"))
     else:
         phase = np.unwrap(np.radians(phase_deg[order]))
         turned = round(float(phase[0]) / pi)  # 180 degrees at low frequency: an inverting amplifier or sensor
         if turned % 2:
-            remarks.append("the response is inverted at the lowest frequency; 180 degrees were taken off")
+            remarks.append(Remark("the response is inverted at the lowest frequency; 180 degrees were taken off"))
         phase = phase - pi * turned
     solution = _best(f, g, phase)
     at, quality = float(np.exp(solution.values[1])), float(np.exp(solution.values[2]))
@@ -66,31 +68,35 @@ def fit_resonance(frequency_hz: Floats, gain: Floats, phase_deg: Floats | None =
                 raise Unphysical(
                     f"the phase leads as by a delay of {delay.value:.3g} s; a lag has to be negative in phase_deg"
                 )
-            remarks.append("no delay is measurable; delay_s is set to 0")
+            remarks.append(Remark("no delay is measurable; delay_s is set to 0"))
             delay = Estimate(0.0, delay.standard_error)
     for name in solution.undetermined:
-        remarks.append(f"{name} is not determined by these points; measure more of them around the resonance")
+        remarks.append(spoils(f"{name} is not determined by these points; measure more of them around the resonance"))
     near = np.abs(f - at) <= at / quality
     if np.sum(near) < 3:
-        remarks.append(f"fewer than three points lie on the resonance, within {at / quality:.3g} Hz of {at:.5g} Hz")
+        remarks.append(
+            spoils(f"fewer than three points lie on the resonance, within {at / quality:.3g} Hz of {at:.5g} Hz")
+        )
     line = np.geomspace(float(f[0]), float(f[-1]), 301)
     model, model_phase = _response(line, solution.values)
     expected, lag = _response(f, solution.values)
     residual = 100.0 * (g / expected - 1.0)
-    if float(np.sqrt(np.mean(residual**2))) > _POOR_PERCENT:
-        remarks.append(
+    if (rms := float(np.sqrt(np.mean(residual**2)))) > _POOR_PERCENT:
+        text = (
             "one resonance does not describe this response; take the measurement itself: "
             "--write --points writes it beside the scanner file and names it there"
         )
+        remarks.append(spoils(text, rms))
     decibels = 20.0 * np.log10(g), 20.0 * np.log10(model)
     if phase is not None:
         missed = float(np.degrees(np.sqrt(np.mean((lag - phase) ** 2))))
         if missed > _POOR_DEGREES:
-            remarks.append(f"the phase is missed by {missed:.2g} degrees rms; are the points near enough to follow it?")
-    curves = [Curve("gain", "log10 of Hz", "dB", (np.log10(f), decibels[0]), (np.log10(line), decibels[1]))]
+            text = f"the phase is missed by {missed:.2g} degrees rms; are the points near enough to follow it?"
+            remarks.append(spoils(text, 100.0 * float(np.radians(missed))))  # of a harmonic, which it moves
+    curves = [Curve("gain", "frequency [Hz]", "gain [dB]", (f, decibels[0]), (line, decibels[1]))]
     if phase is not None:
-        degrees = (np.log10(line), np.degrees(model_phase))
-        curves.append(Curve("phase", "log10 of Hz", "degrees", (np.log10(f), np.degrees(phase)), degrees))
+        degrees = (line, np.degrees(model_phase))
+        curves.append(Curve("phase", "frequency [Hz]", "phase [degrees]", (f, np.degrees(phase)), degrees))
     rows = outliers(solution.jacobian, solution.residuals, _MIN_SCATTER)
     return ResonanceFit(
         points=len(f),

@@ -11,6 +11,7 @@ from tablegen.calibration.least_squares import Solution, solve, with_errors
 from tablegen.calibration.outliers import outliers
 from tablegen.driver import Driver
 from tablegen.figures import at_most
+from tablegen.findings import Remark, spoils
 from tablegen.numerics.arrays import Floats
 from tablegen.problems import Unphysical
 
@@ -62,7 +63,7 @@ def fit_size(
         raise Unphysical(f"a threshold of {threshold:g} is not above 0 and at most 1; it is a fraction of v_max")
     weight = actual_nm if noise == "relative" else np.full(len(v), float(np.max(actual_nm)))
     kept = threshold if threshold is not None else TYPICAL_THRESHOLD
-    remarks: list[str] = []
+    remarks: list[Remark] = []
     fit = _SizeModel(v, actual_nm, weight, span, base_nm)
     free = fit.best_threshold() if threshold is None and different >= 4 else None
     solution = free or fit.solve(kept)
@@ -76,8 +77,10 @@ def fit_size(
         free = solution if free is not None and _NAMES[2] in solution.names else None
     if free is None and threshold is None:
         remarks.append(
-            f"the threshold is not determined by these points and was left at {kept:g}; it takes four sizes or "
-            f"more, some of them above 0.6 of v_max and some below 0.4"
+            Remark(
+                f"the threshold is not determined by these points and was left at {kept:g}; it takes four sizes or "
+                f"more, some of them above 0.6 of v_max and some below 0.4"
+            )
         )
     k, beta = (solution.estimate(name) for name in _NAMES[:2])
     k = Estimate(k.value, hypot(k.standard_error, shared * k.value))
@@ -106,7 +109,7 @@ def fit_size(
             Curve(
                 "size against that of the linear law",
                 "drive [V]",
-                "ratio",
+                "size / that law [ratio]",
                 (drive_v, actual_nm / (linear * v)),
                 (line * span, fit.size(solution.values, line) / (linear * line)),
             ),
@@ -187,18 +190,22 @@ def _unit(v: Floats, beta: float, threshold: float) -> Floats:
     return np.where(v <= threshold, below, (1.0 + 2.0 * beta * threshold) * v - beta * threshold * threshold)
 
 
-def _remarks(solution: Solution, v: Floats, at_base: float, base_nm: float, actual_nm: Floats) -> list[str]:
-    remarks = []
+def _remarks(solution: Solution, v: Floats, at_base: float, base_nm: float, actual_nm: Floats) -> list[Remark]:
+    remarks: list[Remark] = []
     if solution.known_errors and len(solution.residuals) == len(solution.names):
-        remarks.append("as many sizes as parameters: errors are those of the images alone; measure more sizes")
+        remarks.append(Remark("as many sizes as parameters: errors are those of the images alone; measure more sizes"))
     elif solution.freedom <= 0 or len(solution.residuals) == len(solution.names):
-        remarks.append("as many points as parameters fit exactly, so errors cannot be estimated; measure more points")
+        remarks.append(
+            Remark("as many points as parameters fit exactly, so errors cannot be estimated; measure more points")
+        )
     if not float(np.min(v)) * 0.8 <= at_base <= float(np.max(v)) * 1.25:
         low, high = float(np.min(actual_nm)), float(np.max(actual_nm))
         remarks.append(
-            f"the base size of {base_nm:g} nm lies outside the {low:.4g}..{high:.4g} nm that were measured; "
-            f"k is extrapolated"
+            spoils(
+                f"the base size of {base_nm:g} nm lies outside the {low:.4g}..{high:.4g} nm that were measured; "
+                f"k is extrapolated"
+            )
         )
     for name in solution.undetermined:
-        remarks.append(f"{name} is not determined by these points; spread the sizes over most of the range")
+        remarks.append(spoils(f"{name} is not determined by these points; spread the sizes over most of the range"))
     return remarks

@@ -258,10 +258,11 @@ def _averaged(model: _TraceModel, x: Floats, left: Floats) -> tuple[Floats, tupl
     (f_at, f_measured, f_fitted), (b_at, b_measured, b_fitted) = drawn
     along = np.concatenate([f_at, 1.0 - b_at])
     curve = Curve(
-        "position less that of a straight line, against the normalised drive",
-        "drive",
-        "% of scan",
+        "residual against the drive",
+        "drive [share of the sweep]",
+        "position less a straight line [% of the scan]",
         (along, np.concatenate([f_measured, -b_measured])),
         (along, np.concatenate([f_fitted, -b_fitted])),
+        (len(f_at), len(f_at)),
     )
     return np.concatenate(residuals), (scaling[0], scaling[1]), curve

@@ -15,6 +15,7 @@ from tablegen.certificate.line_errors import EmittedPeriod
 from tablegen.compensation.expectation import Expectation, Figure
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan
+from tablegen.waveform.sampler import Expansion, on_grid
 
 _POINTS = 401  # over the window
 _GRID = 32  # points per period of the highest harmonic
@@ -64,18 +65,19 @@ def rounding_mismatch(line: LinePlan) -> float | None:
     drive = line.drive
     if drive.shape.waveform is not None or not drive.hysteresis.compensates:
         return None
-    w = line.target.on_grid(_GRID * line.target.harmonics)
+    w = on_grid(line.target, _GRID * line.target.harmonics)
+    target = Expansion(line.target)
     low, high = float(np.min(w)), float(np.max(w))
     played = drive.line_at(drive.v_scan_normalised * (high - low))
     if played is None:
         return None
     x = np.linspace(*line.band_limit.window, _POINTS)
-    there, back = (_share(line, side, x, low, high) for side in ("forward", "backward"))
+    there, back = (_share(line, target, side, x, low, high) for side in ("forward", "backward"))
     apart = played.forward.inverse(there) - (1.0 - played.backward.inverse(1.0 - back))
     extent = drive.size_law.size_nm(drive.v_scan_normalised * (high - low)) / drive.size_nm
     return 100.0 * extent * float(np.max(np.abs(apart)))
 
 
-def _share(line: LinePlan, side: str, x: Floats, low: float, high: float) -> Floats:
+def _share(line: LinePlan, target: Expansion, side: str, x: Floats, low: float, high: float) -> Floats:
     """The drive where the line is at ``x``, from 0 to 1 between its turns."""
-    return (line.target.value(line.drive.shape.times(side, x)) - low) / (high - low)
+    return (target.at(line.drive.shape.times(side, x), 0)[0] - low) / (high - low)

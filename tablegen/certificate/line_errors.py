@@ -15,7 +15,7 @@ from tablegen.compensation.line import Sweep
 from tablegen.fixedpoint.runs import Runs, runs_of
 from tablegen.numerics.arrays import Floats, Ints, merged
 from tablegen.planning.line_plan import LinePlan
-from tablegen.waveform.sampler import Sampler
+from tablegen.waveform.sampler import Expansion, Sampler, on_grid
 from tablegen.waveform.series import FourierSeries, values
 
 CHORD = 0.05  # share of the line, about one lattice constant of the paper's images
@@ -58,6 +58,7 @@ class EmittedPeriod:
     def __init__(self, line: LinePlan) -> None:
         self._line = line
         self._hold = line.program.hold
+        self._expansions: dict[int, tuple[FourierSeries, Expansion]] = {}
         self._reference = Sampler(line.series, line.program.phase.ticks)
         # Between its extremes the float waveform is monotonic, so that errors are largest where runs begin and end.
         self.runs = runs_of(line.program).split_at(self._extremes())
@@ -68,16 +69,22 @@ class EmittedPeriod:
     def _extremes(self) -> Ints:
         """The ticks before and behind each extreme of the float waveform."""
         points = 64 * self._line.series.harmonics
-        w = self._line.series.on_grid(points)
+        w = on_grid(self._line.series, points)
         turning = (w - np.roll(w, 1)) * (np.roll(w, -1) - w) <= 0.0
         t = np.flatnonzero(turning) / points
         for _ in range(3):  # Newton on the slope; where it is flat any tick is as good
-            slope, bend = values(t, (self._line.series, 1), (self._line.series, 2))
+            slope, bend = self.expansion(self._line.series).at(t, 1, 2)
             step = slope / np.where(bend == 0.0, np.inf, bend)
             t = t - np.clip(step, -1.0 / points, 1.0 / points)
         ticks = self._line.program.ticks
         before = np.floor(t * ticks).astype(np.int64)
         return merged(before % ticks, (before + 1) % ticks)
+
+    def expansion(self, series: FourierSeries) -> Expansion:
+        """A series of the line, to be asked at any times; it is worked out once."""
+        if id(series) not in self._expansions:
+            self._expansions[id(series)] = series, Expansion(series)  # the series is kept, so that no other has its id
+        return self._expansions[id(series)][1]
 
     def _asked(self, k: Ints) -> Floats:
         codes = np.empty(len(k))
@@ -130,7 +137,7 @@ class EmittedPeriod:
 def scaling_error(line: LinePlan, played: EmittedPeriod, side: str, branch: Sweep) -> ScalingError:
     low, high = line.band_limit.window
     position = np.linspace(low, high, _POINTS_PER_HARMONIC * line.target.harmonics + 513)
-    deviation, speed, wanted_speed = _followed(line, side, position)
+    deviation, speed, wanted_speed = _followed(line, played, side, position)
     sweep = position if side == "forward" else 1.0 - position
     steepness = branch.slope(sweep)
     chords, noise = _chords(line, played, side, position, deviation, steepness)
@@ -147,7 +154,7 @@ def scaling_error(line: LinePlan, played: EmittedPeriod, side: str, branch: Swee
     )
 
 
-def _followed(line: LinePlan, side: str, position: Floats) -> tuple[Floats, Floats, Floats]:
+def _followed(line: LinePlan, played: EmittedPeriod, side: str, position: Floats) -> tuple[Floats, Floats, Floats]:
     """Where the modelled piezo is, less ``position``; its speed over the line's; and that if the target arrived.
 
     What the layer moves is no error: it is there for what the model does not know. So all is taken without it.
@@ -155,10 +162,15 @@ def _followed(line: LinePlan, side: str, position: Floats) -> tuple[Floats, Floa
     shape, reached = line.drive.shape, _reached(line)
     times = shape.times(side, position)
 
+    def at_times(series: FourierSeries) -> list[Floats]:
+        if shape.waveform is not None:  # its branches are a series too, and equal ones have to leave nothing
+            return list(values(times, (series, 0), (series, 1)))
+        return played.expansion(series).at(times, 0, 1)
+
     def follow(series: FourierSeries) -> tuple[Floats, Floats]:
-        value, slope = values(times, (series, 0), (series, 1))
+        value, slope = at_times(series)
         if line.layer is not None:
-            layer_value, layer_slope = values(times, (line.layer, 0), (line.layer, 1))
+            layer_value, layer_slope = at_times(line.layer)
             series, value, slope = series.less(line.layer), value - layer_value, slope - layer_slope
         return shape.followed(side, position, series, value, slope)
 

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 from tablegen.certificate.certificate import Certificate
 from tablegen.certificate.doubts import Doubt, doubts
 from tablegen.certificate.excess import Excess, excess
-from tablegen.certificate.matching import apart_warning
+from tablegen.certificate.matching import apart_percent, apart_warning
 from tablegen.config.load import Setup
+from tablegen.findings import Finding, as_printed, worst_first
 from tablegen.planning.line_plan import LinePlan, Plan
 from tablegen.problems import Problem
 
@@ -17,23 +18,31 @@ if TYPE_CHECKING:
 
 def brief_warnings(plan: Plan, certificates: Mapping[str, Certificate]) -> list[str]:
     """What exceeds 1 % or the uncompensated line, and what is to be doubted, without remedies: it costs nothing."""
-    return [
-        *(found.text(line.axis) for line, found in _found(plan, certificates)),
-        *(doubt.text for _, doubt in _doubts(plan, certificates)),
+    found = [Finding("spoils", abs(one.percent), one.text(line.axis)) for line, one in _found(plan, certificates)]
+    found += [
+        Finding("spoils", doubt_percent(doubt, certificates[line.axis]), doubt.text)
+        for line, doubt in _doubts(plan, certificates)
     ]
+    return [one.text for one in worst_first(found)]
 
 
 def scan_warnings(setup: Setup, plan: Plan, certificates: Mapping[str, Certificate]) -> list[Problem]:
-    """The same with remedies, each at the key that the cause stands at. Every remedy was planned and measured.
+    """The same with remedies, each at the key that the cause stands at; see ``weighed_warnings``."""
+    return [problem for _, problem in weighed_warnings(setup, plan, certificates)]
+
+
+def weighed_warnings(setup: Setup, plan: Plan, certificates: Mapping[str, Certificate]) -> list[tuple[float, Problem]]:
+    """Warnings with remedies, every one of which was planned and measured.
 
     And what is to be doubted of what is expected on the scanner; and what trace and retrace are apart by ticks alone,
-    where that is more than a quarter of a pixel.
+    where that is more than a quarter of a pixel. Each with the percentage of the scan that it tells of, the worst
+    first.
     """
     warnings = []
     for line, found in _found(plan, certificates):
         share = _share(line, found, certificates[line.axis])
         why = f"{found.text(line.axis)}; {share}{_advice(setup, plan, line, found)}"
-        warnings.append(setup.scan_file.problem(_key(setup, line, found), why))
+        warnings.append((abs(found.percent), setup.scan_file.problem(_key(setup, line, found), why)))
     for line, doubt in _doubts(plan, certificates):
         key, advice = _size_key(setup, line), ""
         if doubt.kind == "scaling error":
@@ -41,11 +50,21 @@ def scan_warnings(setup: Setup, plan: Plan, certificates: Mapping[str, Certifica
 
             tried = tried_on_operator(setup, plan, line, doubt.limit, own=False)
             key, advice = _band_key(setup, line), "; " + _in_words(tried, doubt.percent)
-        warnings.append(setup.scan_file.problem(key, doubt.text + advice))
+        percent = doubt_percent(doubt, certificates[line.axis])
+        warnings.append((percent, setup.scan_file.problem(key, doubt.text + advice)))
     if apart := apart_warning(plan):
         given = setup.scan.timing.ticks_per_line is not None
-        warnings.append(setup.scan_file.problem(f"timing.{'ticks_per_line' if given else 'line_rate_hz'}", apart))
-    return warnings
+        key = f"timing.{'ticks_per_line' if given else 'line_rate_hz'}"
+        warnings.append((apart_percent(plan), setup.scan_file.problem(key, apart)))
+    return sorted(warnings, key=lambda one: -as_printed(one[0]))
+
+
+def doubt_percent(doubt: Doubt, certificate: Certificate) -> float:
+    """Of the scan: a distance is one of volts, and tells what the operator may be wrong by."""
+    expected = certificate.expected
+    if doubt.kind != "distance" or expected is None:
+        return doubt.percent
+    return max((figure.value + (figure.uncertainty or 0.0) for figure in expected.rms.values()), default=0.0)
 
 
 def limit_advice(setup: Setup, plan: Plan, certificates: Mapping[str, Certificate], axis: str) -> str:

@@ -7,7 +7,7 @@ import numpy as np
 
 from tablegen.certificate.certificate import Certificate
 from tablegen.certificate.excess import excess
-from tablegen.certificate.matching import apart_note, apart_percent
+from tablegen.certificate.matching import apart_percent
 from tablegen.compensation.expectation import LEVEL_PERCENT, Expectation, Figure
 from tablegen.compensation.hold import hold_inverse
 from tablegen.planning.line_plan import LinePlan, Plan
@@ -173,36 +173,6 @@ def _windows(plan: Plan) -> list[str]:
     return [
         f"{text}; a pixel's places in trace and retrace are up to {_percent(apart_percent(plan))} % of the line apart"
     ]
-
-
-def notes(plan: Plan) -> list[str]:
-    """What a user should know before trusting the image, in sentences."""
-    schedule, found, resting = plan.schedule, [], plan.y.drive.resting
-    per_pixel = schedule.pixel_ticks
-    if per_pixel.denominator != 1:
-        whole = [n for n in (int(per_pixel), int(per_pixel) + 1) if n > 0]
-        rates = [f"{float(schedule.line_rate) * float(per_pixel) / n:.6g} Hz" for n in whole]
-        found.append(
-            f"a pixel is {float(per_pixel):.4g} ticks, so its start is rounded to the tick; "
-            f"line rates near {' or '.join(rates)} make it {' or '.join(map(str, whole))} whole ticks"
-        )
-    if apart := apart_note(plan):
-        found.append(apart)
-    found.append(
-        f"a frame images {schedule.pixels} x {schedule.up.count}"
-        + (f" + {schedule.down.count}" if schedule.down.count else "")
-        + (" pixels: y rests" if resting else f" pixels: the lines inside the window of y, of {schedule.lines} a frame")
-    )
-    for line in plan.lines:
-        settles = settling(line.axis, line.drive, schedule)
-        if settles is not None and settles.lines > schedule.settle_lines:
-            found.append(
-                f"{line.axis} drifts by more than {settles.bound_nm:.3g} nm a frame after the {schedule.settle_lines} "
-                f"settle_lines that follow a change of offset of {settles.offset_v:.4g} V or a smaller scan"
-            )
-        if not line.drive.hysteresis.compensates and not line.drive.resting:
-            found.append(f"hysteresis of {line.axis} is not compensated: the scanner file has no model for it")
-    return found
 
 
 def _volts(line: LinePlan) -> str:

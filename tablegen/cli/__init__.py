@@ -17,6 +17,7 @@ from tablegen.version import __version__
 # Commands by name: the module in this folder, and the command in it.
 _COMMANDS = {
     "build": ("build", "build"),
+    "sweep": ("sweep", "sweep"),
     "check": ("check", "check"),
     "show": ("show", "show"),
     "report": ("report", "report"),
@@ -78,6 +79,7 @@ Exit status of all commands:
     8 no answer from the device
     9 refused by the device
    10 link lost, or timeout
+   11 some scans of a sweep could not be built; the others were
   130 interrupted, by Ctrl-C, SIGTERM or SIGHUP""",
 )
 @click.version_option(__version__, prog_name="tablegen", message="%(prog)s %(version)s")

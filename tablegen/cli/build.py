@@ -18,6 +18,7 @@ from tablegen.cli.common import (
 )
 from tablegen.cli.depfile import Depfile
 from tablegen.cli.exit_status import ExitStatus
+from tablegen.cli.plot import PlottingCommand, check_plot, in_terminal, plot_option, put_plot
 
 if TYPE_CHECKING:
     from tablegen.api.build import Build
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 _NAMES_SHOWN = 8
 
 
-@click.command(short_help="Write C, Verilog, tables and manifest of a scan.")
+@click.command(cls=PlottingCommand, short_help="Write C, Verilog, tables and manifest of a scan.")
 @scan_argument
 @click.option(
     "-o",
@@ -56,6 +57,7 @@ _NAMES_SHOWN = 8
     help="Target name in the dependency file, like gcc -MT.  [default: DIR/manifest.json]",
 )
 @strict_option
+@plot_option("drive, correction and expected error")
 @click.option("-q", "--quiet", is_flag=True, help="Do not print the certificate.")
 def build(
     scan: Path,
@@ -65,6 +67,7 @@ def build(
     depfile: Path | None,
     depfile_target: str | None,
     strict: bool,
+    plot: Path | None,
     quiet: bool,
 ) -> int:
     """Write the tables, constants and sequencer of a scan in C and Verilog, and manifest.json with the certificate.
@@ -91,6 +94,9 @@ def build(
         raise click.UsageError("--depfile-target needs --depfile FILE")
     if depfile is not None and only_check:
         raise click.UsageError("--check cannot be used with --depfile")
+    if plot is not None and only_check:
+        raise click.UsageError("--check cannot be used with --plot")
+    check_plot(plot)
     rule = Depfile(depfile, depfile_target or str(output / "manifest.json"), scan) if depfile is not None else None
     try:
         built = planned(scan, list(formats) or None, strict)
@@ -127,6 +133,9 @@ def build(
         from tablegen.cli.tables import certificate_table
 
         click.echo("\n".join(certificate_table(built.plan, built.certificates)))
+        for finding in built.findings:
+            if finding.weight == "spoils":  # `show` prints the small print too
+                click.echo(finding.line)
         if built.choices:
             click.echo()
         for choice in built.choices:
@@ -134,6 +143,11 @@ def build(
         click.echo(f"\n{output}: {_state(built, changed)}")
         if removed:
             click.echo(f"{output}: removed files of an earlier build: {_few(removed)}")
+    if plot is not None:
+        from tablegen.report.scan_charts import scan_charts
+
+        brief = in_terminal(plot)
+        put_plot(plot, lambda: scan_charts(built.setup, built.plan, built.certificates, brief))
     return ExitStatus.OK
 
 

@@ -6,6 +6,7 @@ import click
 
 from tablegen.cli.calibration_options import data_argument, from_hz_option, to_hz_option
 from tablegen.cli.calibration_run import Common, finish, in_file, read_columns, shared_options, within
+from tablegen.cli.plot import PlottingCommand
 
 _REFERENCE_HELP = (
     "Frequency in Hz at which the size was calibrated.  [default: reference_hz of the scanner file, or the lowest "
@@ -13,7 +14,7 @@ _REFERENCE_HELP = (
 )
 
 
-@click.command(short_help="Fit alpha to gains at several frequencies.")
+@click.command(cls=PlottingCommand, short_help="Fit alpha to gains at several frequencies.")
 @shared_options
 @data_argument
 @click.option("--reference-hz", type=click.FloatRange(min=1e-6), metavar="HZ", help=_REFERENCE_HELP)

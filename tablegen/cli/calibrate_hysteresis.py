@@ -6,9 +6,10 @@ import click
 
 from tablegen.cli.calibration_options import delay_of, delay_option, points_option, rho_option
 from tablegen.cli.calibration_run import Common, driver_of, finish, read_columns, shared_options
+from tablegen.cli.plot import PlottingCommand
 
 
-@click.command(short_help="Fit beta_max, rho, u_peak to sensor traces.")
+@click.command(cls=PlottingCommand, short_help="Fit beta_max, rho, u_peak to sensor traces.")
 @shared_options
 @click.argument("data", type=click.Path(path_type=Path), metavar="DATA.CSV...", nargs=-1, required=True)
 @rho_option

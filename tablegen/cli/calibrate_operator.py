@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tablegen.cli.calibration_options import delay_of, delay_option
-from tablegen.cli.calibration_run import Common, driver_of, in_file, read_columns, scanner_axis, shared_options
+from tablegen.cli.calibration_run import (
+    Common,
+    driver_of,
+    in_file,
+    plot_fit,
+    read_columns,
+    scanner_axis,
+    shared_options,
+)
 from tablegen.cli.common import fail, written
 from tablegen.cli.exit_status import ExitStatus
 from tablegen.cli.image_samples import (
@@ -34,6 +42,7 @@ if TYPE_CHECKING:
     from tablegen.calibration.operator.periodic_line import PeriodicLine
     from tablegen.calibration.table import MeasuredTable
     from tablegen.driver import Driver
+    from tablegen.report.picture import PlottedCharts
 
 
 _MEASURES = "    rms   scaling  mismatch"
@@ -126,16 +135,20 @@ def operator(
         click.echo(json.dumps(_record(fit, lines, further, common.axis, sources, delay), indent=2, allow_nan=False))
     else:
         click.echo("\n".join(_text(fit, lines, further, common.axis, driver, delay)))
-    if common.plot is not None:
-        from tablegen.calibration.operator.figure import draw_operator
-
-        kind: Any = common.plot.suffix[1:]
-        written(common.plot.parent, {common.plot.name: draw_operator(fit, lines, further, driver, kind)})
+    plot_fit(common, lambda: _charts(fit, lines, further, driver, common.axis))
     if common.report is not None:
         written(common.report.parent, {common.report.name: _page(fit, lines, further, common.axis, driver, sources)})
     if common.write:
         _write(common, fit, sources, driver, delay)
     return ExitStatus.OK
+
+
+def _charts(
+    fit: "OperatorFit", lines: "Sequence[PeriodicLine]", further: "NextTrace", driver: "Driver", axis: str
+) -> "PlottedCharts":
+    from tablegen.report.operator_charts import operator_charts
+
+    return operator_charts(fit, lines, further, driver, axis)
 
 
 def _page(

@@ -6,9 +6,10 @@ import click
 
 from tablegen.cli.calibration_options import data_argument, from_hz_option, to_hz_option
 from tablegen.cli.calibration_run import Common, finish, read_columns, shared_options, within
+from tablegen.cli.plot import PlottingCommand
 
 
-@click.command(short_help="Fit resonance frequency, quality and delay to a response.")
+@click.command(cls=PlottingCommand, short_help="Fit resonance frequency, quality and delay to a response.")
 @shared_options
 @data_argument
 @from_hz_option

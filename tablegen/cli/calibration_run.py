@@ -11,6 +11,7 @@ import click
 
 from tablegen.cli.common import OutputFile, fail, require, written
 from tablegen.cli.exit_status import ExitStatus
+from tablegen.cli.plot import check_plot, plot_option, put_plot
 from tablegen.cli.progress import Progress
 from tablegen.reading import CONFIGURATION, RESPONSE, read_bytes, read_text
 
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from tablegen.compensation.offset import OffsetLaw
     from tablegen.compensation.size import SizeLaw
     from tablegen.driver import Driver
+    from tablegen.report.picture import PlottedCharts
 
 F = TypeVar("F", bound=Callable[..., Any])
 _REQUIRED_MODULES = ("scipy", "tomlkit")
@@ -42,6 +44,7 @@ class Common:
     write: bool
     force: bool
     plot: Path | None
+    no_plot: bool
     report: Path | None
     as_json: bool
 
@@ -75,12 +78,7 @@ def shared_options(command: F) -> F:
             help="Update the scanner file. With --v-max, create it if it does not exist.",
         ),
         click.option("--force", is_flag=True, help="With --write, write a fit even if it is meaningless."),
-        click.option(
-            "--plot",
-            type=OutputFile(),
-            metavar="FILE",
-            help="Plot the data and the fit to FILE: .png, .svg or .pdf.",
-        ),
+        plot_option("the data and the fit", by_default=True),
         click.option(
             "--report",
             type=OutputFile(),
@@ -98,6 +96,7 @@ def shared_options(command: F) -> F:
         write: bool,
         force: bool,
         plot: Path | None,
+        no_plot: bool,
         report: Path | None,
         as_json: bool,
         **rest: Any,
@@ -108,11 +107,9 @@ def shared_options(command: F) -> F:
             raise click.UsageError("--force is for --write")
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the fits are small, and its threads would only spin
         require(*_REQUIRED_MODULES, extra="calibrate")
-        if plot is not None:
-            if plot.suffix not in (".png", ".svg", ".pdf"):
-                raise click.UsageError(f"--plot {plot}: the name has to end in .png, .svg or .pdf")
-            require("matplotlib", extra="plot")
-        return command(common=Common(axis, scanner, v_max, v_min, write, force, plot, report, as_json), **rest)
+        check_plot(plot, as_json)
+        common = Common(axis, scanner, v_max, v_min, write, force, plot, no_plot, report, as_json)
+        return command(common=common, **rest)
 
     run.__doc__, run.__name__ = command.__doc__, command.__name__
     for option in reversed(options):
@@ -252,6 +249,7 @@ def finish(
     A fit that says nothing is printed with its doubts, and not written unless forced.
     """
     from tablegen.calibration.doubts import doubts
+    from tablegen.calibration.fit_findings import fit_findings
     from tablegen.calibration.summary import record
     from tablegen.cli.calibration_text import calibration_text
     from tablegen.problems import Unphysical
@@ -266,17 +264,17 @@ def finish(
     if common.as_json:
         click.echo(json.dumps(record(fit, common.axis, sources), indent=2, allow_nan=False))
     else:
-        click.echo("\n".join(calibration_text(fit, common.axis, tables, points)))
-    if common.plot is not None:
-        from tablegen.calibration.figure import draw
-
-        kind: Any = common.plot.suffix[1:]
-        written(common.plot.parent, {common.plot.name: draw(fit.curves, kind)})
+        click.echo("\n".join(calibration_text(fit, common.axis, tables)))
+    plot_fit(common, lambda: _charts(fit, common.axis))
+    places = [_place(fit, tables[0], tables[0].file, at) for at in fit.outliers]
+    if not common.as_json:
+        for finding in fit_findings(fit, places, points):
+            click.echo(finding.line)
     if common.report is not None:
         from tablegen.report.fitted import fit_page
 
-        places = [_place(tables[0], at) for at in fit.outliers]
-        written(common.report.parent, {common.report.name: fit_page(fit, common.axis, sources, places, points)})
+        names = [_place(fit, tables[0], tables[0].source.name, at) for at in fit.outliers]
+        written(common.report.parent, {common.report.name: fit_page(fit, common.axis, sources, names, points)})
     if common.write:
         meaningless = doubts(fit, points)
         if meaningless and not common.force:
@@ -287,11 +285,23 @@ def finish(
     return ExitStatus.OK
 
 
-def _place(table: "MeasuredTable | ScanImage", at: int) -> str:
-    """File and line of a point."""
+def plot_fit(common: Common, charts: "Callable[[], PlottedCharts]") -> None:
+    """Draw as the options say."""
+    put_plot(common.plot, charts, by_default=not (common.as_json or common.no_plot))
+
+
+def _charts(fit: "Fit", axis: str) -> "PlottedCharts":
+    from tablegen.report.fitted import fit_charts
+
+    return fit_charts(fit, axis)
+
+
+def _place(fit: "Fit", table: "MeasuredTable | ScanImage", name: str, at: int) -> str:
+    """File, as it is called, and line of a point, or its image."""
     from tablegen.calibration.table import MeasuredTable
 
-    name = table.source.name
+    if fit.images:
+        return fit.images[at].name
     return f"{name}:{table.lines[at]}" if isinstance(table, MeasuredTable) else name
 
 

@@ -1,10 +1,9 @@
-"""A calibration for the terminal: parameters with errors, what they leave, a plot, and what to look at."""
+"""A calibration for the terminal: parameters with errors, what they leave, of each measurement."""
 
 from collections.abc import Sequence
 from math import floor, isfinite, log10
 
 from tablegen.calibration.branch import AmplitudeFit, MeasuredBranch
-from tablegen.calibration.doubts import doubts
 from tablegen.calibration.estimate import Estimate, Fit
 from tablegen.calibration.hysteresis import HysteresisFit
 from tablegen.calibration.image_files import ScanImage
@@ -12,16 +11,13 @@ from tablegen.calibration.image_fit import ImageFit
 from tablegen.calibration.summary import change, parameters
 from tablegen.calibration.table import MeasuredTable
 from tablegen.calibration.trace import TraceFit
-from tablegen.cli.scatter import scatter
 
 _TRACE_HEAD = ("turn", "V_scan", "rate [Hz]", "periods", "noise [%]", "drift [%]")
 _IMAGE_HEAD = ("turn", "V_scan", "periods", "noise [%]", "drift [%]", "apart [%]")
 
 
-def calibration_text(
-    fit: Fit, axis: str, tables: Sequence[MeasuredTable | ScanImage], points: bool = False
-) -> list[str]:
-    """Lines of text; ``tables`` are what was fitted, for the places of outliers, ``points`` what would be written."""
+def calibration_text(fit: Fit, axis: str, tables: Sequence[MeasuredTable | ScanImage]) -> list[str]:
+    """Lines of text; ``tables`` are what was fitted."""
     hysteresis = isinstance(fit, HysteresisFit)
     rows = [(name, *figures(estimate), meaning) for name, estimate, meaning in parameters(fit)]
     widths = [max(len(row[i]) for row in rows) for i in range(3)]
@@ -46,16 +42,7 @@ def calibration_text(
         lines += [*_traces(fit), ""]
     if fit.images:
         lines += [*image_lines(fit), ""]
-    for curve in fit.curves:
-        lines += [*scatter(curve), ""]
-    for row in fit.outliers:
-        place = f"{tables[0].file}:{tables[0].lines[row]}" if isinstance(tables[0], MeasuredTable) else tables[0].file
-        place, part = (fit.images[row].name, "image") if fit.images else (place, "row")
-        lines.append(
-            f"outlier: {place}: far from the other points, but used. Remove the {part} if the measurement was wrong"
-        )
-    lines += [f"note: {remark}" for remark in fit.remarks]
-    return lines + [f"warning: {doubt}" for doubt in doubts(fit, points)]
+    return lines
 
 
 def image_lines(fit: Fit) -> list[str]:

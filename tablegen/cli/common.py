@@ -105,13 +105,20 @@ strict_option = click.option(
 )
 
 
+def quiet_blas() -> None:
+    """Before numpy is imported: no linear algebra library is used, and its threads would only spin.
+
+    They are a good part of what importing numpy costs.
+    """
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+
 def planned(scan: Path, formats: "Sequence[str] | None" = None, strict: bool = False) -> "Build":
     """Load, plan and certify a scan; every failure ends the command with its status.
 
     Warnings go to stderr; with ``strict`` they end the command too.
     """
-    # No linear algebra library is used, and its threads would only spin: a good part of what importing numpy costs.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    quiet_blas()
     from tablegen.api.build import BrokenLimit, build
     from tablegen.problems import Rejected
 

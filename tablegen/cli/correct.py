@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from tablegen.cli.bar import Bar
-from tablegen.cli.common import OutputFile, fail, finite, require, written
+from tablegen.cli.common import fail, finite, require, written
 from tablegen.cli.exit_status import ExitStatus
+from tablegen.cli.plot import PlottingCommand, check_plot, plot_option, put_plot
 from tablegen.cli.progress import Progress
 
 if TYPE_CHECKING:
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from tablegen.correction.straight import StraightScan
 
 F = TypeVar("F", bound=Callable[..., Any])
-_FIGURES = (".png", ".svg", ".pdf")
 _OUTPUTS = (".gwy", ".tif", ".tiff", ".npy", ".png")
 _POSITIVE = click.FloatRange(min=0.0, min_open=True)
 
@@ -29,6 +29,7 @@ def _number(name: str, metavar: str, text: str, kind: Any = _POSITIVE, **more: A
 
 
 @click.command(
+    cls=PlottingCommand,
     short_help="Put images that were already taken straight.",
     epilog="""\b
 Examples:
@@ -140,9 +141,7 @@ Exit status: 0 done, 2 wrong input, 4 cannot write, 6 a library is missing, 130 
     show_default=True,
     help="With --each or --pairs: format of the corrected images.",
 )
-@click.option(
-    "--plot", type=OutputFile(), metavar="FILE", help="Plot before, after and what is left to FILE: .png, .svg or .pdf."
-)
+@plot_option("before, after and what is left")
 @click.option("--force", is_flag=True, help="Replace files that are there.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")
 def correct(images: tuple[Path, ...], **options: Any) -> int:
@@ -163,7 +162,8 @@ def correct(images: tuple[Path, ...], **options: Any) -> int:
     _check_usage(images, options)
     several = options["each"] or options["pairs"]
     suffix = f".{options['suffix']}" if several else (options["output"].suffix.lower() if options["output"] else None)
-    _require(images, suffix, options["plot"])
+    _require(images, suffix)
+    check_plot(options["plot"], options["as_json"])
     jobs = _jobs(images, options)
     targets = _targets(jobs, options, suffix)
     records: list[dict[str, Any]] = []
@@ -226,21 +226,19 @@ def _check_usage(images: tuple[Path, ...], options: dict[str, Any]) -> None:
             wrong = f"{name}-v and {name}-nm: keep one of the two"
     if options["output"] is not None and not several and options["output"].suffix.lower() not in _OUTPUTS:
         wrong = f"-o {options['output']}: the name has to end in {', '.join(_OUTPUTS)}"
-    if options["plot"] is not None and options["plot"].suffix not in _FIGURES:
-        wrong = f"--plot {options['plot']}: the name has to end in .png, .svg or .pdf"
+    if options["plot"] in images:
+        wrong = f"--plot {options['plot']}: is an image to correct"
     if wrong:
         raise click.UsageError(wrong)
 
 
-def _require(images: Sequence[Path], suffix: str | None, plot: Path | None) -> None:
+def _require(images: Sequence[Path], suffix: str | None) -> None:
     """The libraries of all files, or an end with advice."""
     from tablegen.calibration.image_files import MODULES as READERS
     from tablegen.correction.output_files import MODULES as WRITERS
 
     needed = {READERS.get(path.suffix.lower()) for path in images} | {WRITERS.get(suffix or "")} | {"scipy"}
     require(*sorted(filter(None, needed)), extra="images")
-    if plot is not None:
-        require("matplotlib", extra="plot")
 
 
 def _jobs(images: tuple[Path, ...], options: dict[str, Any]) -> list[tuple[Path, Path | None]]:
@@ -326,11 +324,9 @@ def _put(
     if not options["as_json"]:
         click.echo("\n".join(correct_text(found, taken)))
     if options["plot"] is not None:
-        from tablegen.correction.figure import draw_correction
+        from tablegen.report.corrected import correction_charts
 
-        plot: Path = options["plot"]
-        kind: Any = plot.suffix[1:]
-        written(plot.parent, {plot.name: draw_correction(found, kind)})
+        put_plot(options["plot"], lambda: correction_charts(found, taken.first.file))
     if target is not None:
         written(target[0], files)
         for name in files:

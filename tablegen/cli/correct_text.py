@@ -2,6 +2,7 @@
 
 from tablegen.correction.job import Images
 from tablegen.correction.straight import StraightScan
+from tablegen.findings import Finding, worst_first
 
 _WORSE = 1.05  # times the distance before: the correction does not fit the image
 _OTHER = 1.4  # times the size of the file: another size
@@ -41,7 +42,7 @@ def correct_text(found: StraightScan, images: Images) -> list[str]:
         across, along = record["lattice_off_percent"]
         of_y = "" if found.lattice.y is None else f", {along:.2g} % along y"
         lines.append(f"lattice       off a perfect one by up to {across:.2g} % along x{of_y}, after")
-    return [*lines, *(f"note: {text}" for text in _notes(found, images))]
+    return [*lines, *(finding.line for finding in _findings(found, images))]
 
 
 def _size(size: tuple[float, float] | None) -> str:
@@ -66,29 +67,35 @@ def _agreement(found: StraightScan) -> list[str]:
     return lines
 
 
-def _notes(found: StraightScan, images: Images) -> list[str]:
-    notes = [f"left out: {text}" for text in images.left_out]
+def _findings(found: StraightScan, images: Images) -> list[Finding]:
+    """The worst first; percentages are of the picture."""
+    notes = [Finding("note", 0.0, f"left out: {text}") for text in images.left_out]
     first, last = found.distortion.left_out
+    rows, columns = images.shape
     if first or last:
-        notes.append(
-            f"{first + last} rows were taken while the slow axis still went back after its turn; they are left out"
-        )
+        text = f"{first + last} rows were taken while the slow axis still went back after its turn; they are left out"
+        notes.append(Finding("expect", 100.0 * (first + last) / rows, text))
     said = _of_file(images)
-    if said is not None and found.size_nm is not None and not 1.0 / _OTHER < found.size_nm[0] / said[0] < _OTHER:
-        notes.append("the file has quite another size; is the drive that of this image?")
+    if said is not None and found.size_nm is not None:
+        ratio = found.size_nm[0] / said[0]
+        if not 1.0 / _OTHER < ratio < _OTHER:
+            text = "the file has quite another size; is the drive that of this image?"
+            notes.append(Finding("spoils", 100.0 * abs(ratio - 1.0), text))
     periods = found.record.get("periods_in_the_line")
     if periods is not None and max(map(abs, periods)) < _FEW_PERIODS:
-        notes.append("with so few periods the line is only as straight as its waves are told apart; image more of them")
+        text = "with so few periods the line is only as straight as its waves are told apart; image more of them"
+        notes.append(Finding("spoils", 0.0, text))
     agreement = found.agreement
     if agreement is not None:
         worst = agreement.worst
+        apart = 0.0 if worst is None else 100.0 * worst[1] / columns
         if agreement.difference[1] > _WORSE * agreement.difference[0]:
-            notes.append(
+            text = (
                 "trace and retrace differ more than before; are drive and scanner file those of this image, and "
                 "are trace and retrace not exchanged or mirrored?"
             )
+            notes.append(Finding("limit", apart, text))
         elif worst is not None and worst[1] > _FAR:
-            notes.append(
-                "trace and retrace are still apart; are drive, offset, rate, turn and window those of the image?"
-            )
-    return notes
+            text = "trace and retrace are still apart; are drive, offset, rate, turn and window those of the image?"
+            notes.append(Finding("spoils", apart, text))
+    return worst_first(notes)

@@ -17,4 +17,5 @@ class ExitStatus(IntEnum):
     NO_ANSWER = 8
     REFUSED = 9
     LINK_LOST = 10
+    PARTIAL = 11
     INTERRUPTED = 130

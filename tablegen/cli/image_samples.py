@@ -10,6 +10,7 @@ from tablegen.cli.calibration_options import delay_pixels_option, mirrored_optio
 from tablegen.cli.common import fail
 from tablegen.cli.exit_status import ExitStatus
 from tablegen.cli.image_pairs import channel_option, frame_option, require_readers, retrace_channel_option
+from tablegen.cli.plot import PlottingCommand
 
 if TYPE_CHECKING:
     from tablegen.calibration.image_files import ScanImage
@@ -31,7 +32,7 @@ def image_option(metavar: str, volts: int, text: str, names: tuple[str, ...] = I
     )
 
 
-class CommandOfImages(click.Command):
+class CommandOfImages(PlottingCommand):
     """A command with options of voltages and two files, the second of which may be left out: (name, voltages)."""
 
     images = (*((name, 1) for name in IMAGE_NAMES),)

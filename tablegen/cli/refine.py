@@ -3,22 +3,23 @@
 import json
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import click
 
 from tablegen.cli.common import OutputFile, fail, finite, require, scan_argument, written
 from tablegen.cli.exit_status import ExitStatus
 from tablegen.cli.image_samples import CommandOfRunningImages
+from tablegen.cli.plot import check_plot, plot_option, put_plot
 from tablegen.cli.progress import Progress
 from tablegen.cli.refine_images import ImageArguments, image_options
+from tablegen.findings import of_remarks, worst_first
 from tablegen.reading import CONFIGURATION, read_text
 
 if TYPE_CHECKING:
     from tablegen.calibration.table import MeasuredTable, Source
     from tablegen.refinement.round import Options, Round
-
-_FORMATS = (".png", ".svg", ".pdf")
+    from tablegen.report.picture import PlottedCharts
 
 
 @click.command(
@@ -89,12 +90,7 @@ Exit status: 0 done, 2 wrong input, 4 cannot write, 6 a library is missing.""",
 @click.option(
     "--force", is_flag=True, help="Use the trace even if its error is larger than before, or if it was used already."
 )
-@click.option(
-    "--plot",
-    type=OutputFile(),
-    metavar="FILE",
-    help="Plot the errors to FILE: .png, .svg or .pdf.",
-)
+@plot_option("measured and predicted errors, and what was learnt,", by_default=True)
 @click.option("--report", type=OutputFile(), metavar="FILE", help="Write the round to FILE as an HTML page.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")
 def refine(
@@ -112,6 +108,7 @@ def refine(
     drift: int | None,
     force: bool,
     plot: Path | None,
+    no_plot: bool,
     report: Path | None,
     as_json: bool,
 ) -> int:
@@ -140,10 +137,7 @@ def refine(
         raise click.UsageError("--period-s is for --triggered; otherwise drive_v has the period")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     require("scipy", "tomlkit", extra="calibrate")
-    if plot is not None:
-        if plot.suffix not in _FORMATS:
-            raise click.UsageError(f"--plot {plot}: the name has to end in .png, .svg or .pdf")
-        require("matplotlib", extra="plot")
+    check_plot(plot, as_json)
     from tablegen.refinement.round import Options
 
     options = Options(gain, harmonics, period_s, delay_s, settle, drift)
@@ -161,11 +155,10 @@ def refine(
         click.echo(json.dumps(refine_record(found, name, sources), indent=2, allow_nan=False))
     else:
         click.echo("\n".join(refine_text(found, name, sources)))
-    if plot is not None:
-        from tablegen.calibration.figure import draw
-
-        kind: Any = plot.suffix[1:]
-        written(plot.parent, {plot.name: draw(found.curves, kind)})
+    put_plot(plot, lambda: _charts(found), by_default=not (as_json or no_plot))
+    if not as_json:
+        for finding in worst_first(of_remarks(found.remarks)):
+            click.echo(finding.line)
     refused = found.worse or _learnt_before(scan, axis, found, sources, text)
     if report is not None:
         from tablegen.refinement.scan_file import rounds_of
@@ -205,6 +198,12 @@ def _learn(
     except OSError as error:
         fail([f"{scan}: {error.strerror or error}"], ExitStatus.WRONG_INPUT)
     return found, [table.source], text
+
+
+def _charts(found: "Round") -> "PlottedCharts":
+    from tablegen.report.learnt import round_charts
+
+    return round_charts(found, found.setup.scan.name)
 
 
 def _learnt_before(scan: Path, axis: str, found: "Round", sources: "list[Source]", text: str) -> str:

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from tablegen.calibration.table import Source
-from tablegen.cli.scatter import scatter
 from tablegen.refinement.departure import Departure
 from tablegen.refinement.image_round import ImageRound, MismatchRound
 from tablegen.refinement.round import Round, TraceRound
@@ -33,9 +32,7 @@ def refine_text(found: Round, name: str, sources: Sequence[Source]) -> list[str]
         *_bound(found),
         "",
     ]
-    for curve in found.curves:
-        lines += [*scatter(curve), ""]
-    return lines + [f"note: {remark}" for remark in found.remarks]
+    return lines
 
 
 def _what(found: Round, sources: Sequence[Source]) -> str:

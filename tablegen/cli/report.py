@@ -132,12 +132,8 @@ def _chosen(charts: "dict[str, Chart]", wanted: tuple[str, ...]) -> "dict[str, C
 
 
 def _write_charts(charts: "dict[str, Chart]", svg: Path | None, png: Path | None, pdf: Path | None) -> None:
-    if svg is not None:
-        from tablegen.report.svg import standalone
+    from tablegen.report.picture import picture
 
-        written(svg, {f"{name}.svg": standalone(chart).encode("utf-8") for name, chart in charts.items()})
-    for folder, kind in ((png, "png"), (pdf, "pdf")):
+    for folder, kind in ((svg, "svg"), (png, "png"), (pdf, "pdf")):
         if folder is not None:
-            from tablegen.report.figures import drawn
-
-            written(folder, {f"{name}.{kind}": drawn(chart, kind) for name, chart in charts.items()})
+            written(folder, {f"{name}.{kind}": picture([chart], kind) for name, chart in charts.items()})

@@ -1,15 +1,20 @@
 """``tablegen show``: what would be built."""
 
-import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from tablegen.cli.common import format_option, planned, rendered, require, scan_argument
+from tablegen.cli.plot import PlottingCommand, check_plot, in_terminal, plot_option, put_plot
 from tablegen.cli.terminal import tell
 
+if TYPE_CHECKING:
+    from tablegen.api.build import Build
+    from tablegen.report.picture import PlottedCharts
 
-@click.command(short_help="Show drive, rates, accuracy and plots of a scan.")
+
+@click.command(cls=PlottingCommand, short_help="Show drive, rates, accuracy and plots of a scan.")
 @scan_argument
 @click.option("--json", "as_json", is_flag=True, help="Print manifest.json instead of text.")
 @format_option
@@ -18,19 +23,21 @@ from tablegen.cli.terminal import tell
     is_flag=True,
     help="Add the least peak acceleration that any waveform of this scaling error could have. Needs scipy.",
 )
-@click.option("--plot/--no-plot", default=True, show_default=True, help="Plot one period of the drive of each axis.")
-def show(scan: Path, as_json: bool, formats: tuple[str, ...], optimum: bool, plot: bool) -> None:
+@plot_option("drive, correction and expected error", by_default=True)
+def show(scan: Path, as_json: bool, formats: tuple[str, ...], optimum: bool, plot: Path | None, no_plot: bool) -> None:
     """Show drive, rates, accuracy and plots of a scan. Writes no file.
 
-    Under each plot, > and < mark the imaging windows of the forward and backward lines.
+    In the plots > is forward and < is backward; the axis is doubled where the image is taken.
 
     \b
     Examples:
       tablegen show annexin_200nm.toml
+      tablegen show annexin_200nm.toml --plot annexin.png
       tablegen show annexin_200nm.toml --json > manifest.json
 
     Exit status: 0 done, 2 wrong input, 3 a limit of the certificate is exceeded.
     """
+    check_plot(plot, as_json)
     if optimum:
         if as_json:
             raise click.UsageError("The manifest has no optimum: leave out --json or --optimum.")
@@ -38,9 +45,8 @@ def show(scan: Path, as_json: bool, formats: tuple[str, ...], optimum: bool, plo
     built = planned(scan, list(formats) or None)
     if as_json:
         click.echo(rendered(built)["manifest.json"], nl=False)
+        put_plot(plot, lambda: _charts(built, plot))
         return
-    from tablegen.cli.tables import plots
-
     plan = built.plan
     tell(f"{plan.name} on {plan.scanner!r}", bold=True)
     lines = built.summary.splitlines()
@@ -55,13 +61,15 @@ def show(scan: Path, as_json: bool, formats: tuple[str, ...], optimum: bool, plo
         lines = summary(plan, found)
     for text in lines:
         tell(text, bold=bool(text) and not text.startswith(" "))
-    if plot:
-        unicode = "utf" in (getattr(sys.stdout, "encoding", None) or "").lower()
-        for line in plan.moving:
-            click.echo()
-            click.echo("\n".join(plots(line, unicode)))
     click.echo()
+    put_plot(plot, lambda: _charts(built, plot), by_default=not no_plot)
     for choice in built.choices:
         click.echo(f"chosen: {choice}")
-    for note in built.notes:
-        click.echo(f"note: {note}")
+    for finding in built.findings:
+        click.echo(finding.line)
+
+
+def _charts(built: "Build", plot: Path | None) -> "PlottedCharts":
+    from tablegen.report.scan_charts import scan_charts
+
+    return scan_charts(built.setup, built.plan, built.certificates, in_terminal(plot))

@@ -9,6 +9,7 @@ from click.core import ParameterSource
 
 from tablegen.cli.common import OutputFile, fail, finite, require, scan_argument, written
 from tablegen.cli.exit_status import ExitStatus
+from tablegen.cli.plot import PlottingCommand, check_plot, plot_option, put_plot
 from tablegen.cli.progress import Progress
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 OWN, DEFAULT = "own", "default"
 
 
-@click.command(short_help="Simulate a scan on a virtual scanner; print its accuracy.")
+@click.command(cls=PlottingCommand, short_help="Simulate a scan on a virtual scanner; print its accuracy.")
 @scan_argument
 @click.option(
     "--scanner-truth",
@@ -40,13 +41,7 @@ OWN, DEFAULT = "own", "default"
     help="Write drive and displacement to FILE, for one line of x and one frame of y. Longer records than 10000 ticks "
     "are thinned.",
 )
-@click.option(
-    "--plot",
-    "plot_file",
-    type=OutputFile(),
-    metavar="FILE.png",
-    help="Plot displacement, residual and scaling error to FILE.png.",
-)
+@plot_option("residual and scaling error")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")
 @click.option(
     "--calibration/--no-calibration",
@@ -78,7 +73,7 @@ def simulate(
     scan: Path,
     truth_file: str | None,
     csv_file: Path | None,
-    plot_file: Path | None,
+    plot: Path | None,
     as_json: bool,
     calibrated: bool,
     noise: float,
@@ -103,6 +98,7 @@ def simulate(
     Exit status: 0 done, 2 wrong input, 4 cannot write, 6 a library is missing.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    check_plot(plot, as_json)
     from msgspec.structs import replace
 
     from tablegen.config.load import load
@@ -124,13 +120,9 @@ def simulate(
             ExitStatus.WRONG_INPUT,
         )
     if _plays_own(context, setup, truth_file):
-        _simulate_own(setup, seed, as_json)
+        _simulate_own(setup, seed, plot, as_json)
         return
     truth_file = truth_file or DEFAULT
-    if plot_file is not None:
-        if plot_file.suffix != ".png":
-            raise click.UsageError(f"--plot {plot_file}: the name has to end in .png")
-        require("matplotlib", extra="plot")
     if calibrated:
         require("scipy", extra="calibrate", otherwise="; or give --no-calibration")
     try:
@@ -162,15 +154,16 @@ def simulate(
                 stages.append(SimulationStage("calibrated", heading, (), (("calibration", (str(reason),)),)))
     if csv_file is not None:
         written(csv_file.parent, {csv_file.name: report.csv(stages).encode()})
-    if plot_file is not None:
-        written(plot_file.parent, {plot_file.name: report.figure(f"{setup.scan.name}: {report.LABEL}", stages)})
     if as_json:
         import json
 
         click.echo(json.dumps(report.data(setup.scan.name, truth, stages), indent=2))
-        return
-    for line in report.text(setup.scan.name, truth, stages):
-        click.echo(line)
+    else:
+        click.echo("\n".join(report.text(setup.scan.name, truth, stages)))
+    if plot is not None:
+        from tablegen.report.simulated import stage_charts
+
+        put_plot(plot, lambda: stage_charts(setup.scan.name, stages))
 
 
 def _plays_own(context: click.Context, setup: "Setup", truth_file: str | None) -> bool:
@@ -186,7 +179,6 @@ def _plays_own(context: click.Context, setup: "Setup", truth_file: str | None) -
         )
     for parameter, name in (
         ("csv_file", "--csv"),
-        ("plot_file", "--plot"),
         ("noise", "--noise"),
         ("calibrated", "--calibration"),
     ):
@@ -197,7 +189,7 @@ def _plays_own(context: click.Context, setup: "Setup", truth_file: str | None) -
     return True
 
 
-def _simulate_own(setup: "Setup", seed: int, as_json: bool) -> None:
+def _simulate_own(setup: "Setup", seed: int, plot: Path | None, as_json: bool) -> None:
     from tablegen.problems import Rejected, Unphysical
     from tablegen.virtual import own_report
     from tablegen.virtual.own_run import own_axes, simulate_own
@@ -214,9 +206,12 @@ def _simulate_own(setup: "Setup", seed: int, as_json: bool) -> None:
         import json
 
         click.echo(json.dumps(own_report.data(*found), indent=2))
-        return
-    for line in own_report.text(*found):
-        click.echo(line)
+    else:
+        click.echo("\n".join(own_report.text(*found)))
+    if plot is not None:
+        from tablegen.report.simulated import own_charts
+
+        put_plot(plot, lambda: own_charts(setup.scan.name, runs))
 
 
 def _play(

@@ -5,14 +5,25 @@ nothing of this package writes to stdout or stderr but through the streams of ``
 control characters there, for a line that is drawn again and for bold text.
 """
 
+import os
 import re
 import sys
+from collections.abc import Iterable
 from io import TextIOWrapper
 from typing import IO, Any
 
 # All controls but tab and line end; marks that reorder or hide text; separators that some take for ends of lines.
 _STEERING = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200b-\u200f\u2028-\u202e\u2060-\u2069\ufeff]")
 _BOLD, _PLAIN = "\x1b[1m", "\x1b[0m"
+_STYLES = {  # colours of the table of 256 that are seen on black and on white, and by all eyes
+    "title": _BOLD,
+    "faint": "\x1b[38;5;245m",
+    "before": "\x1b[38;5;245m",
+    "forward": "\x1b[38;5;32m",
+    "backward": "\x1b[38;5;172m",
+    "other": "\x1b[38;5;35m",
+    "limit": "\x1b[38;5;161m",
+}
 
 
 def visible(text: str) -> str:
@@ -64,6 +75,16 @@ def tell(text: str, bold: bool = False) -> None:
         return
     shown = visible(text)
     stream.write(f"{_BOLD}{shown}{_PLAIN}\n" if bold and stream.isatty() else f"{shown}\n")
+
+
+def paint(spans: Iterable[tuple[str, str]]) -> None:
+    """A line on stdout of texts with their styles; in colours on a terminal, unless NO_COLOR is set."""
+    stream = _behind(sys.stdout)
+    if stream is None:
+        return
+    coloured = stream.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+    shown = ((visible(text), _STYLES.get(style, "") if coloured else "") for text, style in spans)
+    stream.write("".join(f"{style}{text}{_PLAIN}" if style else text for text, style in shown) + "\n")
 
 
 def redraw(text: str) -> None:

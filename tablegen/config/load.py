@@ -31,6 +31,8 @@ from tablegen.problems import Document, Problem, Problems, Rejected
 from tablegen.quantities import MAXIMUM_FILE_NAME
 from tablegen.toml import read_toml
 
+_LIBRARY = "this file is a library of scans; `tablegen sweep` builds them, each into a directory of its own"
+
 
 @dataclass(frozen=True, repr=False)
 class Setup:
@@ -85,10 +87,31 @@ def load(path: str | Path) -> Setup:
     Raises ``Rejected`` with every fault of both files.
     """
     path = Path(path)
+    values, scan_file = read_scan_file(path)
+    if "scans" in values:
+        raise Rejected([scan_file.problem("scans", _LIBRARY)])
+    return assembled(path, values, scan_file)
+
+
+def read_scan_file(path: Path) -> tuple[dict[str, Any], Document]:
+    """The values of a scan file, and where its keys stand. Raises ``Rejected`` where it is none."""
     values, scan_file = read_toml(path, str(path))
     if "v_max" in values and not _is_scan(values):  # else every key of it is a fault, and none says this
         why = f"this is a scanner file; give the scan file that names it, scanner = '{shown_path(Path(path.name))}'"
         raise Rejected([scan_file.problem("", why)])
+    return values, scan_file
+
+
+Scanners = dict[Path, tuple[Mapping[str, Any], Scanner, Document]]
+"""The values, the types and the places of scanner files that were read already, and found right."""
+
+
+def assembled(path: Path, values: Mapping[str, Any], scan_file: Document, scanners: Scanners | None = None) -> Setup:
+    """The setup of the values of a scan file at a path, with the scanner that it names.
+
+    ``scanners`` are taken as they are, and what is read is kept there: for many scans of one scanner. Raises
+    ``Rejected`` with every fault of both files.
+    """
     problems = Problems()
     values, scan_file = inherited(values, scan_file)
     scan = decode(WrittenScan, values, scan_file, problems, partial(_check, values, scan_file, problems))
@@ -100,6 +123,10 @@ def load(path: str | Path) -> Setup:
     if not isinstance(named, str) or not 0 < len(named) <= MAXIMUM_FILE_NAME:
         raise Rejected(problems.found)
     scanner_path = path.parent / named
+    if scanners is not None and scanner_path in scanners:
+        known_values, known, scanner_file = scanners[scanner_path]
+        check_hardware(values, known_values, scan_file, scanner_file, problems)
+        return _setup(scan, known, values, scan_file, scanner_file, scanner_path.parent, problems)
     if not os.path.isfile(scanner_path):  # unlike the method of Path it never raises
         problems.add(
             scan_file, "scanner", f"{shown_path(scanner_path)} is not a file; the path is relative to this file"
@@ -114,7 +141,10 @@ def load(path: str | Path) -> Setup:
         raise Rejected(problems.found)
     scanner_values, scanner_file = inherited(scanner_values, scanner_file)
     check = partial(_check, scanner_values, scanner_file, problems)
+    before = len(problems.found)
     scanner = decode(Scanner, scanner_values, scanner_file, problems, check)
+    if scanners is not None and scanner is not None and len(problems.found) == before:
+        scanners[scanner_path] = scanner_values, scanner, scanner_file
     check_hardware(values, scanner_values, scan_file, scanner_file, problems)
     return _setup(scan, scanner, values, scan_file, scanner_file, scanner_path.parent, problems)
 
@@ -167,6 +197,8 @@ def from_values(scan: Mapping[str, Any], scanner: Mapping[str, Any], folder: str
     for in ``folder``. Raises ``Rejected`` as ``load`` does, with "scan" and "scanner" for the names of files.
     """
     values, scan_file = inherited({"name": "scan", "scanner": "values", **_plain(scan)}, Document("scan", None))
+    if "scans" in values:
+        raise Rejected([scan_file.problem("scans", "values are of one scan; give each of many its own")])
     scanner_values, scanner_file = inherited(_plain(scanner), Document("scanner", None))
     problems = Problems()
     built = decode(WrittenScan, values, scan_file, problems, partial(_check, values, scan_file, problems))

@@ -337,6 +337,12 @@ class Emit(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     header_only: Annotated[bool, Meta(description="C: put the tables into the header instead of a .c file")] = False
 
 
+class ScanOfMany(Struct, frozen=True, kw_only=True):
+    """One scan of a library, for `tablegen sweep`: its name, and the keys of this file that differ for it."""
+
+    name: Annotated[Identifier, Meta(description="prefix of its files and identifiers, and its directory")]
+
+
 class WrittenScan(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One scan."""
 
@@ -367,6 +373,10 @@ class WrittenScan(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     y: SlowAxis
     limits: Limits = Limits()
     emit: Emit = Emit()
+    scans: (
+        Annotated[list[ScanOfMany], Meta(min_length=1, description="scans of a library; `name` above is then its name")]
+        | None
+    ) = None
 
 
 class Scan(WrittenScan, frozen=True, kw_only=True, forbid_unknown_fields=True):

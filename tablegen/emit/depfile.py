@@ -27,7 +27,10 @@ def _escaped(name: bytes) -> bytes:
 
 
 # What no build reads, beside the commands: the independent side, and what works out the input of builds.
-_OTHER_FOLDERS = ("api", "calibration", "cli", "link", "refinement", "verification", "virtual", "examples")
+_OTHER_FOLDERS = (
+    *("api", "calibration", "cli", "library", "link", "refinement", "sweep", "verification", "virtual"),
+    "examples",
+)
 _OTHER_MODULES = ("manifest/read.py", "firmware_templates/__init__.py")
 
 

@@ -54,6 +54,10 @@ def memories(content: Content) -> list[Memory]:
 def memory_file(words: Ints | Iterable[int], bits: int) -> bytes:
     """The words, each in as many hexadecimal digits as ``bits`` take."""
     digits, mask = -(-bits // 4), (1 << bits) - 1
+    values = np.asarray(words if isinstance(words, np.ndarray | list) else list(words), dtype=np.int64)
+    if len(values) and digits % 2 == 0:  # whole bytes, which are spelled all at once
+        raw = (values & mask).astype(">u8").view(np.uint8).reshape(-1, 8)[:, 8 - digits // 2 :].tobytes()
+        return raw.hex("\n", digits // 2).encode("ascii") + b"\n"
     return "".join(f"{int(word) & mask:0{digits}x}\n" for word in words).encode("ascii")
 
 

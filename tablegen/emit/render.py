@@ -74,6 +74,7 @@ def runtime_files(of: Format) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in of.runtime()}
 
 
+@cache
 def own_runtime(of: Format) -> set[str]:
     """The names of those files among ``runtime_files`` that are tablegen's own, whoever's format this is."""
     own = resource_folder("firmware_templates").resolve()

@@ -70,8 +70,7 @@ def runs_of(program: Program) -> Runs:
 def _between_words(program: Program) -> Runs | None:
     """Runs between the words of a table, where codes rise or fall one by one; None where ticks are fewer.
 
-    Along a segment the code is monotonic in the fraction, so that the fraction at which each code is first
-    reached is found by bisection of the very arithmetic that plays it.
+    Along a segment the code is monotonic in the fraction, so that there is one at which each code is first reached.
     """
     words, guard = program.words, program.guard
     here, there = words, np.roll(words, -1)
@@ -86,16 +85,30 @@ def _between_words(program: Program) -> Runs | None:
     order = np.arange(len(segment)) - np.repeat(np.cumsum(changes + 1) - (changes + 1), changes + 1)
     direction = np.sign(last_code - first_code)[segment]
     codes = first_code[segment] + direction * order
-    low, high = np.zeros_like(segment), last[segment]  # the code is reached at ``high``, and at ``low`` or later
-    from_here, to_there = here[segment], there[segment]
-    for _ in range(FRACTION_BITS):
-        middle = (low + high) >> 1
-        reached = direction * (program.output.code(between(from_here, to_there, middle, guard)) - codes) >= 0
-        low, high = np.where(reached, low, middle + 1), np.where(reached, middle, high)
+    reached = _first_fraction(program, here[segment], there[segment], codes, direction)
+    reached = np.where(order == 0, 0, np.clip(reached, 0, last[segment]))
 
     # The first tick whose phase reaches that fraction: ceil(phase ticks / 2^32), below 2^63.
     index_bits = index_bits_of(len(words))
-    phase = ((segment << FRACTION_BITS) | high) << (PHASE_BITS - FRACTION_BITS - index_bits)
+    phase = ((segment << FRACTION_BITS) | reached) << (PHASE_BITS - FRACTION_BITS - index_bits)
     starts = (phase * program.ticks + ((1 << PHASE_BITS) - 1)) >> PHASE_BITS
     taken = np.append(np.diff(starts) > 0, starts[-1] < program.ticks)
     return Runs(starts[taken], codes[taken], program.ticks)
+
+
+def _first_fraction(program: Program, here: Ints, there: Ints, codes: Ints, direction: Ints) -> Ints:
+    """The least fraction at which a segment from word to word plays a code, on its way up (direction 1) or down (-1).
+
+    ``between`` and ``Output.unclamped`` solved for the fraction, in whole numbers: a code rises to c where
+    gain sample + offset + 1/2 >= c, falls to it where that is < c + 1; the sample rises to S, or falls to it, alike.
+    """
+    output, guard = program.output, program.guard
+    shift = FRACTION_BITS - guard
+    half = 1 << (output.gain_q - 1)
+    rising = direction > 0
+    product = ((codes + np.where(rising, 0, 1)) << output.gain_q) - output.offset_word - half - np.where(rising, 0, 1)
+    rise = there - here
+    up = rise > 0
+    gain = np.int64(output.gain_word or 1)  # without gain no code changes, and nothing of this is used
+    sample = np.where(up, -(-product // gain), product // gain + 1) - (here << guard)
+    return np.asarray(-(-((sample << shift) - (1 << (shift - 1)) - np.where(up, 0, 1)) // np.where(rise == 0, 1, rise)))

@@ -1,6 +1,7 @@
 """Fourier words, and the integer synthesis that renders them into table words on the host and on the device alike."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -12,6 +13,7 @@ WORD_BITS = 32
 FRACTION_BITS = 30  # Q2.30: |s| <= 1 bounds every coefficient by 4/pi
 SINE_FRACTION_BITS = 30
 ACCUMULATOR_BITS = 64
+_KEPT = 1 << 16  # words of the longest sine table that is kept
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,9 +59,20 @@ def sine_table(length: int) -> Ints:
 
     A device keeps a quarter of it: for a length divisible by 4 the rest follows by symmetry, word for word.
     """
+    return _kept_sine_table(length) if length <= _KEPT else _sine_table(length)
+
+
+def _sine_table(length: int) -> Ints:
     value = sine(np.arange(length) / length) * float(1 << SINE_FRACTION_BITS)
     magnitude: Floats = np.abs(value)
-    return np.where(value < 0.0, -round_half_up(magnitude), round_half_up(magnitude))
+    table: Ints = np.where(value < 0.0, -round_half_up(magnitude), round_half_up(magnitude))
+    freeze(table)
+    return table
+
+
+@lru_cache(maxsize=4)  # a build asks for the same one or two again and again
+def _kept_sine_table(length: int) -> Ints:
+    return _sine_table(length)
 
 
 def sine_quarter(index_bits: int) -> Ints:

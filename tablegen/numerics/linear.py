@@ -5,6 +5,7 @@ import numpy as np
 from tablegen.numerics.arrays import Floats
 
 _PANEL = 32  # columns that are worked out together
+_SMALL = 192  # up to this size all columns are one panel: the whole fits the cache
 _ROWS, _COLUMNS = 32, 256  # of a tile, which then has 64 KiB
 
 
@@ -22,8 +23,9 @@ class Cholesky:
     def __init__(self, matrix: Floats) -> None:
         work = np.array(matrix, dtype=np.float64)
         size = len(work)
-        for first in range(0, size, _PANEL):
-            last = min(first + _PANEL, size)
+        panel = size if size <= _SMALL else _PANEL
+        for first in range(0, size, panel):
+            last = min(first + panel, size)
             for j in range(first, last):
                 pivot = work[j, j]
                 if not pivot > 0.0:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 from tablegen.compensation import models
@@ -180,19 +181,14 @@ def compensate(
         both=scan.band_limit.directions == "both",
         response=response,
         max_boost_db=max_boost_db,
-        factor_at=lambda share: surface.small.factor(driver.p(driver.volts(share))),
-        rate_gain=None if law is None else lambda hz: frequency_gain(hz, law.alpha, law.reference_hz),
+        factor_at=partial(_factor_at, surface.small, driver),
+        rate_gain=None if law is None else partial(frequency_gain, alpha=law.alpha, reference_hz=law.reference_hz),
         folder=setup.scanner_folder,
         scan_file=scan_file,
         scanner_file=scanner_file,
         problems=problems,
         allowed=allowed,
     )
-
-    def line_at(v: float) -> LineShape | None:
-        apart = Problems()
-        made = hysteresis.line(replace(wanted, v=v, problems=apart))
-        return None if apart.found else made
 
     shape = hysteresis.line(wanted)
     if len(problems.found) > before or shape is None or size_law is None:
@@ -215,7 +211,7 @@ def compensate(
         shape=shape,
         response=response,
         max_boost_db=max_boost_db,
-        line_at=line_at,
+        line_at=partial(_line_at, hysteresis, wanted),
         harmonics=most,
         allowed=allowed,
         model_files=tuple(
@@ -228,6 +224,17 @@ def compensate(
 def outside_driver(volts: float, driver: Driver) -> str:
     """Say that a voltage is outside the driver's range, and by how much."""
     return f"{volts:.6g} V is outside the driver's {driver}, by {driver.beyond(volts, volts):.4g} V"
+
+
+# Functions of a module, not of a call: a plan that travels to another process takes them along.
+def _factor_at(law: OffsetLaw, driver: Driver, share: float) -> float:
+    return law.factor(driver.p(driver.volts(share)))
+
+
+def _line_at(hysteresis: Hysteresis, wanted: WantedLine, v: float) -> LineShape | None:
+    apart = Problems()
+    made = hysteresis.line(replace(wanted, v=v, problems=apart))
+    return None if apart.found else made
 
 
 def _check_points(setup: Setup, axis: str, problems: Problems) -> None:

@@ -11,6 +11,7 @@ from tablegen.calibration.image_checks import check_size
 from tablegen.calibration.image_scale import size_of_line
 from tablegen.calibration.image_sizes import KnownSample
 from tablegen.config.load import Setup
+from tablegen.findings import Remark, spoils
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, Plan, make_plan
 from tablegen.problems import Unphysical
@@ -144,45 +145,57 @@ def _size(plan: Plan, frames: Sequence[LatticeLine], sample: KnownSample) -> Lin
     return replace(found[0], nm=Estimate(value, float(np.hypot(error, found[0].shared * value))))
 
 
-def _size_remarks(plan: Plan, size: LineSize | None) -> list[str]:
+def _size_remarks(plan: Plan, size: LineSize | None) -> list[Remark]:
     if size is None:
         return []
     asked, found, error = plan.x.drive.size_nm, size.nm.value, size.nm.standard_error
     if abs(found / asked - 1.0) < max(_SIZE_NOTE_LIMIT, _SIZE_NOTE_ERRORS * error / asked):
         return []
     return [
-        f"the line of x is {found:.5g} nm where the scan file asks for {asked:.5g} nm "
-        f"({100.0 * (found / asked - 1.0):+.2f} %); sizes are not learnt: tablegen calibrate size --images corrects it "
-        f"at every size, or ask for {asked * asked / found:.5g} nm to have {asked:.5g} nm here"
+        spoils(
+            f"the line of x is {found:.5g} nm where the scan file asks for {asked:.5g} nm "
+            f"({100.0 * (found / asked - 1.0):+.2f} %); sizes are not learnt: tablegen calibrate size --images "
+            f"corrects it at every size, or ask for {asked * asked / found:.5g} nm to have {asked:.5g} nm here",
+            100.0 * abs(found / asked - 1.0),
+        )
     ]
 
 
-def _remarks(line: LinePlan, frames: Sequence[LatticeLine], lesson: Lesson) -> tuple[str, ...]:
+def _remarks(line: LinePlan, frames: Sequence[LatticeLine], lesson: Lesson) -> tuple[Remark, ...]:
     found = [text for frame in frames[:1] for text in _remarks_of(frame)]
     if line.axis == "y" and len(frames) == 1:
         found.append(
-            "a drift that becomes faster or slower counts as an error of y; give two frames that follow each other, "
-            "which tell it"
+            spoils(
+                "a drift that becomes faster or slower counts as an error of y; give two frames that follow each "
+                "other, which tell it"
+            )
         )
     return tuple(found + _learning_remarks(lesson))
 
 
-def _remarks_of(seen: LatticeLine) -> list[str]:
-    found, fit, geometry = [], seen.fit, seen.geometry
+def _remarks_of(seen: LatticeLine) -> list[Remark]:
+    found: list[Remark] = []
+    fit, geometry = seen.fit, seen.geometry
     explained = min(fit.explained)
     if explained < _LITTLE_EXPLAINED:
-        found.append(f"{100.0 * explained:.0f} % of the contrast is periodic, the rest noise, debris or defects")
+        found.append(
+            Remark(f"{100.0 * explained:.0f} % of the contrast is periodic, the rest noise, debris or defects")
+        )
     span = (geometry.window[1] - geometry.window[0]) * float(np.max(np.abs(fit.state.q)))
     if geometry.columns / span < _MIN_PIXELS_PER_PERIOD:
-        found.append(f"the shortest period has {geometry.columns / span:.2g} pixels; scan less, or take more pixels")
+        found.append(
+            Remark(f"the shortest period has {geometry.columns / span:.2g} pixels; scan less, or take more pixels")
+        )
     if seen.start.apart > _FAR_APART:
         found.append(
-            f"trace and retrace are {seen.start.apart:.2g} periods apart, and beyond half a period they would be taken "
-            f"for the next one; calibrate first, or take a sample of a longer period"
+            spoils(
+                f"trace and retrace are {seen.start.apart:.2g} periods apart, and beyond half a period they would be "
+                f"taken for the next one; calibrate first, or take a sample of a longer period"
+            )
         )
     if fit.loud:
         shown = ", ".join(str(i + 1) for i in fit.loud[:5]) + (", ..." if len(fit.loud) > 5 else "")
-        found.append(f"{len(fit.loud)} rows differ from the others (row {shown}); they counted less")
+        found.append(Remark(f"{len(fit.loud)} rows differ from the others (row {shown}); they counted less"))
     return found
 
 
@@ -221,8 +234,10 @@ def refine_mismatch(
     lesson = learn(plan.x, measured, options.gain, limits.used)
     refinement, changed = with_lesson(setup, plan.x, lesson, "mismatch")
     remarks = [
-        "only what trace and retrace differ by was seen, and is corrected, half of it in each; an error that both "
-        "share stays, and is in none of these figures",
+        spoils(
+            "only what trace and retrace differ by was seen, and is corrected, half of it in each; an error that both "
+            "share stays, and is in none of these figures"
+        ),
         *_learning_remarks(lesson),
     ]
     return MismatchRound(
@@ -238,13 +253,13 @@ def refine_mismatch(
     )
 
 
-def _learning_remarks(lesson: Lesson) -> list[str]:
-    found = []
+def _learning_remarks(lesson: Lesson) -> list[Remark]:
+    found: list[Remark] = []
     if lesson.harmonics == 0:
-        found.append("the error is within the noise of the images: there is nothing more to learn from them")
+        found.append(Remark("the error is within the noise of the images: there is nothing more to learn from them"))
     elif finished(lesson):
-        found.append("most of the remaining error is noise: give several frames, or stop refining")
-    return [*found, "images do not show that the build of this scan file was running"]
+        found.append(Remark("most of the remaining error is noise: give several frames, or stop refining"))
+    return [*found, Remark("images do not show that the build of this scan file was running")]
 
 
 def _pixels(frames: Sequence[LatticeLine] | Sequence[SweepMismatch]) -> str:

@@ -6,9 +6,9 @@ from typing import Any, Literal
 import msgspec
 import numpy as np
 
-from tablegen.calibration.estimate import Curve
 from tablegen.config.load import Setup
 from tablegen.config.schema import Refinement
+from tablegen.findings import Remark, spoils
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, make_plan
 from tablegen.planning.refinement_layer import model_digest
@@ -44,24 +44,12 @@ class Round:
     refinement: Refinement | None
     setup: Setup
     worse: str
-    remarks: tuple[str, ...]
+    remarks: tuple[Remark, ...]
 
     @property
     def recorded(self) -> str:
         """How much was recorded, in words."""
         raise NotImplementedError
-
-    @property
-    def curves(self) -> list[Curve]:
-        """Residual of each direction: measured, and as predicted with the new layer."""
-        before, after = self.lesson.before, self.lesson.after
-        curves = []
-        for side, x in before.points.by_side(before.points.position).items():
-            measured, predicted = (100.0 * d.points.by_side(d.error)[side] for d in (before, after))
-            thin = slice(None, None, 20)
-            title = f"residual {side}: measured (points), predicted (line)"
-            curves.append(Curve(title, "position", "% of line", (x[thin], measured[thin]), (x, predicted)))
-        return curves
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -185,35 +173,44 @@ def why_worse(setup: Setup, axis: str, lesson: Lesson, before_of: BeforeOf | Non
     )
 
 
-def _remarks(line: LinePlan, measured: Displacement, lesson: Lesson, phase: Phase, time_s: Floats) -> tuple[str, ...]:
-    found = []
+def _remarks(
+    line: LinePlan, measured: Displacement, lesson: Lesson, phase: Phase, time_s: Floats
+) -> tuple[Remark, ...]:
+    found: list[Remark] = []
     size = abs(lesson.before.size_nm)
     by = size / line.drive.size_nm - 1.0
     if abs(by) > _SIZE_NOTE_LIMIT:
         found.append(
-            f"the line is {size:.5g} nm where the scan file asks for {line.drive.size_nm:.5g} nm "
-            f"({100.0 * by:+.2f} %); sizes are not learnt: calibrate {line.axis}.size, best before refining"
+            spoils(
+                f"the line is {size:.5g} nm where the scan file asks for {line.drive.size_nm:.5g} nm "
+                f"({100.0 * by:+.2f} %); sizes are not learnt: calibrate {line.axis}.size, best before refining",
+                100.0 * abs(by),
+            )
         )
     if lesson.before.size_nm < 0.0:
         doubt = "; if the sensor counts upwards, time 0 is where the line turns, and this is not to be learnt"
         turned = "the displacement falls where the drive rises; its sign was inverted"
-        found.append(turned + (doubt if phase.drive is None else ""))
+        found.append(spoils(turned + doubt) if phase.drive is None else Remark(turned))
     if measured.stray is not None:
         at = float(time_s[measured.stray])
-        found.append(f"the reading at {at:.9g} s is far off the others; it adds noise")
+        found.append(Remark(f"the reading at {at:.9g} s is far off the others; it adds noise"))
     if lesson.harmonics == 0:
-        found.append("the error is within the noise of the sensor: there is nothing more to learn from this trace")
+        found.append(
+            Remark("the error is within the noise of the sensor: there is nothing more to learn from this trace")
+        )
     elif finished(lesson):
-        found.append("most of the remaining error is noise: record more periods, or stop refining")
+        found.append(Remark("most of the remaining error is noise: record more periods, or stop refining"))
     if measured.correlated > 3.0:
         found.append(
-            f"residuals are correlated over {measured.correlated:.0f} samples: besides noise, they contain drift, hum "
-            f"or what the harmonics leave; standard errors were widened by {measured.correlated**0.5:.2g}"
+            Remark(
+                f"residuals are correlated over {measured.correlated:.0f} samples: besides noise, they contain drift, "
+                f"hum or what the harmonics leave; standard errors were widened by {measured.correlated**0.5:.2g}"
+            )
         )
     if measured.periods < 1.99:
-        found.append("drift cannot be determined from a single period; record several")
+        found.append(Remark("drift cannot be determined from a single period; record several"))
     if phase.drive is None:
-        found.append("without drive_v it is not checked that the trace belongs to this build")
+        found.append(Remark("without drive_v it is not checked that the trace belongs to this build"))
     return tuple(found)
 
 

@@ -9,10 +9,11 @@ import msgspec
 
 from tablegen.compensation.models.operator import OperatorLine
 from tablegen.config.load import Setup
+from tablegen.findings import Tone
 from tablegen.planning.line_plan import LinePlan
 from tablegen.problems import Document, shortened
 from tablegen.reading import CONFIGURATION, read_text
-from tablegen.report.blocks import Grid, Paragraph, Section, TableCell, Tone, row
+from tablegen.report.blocks import Grid, Paragraph, Section, TableCell, row
 from tablegen.report.subject import PlannedScan
 
 _MARK = re.compile(r"# (calibrate|refine) (.*?): (.*)$")

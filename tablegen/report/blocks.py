@@ -3,9 +3,8 @@
 from dataclasses import dataclass, field
 from typing import Literal
 
+from tablegen.findings import Tone
 from tablegen.report.chart import Chart
-
-Tone = Literal["", "good", "warn", "bad", "quiet"]
 
 
 @dataclass(frozen=True)

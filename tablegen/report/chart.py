@@ -11,6 +11,7 @@ from tablegen.numerics.arrays import Floats
 
 Role = Literal["forward", "backward", "before", "other", "limit"]
 _BINS = 400  # of a curve with more points than twice that: the least and the largest of each are drawn
+POSITION = "position on the line [share]"
 _ROOM = 0.06  # above and below the curves, of their range
 
 
@@ -18,7 +19,7 @@ _ROOM = 0.06  # above and below the curves, of their range
 class DrawnCurve:
     """Values over a coordinate, (n,) each; NaN breaks the line. ``role`` decides colour and line style.
 
-    A curve without a name is not in the legend.
+    A curve without a name is not in the legend. A ``faint`` one is of the same direction and matters less.
     """
 
     name: str
@@ -26,6 +27,7 @@ class DrawnCurve:
     x: Floats
     y: Floats
     kind: Literal["line", "points", "stems", "area"] = "line"
+    faint: bool = False
 
 
 @dataclass(frozen=True)
@@ -47,8 +49,38 @@ class Mark:
 
 
 @dataclass(frozen=True, eq=False)
+class Raster:
+    """An image: values of shape (rows, columns), the first row on top, NaN left out; ``low`` to ``high`` are shaded.
+
+    It spans ``x``, from left to right, and ``y``, from below to above. ``label`` is that of the scale of its shades,
+    with the unit; without one there is no scale.
+    """
+
+    values: Floats
+    x: tuple[float, float]
+    y: tuple[float, float]
+    low: float
+    high: float
+    shades: Literal["grey", "heat", "signed"] = "grey"
+    label: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Arrows:
+    """Arrows from (x, y) by (dx, dy), (n,) each, in the units of the axes."""
+
+    x: Floats
+    y: Floats
+    dx: Floats
+    dy: Floats
+
+
+@dataclass(frozen=True, eq=False)
 class Chart:
-    """One chart. ``key`` is its id in the page and its name as a file; labels contain the unit."""
+    """One chart. ``key`` is its id in the page and its name as a file; labels contain the unit.
+
+    ``equal``: a step of x is as long as one of y.
+    """
 
     key: str
     title: str
@@ -61,15 +93,22 @@ class Chart:
     x_range: tuple[float, float] | None = None
     y_range: tuple[float, float] | None = None
     caption: str = ""
+    raster: Raster | None = None
+    arrows: Arrows | None = None
+    equal: bool = False
 
     @property
     def x_limits(self) -> tuple[float, float]:
         """What the horizontal axis spans."""
+        if self.raster is not None and self.x_range is None:
+            return self.raster.x
         return self.x_range or _range([curve.x for curve in self.curves], [], 0.0)
 
     @property
     def y_limits(self) -> tuple[float, float]:
-        """What the vertical axis spans."""
+        """What the vertical axis spans, from below to above."""
+        if self.raster is not None and self.y_range is None:
+            return self.raster.y
         marks = [mark.at for mark in self.marks if mark.of == "y"]
         return self.y_range or _range([curve.y for curve in self.curves], marks, _ROOM)
 
@@ -77,6 +116,12 @@ class Chart:
     def legend(self) -> list[DrawnCurve]:
         """The curves that have a name, each name once."""
         return list({curve.name: curve for curve in self.curves if curve.name}.values())
+
+    @property
+    def needed_legend(self) -> list[DrawnCurve]:
+        """The same, but none of a single curve that has no direction: the title says what it is."""
+        found = self.legend
+        return found if len(found) > 1 or any(curve.role in ("forward", "backward") for curve in found) else []
 
 
 def _range(values: list[Floats], more: list[float], room: float) -> tuple[float, float]:
@@ -124,7 +169,7 @@ def ticks(low: float, high: float, log: bool = False, wanted: int = 5) -> list[t
     step = next(size for size in (1.0, 2.0, 5.0, 10.0) if size * 10.0**power >= raw * 0.999) * 10.0**power
     digits = max(0, -floor(log10(step) + 1e-9))
     first, last = ceil(low / step - 1e-9), floor(high / step + 1e-9)
-    return [(i * step, f"{i * step:.{digits}f}" if digits < 7 else f"{i * step:.3g}") for i in range(first, last + 1)]
+    return [(i * step, f"{i * step:.{digits}f}" if digits < 5 else f"{i * step:.3g}") for i in range(first, last + 1)]
 
 
 def _power(power: int) -> str:

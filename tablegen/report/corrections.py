@@ -6,7 +6,7 @@ from tablegen.compensation import models
 from tablegen.manifest.fields import ManifestAxis
 from tablegen.planning.line_plan import LinePlan
 from tablegen.report.blocks import Charts, Grid, Section, TableCell, row
-from tablegen.report.chart import Band, Chart, DrawnCurve, Mark
+from tablegen.report.chart import POSITION, Band, Chart, DrawnCurve, Mark
 from tablegen.report.subject import Subject
 from tablegen.report.words import hertz
 
@@ -20,7 +20,7 @@ def corrections(subject: Subject) -> Section:
         line = None if subject.planned is None else subject.planned.plan.lines[at]
         tables.append(Grid(f"{axis} axis", _HEAD, tuple(_steps(entry, line))))
         if line is not None and line.drive.hysteresis.compensates:
-            charts.append(_shape(line))
+            charts.append(shape_chart(line))
     return Section("corrections", "The corrections, step by step", (*tables, Charts(tuple(charts))))
 
 
@@ -72,7 +72,7 @@ def _steps(entry: ManifestAxis, line: LinePlan | None) -> list[tuple[TableCell, 
     return rows
 
 
-def _shape(line: LinePlan) -> Chart:
+def shape_chart(line: LinePlan) -> Chart:
     """By how much the drive is bent away from a straight line."""
     x = np.linspace(0.0, 1.0, 301)
     low, high = line.band_limit.window
@@ -81,7 +81,7 @@ def _shape(line: LinePlan) -> Chart:
     return Chart(
         f"shape-{line.axis}",
         f"{line.axis}: how the drive is bent",
-        "position on the line",
+        POSITION,
         "drive less line [% of V_scan]",
         (DrawnCurve("forward", "forward", x, 100.0 * forward), DrawnCurve("backward", "backward", x, 100.0 * backward)),
         (Band(low, high, "imaged"),),

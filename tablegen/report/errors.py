@@ -5,7 +5,7 @@ import numpy as np
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan
 from tablegen.report.blocks import Charts, Grid, Paragraph, Section, TableCell, row
-from tablegen.report.chart import Band, Chart, DrawnCurve, Mark, Role
+from tablegen.report.chart import POSITION, Band, Chart, DrawnCurve, Mark, Role
 from tablegen.report.playing import PlayedAxis, PlayedCorrection
 from tablegen.report.subject import PlannedScan
 from tablegen.virtual.line_error import BranchError
@@ -62,33 +62,31 @@ def inside(branch: BranchError) -> tuple[Floats, Floats]:
     return branch.position[kept], branch.residual[kept]
 
 
-def _charts(line: LinePlan, correction: PlayedCorrection) -> list[Chart]:
-    run, name, axis = correction.run, correction.name, line.axis
-    sides = [side for side in SIDES if side in run.directions]
-    residual = tuple(DrawnCurve(side, side, *inside(getattr(run.imaged, side))) for side in sides)
-    scaling = tuple(
-        DrawnCurve(side, side, getattr(run.imaged, side).scaling_position, getattr(run.imaged, side).scaling)
-        for side in sides
+def residual_chart(axis: str, correction: PlayedCorrection) -> Chart:
+    """What is left in the image, about the best straight line through it."""
+    run = correction.run
+    return Chart(
+        f"residual-{axis}-{correction.name}",
+        f"{axis} residual, {correction.title}",
+        POSITION,
+        "residual [% of the line]",
+        tuple(DrawnCurve(side, side, *inside(getattr(run.imaged, side))) for side in SIDES if side in run.directions),
+        marks=(Mark(0.0, "", "y"),),
     )
-    zero = (Mark(0.0, "", "y"),)
-    return [
-        Chart(
-            f"residual-{axis}-{name}",
-            f"{axis} residual, {correction.title}",
-            "position on the line",
-            "residual [% of the line]",
-            residual,
-            marks=zero,
-        ),
-        Chart(
-            f"scaling-{axis}-{name}",
-            f"{axis} scaling error, {correction.title}",
-            "position on the line",
-            "scaling error [%]",
-            scaling,
-            marks=zero,
-        ),
-    ]
+
+
+def _charts(line: LinePlan, correction: PlayedCorrection) -> list[Chart]:
+    run = correction.run
+    errors = [(side, getattr(run.imaged, side)) for side in SIDES if side in run.directions]
+    scaling = Chart(
+        f"scaling-{line.axis}-{correction.name}",
+        f"{line.axis} scaling error, {correction.title}",
+        POSITION,
+        "scaling error [%]",
+        tuple(DrawnCurve(side, side, one.scaling_position, one.scaling) for side, one in errors),
+        marks=(Mark(0.0, "", "y"),),
+    )
+    return [residual_chart(line.axis, correction), scaling]
 
 
 def _refinement(line: LinePlan) -> list[Chart]:
@@ -107,8 +105,8 @@ def _refinement(line: LinePlan) -> list[Chart]:
         Chart(
             f"refinement-{line.axis}",
             f"{line.axis}: what the refinement adds",
-            "position on the line",
-            "[% of the line]",
+            POSITION,
+            "moved by [% of the line]",
             tuple(curves),
             caption="Learnt from traces of the running scan. The scanner file does not know of it, so the curves of "
             "the residual are without it.",
@@ -123,7 +121,7 @@ def windows(line: LinePlan, period: float) -> tuple[Band, ...]:
     found = []
     for side in sides:
         first, last = sorted(float(t) for t in line.drive.shape.times(side, np.array([low, high])))
-        found.append(Band(first * period, last * period, f"imaged {side}"))
+        found.append(Band(first * period, last * period, "imaged"))
     return tuple(found)
 
 

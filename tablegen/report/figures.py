@@ -1,49 +1,158 @@
-"""A chart as PNG or PDF, by matplotlib, for documents; the colours and line styles are those of the page."""
+"""A drawing as PNG or PDF, by matplotlib: the same lines, words and areas at the same places as in the SVG."""
 
+from collections.abc import Iterable, Sequence
 from io import BytesIO
-from typing import Literal
+from typing import Any, Literal
 
-from tablegen.report.chart import Chart, runs
+import numpy as np
 
-_COLOURS = {"forward": "#0072b2", "backward": "#c44e00", "before": "#6f7681", "other": "#00795c", "limit": "#b00040"}
-_STYLES = {"forward": "-", "backward": "--", "before": ":", "other": "-", "limit": "-"}
+from tablegen.report.chart import Chart
+from tablegen.report.drawing import Box, Inside, Moved, Part, Ruled, Shades, Together, Trail, Words, sheet
+from tablegen.report.looks import LOOKS, Look, look_of, spot_of
+
+_POINTS = 0.72  # of a pixel, where 100 pixels are an inch
+_ANCHORS = {"start": "left", "middle": "center", "end": "right"}
+_METADATA: dict[str, dict[str, Any]] = {
+    "png": {"Software": None},
+    "pdf": {"CreationDate": None, "Producer": None, "Creator": None},
+}
 
 
-def drawn(chart: Chart, kind: Literal["png", "pdf"] | str) -> bytes:
-    """The file. Without a date, so that the same chart gives the same bytes."""
+def drawn(charts: Sequence[Chart], kind: Literal["png", "pdf"], heading: str = "", columns: int = 2) -> bytes:
+    """The file. Without a date, so that the same charts give the same bytes."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(6.2, 3.8), layout="constrained")
+    width, height, parts = sheet(heading, charts, columns)
+    figure = Figure(figsize=(0.01 * width, 0.01 * height))
     FigureCanvasAgg(figure)
-    axes = figure.add_subplot()
-    for band in chart.bands:
-        axes.axvspan(band.low, band.high, color="#4b78b8", alpha=0.13, lw=0)
-    for mark in chart.marks:
-        (axes.axvline if mark.of == "x" else axes.axhline)(mark.at, color="#6f7681", lw=0.9, ls=":")
-    named: set[str] = set()
-    (low, _), base = chart.y_limits, 0.0
-    base = max(base, low)
-    for curve in chart.curves:
-        colour, style = _COLOURS[curve.role], _STYLES[curve.role]
-        for x, y in runs(curve):
-            label = curve.name if curve.name not in named else "_"
-            named.add(curve.name)
-            if curve.kind == "stems":
-                axes.vlines(x, low, y, color=colour, lw=1.2, label=label)
-            elif curve.kind == "points":
-                axes.plot(x, y, "o", color=colour, label=label)
-            else:
-                axes.plot(x, y, color=colour, ls=style, lw=1.6, label=label)
-                if curve.kind == "area":
-                    axes.fill_between(x, y, base, color="#4b78b8", alpha=0.16, lw=0)
-    if chart.log_x:
-        axes.set_xscale("log")
-    axes.set(title=chart.title, xlabel=chart.x_label, ylabel=chart.y_label, xlim=chart.x_limits, ylim=chart.y_limits)
-    axes.spines[["top", "right"]].set_visible(False)
-    if len(chart.legend) > 1:
-        axes.legend(frameon=False, fontsize=9)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axes.set_axis_off()
+    axes.set(xlim=(0.0, width), ylim=(height, 0.0), aspect="auto")
+    _Painter(axes).paint(parts, 0.0, 0.0, None)
+    axes.set(xlim=(0.0, width), ylim=(height, 0.0), aspect="auto")  # images change them
     stream = BytesIO()
-    metadata = {"Software": None} if kind == "png" else {"CreationDate": None, "Producer": None, "Creator": None}
-    figure.savefig(stream, format=kind, dpi=150, metadata=metadata)
+    figure.savefig(stream, format=kind, dpi=150, metadata=_METADATA[kind])
     return stream.getvalue()
+
+
+class _Painter:
+    """Puts parts of a drawing on axes whose units are its pixels."""
+
+    def __init__(self, axes: Any) -> None:
+        self.axes = axes
+        self.order = 0
+
+    def paint(self, parts: Iterable[Part], x: float, y: float, frame: Any) -> None:
+        """Parts from a place on; what lies outside ``frame`` is cut off."""
+        for part in parts:
+            self.order += 1  # what comes later is drawn above
+            match part:
+                case Moved():
+                    self.paint(part.parts, x + part.x, y + part.y, frame)
+                case Together():
+                    self.paint(part.parts, x, y, frame)
+                case Inside():
+                    self._inside(part, x, y)
+                case Box():
+                    self._box(part, x, y, frame)
+                case Ruled():
+                    for x0, y0, x1, y1 in part.lines:
+                        self._line([x + x0, x + x1], [y + y0, y + y1], LOOKS[part.style], frame)
+                case Words():
+                    self._words(part, x, y)
+                case Trail():
+                    self._trail(part, x, y, frame)
+                case Shades():
+                    self._shades(part, x, y)
+
+    def _inside(self, part: Inside, x: float, y: float) -> None:
+        from matplotlib.patches import Rectangle
+
+        left, top = x + part.x, y + part.y
+        edge = Rectangle((left, top), part.width, part.height, transform=self.axes.transData)
+        self.paint(part.parts, left, top, edge)
+
+    def _box(self, part: Box, x: float, y: float, frame: Any) -> None:
+        from matplotlib.patches import Rectangle
+
+        look = LOOKS[part.style]
+        colours: dict[str, Any] = {
+            "facecolor": look.fill or "none",
+            "edgecolor": look.stroke or "none",
+            "alpha": look.opacity,
+        }
+        box = Rectangle(
+            (x + part.x, y + part.y),
+            part.width,
+            part.height,
+            linewidth=_POINTS * look.width,
+            clip_on=False,
+            zorder=self.order,
+            **colours,
+        )
+        self.axes.add_patch(box)
+        if frame is not None:
+            box.set_clip_path(frame)
+
+    def _line(self, x: Any, y: Any, look: Look, frame: Any, **more: Any) -> None:
+        width = _POINTS * look.width
+        style: Any = (0.0, tuple(_POINTS * one / width for one in look.dashes)) if look.dashes else "-"
+        (line,) = self.axes.plot(
+            x,
+            y,
+            color=look.stroke,
+            linewidth=width,
+            linestyle=style,
+            solid_joinstyle="round",
+            clip_on=False,
+            zorder=self.order,
+            **more,
+        )
+        if frame is not None:
+            line.set_clip_path(frame)
+
+    def _words(self, part: Words, x: float, y: float) -> None:
+        look = LOOKS[part.style]
+        self.axes.text(
+            x + part.x,
+            y + part.y,
+            part.text,
+            color=look.fill,
+            fontsize=_POINTS * look.size,
+            fontweight="bold" if look.bold else "normal",
+            ha=_ANCHORS[part.anchor],
+            va="bottom" if part.upright else "baseline",
+            rotation=90 if part.upright else 0,
+            rotation_mode="anchor" if part.upright else "default",
+            parse_math=False,
+            zorder=self.order,
+        )
+
+    def _trail(self, part: Trail, x: float, y: float, frame: Any) -> None:
+        look = look_of(part.curve)
+        for across, down in part.stretches:
+            px, py = x + across, y + down
+            if part.curve.kind == "points":
+                size, form = spot_of(part.curve)
+                marker = {"round": "o", "square": "s"}[form]
+                spots: dict[str, Any] = {"marker": marker, "markersize": _POINTS * size, "markeredgewidth": 0.0}
+                self._line(px, py, Look(look.stroke, 0.0001), frame, **spots)
+            elif part.curve.kind == "stems":
+                plain = Look(look.stroke, look.width)
+                for a, b in zip(px.tolist(), py.tolist(), strict=True):
+                    self._line([a, a], [b, y + part.base], plain, frame)
+            else:
+                self._line(px, py, look, frame)
+                if part.curve.kind == "area":
+                    area = LOOKS["area"]
+                    filled = self.axes.fill_between(
+                        px, py, y + part.base, color=area.fill, alpha=area.opacity, lw=0, zorder=self.order
+                    )
+                    if frame is not None:
+                        filled.set_clip_path(frame)
+
+    def _shades(self, part: Shades, x: float, y: float) -> None:
+        colours = part.palette[part.shades]
+        ends = (x + part.x, x + part.x + part.width, y + part.y + part.height, y + part.y)
+        self.axes.imshow(np.asarray(colours), extent=ends, interpolation="nearest", aspect="auto", zorder=self.order)

@@ -2,19 +2,21 @@
 
 from collections.abc import Sequence
 from math import isfinite
+from typing import Literal
 
 import numpy as np
 
 from tablegen.calibration.branch import AmplitudeFit
 from tablegen.calibration.doubts import doubts
 from tablegen.calibration.estimate import Curve, Estimate, Fit
+from tablegen.calibration.fit_findings import fit_findings
 from tablegen.calibration.hysteresis import HysteresisFit
 from tablegen.calibration.summary import change, parameters
 from tablegen.calibration.table import Source
-from tablegen.numerics.arrays import Floats
 from tablegen.report.blocks import Block, Charts, Grid, Paragraph, Section, TableCell, row
 from tablegen.report.chart import Chart, DrawnCurve, Mark
 from tablegen.report.document import document
+from tablegen.report.picture import PlottedCharts
 from tablegen.report.ranking import Finding
 from tablegen.version import __version__
 
@@ -28,18 +30,18 @@ def fit_page(fit: Fit, axis: str, sources: Sequence[Source], places: Sequence[st
     """The page of a fit. ``places`` are files and lines of its outliers, ``points`` what would be written."""
     kind = change(fit, []).kind
     meaningless = doubts(fit, points)
-    findings = [Finding("limit", 1.0, text, "\u2717 means nothing") for text in meaningless]
-    findings += [
-        Finding("spoils", 1.0, f"{place}: far from the other points, but used", "! outlier") for place in places
-    ]
-    findings += [Finding("note", 0.0, remark) for remark in fit.remarks]
+    findings = fit_findings(fit, places, points)
     verdict = TableCell("\u2713 Nothing speaks against this fit.", "good")
     if meaningless:
         verdict = TableCell("\u2717 This fit means nothing as it is; measure again.", "bad")
     elif places:
         many = "one outlier" if len(places) == 1 else f"{len(places)} outliers"
         verdict = TableCell(f"! Look at {many} first.", "warn")
-    found = [_parameters(fit), Section("data", "Data and fit", (Charts(_charts(fit.curves)),)), _sources(sources)]
+    found = [
+        _parameters(fit),
+        Section("data", "Data and fit", (Charts(fit_charts(fit, axis).charts),)),
+        _sources(sources),
+    ]
     return document(f"{kind} of {axis}", verdict, findings, found, "", _FOOT)
 
 
@@ -84,34 +86,40 @@ def _trace(turn: float, trace: AmplitudeFit, at: int, side: str) -> tuple[TableC
     return row(f"{turn:.3g} {side}", *quality, *both, f"{trace.scaling_percent[at]:.2g}")
 
 
-def _charts(curves: Sequence[Curve]) -> tuple[Chart, ...]:
-    return tuple(
-        Chart(
-            f"fit-{number}",
-            curve.title,
-            curve.x_label,
-            curve.y_label,
-            (
-                DrawnCurve("fit", "forward", *in_parts(*curve.fitted)),
-                DrawnCurve(
-                    "measured",
-                    "other" if len(curve.measured[0]) <= _FEW else "before",
-                    curve.measured[0],
-                    curve.measured[1],
-                    "points",
-                ),
-            ),
-            log_x=_over_decades(curve),
-        )
-        for number, curve in enumerate(curves, 1)
+def fit_charts(fit: Fit, axis: str) -> PlottedCharts:
+    """The data of a calibration with the fit."""
+    heading = f"{change(fit, []).kind} of {axis}: data and fit"
+    return PlottedCharts(heading, tuple(_chart(number, curve) for number, curve in enumerate(fit.curves, 1)), 3)
+
+
+def _chart(number: int, curve: Curve) -> Chart:
+    return Chart(
+        f"fit-{number}",
+        curve.title,
+        curve.x_label,
+        curve.y_label,
+        tuple(drawn_curves(curve)),
+        marks=(Mark(0.0, "", "y"),) if "less a straight line" in curve.y_label else (),
+        log_x=_over_decades(curve),
     )
 
 
-def in_parts(x: Floats, y: Floats) -> tuple[Floats, Floats]:
-    """The fitted line, lifted where x turns back: forward and backward are two lines."""
-    steps = np.sign(np.diff(x))
-    turns = np.flatnonzero(steps[1:] * steps[:-1] < 0.0) + 2
-    return np.insert(x, turns, np.nan), np.insert(y, turns, np.nan)
+def drawn_curves(curve: Curve) -> list[DrawnCurve]:
+    """Measured points and the fitted line, of each direction that the curve has."""
+    kinds: tuple[Literal["points", "line"], ...] = ("points", "line")
+    found = []
+    for name, kind, (x, y), at in zip(
+        ("measured", "fit"), kinds, (curve.measured, curve.fitted), curve.backward or (None, None), strict=True
+    ):
+        many = kind == "points" and len(x) > _FEW
+        if at is not None:
+            found.append(DrawnCurve(f"forward, {name}", "forward", x[:at], y[:at], kind, many))
+            found.append(DrawnCurve(f"backward, {name}", "backward", x[at:], y[at:], kind, many))
+        elif curve.direction:
+            found.append(DrawnCurve(f"{curve.direction}, {name}", curve.direction, x, y, kind, many))
+        else:
+            found.append(DrawnCurve(name, "other", x, y, kind, many))
+    return found
 
 
 def _over_decades(curve: Curve) -> bool:
@@ -148,11 +156,11 @@ def operator_page(
     chart = Chart(
         "left-out",
         "rms residual of each trace",
-        "trace",
+        "trace [number]",
         "rms residual [% of the line]",
         (
-            DrawnCurve("in the fit", "forward", numbers - _BESIDE, inside, "points"),
-            DrawnCurve("left out", "backward", numbers + _BESIDE, left_out, "points"),
+            DrawnCurve("in the fit", "before", numbers - _BESIDE, inside, "points"),
+            DrawnCurve("left out", "other", numbers + _BESIDE, left_out, "points"),
         ),
         marks=(Mark(0.0, "", "y"),),
         x_range=(0.0, len(traces) + 1.0),

@@ -5,12 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from tablegen.calibration.table import Source
+from tablegen.findings import Finding, of_remarks, worst_first
 from tablegen.refinement.round import Round
 from tablegen.report.blocks import Charts, Grid, Paragraph, Section, TableCell, row
-from tablegen.report.chart import Chart, DrawnCurve, Mark
+from tablegen.report.chart import POSITION, Chart, DrawnCurve, Mark
 from tablegen.report.document import document
 from tablegen.report.errors import windows
-from tablegen.report.ranking import Finding
+from tablegen.report.picture import PlottedCharts
 from tablegen.version import __version__
 
 _TURNS = np.linspace(0.0, 1.0, 601)
@@ -19,7 +20,7 @@ _TURNS = np.linspace(0.0, 1.0, 601)
 def round_page(found: Round, name: str, sources: Sequence[Source], earlier: Sequence[str], refused: str) -> bytes:
     """The page of a round. ``earlier`` are the comments of rounds before, ``refused`` why it is not learnt from."""
     axis, lesson = found.line.axis, found.lesson
-    findings = [Finding("note", 0.0, remark) for remark in found.remarks]
+    findings = worst_first(of_remarks(found.remarks))
     both = f"{lesson.before.rms_percent:.3g} % rms measured; {lesson.after.rms_percent:.2g} % predicted after it."
     verdict = TableCell(f"\u2713 {both}", "good")
     if refused:
@@ -46,6 +47,18 @@ def _errors(found: Round) -> Section:
     noise = f"{lesson.chord_noise_percent:.2g} rms of a chord"
     rows.append(row("noise of it", f"{lesson.noise_percent:.2g}", "", noise))
     head = ("", "rms residual [% of the line]", "largest [% of the line]", "scaling error [%, peak to peak]")
+    parts = (Grid("", head, tuple(rows)), Charts(_residuals(found)))
+    return Section("errors", "Measured and predicted", parts, f"{found.recorded}.")
+
+
+def round_charts(found: Round, name: str) -> PlottedCharts:
+    """What a round measured, what it predicts, and what it adds to the drive."""
+    heading = f"{name}: refinement of {found.line.axis}"
+    return PlottedCharts(heading, (*_residuals(found), _layer_chart(found)), 3)
+
+
+def _residuals(found: Round) -> tuple[Chart, ...]:
+    lesson = found.lesson
     charts = []
     points = lesson.before.points
     for side, x in points.by_side(points.position).items():
@@ -55,25 +68,31 @@ def _errors(found: Round) -> Section:
             curves = (curves[0], DrawnCurve("predicted", "backward", x, after))
         zero = (Mark(0.0, "", "y"),)
         title = f"residual {side}"
-        charts.append(
-            Chart(f"residual-{side}", title, "position on the line", "residual [% of the line]", curves, marks=zero)
-        )
-    parts = (Grid("", head, tuple(rows)), Charts(tuple(charts)))
-    return Section("errors", "Measured and predicted", parts, f"{found.recorded}.")
+        charts.append(Chart(f"residual-{side}", title, POSITION, "residual [% of the line]", curves, marks=zero))
+    return tuple(charts)
 
 
 def _layer(found: Round) -> Section:
     lesson, bound = found.lesson, found.bound
-    curves = (
-        DrawnCurve("this round", "other", _TURNS, 100.0 * lesson.change.value(_TURNS)),
-        DrawnCurve("the layer now", "forward", _TURNS, 100.0 * lesson.layer.value(_TURNS)),
-    )
     text = (
         f"Harmonics 1 to {lesson.harmonics} of {bound.used}, at a gain of {bound.gain:g}. It converges while the "
         f"response of the scanner is below {bound.largest_gain:.3g} times the modelled one, or off by less than "
         f"{bound.phase_deg:.3g} degrees."
     )
-    chart = Chart(
-        "layer", "What is added to the drive", "time [periods]", "[% of V_scan]", curves, windows(found.line, 1.0)
+    return Section("layer", "What was learnt", (Paragraph(text), Charts((_layer_chart(found),))))
+
+
+def _layer_chart(found: Round) -> Chart:
+    lesson = found.lesson
+    curves = (
+        DrawnCurve("this round", "other", _TURNS, 100.0 * lesson.change.value(_TURNS), faint=True),
+        DrawnCurve("the layer now", "other", _TURNS, 100.0 * lesson.layer.value(_TURNS)),
     )
-    return Section("layer", "What was learnt", (Paragraph(text), Charts((chart,))))
+    return Chart(
+        "layer",
+        "What is added to the drive",
+        "time [periods]",
+        "added to the drive [% of V_scan]",
+        curves,
+        windows(found.line, 1.0),
+    )

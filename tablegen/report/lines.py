@@ -1,5 +1,7 @@
 """Drive, position and error of both axes over time."""
 
+from typing import Protocol
+
 import numpy as np
 
 from tablegen.numerics.arrays import Floats
@@ -9,6 +11,7 @@ from tablegen.report.chart import Band, Chart, DrawnCurve, Mark
 from tablegen.report.errors import over_time, windows
 from tablegen.report.playing import PlayedAxis
 from tablegen.report.subject import PlannedScan, Subject, series_of
+from tablegen.waveform.series import FourierSeries
 
 _POINTS = 601
 
@@ -18,35 +21,60 @@ def lines(subject: Subject, axes: tuple[PlayedAxis, ...] | None) -> Section:
     charts = []
     for at, (axis, entry) in enumerate(subject.axes):
         period_s = entry.line.rate_exact[1] / entry.line.rate_exact[0]
-        times, unit = (1e3, "ms") if period_s < 1.0 else (1.0, "s")
-        period, drive, turn = times * period_s, entry.drive, entry.drive.turn
-        t = np.linspace(0.0, 1.0, _POINTS)
-        volts = drive.v_offset + drive.v_amplitude * (series_of(entry).value(t) - 0.5)
-        low, high = entry.fourier.window
-        bands = [(turn * low, turn * high)]
-        if entry.fourier.directions == "both":
-            bands.append((turn + (1.0 - turn) * (1.0 - high), turn + (1.0 - turn) * (1.0 - low)))
-        imaged = tuple(Band(a * period, b * period, "imaged") for a, b in bands)
-        triangle = drive.v_offset + drive.v_amplitude * (np.where(t <= turn, t / turn, (1 - t) / (1 - turn)) - 0.5)
-        label = f"time [{unit}]"
-        charts.append(
-            Chart(
-                f"drive-{axis}",
-                f"{axis} drive, one {'line' if axis == 'x' else 'frame'}",
-                label,
-                "drive at the piezo [V]",
-                (*_sides(t, period, volts, turn), DrawnCurve("plain triangle", "before", t * period, triangle)),
-                imaged,
-            )
-        )
+        window, both = entry.fourier.window, entry.fourier.directions == "both"
+        charts.append(drive_chart(axis, entry.drive, series_of(entry), window, both, period_s))
+        times, unit = time_unit(period_s)
         if subject.planned is not None and axes is not None:
-            charts += _moved(subject.planned, axes[at], at, period, label)
+            charts += _moved(subject.planned, axes[at], at, times * period_s, f"time [{unit}]")
     return Section(
         "lines",
         "Drive, position and error over time",
         (Charts(tuple(charts)),),
         "The image is taken in the shaded windows. Drag across a chart to zoom, press Escape to come back; the arrow "
         "keys step along the curves.",
+    )
+
+
+class DriveFigures(Protocol):
+    """What a chart has to know of a drive: volts at the piezo, and the share of the period that is forward."""
+
+    @property
+    def v_offset(self) -> float:
+        """Offset in V."""
+
+    @property
+    def v_amplitude(self) -> float:
+        """Peak to peak in V."""
+
+    @property
+    def turn(self) -> float:
+        """Of the period."""
+
+
+def time_unit(period_s: float) -> tuple[float, str]:
+    """How many of the unit are a second, and its name."""
+    return (1e3, "ms") if period_s < 1.0 else (1.0, "s")
+
+
+def drive_chart(
+    axis: str, drive: DriveFigures, series: FourierSeries, window: tuple[float, float], both: bool, period_s: float
+) -> Chart:
+    """The drive over a period, forward and backward, beside a plain triangle; the imaged windows are shaded."""
+    times, unit = time_unit(period_s)
+    period, turn, (low, high) = times * period_s, drive.turn, window
+    t = np.linspace(0.0, 1.0, _POINTS)
+    volts = drive.v_offset + drive.v_amplitude * (series.value(t) - 0.5)
+    bands = [(turn * low, turn * high)]
+    if both:
+        bands.append((turn + (1.0 - turn) * (1.0 - high), turn + (1.0 - turn) * (1.0 - low)))
+    triangle = drive.v_offset + drive.v_amplitude * (np.where(t <= turn, t / turn, (1 - t) / (1 - turn)) - 0.5)
+    return Chart(
+        f"drive-{axis}",
+        f"{axis} drive, one {'line' if axis == 'x' else 'frame'}",
+        f"time [{unit}]",
+        "drive at the piezo [V]",
+        (*_sides(t, period, volts, turn), DrawnCurve("plain triangle", "before", t * period, triangle)),
+        tuple(Band(a * period, b * period, "imaged") for a, b in bands),
     )
 
 

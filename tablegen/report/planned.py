@@ -5,13 +5,13 @@ from functools import partial
 from pathlib import Path
 
 from tablegen.certificate.certificate import broken_limits, certify
-from tablegen.certificate.scan_warnings import limit_advice, scan_warnings
+from tablegen.certificate.scan_warnings import limit_advice, weighed_warnings
 from tablegen.config.load import load
 from tablegen.emit.formats import UnknownFormat
 from tablegen.emit.render import render
 from tablegen.planning.line_plan import make_plan
 from tablegen.problems import Rejected, Unphysical
-from tablegen.report.ranking import placed, weighed
+from tablegen.report.ranking import placed
 from tablegen.report.record import VerifyRecord
 from tablegen.report.subject import PlannedScan, Subject, of_scan
 
@@ -29,7 +29,7 @@ def planned_scan(
     broken = broken_limits(
         plan, certificates, setup.scan_file, partial(limit_advice, setup, plan, certificates), setup.hardware_problem
     )
-    warnings = weighed(plan, certificates, scan_warnings(setup, plan, certificates))
+    warnings = [(percent, placed(one)) for percent, one in weighed_warnings(setup, plan, certificates)]
     tell("writing the formats")
     try:
         files = render(plan, certificates, list(plan.formats))

@@ -1,4 +1,4 @@
-"""A grey picture as PNG. Nothing is compressed, so that every machine writes the same bytes."""
+"""A picture in shades as PNG. Nothing is compressed, so that every machine writes the same bytes."""
 
 import struct
 import zlib
@@ -14,10 +14,19 @@ _MOST = 65535  # bytes of a stored block
 def grey_png(heights: Floats, low: float, high: float) -> bytes:
     """Heights, rows x columns, the first row on top: ``low`` is black and ``high`` white."""
     shades = np.clip(np.rint(255.0 * (heights - low) / (high - low)), 0, 255).astype(np.uint8)
+    return _png(shades, 0)
+
+
+def indexed_png(shades: np.typing.NDArray[np.uint8], palette: np.typing.NDArray[np.uint8]) -> bytes:
+    """Shades, rows x columns, each of which is a colour of the palette, (256, 3)."""
+    return _png(shades, 3, (b"PLTE", palette.tobytes()))
+
+
+def _png(shades: np.typing.NDArray[np.uint8], colours: int, *more: tuple[bytes, bytes]) -> bytes:
     rows, columns = shades.shape
     raw = b"".join(b"\0" + shades[row].tobytes() for row in range(rows))
-    head = struct.pack(">IIBBBBB", columns, rows, 8, 0, 0, 0, 0)
-    chunks = (b"IHDR", head), (b"IDAT", _stored(raw)), (b"IEND", b"")
+    head = struct.pack(">IIBBBBB", columns, rows, 8, colours, 0, 0, 0)
+    chunks = (b"IHDR", head), *more, (b"IDAT", _stored(raw)), (b"IEND", b"")
     return b"\x89PNG\r\n\x1a\n" + b"".join(_chunk(*chunk) for chunk in chunks)
 
 

@@ -1,62 +1,21 @@
 """What to know before the image is trusted: what spoils it first comes first, small print last."""
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Literal
 
-from tablegen.certificate.certificate import Certificate
-from tablegen.certificate.doubts import doubts
-from tablegen.certificate.excess import excess
-from tablegen.certificate.matching import apart_percent
-from tablegen.certificate.summary import notes
+from tablegen.certificate.scan_findings import expected_mismatch, note_findings
+from tablegen.findings import Finding, worst_first
 from tablegen.manifest.fields import ManifestCertificate
-from tablegen.planning.line_plan import Plan
 from tablegen.problems import Problem
-from tablegen.report.blocks import Tone
 from tablegen.report.record import VerifyRecord
 from tablegen.report.subject import Subject
 
-Weight = Literal["limit", "spoils", "expect", "note"]
-_ORDER: tuple[Weight, ...] = ("limit", "spoils", "expect", "note")
-_TONES: dict[Weight, Tone] = {"limit": "bad", "spoils": "warn", "expect": "", "note": "quiet"}
-_SIGNS: dict[Weight, str] = {
-    "limit": "\u2717 breaks a limit",
-    "spoils": "! spoils the image",
-    "expect": "to expect",
-    "note": "note",
-}
-_UNCOMPENSATED = "is not compensated"
 _CHORD = 0.05  # of the line: a scaling error over it is a place that is wrong by so much of it
-_TYPICAL_PERCENT = 10.0  # of a piezo whose hysteresis is not compensated: 10 to 20 % of the line
-
-
-@dataclass(frozen=True)
-class Finding:
-    """A sentence, how much it weighs, and by what percentage of the line within that.
-
-    ``called`` replaces the words for its weight.
-    """
-
-    weight: Weight
-    percent: float
-    text: str
-    called: str = ""
-
-    @property
-    def tone(self) -> Tone:
-        """Its colour."""
-        return _TONES[self.weight]
-
-    @property
-    def sign(self) -> str:
-        """Its weight in words, for eyes that see no colour."""
-        return self.called or _SIGNS[self.weight]
 
 
 def ranked(subject: Subject) -> list[Finding]:
     """All that is known, the worst first."""
-    return sorted(_found(subject), key=lambda one: (_ORDER.index(one.weight), -one.percent))
+    return worst_first(_found(subject))
 
 
 def _found(subject: Subject) -> Iterator[Finding]:
@@ -72,9 +31,7 @@ def _found(subject: Subject) -> Iterator[Finding]:
         for percent, text in planned.warnings:
             if not any(_same(text, broken) for broken in planned.broken):
                 yield Finding("spoils", percent, text)
-        for text in notes(planned.plan):
-            spoils = _UNCOMPENSATED in text
-            yield Finding("spoils" if spoils else "note", _TYPICAL_PERCENT if spoils else 0.0, text)
+        yield from note_findings(planned.plan)
     for axis, entry in subject.axes:
         yield from _expected(axis, entry.certificate, any(_scaling(axis) in text for text in told))
 
@@ -94,11 +51,7 @@ def _expected(axis: str, certificate: ManifestCertificate, told: bool) -> Iterat
     expected = certificate.expected
     if expected is not None and expected.mismatch_percent is not None:
         figure = expected.mismatch_percent
-        basis = "the operator expects" if expected.basis == "traces" else "the laws expect"
-        by = "" if figure.uncertainty is None else f" \u00b1 {figure.uncertainty:.2g}"
-        why = ", since turnarounds are rounded" if expected.basis == "laws" else ""
-        text = f"trace and retrace of {axis} up to {figure.value:.3g}{by} % of the line apart, {basis}{why}"
-        yield Finding("expect", figure.value, text)
+        yield expected_mismatch(axis, expected.basis, figure.value, figure.uncertainty)
     for side, error in ({} if told else certificate.scaling_error_percent or {}).items():
         text = f"{axis} {side}: the waveform itself has {error.get('total', 0.0):.3g} % of scaling error"
         if error.get("uncompensated", 0.0) > 0.0005:
@@ -116,22 +69,9 @@ def _verified(record: VerifyRecord | None, subject: Subject) -> Iterator[Finding
         yield Finding("limit", 950.0, f"verify found {len(failed)} of {len(record.checks)} checks failed")
 
 
-def weighed(plan: Plan, certificates: Mapping[str, Certificate], warnings: list[Problem]) -> list[tuple[float, str]]:
-    """The warnings of a scan, each with the percentage of the error that it tells of, and without folders."""
-    known = []
-    for line in plan.lines:
-        found = excess(certificates[line.axis].scaling)
-        known += [] if found is None else [(found.text(line.axis), abs(found.percent))]
-        known += [(doubt.text, doubt.percent) for doubt in doubts(line, certificates[line.axis])]
-    return [
-        (
-            next((percent for text, percent in known if problem.why.startswith(text)), apart_percent(plan)),
-            placed(problem),
-        )
-        for problem in warnings
-    ]
-
-
 def placed(problem: Problem) -> str:
     """A problem at its place in the file, without the folder, which is of one machine alone."""
     return str(problem._replace(file=Path(problem.file).name))
+
+
+__all__ = ["Finding", "placed", "ranked"]

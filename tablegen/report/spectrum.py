@@ -35,7 +35,7 @@ def _spectrum(axis: str, entry: ManifestAxis) -> Chart:
     n = np.arange(1.0, series.harmonics + 1.0)
     power = series.a**2 + series.b**2
     first = float(power[0]) or 1.0
-    shown = [DrawnCurve("emitted harmonics", "forward", n * rate, _db(power / first), "stems")]
+    shown = [DrawnCurve("emitted harmonics", "other", n * rate, _db(power / first), "stems")]
     turn = entry.drive.turn
     triangle = (np.sin(np.pi * n * turn) / (np.pi * n) ** 2 / (turn * (1.0 - turn))) ** 2
     seen = triangle > triangle[0] * 10.0 ** (0.1 * _FLOOR_DB)
@@ -47,7 +47,7 @@ def _spectrum(axis: str, entry: ManifestAxis) -> Chart:
         found = np.abs(np.fft.rfft(codes - np.mean(codes))[1:]) ** 2 / ticks**2 * 4.0 / entry.drive.v_amplitude**2
         noise = np.arange(1, len(found) + 1) > series.harmonics
         f, worst = _worst_of_bins(np.arange(1.0, len(found) + 1.0)[noise] * rate, found[noise] / first)
-        shown.append(DrawnCurve("codes beyond the cutoff", "backward", f, _db(worst)))
+        shown.append(DrawnCurve("codes beyond the cutoff", "other", f, _db(worst), faint=True))
         last = rate * ticks / 2.0
     marks = [Mark(series.harmonics * rate, f"cutoff {hertz(series.harmonics * rate)}")]
     bands: list[Band] = []

@@ -41,13 +41,13 @@ def _axis(planned: PlannedScan, line: LinePlan) -> tuple[Chart, list[str]]:
         curves.append(
             DrawnCurve(
                 "traces of the operator",
-                "backward",
+                "before",
                 drive.driver.volts(np.array([trace.centre for trace in traces])),
                 np.array([drive.size_law.size_nm(min(one / (drive.m * drive.g), 1.0)) for one in v.tolist()]),
                 "points",
             )
         )
-    curves.append(DrawnCurve("this scan", "forward", np.array([drive.v_offset]), np.array([drive.size_nm]), "points"))
+    curves.append(DrawnCurve("this scan", "limit", np.array([drive.v_offset]), np.array([drive.size_nm]), "points"))
     top = 1.15 * max(float(np.max(largest)), drive.size_nm)
     here = float(np.interp(drive.v_offset, offsets, largest))
     words = [

@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Literal
 
+from tablegen.library.whole import whole_build
 from tablegen.manifest.read import read_build
 from tablegen.verification.build import Report, Target, verify_build
 from tablegen.verification.files_target import FilesTarget
@@ -33,12 +34,12 @@ def verify(
     kept. What the directory of the build holds is compiled and run. The report's ``failures`` are empty if all is well.
 
     Raises ``NotABuild`` where there is no build, ``ToolMissing`` without a simulator or compiler, ``OSError`` where
-    nothing can be written.
+    nothing can be written. A program of a library is played with the runtime of the library.
     """
     folder = Path(folder)
     chosen, most_ticks = _target(target or default_target(folder), simulator, axis, fourier, ticks is None)
-    with _work_folder(None if keep is None else Path(keep)) as work:
-        return verify_build(folder, work, chosen, most_ticks if ticks is None else ticks, seed, progress)
+    with _work_folder(None if keep is None else Path(keep)) as work, whole_build(folder) as whole:
+        return verify_build(whole, work, chosen, most_ticks if ticks is None else ticks, seed, progress)
 
 
 def default_target(folder: Path) -> TargetName:

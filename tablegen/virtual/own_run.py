@@ -1,7 +1,7 @@
 """A scan on the scanner file's own operator: what its corrections gain, over several departures from the operator."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import msgspec
@@ -28,13 +28,14 @@ class OwnRow:
     """One correction on one axis.
 
     ``errors`` has a row a seed and a column a measure, in percent of the line; mismatch is NaN where one direction
-    images. ``rejected`` says why there are none.
+    images. ``rejected`` says why there are none. ``example`` is the run of the first seed.
     """
 
     correction: str
     model: str
     errors: tuple[tuple[float, ...], ...] = ()
     rejected: str = ""
+    example: AxisRun | None = field(default=None, compare=False, repr=False)
 
     def summary(self) -> dict[str, tuple[float, float]]:
         """Mean and worst of each measure, the worst with its sign; without the mismatch where there is none."""
@@ -103,15 +104,20 @@ def _axis(setup: Setup, name: str, line: LinePlan, seed: int, tell: Callable[[st
         except Rejected as faults:
             rows.append(OwnRow(correction, model, rejected="; ".join(map(str, faults.problems))))
             continue
-        rows.append(OwnRow(correction, model, errors_on(played, plants)))
+        runs = _on_each(played, plants)
+        rows.append(OwnRow(correction, model, tuple(map(measured, runs)), example=runs[0]))
     nearest = min(abs(one.centre - centre) for one in operator.lines)
     return OwnRun(name, line.drive.size_nm, operator.lines, nearest, False, tuple(rows))
 
 
 def errors_on(line: LinePlan, plants: Sequence[OwnAxis]) -> tuple[tuple[float, ...], ...]:
     """Of a line that is played on several scanners: a row each, of ``MEASURES``."""
+    return tuple(map(measured, _on_each(line, plants)))
+
+
+def _on_each(line: LinePlan, plants: Sequence[OwnAxis]) -> list[AxisRun]:
     try:
-        return tuple(measured(run) for run in run_on_each(line, plants, _MOST_TICKS))
+        return run_on_each(line, plants, _MOST_TICKS)
     except Unphysical as reason:
         raise Unphysical(f"{line.axis}: with a random departure of its own uncertainty, {reason}") from None
 

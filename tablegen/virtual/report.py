@@ -1,4 +1,4 @@
-"""What a simulation says, as text, rows of a CSV, plain data and a figure. All of it is labelled as a simulation."""
+"""What a simulation says, as text, rows of a CSV and plain data. All of it is labelled as a simulation."""
 
 import io
 from collections.abc import Sequence
@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from tablegen.compensation import models
-from tablegen.virtual.line_error import BranchError, LineError, ideal_triangle
+from tablegen.findings import Finding, worst_first
+from tablegen.virtual.line_error import BranchError, ideal_triangle
 from tablegen.virtual.parameters import Truth
 from tablegen.virtual.simulation import AxisRun, Run
 
 LABEL = "simulation on a virtual scanner"
 _MAX_CSV_ROWS = 10_000
-_COLOURS = ("#c23b22", "#d98e04", "#1f5fa8", "#2e7d4f", "#7b4fa3")  # by the order of models
+_LARGE_PERCENT = 1.0  # of the line: more spoils an image
 
 
 @dataclass(frozen=True)
@@ -49,8 +49,25 @@ def text(name: str, truth: Truth, stages: Sequence[SimulationStage]) -> list[str
     lines.append("* the model of the scanner file")
     if any(getattr(run, axis).refined for stage in stages for run in stage.runs for axis in ("x", "y")):
         lines.append("+ with the refinement of the scan file")
+    lines += [finding.line for finding in simulation_findings(stages)]
     lines.append(f"A simulation, not a measurement: the virtual scanner was identified on {truth.identified_on}.")
     return lines
+
+
+def simulation_findings(stages: Sequence[SimulationStage]) -> list[Finding]:
+    """What the scanner file's own models leave in the image, the worst first; of the last stage that was played."""
+    played = [stage for stage in stages if stage.runs]
+    found = []
+    for run in played[-1].runs if played else ():
+        for one in (getattr(run, axis) for axis in run.asked):
+            left = {side: max(map(abs, getattr(one.imaged, side).residual_range)) for side in one.directions}
+            side = max(left, key=lambda name: left[name])
+            text = f"the {run.model} model leaves {left[side]:.2g} % of the line of {one.axis}, {side}"
+            found.append(Finding("spoils" if left[side] > _LARGE_PERCENT else "expect", left[side], text))
+            by = one.size_error_percent
+            if abs(by) > _LARGE_PERCENT:
+                found.append(Finding("spoils", abs(by), f"the image is {by:+.2g} % off in the size of {one.axis}"))
+    return worst_first(found)
 
 
 def _rows(axis: str, run: Run) -> list[str]:
@@ -143,42 +160,3 @@ def _write_ticks(out: io.StringIO, start: str, one: AxisRun) -> None:
     columns = (drive.tick, drive.time_s, drive.codes, drive.volts, one.displacement_nm)
     for k, t, code, v, d, p, r in zip(*(c[thin] for c in columns), position, residual, strict=True):
         out.write(f"{start},{k},{t:.9g},{code},{v:.9g},{d:.9g},{p:.6f},{r:.6f}\n")
-
-
-def figure(title: str, stages: Sequence[SimulationStage]) -> bytes:
-    """A PNG: displacement, residual and scaling error, a row for each axis and stage. Needs matplotlib."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    rows = [(axis, stage) for axis in ("x", "y") for stage in stages if stage.runs]
-    page = Figure(figsize=(12, 3.1 * len(rows) + 0.4), layout="constrained")
-    FigureCanvasAgg(page)
-    grid = page.subplots(len(rows), 3, squeeze=False)
-    for axes, (name, stage) in zip(grid, rows, strict=True):
-        for run in stage.runs:
-            _draw(axes, getattr(run, name), run.model)
-        axes[0].set(title=f"{name}, scanner file as {stage.name}: displacement", xlabel="time [s]", ylabel="nm")
-        axes[1].set(title="residual", xlabel="position in the line", ylabel="% of the line")
-        axes[2].set(title="scaling error", xlabel="position in the line", ylabel="%")
-        axes[0].legend(frameon=False, fontsize=8)
-        for panel in axes[1:]:
-            panel.axhline(0.0, color="#999999", lw=0.6)
-            panel.set_xlim(0.0, 1.0)
-    page.suptitle(f"{title}; forward solid, backward dashed")
-    out = io.BytesIO()
-    page.savefig(out, dpi=110, metadata={"Software": None})
-    return out.getvalue()
-
-
-def _draw(axes: Sequence[Any], one: AxisRun, model: str) -> None:
-    colour = _COLOURS[models.get(model).order % len(_COLOURS)]
-    thin = slice(None, None, max(1, len(one.displacement_nm) // 4000))
-    axes[0].plot(one.drive.time_s[thin], one.displacement_nm[thin], color=colour, lw=1.4, label=model)
-    error: LineError = one.error
-    for side in one.directions:
-        branch: BranchError = getattr(error, side)
-        style = "-" if side == "forward" else "--"
-        low, high = branch.window
-        inside = (branch.position >= low) & (branch.position <= high)
-        axes[1].plot(branch.position[inside], branch.residual[inside], style, color=colour, lw=1.4)
-        axes[2].plot(branch.scaling_position, branch.scaling, style, color=colour, lw=1.4)

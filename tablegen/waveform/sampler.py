@@ -6,14 +6,62 @@ Nothing that is emitted comes from here: the transform's last bits differ betwee
 from math import factorial, tau
 
 import numpy as np
+import numpy.typing as npt
 
 from tablegen.numerics.arrays import Floats, Ints
 from tablegen.waveform.series import FourierSeries
 
+Complexes = npt.NDArray[np.complex128]
 _TAYLOR_ORDER = 6
 # Half a block of the highest harmonic is then pi/64 of angle, and its seventh power over 7! is 1e-13.
 _BLOCKS_PER_HARMONIC = 64
 _CHUNK_TICKS = 1 << 14  # ticks that are worked out together, in the cache
+
+# Half a block of the highest harmonic is then pi/16 of angle: its eleventh power over 11! is 4e-16.
+_LONG_ORDER, _LONG_BLOCKS_PER_HARMONIC = 10, 16
+_MOST_DERIVATIVES = 2
+
+
+def _spectrum(series: FourierSeries) -> Complexes:
+    return np.concatenate([[series.a0], 0.5 * (series.a - 1j * series.b)])
+
+
+def on_grid(series: FourierSeries, count: int) -> Floats:
+    """w(k / count) for k in [0, count), by a transform; ``count`` is above twice the highest harmonic."""
+    samples: Floats = np.fft.irfft(_spectrum(series), count) * count
+    return samples
+
+
+class Expansion:
+    """w and its first two derivatives at any times, to some units in the last place, in a time without harmonics in it.
+
+    Taylor series about the centres of blocks, as in ``Sampler``, but to the precision of the numbers.
+    """
+
+    def __init__(self, series: FourierSeries) -> None:
+        self._blocks = blocks = 1 << (_LONG_BLOCKS_PER_HARMONIC * series.harmonics - 1).bit_length()
+        spectrum, rate = _spectrum(series), 1j * tau * np.arange(series.harmonics + 1)
+        self._terms: list[Floats] = []
+        for m in range(_LONG_ORDER + _MOST_DERIVATIVES + 1):
+            self._terms.append(np.fft.irfft(spectrum, blocks) * (blocks / factorial(m)))
+            spectrum = spectrum * rate
+
+    def at(self, t: Floats, *derivatives: int) -> list[Floats]:
+        """w, or these derivatives of it, at times in periods."""
+        nearest = np.rint(t * self._blocks)
+        h = t - nearest / self._blocks
+        block = nearest.astype(np.int64) & (self._blocks - 1)
+        near = [term[block] for term in self._terms[: _LONG_ORDER + max(derivatives) + 1]]
+        return [_derivative(near, h, order) for order in derivatives]
+
+
+def _derivative(near: list[Floats], h: Floats, order: int) -> Floats:
+    """The derivative of a polynomial in h with these coefficients, but for its highest terms, by Horner."""
+    total = np.zeros_like(h)
+    for m in reversed(range(order, order + _LONG_ORDER + 1)):
+        total *= h
+        total += near[m] * (factorial(m) // factorial(m - order))
+    return total
 
 
 class Sampler:
@@ -26,7 +74,7 @@ class Sampler:
     def __init__(self, series: FourierSeries, count: int) -> None:
         self._count = count
         blocks = 1 << (_BLOCKS_PER_HARMONIC * series.harmonics - 1).bit_length()
-        spectrum = np.concatenate([[series.a0], 0.5 * (series.a - 1j * series.b)])
+        spectrum = _spectrum(series)
         if count <= 2 * blocks:
             self._blocks = 0  # few enough to hold them all
             self._samples = np.fft.irfft(spectrum, count) * count

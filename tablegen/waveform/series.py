@@ -1,7 +1,8 @@
 """A real, periodic, band-limited waveform: w(t) = a0 + sum_n a_n cos(2 pi n t) + b_n sin(2 pi n t)."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from math import tau
 
 import numpy as np
@@ -11,6 +12,20 @@ from tablegen.numerics.turns import sine_and_cosine
 
 _BLOCK = 1 << 12  # times that are worked out together
 _TURNED = 16  # harmonics from one whose sine is worked out to the next
+
+_KEPT = 1 << 18  # sines and cosines of one grid that are kept for the next series on it: 4 MB
+
+
+def _waves(count: int, harmonics: int) -> Iterator[tuple[Floats, Floats]]:
+    """Sine and cosine of 2 pi n k / count for k in [0, count), for n = 1..harmonics."""
+    s, c = sine_and_cosine(np.arange(count) / count)
+    for at in multiples(np.arange(count), count, harmonics):
+        yield s.take(at, mode="clip"), c.take(at, mode="clip")
+
+
+@lru_cache(maxsize=4)  # both axes, in a plan and in its certificate
+def _kept_waves(count: int, harmonics: int) -> list[tuple[Floats, Floats]]:
+    return list(_waves(count, harmonics))
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,10 +50,10 @@ class FourierSeries:
 
     def on_grid(self, count: int, derivative: int = 0) -> Floats:
         """As ``value`` at k / count for k in [0, count), by one table of sines for all harmonics."""
-        s, c = sine_and_cosine(np.arange(count) / count)
         total = np.full(count, self.a0 if derivative == 0 else 0.0)
-        for n, at in enumerate(multiples(np.arange(count), count, self.harmonics), 1):
-            total += self.term(n, derivative, s.take(at, mode="clip"), c.take(at, mode="clip"))
+        kept = count * self.harmonics <= _KEPT
+        for n, (s, c) in enumerate((_kept_waves if kept else _waves)(count, self.harmonics), 1):
+            total += self.term(n, derivative, s, c)
         return total
 
     def term(self, n: int, derivative: int, s: Floats, c: Floats) -> Floats:

@@ -162,7 +162,14 @@ def test_a_notebook_shows_drive_error_and_certificate(scan: tablegen.Build) -> N
     seen.feed(html)
     assert seen.open == []
     text = " ".join(seen.texts)
-    for wanted in ("x: drive [V]", "y: modelled error", "compensated", "max 0.574 LSB", "20.3679 V peak to"):
+    for wanted in (
+        "x drive, one line",
+        "drive at the piezo [V]",
+        "y: modelled error",
+        "compensated",
+        "max 0.574 LSB",
+        "20.3679 V peak to",
+    ):
         assert wanted in text
     assert len(html) < 60_000
     assert not any("http" in value for value in (*seen.attributes, *seen.texts))

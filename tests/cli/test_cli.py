@@ -22,7 +22,7 @@ from limits import PATIENCE_S
 
 from tablegen import __version__
 
-COMMANDS = ("build", "check", "show", "report", "verify", "init", "paths", "schema")
+COMMANDS = ("build", "sweep", "check", "show", "report", "verify", "init", "paths", "schema")
 COMMANDS += ("upload", "status", "readback", "park", "trigger", "clear", "ports")
 OWN_FILES = [
     "annexin_200nm.c",
@@ -85,7 +85,7 @@ def test_help_names_every_command_and_every_exit_status() -> None:
     for command in COMMANDS:
         assert re.search(rf"^  {command} +\S.*\.$", shown, re.MULTILINE), command
     statuses = "0 done|1 output is stale|2 wrong input|3 a limit|4 cannot write|5 a build|6 a simulator|130 interrupted"
-    statuses += "|7 no port|8 no answer|9 refused|10 link lost"
+    statuses += "|7 no port|8 no answer|9 refused|10 link lost|11 some scans"
     for status in statuses.split("|"):
         assert status in shown
     assert run("-h").out == shown
@@ -97,7 +97,7 @@ def test_help_names_every_command_and_every_exit_status() -> None:
         ("build", ("SCAN.TOML", "--output DIR", "--check", "--quiet", "[default: build]", "tablegen build annexin")),
         ("build", ("--depfile FILE", "--depfile-target NAME", "gcc -MD -MP", "[default: DIR/manifest.json]")),
         ("check", ("SCAN.TOML", "file:line: key: why")),
-        ("show", ("SCAN.TOML", "--json", "--plot / --no-plot", "> and <")),
+        ("show", ("SCAN.TOML", "--json", "--plot [FILE]", "--no-plot", "> is forward and < is backward")),
         ("report", ("SCAN.TOML|DIR", "--output FILE", "[default: report.html]", "--verified FILE", "--svg DIR")),
         (
             "verify",
@@ -324,22 +324,23 @@ def test_a_broken_limit_is_status_3_and_nothing_is_written(tmp_path: Path) -> No
     assert not (tmp_path / "out").exists()
 
 
-def test_show_draws_in_braille_where_it_can_and_in_stars_elsewhere(scan: Path) -> None:
+def test_show_draws_in_braille_where_it_can_and_in_marks_elsewhere(scan: Path) -> None:
     braille = re.compile("[\u2801-\u28ff]")
     rich = tablegen("show", scan, PYTHONIOENCODING="utf-8")
     plain = tablegen("show", scan, PYTHONIOENCODING="ascii")
     assert (rich.returncode, plain.returncode, rich.stderr, plain.stderr) == (0, 0, b"", b"")
     rich_text, plain_text = rich.stdout.decode("utf-8"), plain.stdout.decode("ascii")
     assert braille.search(rich_text)
-    assert "****" in plain_text
+    assert not braille.search(plain_text)
+    assert ">>>>" in plain_text
+    assert "<<<<" in plain_text
     for text in (rich_text, plain_text):
         assert "\x1b" not in text, "no colours in a pipe"
-        assert text.count("drive [V]") == 2
-        assert ">>>>" in text
-        assert "<<<<" in text
+        assert text.count("drive at the piezo [V]") == 2
+        assert text.count("> forward   < backward") == 4
         assert text.splitlines()[-1].startswith("note: ")
     no_plot = tablegen("show", scan, "--no-plot").stdout.decode()
-    assert "drive [V]" not in no_plot
+    assert "drive at the piezo [V]" not in no_plot
     assert no_plot.splitlines()[:12] == rich_text.splitlines()[:12]
 
 

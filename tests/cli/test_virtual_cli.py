@@ -131,13 +131,13 @@ def test_a_figure(tmp_path: Path) -> None:
 def test_wrong_use(tmp_path: Path) -> None:
     scan = write_pair(tmp_path, SHORT)
     for arguments, why in (
-        (("--plot", tmp_path / "figure.pdf"), "the name has to end in .png"),
+        (("--plot", tmp_path / "figure.gif"), "the name has to end in .png, .svg or .pdf"),
         (("--noise", "nan"), "nan is not a finite number"),
     ):
         outcome = run("simulate", scan, *arguments)
         assert outcome.status == ExitStatus.WRONG_INPUT
         assert why in outcome.err
-    assert not (tmp_path / "figure.pdf").exists()
+    assert not (tmp_path / "figure.gif").exists()
 
 
 @pytest.mark.common
@@ -208,7 +208,6 @@ def test_what_goes_with_the_own_operator(tmp_path: Path) -> None:
     assert "the nearest trace is 10 % of v_max from this offset" in text
     for extra, name in (
         (("--csv", tmp_path / "a.csv"), "--csv"),
-        (("--plot", tmp_path / "a.png"), "--plot"),
         (("--noise", "1"), "--noise"),
         (("--no-calibration",), "--calibration"),
     ):

@@ -219,7 +219,7 @@ KEYS = [
         says=(
             "scan.toml:1: wholly_different: unknown key; known here: amplifier, dac, emit, image_nm, image_um, "
             "limits, name, "
-            "scanner, timing, x, y"
+            "scanner, scans, timing, x, y"
         ),
     ),
     case("+ [emti]\nheader_only = true", says="scan.toml:57: emti: unknown key; did you mean emit?"),
@@ -229,7 +229,7 @@ KEYS = [
         says=(
             'scan.toml:54: "we.ird \\"key\\"": unknown key; known here: amplifier, dac, emit, image_nm, '
             "image_um, limits, name, "
-            "scanner, timing, x, y"
+            "scanner, scans, timing, x, y"
         ),
     ),
     case(

@@ -13,7 +13,7 @@ import tablegen
 PACKAGE = Path(tablegen.__file__).parent
 # From the lowest to the highest; a module imports from its own layer and from those before it.
 LAYERS = (
-    "version problems interruption reading resources installation figures quantities toml",
+    "version findings problems interruption reading resources installation figures quantities toml",
     "numerics driver",
     "waveform",
     "compensation",
@@ -24,6 +24,7 @@ LAYERS = (
     "certificate",
     "manifest",
     "emit",
+    "library",
     "link",
     "verification",
     "calibration",
@@ -32,6 +33,7 @@ LAYERS = (
     "correction",
     "report",
     "api",
+    "sweep",
     "cli",
     "__main__",
 )

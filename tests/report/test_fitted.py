@@ -11,7 +11,8 @@ from editing import run
 from foreign_plants import SIX, ForeignPlant, ManyPlays, record
 from html_page import Page, well_formed
 
-from tablegen.report.fitted import in_parts
+from tablegen.calibration.estimate import Curve
+from tablegen.report.fitted import drawn_curves
 
 NOISE = 1.0 + 0.002 * np.random.default_rng(11).standard_normal(100)
 
@@ -83,10 +84,20 @@ def test_a_resonance(tmp_path: Path) -> None:
     assert f"frequency_hz {told['parameters']['frequency_hz']['value']:.6g} ±" in read.said
 
 
-def test_a_line_is_lifted_where_it_turns() -> None:
-    x, y = in_parts(np.array([0.0, 1.0, 2.0, 1.5, 0.5]), np.arange(5.0))
-    assert np.array_equal(x, [0.0, 1.0, 2.0, np.nan, 1.5, 0.5], equal_nan=True)
-    assert np.array_equal(y, [0.0, 1.0, 2.0, np.nan, 3.0, 4.0], equal_nan=True)
+def test_both_directions_of_a_curve_are_drawn_by_themselves() -> None:
+    """Measured and fitted have other numbers of points; a curve without a direction has none in its picture."""
+    x = np.array([0.0, 1.0, 2.0, 1.5, 0.5])
+    both = Curve("t", "x [V]", "y [nm]", (x, x), (x[1:], x[1:]), (3, 2))
+    drawn = drawn_curves(both)
+    assert [(one.name, one.role, one.kind) for one in drawn] == [
+        ("forward, measured", "forward", "points"),
+        ("backward, measured", "backward", "points"),
+        ("forward, fit", "forward", "line"),
+        ("backward, fit", "backward", "line"),
+    ]
+    assert [one.x.tolist() for one in drawn] == [[0.0, 1.0, 2.0], [1.5, 0.5], [1.0, 2.0], [1.5, 0.5]]
+    plain = Curve("t", "x [V]", "y [nm]", (x, x), (x, x))
+    assert [(one.name, one.role) for one in drawn_curves(plain)] == [("measured", "other"), ("fit", "other")]
 
 
 @pytest.mark.common

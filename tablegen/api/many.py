@@ -1,0 +1,95 @@
+"""Many builds at once: in processes of their own, as they complete, with errors as values."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tablegen.api.build import Build, build, load
+from tablegen.api.workers import default_jobs, results
+from tablegen.config.load import Setup
+from tablegen.config.variants import Variant
+from tablegen.config.variants import variants as library_and_variants
+
+Scans = Iterable["str | Path | Setup | Variant"]
+
+
+@dataclass(frozen=True, repr=False)
+class BuildOutcome:
+    """What became of one scan of many: a build, or the error that kept it from being one."""
+
+    number: int
+    """Its place in the sources, from 0."""
+    source: "str | Path | Setup | Variant"
+    build: Build | None
+    error: Exception | None
+    """``Rejected``, ``BrokenLimit``, ``CannotWrite``, or whatever else was raised."""
+
+    @property
+    def name(self) -> str:
+        """The name of the scan, or its path where it could not be read."""
+        if self.build is not None:
+            return self.build.name
+        if isinstance(self.source, Setup):
+            return self.source.scan.name
+        return self.source.name if isinstance(self.source, Variant) else str(self.source)
+
+    def __repr__(self) -> str:
+        told = repr(self.build).partition("\n")[0] + ">" if self.build is not None else f"{self.error}"
+        return f"<tablegen outcome {self.number}: {told}>"
+
+
+def variants(path: str | Path, settings: Mapping[str, Iterable[Any]] | None = None) -> list[Variant]:
+    """Every scan of a file: of its ``[[scans]]``, or the file itself, with each combination of the settings.
+
+    ``settings`` are values by keys of the scan file: ``{"x.size_nm": range(50, 1001, 50)}``. Each variant has a
+    ``name``, the ``settings`` that differ, and a ``setup``. Raises ``Rejected`` where the file cannot be read, or names
+    meet; what is wrong with a single scan is found when its ``setup`` is asked for.
+    """
+    return library_and_variants(path, settings or {})[1]
+
+
+def build_many(
+    sources: Scans,
+    out: str | Path | None = None,
+    *,
+    formats: Sequence[str] | None = None,
+    jobs: int | None = None,
+) -> Iterator[BuildOutcome]:
+    """Build many scans in parallel processes, and give each as it completes, its error in place of a build.
+
+    ``sources`` are scan files, setups or variants; they are taken as workers become free, and nothing is kept, so that
+    memory does not grow with their number. Where ``out`` is given, each is written into ``out/NAME``, as by ``build``.
+    ``jobs`` are processes: nine tenths of the cores unless given; with 1 all of it runs in this process.
+    """
+    given: dict[int, str | Path | Setup | Variant] = {}
+
+    def tasks() -> Iterator[tuple[Setup | Exception, str | None, Sequence[str] | None]]:
+        for number, source in enumerate(sources):
+            given[number] = source
+            yield _setup(source), None if out is None else str(out), formats
+
+    for number, found in results(_built, tasks(), default_jobs() if jobs is None else jobs):
+        source = given.pop(number)
+        if isinstance(found, Exception):
+            yield BuildOutcome(number, source, None, found)
+        else:
+            yield BuildOutcome(number, source, found, None)
+
+
+def _setup(source: "str | Path | Setup | Variant") -> Setup | Exception:
+    try:
+        if isinstance(source, Variant):
+            return source.setup
+        return source if isinstance(source, Setup) else load(source)
+    except Exception as error:
+        return error
+
+
+def _built(setup: Setup | Exception, out: str | None, formats: Sequence[str] | None) -> Build:
+    """In a worker. What went wrong before comes back as it went."""
+    if isinstance(setup, Exception):
+        raise setup
+    built = build(setup, None if out is None else Path(out) / setup.scan.name, formats=formats)
+    built.__dict__.pop("files", None)  # ten times what the rest is; it makes them again when it is asked
+    return built

@@ -1,0 +1,128 @@
+"""Values of a key that a sweep goes through, from the text of ``--set``: ranges, lists, texts."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from decimal import Decimal, InvalidOperation
+from typing import Any
+
+from tablegen.problems import Problem, Rejected, shortened
+from tablegen.toml import parse_toml
+
+MOST_VALUES = 65_536  # of one key, and of scans in one sweep
+_OPENING, _CLOSING = "[{", "]}"
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A key of the scan file, such as ``x.size_nm``, the values it goes through, and what messages call it."""
+
+    key: str
+    values: tuple[Any, ...]
+    origin: str = ""
+
+    @property
+    def parts(self) -> list[str]:
+        """The key, table by table."""
+        return self.key.split(".")
+
+
+def parse_setting(text: str) -> Setting:
+    """A setting from ``KEY=VALUE,VALUE..``; a value is a number, a range START:STOP:STEP, a word or a TOML value.
+
+    A range ends at STOP where a whole number of steps reaches it, and before it where none does. Raises ``Rejected``.
+    """
+    origin = f"--set {shortened(text)}"
+    key, equals, written = text.partition("=")
+    key = key.strip()
+    if not equals or not key or not all(key.split(".")):
+        raise _refused(origin, "is not KEY=VALUES, as in x.size_nm=50:1000:50 or x.offset_v=10,50,90")
+    values: list[Any] = []
+    for item in _items(written, origin):
+        values += _values(item.strip(), origin)
+        if len(values) > MOST_VALUES:
+            raise _refused(origin, f"has more than {MOST_VALUES} values")
+    seen: set[str] = set()
+    for value in values:
+        if repr(value) in seen:
+            raise _refused(origin, f"has {value!r} twice")
+        seen.add(repr(value))
+    return Setting(key, tuple(values), origin)
+
+
+def given(settings: "Sequence[Setting]") -> None:
+    """Refuse a key that is given twice, or beside a table that holds it."""
+    for at, setting in enumerate(settings):
+        for other in settings[:at]:
+            if setting.key == other.key:
+                raise _refused(setting.origin or setting.key, f"{setting.key} is given twice; list its values in one")
+            shorter, longer = sorted((setting.parts, other.parts), key=len)
+            if longer[: len(shorter)] == shorter:
+                raise _refused(setting.origin or setting.key, f"{'.'.join(longer)} lies in {'.'.join(shorter)}")
+
+
+def _refused(origin: str, why: str) -> Rejected:
+    return Rejected([Problem(origin, 0, "", why)])
+
+
+def _items(text: str, origin: str) -> list[str]:
+    """The text at its commas, but those in brackets and quotes."""
+    items, depth, quote = [""], 0, ""
+    for character in text:
+        if quote:
+            quote = "" if character == quote else quote
+        elif character in "\"'":
+            quote = character
+        elif character in _OPENING:
+            depth += 1
+        elif character in _CLOSING:
+            depth -= 1
+        elif character == "," and depth == 0:
+            items.append("")
+            continue
+        items[-1] += character
+    if not all(item.strip() for item in items):
+        raise _refused(origin, "has an empty value; quote a text that is empty")
+    return items
+
+
+def _values(item: str, origin: str) -> list[Any]:
+    if ":" in item and item[0] not in "\"'[{":
+        numbers = [_number(part.strip()) for part in item.split(":")]
+        if all(number is not None for number in numbers):
+            return _range([number for number in numbers if number is not None], item, origin)
+        if any(number is not None for number in numbers):
+            raise _refused(origin, f"{item!r} is no range START:STOP:STEP of numbers; quote it if it is a text")
+    try:
+        return [parse_toml(f"value = {item}", origin)[0]["value"]]
+    except Rejected:
+        return [item]  # a word without quotes
+
+
+def _number(text: str) -> Decimal | None:
+    try:
+        value = Decimal(text.replace("_", ""))
+    except InvalidOperation:
+        return None
+    return value if value.is_finite() and abs(value.adjusted()) < 100 else None
+
+
+def _range(numbers: list[Decimal], item: str, origin: str) -> list[int | float]:
+    """Every STEP from START to STOP, in decimal: 0.1:0.5:0.1 has 0.3 in it, and 0.5."""
+    if len(numbers) != 3:
+        raise _refused(origin, f"{item!r} has no step; a range is START:STOP:STEP, as in 50:1000:50")
+    start, stop, step = numbers
+    if step == 0:
+        raise _refused(origin, f"{item!r} has a step of 0")
+    if (stop - start) * step < 0:
+        raise _refused(origin, f"{item!r} steps away from {stop}; give the step the other sign")
+    count = int((stop - start) / step) + 1
+    if count > MOST_VALUES:
+        raise _refused(origin, f"{item!r} has {count} values; at most {MOST_VALUES} are taken")
+    whole = all(number == number.to_integral_value() and _exponent(number) >= 0 for number in numbers)
+    found = [start + step * at for at in range(count)]
+    return [int(value) for value in found] if whole else [float(value) for value in found]
+
+
+def _exponent(number: Decimal) -> int:
+    exponent = number.as_tuple().exponent
+    return exponent if isinstance(exponent, int) else 0

@@ -1,0 +1,85 @@
+"""What a user has to know of an image, with its weight: what spoils the image first, small print last.
+
+A weight is by what becomes of the image; within it, percentages of the scan count: by how much of the line a place, or
+the size, is wrong. Where no percentage is known it is 0.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+Weight = Literal["limit", "spoils", "expect", "note"]
+Tone = Literal["", "good", "warn", "bad", "quiet"]
+_ORDER: tuple[Weight, ...] = ("limit", "spoils", "expect", "note")
+_TONES: dict[Weight, Tone] = {"limit": "bad", "spoils": "warn", "expect": "", "note": "quiet"}
+_SIGNS: dict[Weight, str] = {
+    "limit": "\u2717 breaks a limit",
+    "spoils": "! spoils the image",
+    "expect": "to expect",
+    "note": "note",
+}
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A sentence, how much it weighs, and by what percentage of the scan within that.
+
+    ``called`` replaces the words for its weight on a page, ``label`` begins its line in a terminal.
+    """
+
+    weight: Weight
+    percent: float
+    text: str
+    called: str = ""
+    label: str = "note"
+
+    @property
+    def tone(self) -> Tone:
+        """Its colour."""
+        return _TONES[self.weight]
+
+    @property
+    def sign(self) -> str:
+        """Its weight in words, for eyes that see no colour."""
+        return self.called or _SIGNS[self.weight]
+
+    @property
+    def line(self) -> str:
+        """As a line of a terminal."""
+        return f"{self.label}: {self.text}"
+
+
+class Remark(str):
+    """A sentence of a fit, which is a text with a weight and a percentage of the scan."""
+
+    weight: Weight
+    percent: float
+
+    def __new__(cls, text: str, weight: Weight = "note", percent: float = 0.0) -> "Remark":
+        made = super().__new__(cls, text)
+        made.weight, made.percent = weight, percent
+        return made
+
+    def under(self, name: str) -> "Remark":
+        """The same, said of something; of nothing if that has no name."""
+        return Remark(f"{name}: {self}", self.weight, self.percent) if name else self
+
+
+def spoils(text: str, percent: float = 0.0) -> Remark:
+    """A remark on what makes the image worse, by so much of the scan where that is known."""
+    return Remark(text, "spoils", percent)
+
+
+def worst_first(findings: Iterable[Finding]) -> list[Finding]:
+    """In order; those of one weight and, as it is printed, one percentage stay as they are."""
+    return sorted(findings, key=lambda one: (_ORDER.index(one.weight), -as_printed(one.percent)))
+
+
+def as_printed(percent: float) -> float:
+    """In three digits: what reads the same is the same."""
+    return float(f"{percent:.3g}")
+
+
+def of_remarks(remarks: Iterable[Remark]) -> list[Finding]:
+    """As findings, in their own order."""
+    return [Finding(one.weight, one.percent, str(one)) for one in remarks]

@@ -1,0 +1,142 @@
+"""What an index has of a program: its record in ``program.json``, beside the files of the program."""
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from msgspec import Struct
+
+from tablegen.device.widths import least_widths
+from tablegen.emit.content import AxisContent, Content
+from tablegen.library.whole import RECORD
+from tablegen.manifest.format import read_json
+from tablegen.reading import BUILD_FILE, file_sha256, read_bytes
+
+
+class AxisEntry(Struct, frozen=True, kw_only=True):
+    """Of an axis: what a device has to be made for, and what the certificate says."""
+
+    table_bits: int
+    table_words: int
+    index_bits: int
+    interpolated: bool
+    harmonics: int
+    dac_bits: int
+    word_bits: int
+    coding: str
+    align: str
+    channel: str
+    max_error_lsb: float
+    scaling_error_percent: float
+
+
+class Entry(Struct, frozen=True, kw_only=True):
+    """A program of a library. ``inputs`` is the digest of all that it was made from, ``files`` those of its folder."""
+
+    library: str
+    name: str
+    hash: str
+    settings: dict[str, Any]
+    formats: list[str]
+    update_rate_hz: float
+    line_ticks: int
+    frame_lines: int
+    widths: dict[str, int]
+    x: AxisEntry
+    y: AxisEntry
+    warnings: list[str]
+    inputs: str
+    files: dict[str, str]
+
+    @property
+    def axes(self) -> tuple[AxisEntry, AxisEntry]:
+        """Both axes, fast first."""
+        return self.x, self.y
+
+    def described(self) -> dict[str, Any]:
+        """What the index shows of it."""
+        record: dict[str, Any] = msgspec.to_builtins(self)
+        return {key: value for key, value in record.items() if key not in ("library", "inputs", "files", "formats")}
+
+
+def make_entry(
+    library: str,
+    content: Content,
+    errors: Mapping[str, tuple[float, float]],
+    *,
+    settings: Mapping[str, Any],
+    formats: Sequence[str],
+    warnings: Sequence[str],
+    inputs: str,
+    files: Mapping[str, bytes],
+) -> Entry:
+    """The entry of a build; ``errors`` are the largest error in LSB and the scaling error in percent, by axis."""
+
+    def axis(one: AxisContent) -> AxisEntry:
+        program, output = one.program, one.program.output
+        return AxisEntry(
+            table_bits=program.bits,
+            table_words=len(program.words),
+            index_bits=program.index_bits,
+            interpolated=program.mode == "interpolated",
+            harmonics=one.harmonics,
+            dac_bits=output.dac_bits,
+            word_bits=output.word_bits,
+            coding=output.coding,
+            align=output.align,
+            channel=output.channel,
+            max_error_lsb=float(f"{errors[one.axis][0]:.6g}"),
+            scaling_error_percent=float(f"{errors[one.axis][1]:.6g}"),
+        )
+
+    schedule = content.schedule
+    return Entry(
+        library=library,
+        name=content.name,
+        hash=content.hash,
+        settings=dict(settings),
+        formats=list(formats),
+        update_rate_hz=float(schedule.update_rate_hz),
+        line_ticks=schedule.ticks,
+        frame_lines=schedule.lines,
+        widths=least_widths(schedule, content.y.program),
+        x=axis(content.x),
+        y=axis(content.y),
+        warnings=list(warnings),
+        inputs=inputs,
+        files={name: hashlib.sha256(text).hexdigest() for name, text in sorted(files.items())},
+    )
+
+
+def entry_file(entry: Entry) -> bytes:
+    """``program.json``."""
+    return (json.dumps(msgspec.to_builtins(entry), indent=1) + "\n").encode("ascii")
+
+
+def read_entry(folder: Path) -> Entry | None:
+    """The entry in the folder of a program; None where there is none, or a damaged one."""
+    try:
+        return msgspec.convert(read_json(read_bytes(folder / RECORD, BUILD_FILE)), Entry)
+    except (OSError, ValueError, RecursionError):  # a ValidationError is a ValueError
+        return None
+
+
+def is_whole(folder: Path, entry: Entry) -> bool:
+    """Whether all files of a program are there, as they were written."""
+    return not changed_files(folder, entry)
+
+
+def changed_files(folder: Path, entry: Entry) -> list[str]:
+    """The files of a program that are missing or not as they were written."""
+    found = []
+    for name, digest in entry.files.items():
+        try:
+            same = file_sha256(folder / name, BUILD_FILE) == digest
+        except OSError:
+            same = False
+        if not same:
+            found.append(name)
+    return found

@@ -1,0 +1,98 @@
+"""The index of a library in Verilog: constants, and one memory of all programs for ``dac_library``.
+
+The memory has words of 32 bits: first the address of each record, by number, then the records. A record is the number
+of words of x and of y, with bit 31 set where they are Fourier words; 48 words of the program; the words of x and y,
+sign-extended; and the CRC-32 of all of these, of their bytes from the lowest.
+"""
+
+import zlib
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS
+from tablegen.emit.formats.verilog import literal, value_range
+from tablegen.emit.templates import template_text
+from tablegen.library.entry import AxisEntry, Entry
+from tablegen.reading import BUILD_FILE, read_bytes, read_text
+
+MODULE = "dac_library.v"
+FOURIER = 1 << 31
+_FOLDER = Path(__file__).parent
+_HARMONICS = AXIS_WORDS.index("harmonics")
+
+
+def verilog_index(library: str, entries: Sequence[Entry], folder: Path, version: str) -> dict[str, bytes]:
+    """``NAME_library.vh``, its memories, and the module that reads them; programs that one sequencer can play.
+
+    Words are those of the ``.mem`` files of the programs in ``folder``. Raises ``OSError`` where one cannot be read.
+    """
+    files = {f"{library}_library_tables.mem": _memory(entries, folder, fourier=False)}
+    rendered = all(axis.interpolated for entry in entries for axis in entry.axes)
+    if rendered:
+        files[f"{library}_library_fourier.mem"] = _memory(entries, folder, fourier=True)
+        longest = max(entries, key=lambda entry: max(axis.index_bits for axis in entry.axes))
+        sine = read_bytes(folder / longest.name / f"{longest.name}_sine.mem", BUILD_FILE)
+        files[f"{library}_library_sine.mem"] = sine
+    context = {
+        "version": version,
+        "library": library,
+        "LIBRARY": library.upper(),
+        "constants": _constants(entries),
+        "files": {
+            name.removesuffix(".mem").removeprefix(f"{library}_library_").upper(): (name, text.count(b"\n"))
+            for name, text in files.items()
+        },
+        "programs": [(entry.name.upper(), number) for number, entry in enumerate(entries)],
+    }
+    header = template_text(read_text(_FOLDER / "library.vh.j2", BUILD_FILE), context, literal, range=value_range)
+    return {f"{library}_library.vh": header, **files, MODULE: read_bytes(_FOLDER / MODULE, BUILD_FILE)}
+
+
+def _constants(entries: Sequence[Entry]) -> dict[str, int]:
+    """The parameters of a ``dac_sequencer`` that plays all of them."""
+    found = {"PROGRAMS": len(entries), "DAC_BITS": entries[0].x.dac_bits}
+    for letter, axes in (("X", [entry.x for entry in entries]), ("Y", [entry.y for entry in entries])):
+        found |= {
+            f"{letter}_INTERPOLATED": int(axes[0].interpolated),
+            f"{letter}_INDEX_BITS": max(_index_bits(axis) for axis in axes),
+            f"{letter}_WORD_BITS": axes[0].table_bits,
+        }
+    found |= {key: max(entry.widths[key] for entry in entries) for key in entries[0].widths}
+    found["HARMONICS"] = max(axis.harmonics for entry in entries for axis in entry.axes)
+    return found
+
+
+def _index_bits(axis: AxisEntry) -> int:
+    """Of a bank that holds the table."""
+    return axis.index_bits if axis.interpolated else max((axis.table_words - 1).bit_length(), 2)
+
+
+def _memory(entries: Sequence[Entry], folder: Path, fourier: bool) -> bytes:
+    records = [_record(entry, folder / entry.name, fourier) for entry in entries]
+    starts = np.cumsum([len(entries), *(len(record) for record in records)])
+    words = np.concatenate([starts[:-1].astype(np.uint32), *records])
+    return "".join(f"{word:08x}\n" for word in words.tolist()).encode("ascii")
+
+
+def _record(entry: Entry, folder: Path, fourier: bool) -> "np.ndarray[tuple[int], np.dtype[np.uint32]]":
+    """A record as words."""
+    kind = "_fourier" if fourier else ""
+    program = _words(folder / f"{entry.name}_program.mem", 32)
+    axes = [
+        _words(folder / f"{entry.name}_{name}{kind}.mem", 32 if fourier else axis.table_bits)
+        for name, axis in (("x", entry.x), ("y", entry.y))
+    ]
+    if fourier:
+        for page, axis in ((1, entry.x), (2, entry.y)):
+            program[page * PAGE_WORDS + _HARMONICS] = axis.harmonics
+    counts = np.array([len(words) | (FOURIER if fourier else 0) for words in axes], dtype=np.uint32)
+    record = np.concatenate([counts, program, *axes])
+    return np.append(record, np.uint32(zlib.crc32(record.astype("<u4").tobytes())))
+
+
+def _words(path: Path, bits: int) -> "np.ndarray[tuple[int], np.dtype[np.uint32]]":
+    """The words of a memory file, sign-extended to 32 bits."""
+    words = np.array([int(word, 16) for word in read_text(path, BUILD_FILE, "ascii").split()], dtype=np.int64)
+    return (words - ((words >> (bits - 1)) << bits)).astype(np.uint32)

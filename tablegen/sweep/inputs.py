@@ -1,0 +1,45 @@
+"""The digest of all that a program is made from, so that a second run knows what it may leave as it is."""
+
+import hashlib
+import json
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from tablegen.config.load import Setup
+from tablegen.emit.depfile import deciding_files
+from tablegen.reading import file_sha256
+
+
+class Inputs:
+    """Digests of files, each read once a run, and of the package that makes the formats."""
+
+    def __init__(self) -> None:
+        self._digests: dict[Path, str] = {}
+        self._tool = cache(_tool_digest)
+
+    def digest(self, setup: Setup, values: dict[str, Any], formats: Sequence[str]) -> str:
+        """The digest of a setup, of the values of its scan file, and of what makes these formats.
+
+        Raises ``OSError`` where a file that it names cannot be read.
+        """
+        files = [path for path in setup.files if str(path) != setup.scan_file.name]
+        for path in files:
+            if path not in self._digests:
+                self._digests[path] = file_sha256(path)
+        record = {
+            "scan": values,
+            "files": [self._digests[path] for path in files],
+            "formats": list(formats),
+            "tool": self._tool(tuple(formats)),
+        }
+        return hashlib.sha256(json.dumps(record, sort_keys=True, default=str).encode()).hexdigest()
+
+
+def _tool_digest(formats: tuple[str, ...]) -> str:
+    whole = hashlib.sha256()
+    for path in deciding_files(formats):
+        whole.update(path.name.encode() + b"\0")
+        whole.update(file_sha256(path).encode() if path.exists() else b"")
+    return whole.hexdigest()

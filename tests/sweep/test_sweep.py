@@ -1,0 +1,303 @@
+"""``tablegen sweep``: what it writes, what it builds again, what it says of failures, and how it ends."""
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from editing import edited, run, write_pair
+from libraries import BASE, NAMES, write_library
+from limits import PATIENCE_S
+
+import tablegen
+from tablegen.cli.bar import Bar
+
+
+def index_of(out: Path) -> dict[str, list[dict[str, object]]]:
+    return json.loads((out / "library.json").read_text("ascii"))
+
+
+def stamps(out: Path) -> dict[str, tuple[int, int]]:
+    """What changes of each file when it is written again, even with the same content."""
+    paths = [path for path in out.rglob("*") if path.is_file()]
+    return {str(path.relative_to(out)): (path.stat().st_mtime_ns, path.stat().st_ino) for path in paths}
+
+
+def rewritten(before: dict[str, tuple[int, int]], out: Path) -> set[str]:
+    """The folders, or files beside them, that were written, are new or are gone."""
+    after = stamps(out)
+    changed = {name for name in before.keys() | after.keys() if before.get(name) != after.get(name)}
+    return {name.split("/")[0] for name in changed}
+
+
+@pytest.fixture
+def scan(tmp_path: Path) -> Path:
+    return write_library(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def stored(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A library that was built once; tests copy it."""
+    folder = tmp_path_factory.mktemp("stored")
+    assert run("sweep", write_library(folder), "-o", folder / "out", "-j", "1").status == 0
+    return folder
+
+
+@pytest.fixture
+def library(stored: Path, tmp_path: Path) -> Path:
+    """The folder of a scan file and of its library, ``out``."""
+    shutil.copytree(stored, tmp_path / "library")
+    return tmp_path / "library"
+
+
+def sweep(folder: Path, *options: str, scan: str = "scan.toml") -> object:
+    done = run("sweep", folder / scan, "-o", folder / "out", "-j", "1", *options)
+    return done.status, done.out.replace(str(folder), "."), done.err.replace(str(folder), ".")
+
+
+def test_each_program_is_what_a_build_of_it_would_be(library: Path, tmp_path: Path) -> None:
+    """Byte for byte, with the runtime once for all."""
+    text = edited(BASE, 'name = "broad"', "x.size_nm = 400.0", "x.offset_v = 45.0", "timing.line_rate_hz = 625.0")
+    path = write_pair(tmp_path, edited(text, "timing.lines = 10"))
+    built = tablegen.build(path).files
+    out = library / "out"
+    found = {path.name: path.read_bytes() for path in (out / "broad").iterdir() if path.name != "program.json"}
+    beside = {path.name: path.read_bytes() for path in out.iterdir() if path.name in built}
+    assert {**found, **beside} == built
+    assert not found.keys() & beside.keys()
+    assert {path.name for path in out.iterdir() if path.is_dir()} == set(NAMES)
+
+
+def test_the_index_has_every_program_and_what_differs(library: Path) -> None:
+    index = index_of(library / "out")
+    assert [(one["number"], one["name"]) for one in index["programs"]] == list(enumerate(NAMES))
+    assert index["programs"][0]["settings"] == {"x.size_nm": 150.0}
+    for one in index["programs"]:
+        manifest = json.loads((library / "out" / str(one["name"]) / "manifest.json").read_text("ascii"))
+        assert (one["hash"], one["line_ticks"]) == (manifest["hash"], manifest["sequence"]["line_ticks"])
+        for axis in "xy":
+            certificate = manifest["axes"][axis]["certificate"]
+            assert one[axis]["max_error_lsb"] == certificate["max_error_lsb"]
+    assert index["failed"] == []
+    assert index["notes"] == []
+
+
+def test_a_second_run_writes_nothing(library: Path) -> None:
+    before = stamps(library / "out")
+    assert sweep(library) == (0, "./out: 3 scans: 3 up to date\n", "")
+    assert stamps(library / "out") == before
+
+
+@pytest.mark.parametrize("change", ["value", "comment", "scanner", "missing", "edited", "record"])
+def test_what_is_missing_or_changed_is_built_and_nothing_else(library: Path, change: str) -> None:
+    path, out = library / "scan.toml", library / "out"
+    text = path.read_text("utf-8")
+    built = {"broad"}
+    if change == "value":
+        path.write_text(text.replace("size_nm = 400.0", "size_nm = 410.0"), "utf-8")
+    elif change == "comment":
+        path.write_text("# about this library\n" + text, "utf-8")
+        built = set()
+    elif change == "scanner":
+        scanner = library / "scanner.toml"
+        scanner.write_text(scanner.read_text("utf-8").replace('name = "hs-afm"', 'name = "other"'), "utf-8")
+        built = set(NAMES)
+    elif change == "missing":
+        (out / "broad" / "broad_x.mem").unlink()
+    elif change == "edited":
+        with (out / "broad" / "broad.h").open("a") as file:
+            file.write("/* mine */\n")
+    else:
+        (out / "broad" / "program.json").write_text("{", "ascii")
+    before = stamps(out)
+    status, said, _ = sweep(library)
+    assert status == 0
+    assert f"{len(built)} built" in said if built else "built" not in said
+    index = {name for name in before if "_library" in name or name == "library.json"}
+    assert rewritten(before, out) - index == built
+    assert sweep(library)[1] == "./out: 3 scans: 3 up to date\n"
+
+
+def test_programs_that_are_not_asked_for_go_unless_they_were_edited(library: Path) -> None:
+    path, out = library / "scan.toml", library / "out"
+    text = path.read_text("utf-8")
+    path.write_text(text[: text.index('[[scans]]\nname = "broad"')], "utf-8")
+    with (out / "even" / "even.c").open("a") as file:
+        file.write("/* mine */\n")
+    status, said, err = sweep(library)
+    assert (status, said) == (0, "./out: 1 scan: 1 up to date, 1 removed\n")
+    assert err == "note: ./out/even: left over from an earlier sweep, and has other files or edited ones; remove it\n"
+    assert {path.name for path in out.iterdir() if path.is_dir()} == {"narrow", "even"}
+    assert [path.name for path in (out / "even").iterdir()] == ["even.c"]
+    assert len(index_of(out)["programs"]) == 1
+    assert "EVEN" not in (out / "lines_library.h").read_text("ascii")
+
+
+def test_formats_that_go_take_their_index_and_runtime_along(library: Path) -> None:
+    assert sweep(library, "-f", "c")[0] == 0
+    out = library / "out"
+    assert not list(out.rglob("*.v")) + list(out.rglob("*.vh")) + list(out.rglob("*.mem"))
+    assert (out / "lines_library.c").exists()
+    assert sweep(library, "-f", "csv")[0] == 0
+    assert sorted(path.name for path in out.iterdir()) == ["broad", "even", "library.json", "narrow"]
+
+
+def test_failures_are_listed_once_with_their_reasons_and_the_rest_is_built(tmp_path: Path) -> None:
+    scan = write_pair(tmp_path, edited(BASE, "+ [limits]\nmax_error_lsb = 30.0"))
+    settings = ("--set", "x.size_nm=150,5000", "--set", "y.size_nm=200,20000", "--set", "timing.lines=12,40")
+    done = run("sweep", scan, *settings, "-o", tmp_path / "out", "-j", "1")
+    assert done.status == 11
+    assert done.out == f"{tmp_path / 'out'}: 8 scans: 2 built, 6 failed\n"
+    reasons = [line for line in done.messages if line.startswith("failed: ")]
+    assert len(reasons) == 3, "by reason: x, y, and both"
+    assert "--set x.size_nm=150,5000: x.size_nm: 5000 nm needs" in done.err
+    index = index_of(tmp_path / "out")
+    assert len(index["programs"]) == 2
+    assert len(index["failed"]) == 6
+    assert index["failed"][0]["settings"] == {"x.size_nm": 150, "y.size_nm": 20000, "timing.lines": 12}
+    assert "5000 nm needs" in str(index["failed"][-1]["reasons"])
+    assert (tmp_path / "out" / "lines_library.c").exists()
+
+
+@pytest.mark.parametrize(
+    ("settings", "options", "status"),
+    [
+        ("x.size_nm=5000,6000", (), 2),
+        ("limits.max_error_lsb=1e-3,1e-2", (), 3),
+        ("x.size_nm=20,30", ("--strict",), 3),
+        ("x.size_nm=20,150", ("--strict",), 11),
+        ("x.size_nm=20", (), 0),
+        ("no.key=1", (), 2),
+        ("x.size_nm", (), 2),
+        ("x.size_nm=1:2", (), 2),
+        ("x.size_nm=150", ("-f", "nothing"), 2),
+        ("scanner=none.toml", (), 2),
+        ("emit.formats=[nothing]", (), 2),
+    ],
+)
+def test_the_status_tells_how_it_ended(tmp_path: Path, settings: str, options: tuple[str, ...], status: int) -> None:
+    done = run(
+        "sweep", write_pair(tmp_path, BASE), "--set", settings, *options, "-o", tmp_path / "out", "-j", "1", "-f", "csv"
+    )
+    assert done.status == status
+    assert done.err, "a failure, or the warning of a small scan"
+
+
+def test_a_directory_that_cannot_be_written(tmp_path: Path) -> None:
+    scan = write_library(tmp_path)
+    (tmp_path / "out").write_text("a file")
+    assert run("sweep", scan, "-o", tmp_path / "out").status == 2
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "broad").write_text("a file")
+    done = run("sweep", scan, "-o", tmp_path / "other", "-j", "1", "-f", "csv")
+    assert (done.status, len(done.messages)) == (4, 1)
+    assert "broad" in done.err
+
+
+def test_list_says_what_would_be_done_and_writes_nothing(library: Path) -> None:
+    before = stamps(library)
+    status, said, err = sweep(library, "--set", "x.turn=0.5,7", "--list")
+    assert (status, err) == (11, "")
+    lines = said.splitlines()
+    assert len(lines) == 6
+    assert lines[0].split() == ["narrow_turn_0p5", "x.size_nm", "=", "150.0,", "x.turn", "=", "0.5:", "to", "build"]
+    assert "wrong: --set x.turn=0.5,7: x.turn: 7" in lines[1]
+    assert sweep(library, "--dry-run")[1].count(": up to date") == 3
+    assert stamps(library) == before
+
+
+def test_check_finds_what_a_sweep_would_write(library: Path) -> None:
+    assert sweep(library, "--check") == (0, "./out: 3 scans: 3 up to date\n", "")
+    path, out = library / "scan.toml", library / "out"
+    (out / "narrow" / "program.json").unlink()  # not what it was made from, but what it is
+    assert sweep(library, "--check")[0] == 0
+    path.write_text(path.read_text("utf-8").replace("size_nm = 400.0", "size_nm = 410.0"), "utf-8")
+    (out / "lines_library.h").unlink()
+    before = stamps(library)
+    status, said, err = sweep(library, "--check")
+    assert status == 1
+    found = {line.removeprefix("./out/").removesuffix(": not up to date") for line in said.splitlines()}
+    assert {"broad/manifest.json", "broad/broad.c", "lines_library.h", "library.json"} <= found
+    assert not any(name.startswith(("narrow", "even", "dac_")) for name in found)
+    assert err == "./out is stale; run the same command without --check\n"
+    assert stamps(library) == before
+
+
+def test_programs_that_one_runtime_cannot_play_have_no_index(tmp_path: Path) -> None:
+    scan = write_pair(tmp_path, BASE)
+    done = run("sweep", scan, "--set", "x.table.bits=16,18", "-o", tmp_path / "out", "-j", "1")
+    assert done.status == 0
+    both = "lines_bits_16 and lines_bits_18 differ in"
+    assert done.messages == [
+        f"note: no index in C: {both} storage of words: (16, 16) and (32, 16); set it in the scan file",
+        f"note: no index in Verilog: {both} x.table.bits: 16 and 18; set it in the scan file",
+    ]
+    assert not list((tmp_path / "out").glob("lines_library*"))
+    assert len(index_of(tmp_path / "out")["programs"]) == 2
+
+
+@pytest.mark.common
+def test_a_program_is_verified_and_read_like_a_build(library: Path) -> None:
+    out = library / "out"
+    assert run("verify", out / "broad", "--target", "c", "--ticks", "4000").status == 0
+    assert tablegen.read_build(out / "broad").program.schedule.lines == 10
+    with (out / "dac_axis.c").open("a") as file:
+        file.write("/* edited */\n")
+    failures = tablegen.verify(out / "broad", "files").failures
+    assert "dac_axis.c" in str(failures)
+
+
+@pytest.mark.common
+def test_more_processes_write_the_same(library: Path, tmp_path: Path) -> None:
+    done = run("sweep", library / "scan.toml", "-o", tmp_path / "two", "-j", "2")
+    assert (done.status, done.out) == (0, f"{tmp_path / 'two'}: 3 scans: 3 built\n")
+    one, two = (
+        {str(path.relative_to(out)): path.read_bytes() for path in out.rglob("*") if path.is_file()}
+        for out in (library / "out", tmp_path / "two")
+    )
+    assert one == two
+
+
+@pytest.mark.common
+@pytest.mark.parametrize("jobs", ["1", "2"])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interruption_leaves_whole_programs_and_no_index(tmp_path: Path, jobs: str, number: signal.Signals) -> None:
+    """And the next run goes on from there; no worker is left behind."""
+    scan, out = write_pair(tmp_path, BASE), tmp_path / "out"
+    command = [sys.executable, "-m", "tablegen", "sweep", scan, "--set", "x.size_nm=100:480:2", "-o", out, "-j", jobs]
+    process = subprocess.Popen([str(word) for word in command], stderr=subprocess.PIPE, text=True)
+    until = time.monotonic() + PATIENCE_S
+    while len(list(out.glob("*/manifest.json"))) < 3 and time.monotonic() < until:
+        time.sleep(0.01)
+    process.send_signal(number)
+    _, said = process.communicate(timeout=PATIENCE_S)
+    assert process.returncode == 130
+    assert said.startswith("interrupted after ")
+    assert "the same command goes on from there" in said
+    folders = [path for path in out.iterdir() if path.is_dir()]
+    whole = [path for path in folders if (path / "manifest.json").exists()]
+    assert 3 <= len(whole) < 191
+    assert not (out / "library.json").exists()
+    for path in whole:
+        assert not tablegen.verify(path, "files").failures or not (out / "dac_axis.c").exists()
+        assert not [name for name in os.listdir(path) if name.startswith(".")]
+    done = run("sweep", scan, "--set", "x.size_nm=100:480:2", "-o", out, "--list")
+    assert done.out.count(": up to date") == len(whole)
+
+
+def test_progress_has_a_fraction() -> None:
+    times = iter([0.0, 10.0])
+    bar = Bar(lambda: next(times), "scans")
+    bar._shows = True
+    shown: list[str] = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("tablegen.cli.bar.redraw", shown.append)
+        bar(0, 40)
+        bar(10, 40)
+    assert "[......" in shown[0]
+    assert "10/40 scans  30 s left" in shown[1]
