@@ -18,13 +18,13 @@ if TYPE_CHECKING:
 @scan_argument
 @click.option("--json", "as_json", is_flag=True, help="Print manifest.json instead of text.")
 @format_option
+@plot_option("drive, correction and expected error", by_default=True)
 @click.option(
     "--optimum",
     is_flag=True,
     help="Add the least peak acceleration that any waveform of this scaling error could have. Needs scipy.",
 )
-@plot_option("drive, correction and expected error", by_default=True)
-def show(scan: Path, as_json: bool, formats: tuple[str, ...], optimum: bool, plot: Path | None, no_plot: bool) -> None:
+def show(scan: Path, as_json: bool, formats: tuple[str, ...], plot: Path | None, no_plot: bool, optimum: bool) -> None:
     """Show drive, rates, accuracy and plots of a scan. Writes no file.
 
     In the plots > is forward and < is backward; the axis is doubled where the image is taken.
