@@ -26,7 +26,9 @@ def executed(notebook: Any) -> Any:
     for cell in notebook.cells:
         if cell.cell_type == "code":
             cell.outputs, cell.execution_count = [], None
-    NotebookClient(notebook, timeout=_TIMEOUT_S, resources={"metadata": {"path": str(FOLDER)}}).execute()
+    folder = {"metadata": {"path": str(FOLDER)}}
+    # What a cell prints comes in pieces, whose number is the machine's affair.
+    NotebookClient(notebook, timeout=_TIMEOUT_S, coalesce_streams=True, resources=folder).execute()
     for cell in notebook.cells:
         cell.metadata.pop("execution", None)
         for output in cell.get("outputs", ()):

@@ -13,7 +13,7 @@ from tablegen.manifest.fields import ManifestAxis
 from tablegen.numerics.arrays import Floats
 from tablegen.report.blocks import Charts as ChartsBlock
 from tablegen.report.blocks import Section
-from tablegen.report.chart import Chart, Mark
+from tablegen.report.chart import POSITION, Chart, Mark
 from tablegen.report.errors import inside
 from tablegen.report.playing import PlayedAxis, played_axes
 from tablegen.report.subject import Subject, series_of
@@ -110,7 +110,7 @@ def _errors(a: PlayedAxis, b: PlayedAxis) -> Iterator[Chart]:
         if side not in one.directions or side not in other.directions:
             continue
         branches = [getattr(run.imaged, side) for run in (one, other)]
-        key, place, zero = f"{a.axis}-{side}", "position on the line", (Mark(0.0, "", "y"),)
+        key, place, zero = f"{a.axis}-{side}", POSITION, (Mark(0.0, "", "y"),)
         residual, scaling = f"residual-{key}", f"scaling-{key}"
         curves = [inside(branch) for branch in branches]
         title = f"{a.axis} residual {side}, simulated"

@@ -16,7 +16,7 @@ from tablegen.driver import Driver
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.drive import offset_surface, size_law_of
 from tablegen.problems import Document, Problems, Unphysical
-from tablegen.report.chart import Chart, Mark
+from tablegen.report.chart import POSITION, Chart, Mark
 
 _POINTS = 201
 _DECADES = (0.1, 10.0)  # about the rates at which the scanners were calibrated
@@ -96,7 +96,7 @@ def _branches(axis: str, a: Scanner, b: Scanner) -> Iterator[Chart]:
                 key = f"branch-{axis}-{turn:g}-{100 * share:.0f}-{side}"
                 title = f"{axis} {side} at turn {turn:g}, {100 * share:.0f} % of full scale"
                 label = "drive less line [% of V_scan]"
-                yield from _chart(key, title, "position on the line", label, curves, marks=(Mark(0.0, "", "y"),))
+                yield from _chart(key, title, POSITION, label, curves, marks=(Mark(0.0, "", "y"),))
 
 
 def _shape(axis: str, scanner: Scanner, turn: float, share: float) -> LineShape | None:

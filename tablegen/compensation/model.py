@@ -41,6 +41,8 @@ class Hysteresis(Parameters, frozen=True, tag_field="model"):
     """Its place among models that are compared: the simplest is 0."""
     compensates: ClassVar[bool] = True
     """Whether it corrects anything."""
+    counts_turns: ClassVar[bool] = False
+    """Whether its line counts with the turns that the waveform really has, and not with those of a triangle."""
 
     @classmethod
     def model(cls) -> str:

@@ -57,8 +57,8 @@ class BandLimit(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
                 ge=0.001,
                 le=10.0,
                 description="window: the least acceleration at the piezo that keeps this scaling error of the waveform,"
-                " peak to peak in the imaging window; alone: 32 harmonics, or as many as it takes. Default without "
-                "`harmonics` and `cutoff_hz`: what the converter's steps leave",
+                " peak to peak in the imaging window; alone: 32 harmonics, or as many as it takes. Default on "
+                "an operator, without `harmonics` and `cutoff_hz`: what the converter's steps leave",
             ),
         ]
         | None

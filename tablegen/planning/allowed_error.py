@@ -7,15 +7,16 @@ CHORD = 0.05  # share of the line over which the certificate measures emitted in
 _UNLIMITED_PERCENT = 1.0  # the error that nobody is told of
 
 
-def allowed_error(limit: BandLimit, limits: Limits, codes: float) -> AllowedError | None:
+def allowed_error(limit: BandLimit, limits: Limits, codes: float, counts_turns: bool) -> AllowedError | None:
     """The error of one axis whose drive is ``codes`` of the converter from w = 0 to 1; None asks for no error.
 
     Where neither harmonics nor an error are asked for it is what rounding to codes leaves: up to half a code at
-    either end of a chord, with either sign. It is then at most half of what the limits of the scan leave.
+    either end of a chord, with either sign. It is then at most half of what the limits of the scan leave. This holds
+    for models that count with the turns of the waveform (``counts_turns``): rounder turns move a line by the others.
     """
     if limit.max_scaling_error_percent is not None:
         return AllowedError(limit.max_scaling_error_percent, True)
-    chosen = limit.harmonics is None or limit.harmonics == "fewest"
+    chosen = limit.harmonics == "fewest" or (limit.harmonics is None and counts_turns)
     if limit.method != "window" or limit.cutoff_hz is not None or not chosen or not codes > 0.0:
         return None
     most = 0.5 * min(limits.max_scaling_error_percent or _UNLIMITED_PERCENT, _UNLIMITED_PERCENT)

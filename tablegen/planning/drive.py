@@ -165,7 +165,7 @@ def compensate(
     v_amplitude = m * g * v * driver.span
     hardware = setup.hardware(axis)
     codes = abs(v_amplitude / Converter.of(hardware.dac, hardware.amplifier).v_per_code)
-    allowed = None if resting else allowed_error(scan.band_limit, setup.scan.limits, codes)
+    allowed = None if resting else allowed_error(scan.band_limit, setup.scan.limits, codes, hysteresis.counts_turns)
     most = harmonics(allowed)
     wanted = WantedLine(
         axis=axis,

@@ -18,6 +18,11 @@ def shipped_files() -> set[str]:
     found |= {f"tablegen/examples/{path.name}" for path in REPOSITORY.glob("examples/*.toml")}
     found |= {f"tablegen/verification/{path.name}" for path in REPOSITORY.glob("tablegen/verification/*.[chv]")}
     found |= {f"tablegen/verification/{path.name}" for path in REPOSITORY.glob("tablegen/verification/*.ld")}
+    found |= {
+        f"tablegen/library/{path.name}"
+        for kind in ("v", "j2")
+        for path in REPOSITORY.glob(f"tablegen/library/*.{kind}")
+    }
     found |= {f"tablegen/report/page.{kind}" for kind in ("css", "html.j2", "js")}
     found |= {f"tablegen/virtual/{path.name}" for path in REPOSITORY.glob("tablegen/virtual/*.toml")}
     for language in (REPOSITORY / "firmware_templates").iterdir():

@@ -64,22 +64,40 @@ def test_the_fewest_harmonics_are_at_least_those_of_a_layer(tmp_path: Path) -> N
     assert all(one.band_limit <= 0.3 for one in certify(plan)["x"].scaling.values())
 
 
-def test_without_harmonics_and_error_it_is_what_the_converter_leaves(tmp_path: Path) -> None:
+def test_by_laws_no_error_is_allowed_that_was_not_asked_for(tmp_path: Path) -> None:
+    """Their line is that of sharp turns: the default is the fit of the window."""
+    given, free = (plan_of(tmp_path, {H: harmonics}).x for harmonics in ("32", ""))
+    assert free.kept_percent is None
+    assert free.target.a.tolist() == given.target.a.tolist()
+
+
+def test_the_fewest_harmonics_alone_keep_what_the_converter_leaves(tmp_path: Path) -> None:
     """And at most half of what the limits of the scan leave."""
-    plan = plan_of(tmp_path, {H: "", **LIMIT})
+    fewest = {H: '"fewest"'}
+    plan = plan_of(tmp_path, {**fewest, **LIMIT})
     scaling = certify(plan)["x"].scaling.values()
     assert plan.x.kept_percent == pytest.approx(max(one.quantisation for one in scaling), rel=0.15)
     assert plan.x.kept_percent == pytest.approx(200.0 / CHORD / abs(plan.x.codes_per_unit))
-    assert plan_of(tmp_path, {H: ""}).x.kept_percent == 0.25  # the example's limit is 0.5 %
-    coarse = plan_of(tmp_path, {H: "", "dac.bits": "12", "limits.max_error_lsb": "", **LIMIT}).x
+    assert plan_of(tmp_path, fewest).x.kept_percent == 0.25  # the example's limit is 0.5 %
+    coarse = plan_of(tmp_path, {**fewest, "dac.bits": "12", "limits.max_error_lsb": "", **LIMIT}).x
     assert coarse.kept_percent == 0.5
     assert allowed_error.CHORD == CHORD
 
 
+def test_on_an_operator_the_default_is_what_the_converter_leaves(tmp_path: Path) -> None:
+    line = make_plan(load(write_operator_scan(tmp_path, operator_file(creep=0.02), f"- {H}"))).x
+    assert line.kept_percent is not None
+    assert line.kept_percent == pytest.approx(min(200.0 / CHORD / abs(line.codes_per_unit), 0.25))
+    assert line.series.harmonics == 32
+
+
 def test_what_the_converter_leaves_is_given_up_where_32_harmonics_cannot_keep_it(tmp_path: Path) -> None:
     """No scan is refused for an error that nobody asked for: it is the fit of the window, as with 32 harmonics."""
-    edits = {"x.band_limit.window": "[0.04, 0.96]", **LIMIT}
-    given, free = (plan_of(tmp_path, {**edits, H: harmonics}).x for harmonics in ("32", ""))
+    window = "x.band_limit.window = [0.04, 0.96]"
+    given, free = (
+        make_plan(load(write_operator_scan(tmp_path, operator_file(), window, harmonics))).x
+        for harmonics in (f"{H} = 32", f"- {H}")
+    )
     assert free.kept_percent is None
     assert free.target.a.tolist() == given.target.a.tolist()
 

@@ -101,6 +101,7 @@ class OperatorModel(WithBranches, frozen=True, kw_only=True, tag="operator"):
     purpose: ClassVar[str] = "identified from traces"
     calibration: ClassVar[str] = "`calibrate operator`"
     order: ClassVar[int] = 3
+    counts_turns: ClassVar[bool] = True
 
     file: Annotated[FileName, Meta(description="the operator's file, relative to the scanner file")]
 
