@@ -177,7 +177,8 @@ def _remarks(fit: TraceFit) -> list[Remark]:
         found.append(
             Remark(
                 f"residuals are correlated over {fit.correlated:.0f} samples: besides noise, they contain what "
-                f"model and drift do not describe; standard errors were widened by {fit.correlated**0.5:.2g}"
+                f"model and drift do not describe; standard errors were widened "
+                f"by a factor of {fit.correlated**0.5:.2g}"
             )
         )
     if fit.strays:

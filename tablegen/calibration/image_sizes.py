@@ -166,7 +166,8 @@ def _remarks(line: ImageLine, size: LineSize) -> list[Remark]:
     if not line.both:
         found.append(Remark("without a retrace nothing shows whether columns were cropped, or are late"))
     if line.widened > 3.0:
-        found.append(Remark(f"standard errors were widened by {line.widened:.3g}, for what is not only noise"))
+        widened = f"standard errors were widened by a factor of {line.widened:.3g}"
+        found.append(Remark(f"{widened}, for what is not only noise"))
     if line.explained < 0.5:
         found.append(
             Remark(f"{100.0 * line.explained:.0f} % of the contrast is periodic, the rest noise, debris or defects")

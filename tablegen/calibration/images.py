@@ -85,7 +85,7 @@ def _remarks(fit: ImageFit) -> list[Remark]:
         found.append(
             Remark(
                 f"the rest is not only noise, but also what the model does not describe; standard errors were "
-                f"widened by {fit.widened:.3g}; a --window that is not that of the images does that too"
+                f"widened by a factor of {fit.widened:.3g}; a --window that is not that of the images does that too"
             )
         )
     if fit.pixels_a_period < _MIN_PIXELS_PER_PERIOD:

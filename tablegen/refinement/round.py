@@ -204,7 +204,8 @@ def _remarks(
         found.append(
             Remark(
                 f"residuals are correlated over {measured.correlated:.0f} samples: besides noise, they contain drift, "
-                f"hum or what the harmonics leave; standard errors were widened by {measured.correlated**0.5:.2g}"
+                f"hum or what the harmonics leave; standard errors were widened "
+                f"by a factor of {measured.correlated**0.5:.2g}"
             )
         )
     if measured.periods < 1.99:
