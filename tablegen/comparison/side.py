@@ -10,6 +10,7 @@ from tablegen.comparison.operators import ComparedOperator
 from tablegen.comparison.quantity import ComparedQuantity
 from tablegen.comparison.scanners import scanner_quantities
 from tablegen.comparison.scans import scan_quantities
+from tablegen.compensation.models.operator import OperatorModel
 from tablegen.config.load import load, load_scanner
 from tablegen.config.scanner import Scanner
 from tablegen.emit.formats import UnknownFormat
@@ -102,7 +103,7 @@ def read_side(path: Path, kind: Kind, tell: Callable[[str], None] = lambda _: No
     operators = {}
     for axis in ("x", "y"):
         table = getattr(scanner, axis).hysteresis
-        for name in () if table is None or table.model() != "operator" else table.files():
+        for name in table.files() if isinstance(table, OperatorModel) else ():
             operators[axis] = ComparedOperator.read(path.parent / name)
     return ComparedSide(path, kind, scanner_quantities(file, scanner), (), None, scanner, operators)
 

@@ -85,10 +85,14 @@ def test_the_fewest_harmonics_alone_keep_what_the_converter_leaves(tmp_path: Pat
 
 
 def test_on_an_operator_the_default_is_what_the_converter_leaves(tmp_path: Path) -> None:
-    line = make_plan(load(write_operator_scan(tmp_path, operator_file(creep=0.02), f"- {H}"))).x
-    assert line.kept_percent is not None
-    assert line.kept_percent == pytest.approx(min(200.0 / CHORD / abs(line.codes_per_unit), 0.25))
+    edits = ("x.band_limit.window = [0.25, 0.75]", "- limits.max_scaling_error_percent")
+    given, line = (
+        make_plan(load(write_operator_scan(tmp_path, operator_file(), *edits, harmonics))).x
+        for harmonics in (f"{H} = 32", f"- {H}")
+    )
+    assert line.kept_percent == pytest.approx(200.0 / CHORD / abs(line.codes_per_unit))
     assert line.series.harmonics == 32
+    assert line.target.peak_acceleration() < given.target.peak_acceleration()
 
 
 def test_what_the_converter_leaves_is_given_up_where_32_harmonics_cannot_keep_it(tmp_path: Path) -> None:
