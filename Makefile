@@ -8,8 +8,10 @@
 # make instructions what the C takes on Cortex-M, into docs/instructions.md
 # make link      what an upload takes, into docs/upload.md
 # make fuzz      a million inputs for the C link, with sanitizers, on from the kept corpus
-# make bench     what a build costs, against importing numpy
+# make bench     tablegen beside what others use, into benchmarks/results.md (ONLY=line: that section)
+# make cost      what a build costs, against importing numpy, and whether that is within its limits
 # make figures   the pictures of the README and the docs
+# make notebooks the notebooks, run again, with what they show
 # make site      the documentation as a site with a search, into build/site
 # make man       the manual pages of all commands, into build/man
 # make reference the pages of commands, keys and Python, into docs
@@ -34,7 +36,7 @@ TOOLS := $(COMMON_TOOLS) $(HDL_TOOLS) $(FIRMWARE_TOOLS) cppcheck
 # they share is made once. OpenBLAS threads only spin beside the other processes.
 PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist worksteal
 
-.PHONY: demo lint check test test-rest test-all test-hdl test-long resources instructions link fuzz bench figures site man reference paper clean
+.PHONY: demo lint check test test-rest test-all test-hdl test-long resources instructions link fuzz bench cost figures notebooks site man reference paper clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/installed
@@ -96,7 +98,20 @@ fuzz: build/fuzz/link
 	build/fuzz/link -runs=$(FUZZ_RUNS) -seed=1 -max_len=400 -timeout=10 -artifact_prefix=build/fuzz/ \
 	    build/fuzz/found tests/runtime_c/fuzz/corpus
 
-bench: $(VENV)/installed
+# What tablegen is measured beside stands in an environment of its own.
+OTHERS := build/bench/others
+$(OTHERS)/installed: benchmarks/others.txt
+	@.ci/virtual-environment $(PYTHON) $(OTHERS)
+	$(OTHERS)/bin/python -m pip --disable-pip-version-check --quiet install --requirement $<
+	@touch $@
+
+ONLY ?=
+bench: $(VENV)/installed-test $(OTHERS)/installed
+	@.ci/system-packages gcc iverilog yosys nextpnr-ice40 gcc-arm-none-eabi gcc-riscv64-unknown-elf gcc-avr avr-libc \
+	    libsimavr-dev libelf-dev
+	$(BIN)/python benchmarks/results.py $(ONLY:%=--only %)
+
+cost: $(VENV)/installed
 	$(BIN)/python benchmarks/build_cost.py
 
 figures: $(VENV)/installed-plot
@@ -105,8 +120,12 @@ figures: $(VENV)/installed-plot
 	$(BIN)/python docs/figures/make_virtual.py
 	$(BIN)/python docs/figures/make_operator.py
 	$(BIN)/python docs/figures/make_correct.py
+	$(BIN)/python docs/figures/make_gallery.py
 	@.ci/system-packages chromium
 	$(BIN)/python docs/figures/make_report.py
+
+notebooks: $(VENV)/installed-test
+	$(BIN)/python docs/make_notebooks.py
 
 site: $(VENV)/installed-docs
 	$(BIN)/python docs/site/make_site.py build/site

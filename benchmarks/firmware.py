@@ -9,7 +9,7 @@ import argparse
 import re
 import subprocess
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -46,6 +46,9 @@ class Counts:
     worst_fill: float  # a tick of both axes, of the call that took longest
     limited_fill: float  # the same of a program that is at a limit for half of each line
     markers: float  # a tick
+    first: float  # an axis sample that is shaped, mean of a frame; by order
+    second: float
+    scanner: float
     step: float  # a tick, both axes, mean
     worst_step: int
     plain: float  # an axis sample
@@ -53,6 +56,7 @@ class Counts:
     word: float  # of a table
     load: int
     code: Mapping[str, int]  # bytes of each source
+    shaping_code: Sequence[int]  # bytes that each order takes more
     bank: int
     state: int  # besides the banks
     stack: Mapping[str, int]
@@ -79,6 +83,7 @@ def measure(core: str, optimisation: str, folder: Path) -> Counts:
     machine.call("count_start")
     limited = [machine.call("count_fill").instructions for _ in fills]
     filled = sum(fill.instructions for fill in fills)
+    shaped = [_shaped(core, sources, options, order, folder, len(fills)) for order in (1, 2, 3)]
     everything, bank = (int.from_bytes(machine.read("bytes", 4, at), "little") for at in (0, 4))
     return Counts(
         fill=filled / len(fills) / TICKS / 2,
@@ -86,13 +91,20 @@ def measure(core: str, optimisation: str, folder: Path) -> Counts:
         worst_fill=max(fill.instructions for fill in fills) / TICKS,
         limited_fill=max(limited) / TICKS,
         markers=(sum(fill.instructions for fill in marked) - filled) / len(fills) / TICKS,
+        first=shaped[0],
+        second=shaped[1],
+        scanner=shaped[2],
         step=sum(step.instructions for step in steps) / len(steps),
         worst_step=max(step.instructions for step in steps),
         plain=sum(plain) / len(plain) / TICKS / 2,
         linear=machine.call("count_linear").instructions / TICKS,
         word=rendered.instructions / len(plan.x.program.words),
         load=loaded.instructions,
-        code=_code(core, optimisation, folder),
+        code=(code := _code(core, optimisation, folder)),
+        shaping_code=[
+            sum(_code(core, optimisation, folder, f"-DDAC_SHAPING={order}").values()) - sum(code.values())
+            for order in (1, 2, 3)
+        ],
         bank=bank,
         state=everything - 2 * bank,
         stack={
@@ -104,15 +116,27 @@ def measure(core: str, optimisation: str, folder: Path) -> Counts:
     )
 
 
-def _code(core: str, optimisation: str, folder: Path) -> dict[str, int]:
+def _shaped(core: str, sources: Sequence[Path], options: Sequence[str], order: int, folder: Path, fills: int) -> float:
+    """Instructions for an axis sample of a runtime of this order; both axes have it."""
+    chosen = {"DAC_SHAPING": order}
+    machine = Processor(compile_bare(folder / f"shaped_{order}.elf", sources, core, None, options, chosen), core)
+    for call in ("count_init", "count_load_shaped", "count_start"):
+        machine.call(call)
+    return sum(machine.call("count_fill").instructions for _ in range(fills)) / fills / TICKS / 2
+
+
+def _code(core: str, optimisation: str, folder: Path, *more: str) -> dict[str, int]:
+    """Bytes of each source that is not empty."""
     found = {}
     for source in c_runtime():
         if source.suffix == ".c":
             target = folder / f"{source.stem}.o"
             compiler = COMPILERS[CORES[core].architecture]
-            options = [*CORES[core].options, "-std=c99", optimisation, "-ffreestanding"]
+            options = [*CORES[core].options, "-std=c99", optimisation, "-ffreestanding", *more]
             _run(compiler, *options, "-c", str(source), "-o", str(target))
-            found[source.name] = int(_run(compiler.replace("gcc", "size"), str(target)).splitlines()[1].split()[0])
+            size = int(_run(compiler.replace("gcc", "size"), str(target)).splitlines()[1].split()[0])
+            if size:
+                found[source.name] = size
     return found
 
 
@@ -139,6 +163,9 @@ def tables(measured: Mapping[tuple[str, str], Counts]) -> str:
             ("markers of `fill`, a tick", "markers", "{:.1f}"),
             ("`fill`, an axis sample, mean of a frame", "fill", "{:.1f}"),
             ("the same between the ends of a line", "fill_line", "{:.1f}"),
+            ("`fill`, shaped `first`, an axis sample, mean of a frame", "first", "{:.1f}"),
+            ("`fill`, shaped `second`", "second", "{:.1f}"),
+            ("`fill`, shaped `scanner`", "scanner", "{:.1f}"),
             ("a plain loop, an axis sample, mean of a frame", "plain", "{:.1f}"),
             ("linear interpolation alone, a sample", "linear", "{:.1f}"),
             ("`step`, a tick of both axes, mean of a line", "step", "{:.0f}"),
@@ -150,6 +177,9 @@ def tables(measured: Mapping[tuple[str, str], Counts]) -> str:
         row(f"code of `{name}`", [str(counts.code[name]) for counts in all_counts]) for name in all_counts[0].code
     )
     memory += row("code, all", [str(sum(counts.code.values())) for counts in all_counts])
+    for order in (1, 2, 3):
+        more = [str(counts.shaping_code[order - 1]) for counts in all_counts]
+        memory += row(f"code that `DAC_SHAPING={order}` takes more", more)
     memory += row("a bank, without tables", [str(counts.bank) for counts in all_counts])
     memory += row("state of both axes besides the banks", [str(counts.state) for counts in all_counts])
     for name in all_counts[0].stack:

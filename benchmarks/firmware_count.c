@@ -1,6 +1,7 @@
 /* What benchmarks/firmware.py counts the instructions of: functions without arguments, called one at a time. */
 #include "dac_sequencer.h"
 #include "annexin_200nm.h"
+#include "linear_interpolation.h"
 
 enum { TICKS = 256 }; /* half a buffer */
 
@@ -41,6 +42,18 @@ void count_load_limited(void)
     limited.x.code_max = limited.x.park_code = (limited.x.code_min + limited.x.code_max) / 2;
     (void)dac_sequencer_load(&sequencer, &limited);
 }
+
+#if DAC_SHAPING
+/* The same, but that both axes shape, of the highest order. */
+void count_load_shaped(void)
+{
+    dac_program shaped = scan;
+
+    shaped.x.shaping_order = shaped.y.shaping_order = DAC_SHAPING;
+    shaped.x.shaping_zero = shaped.y.shaping_zero = DAC_SHAPING == 3 ? 100 : 0;
+    (void)dac_sequencer_load(&sequencer, &shaped);
+}
+#endif
 
 void count_start(void)
 {
@@ -106,22 +119,7 @@ void count_plain(void)
     plain_y = y;
 }
 
-/* And: linear interpolation and nothing else, as libraries for signal processing have it: a call a sample, 12 bits of
- * index and 20 of fraction, a look at both ends of the table, a 64-bit product for each neighbour. */
-static int32_t __attribute__((noinline)) linear(const int16_t *words, int32_t x, uint32_t length)
-{
-    const int32_t index = x >> 20, fraction = x & 0xfffff;
-    int64_t sum;
-
-    if (index >= (int32_t)(length - 1))
-        return words[length - 1];
-    if (index < 0)
-        return words[0];
-    sum = (int64_t)words[index] * (0xfffff - fraction);
-    sum += (int64_t)words[index + 1] * fraction;
-    return (int32_t)(sum >> 20);
-}
-
+/* And: linear interpolation and nothing else. */
 void count_linear(void)
 {
     int32_t x = 0;

@@ -169,9 +169,9 @@ class Rate:
     wire_bytes: int
 
 
-def rate(scan: PreparedScan, image: ProgramImage, baud: int, back_s: float) -> Rate:
-    """An upload over a paced line."""
-    line = _line(scan, baud, back_s, 500_000)
+def rate(scan: PreparedScan, image: ProgramImage, baud: int, back_s: float, window: int = 8) -> Rate:
+    """An upload over a paced line, to a device that takes so many frames at a time."""
+    line = _line(scan, baud, back_s, 500_000, window=window)
     with Device(line.open, random=Random(1), sleep=line.sleep) as client:
         client.arm()
         client.trigger()

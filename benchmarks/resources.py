@@ -64,6 +64,19 @@ _TOP = {"X_INDEX_BITS": 10, "Y_INDEX_BITS": 10}
 CASES = {
     "axis": Case("one axis, a sample a clock", "dac_axis", "HX8K", _AXIS, most_cells=2500, least_mhz=120),
     "axis_serial": Case("one axis, low area", "dac_axis_serial", "HX8K", _AXIS, most_cells=900),
+    "axis_first": Case(
+        "one axis, shaped: first", "dac_axis", "HX8K", {**_AXIS, "SHAPING": 1}, most_cells=2567, least_mhz=120
+    ),
+    "axis_second": Case("one axis, shaped: to second", "dac_axis", "HX8K", {**_AXIS, "SHAPING": 2}),
+    "axis_scanner": Case(
+        "one axis, shaped: to scanner", "dac_axis", "HX8K", {**_AXIS, "SHAPING": 3}, most_cells=2847, least_mhz=120
+    ),
+    "axis_serial_first": Case(
+        "one axis, low area, shaped: first", "dac_axis_serial", "HX8K", {**_AXIS, "SHAPING": 1}, most_cells=694
+    ),
+    "axis_serial_scanner": Case(
+        "one axis, low area, shaped: to scanner", "dac_axis_serial", "HX8K", {**_AXIS, "SHAPING": 3}, most_cells=974
+    ),
     "sequencer": Case("two axes, a sample a clock", "dac_sequencer", "HX8K", _TOP),
     "sequencer_low_area": Case("two axes, low area", "dac_sequencer", "HX8K", {**_TOP, "LOW_AREA": 1}),
     "sequencer_low_area_fourier": Case(
@@ -113,12 +126,13 @@ CASES = {
 
 
 # What yosys makes of a module moves by a few LUTs with what else it reads: the others, which have no dac_fit, are
-# measured without its file. Were one of them to have one, yosys would miss the module, and say so.
+# measured without its file, and what does not shape without that of dac_shaper. Were one of them to have one, yosys
+# would miss the module, and say so.
 WITH_FIT = ("dac_sequencer",)
 
 
-def measure(case: Case, seeds: Sequence[int] = SEEDS) -> Result:
-    """Synthesise a case, and for the HX8K place and route it once for each seed."""
+def measure(case: Case, seeds: Sequence[int] = SEEDS, modules: Path = MODULES) -> Result:
+    """Synthesise a case of a folder of ``modules``, and for the HX8K place and route it once for each seed."""
     with tempfile.TemporaryDirectory() as folder:
         netlist, statistics = Path(folder, "netlist.json"), Path(folder, "statistics")
         parameters = " ".join(f"-chparam {name} {value}" for name, value in case.parameters.items())
@@ -126,8 +140,10 @@ def measure(case: Case, seeds: Sequence[int] = SEEDS) -> Result:
             # Without contents the memory would be synthesised away.
             index_bits = max((value for name, value in case.parameters.items() if "INDEX" in name), default=11)
             Path(folder, "sine.mem").write_text(_quarter_sine(index_bits), "utf-8")
-        for path in MODULES.glob("*.v"):
+        for path in modules.glob("*.v"):
             if path.stem == "dac_fit" and case.top not in WITH_FIT:
+                continue
+            if path.stem == "dac_shaper" and not case.parameters.get("SHAPING"):
                 continue
             text = path.read_text("utf-8")
             Path(folder, path.name).write_text(text.replace('SINE_FILE = ""', 'SINE_FILE = "sine.mem"'), "utf-8")

@@ -25,6 +25,10 @@ WIDTHS = {
     "least": Widths(8, 3, 1, AxisWidths(True, 2, 8, 4), AxisWidths(True, 2, 8, 1), 1),
     "most": Widths(24, 30, 16, AxisWidths(True, 16, 24, 31), AxisWidths(False, 16, 24, 31), 512),
     "direct": Widths(12, 8, 5, AxisWidths(False, 6, 22, 9), AxisWidths(False, 2, 12, 7), 63),
+    **{
+        name: Widths(16, 24, 16, AxisWidths(True, 11, 16, 25), AxisWidths(True, 11, 16, 31), shaping=order)
+        for order, name in enumerate(("first", "second", "scanner"), 1)
+    },
 }
 
 
@@ -38,7 +42,7 @@ def parameters(widths: Widths) -> dict[str, int]:
             f"{name}_WORD_BITS": axis.word_bits,
             f"{name}_PERIOD_BITS": axis.period_bits,
         }
-    return found | {"HARMONICS": widths.harmonics}
+    return found | {"HARMONICS": widths.harmonics, "SHAPING": widths.shaping}
 
 
 DISCARD, WRITE = 1 << 7, 1 << 6
@@ -54,7 +58,8 @@ def entries(seed: int) -> list[tuple[int, int]]:
     for at in used:
         edges = {(1 << bit) + d & 0xFFFFFFFF for bit in range(33) for d in (-1, 0, 1)}
         edges |= {-(1 << bit) + d & 0xFFFFFFFF for bit in range(32) for d in (-1, 0, 1)}
-        for word in [*sorted(edges), 63, 64, 512, 513]:
+        zeros = {order | zero << 8 for order in range(5) for zero in (0, 1, 64, 127, 128, 129, 192, 255)}
+        for word in [*sorted(edges), 63, 64, 512, 513, *sorted(zeros)]:
             after = [(WRITE | at, good[at]), (int(rng.choice([0, WRITE | 14])), 0)][: int(rng.integers(3))]
             found += [(WRITE | at, word), *after, (DISCARD, 0), (0, 0), (WRITE | 0, 8)]
     found += [(DISCARD | WRITE | at, good[at]) for at in used]

@@ -51,6 +51,9 @@ PROOFS = {
     "sequencer_of_look_up_tables": Proof(
         "sequencer_properties", 38, 40, {"PLAIN_MULTIPLIER": 0}, stubs=("dac_axis", "dac_fit")
     ),
+    "sequencer_that_shapes": Proof("sequencer_properties", 27, 35, {"SHAPING": 3}, stubs=("dac_axis", "dac_fit")),
+    "first": Proof("shaper_properties", 1, 8, {"SHAPING": 1}, covers=8),
+    "second": Proof("shaper_properties", 2, 12, {"SHAPING": 2}, covers=12),
 }
 
 
@@ -114,13 +117,16 @@ BY_SAT = {
     "slew_8_bits": Proof("slew_properties", 1, 0, {"BITS": 8}),
     "slew_16_bits": Proof("slew_properties", 1, 0, {"BITS": 16}),
     "serial": SERIAL,
+    "serial_that_shapes": Proof("serial_properties", 1, 0, {"SHAPING": 3}),
     "requests": Proof("request_properties", 2, 30),
     "windows": Proof("window_properties", 1, 16),
+    # The product of a tick is made on the clocks after it.
+    "scanner": Proof("scanner_properties", 7, 26, {"SHAPING": 3, "BITS": 3}),
 }
 
 
 def _proven_by_sat(proof: Proof, folder: Path, modules: Mapping[str, str] | None = None) -> bool:
-    induction = "-tempinduct -maxsteps 4"
+    induction = f"-tempinduct -maxsteps {max(proof.depth + 1, 4)}"
     return _sat(_read(proof, modules or {}, folder), induction, folder, "Induction step proven: SUCCESS!")
 
 
@@ -256,6 +262,14 @@ MUTANTS = {
         "windows", "dac_markers", "settled_2 && (forward_imaging || backward_imaging)", "settled_2 && forward_imaging"
     ),
     "lines_outside_their_window": ("windows", "dac_markers", "(up_imaging || down_imaging)", "1"),
+    # i. remainders are fed back by their definition, from 0 where a program begins
+    "remainder_of_the_last_program": ("second", "dac_shaper", "begins || order == 2'd0", "order == 2'd0"),
+    "difference_of_the_last_program": ("second", "dac_shaper", "begins || !order[1]", "!order[1]"),
+    "carry_lost": ("first", "dac_shaper", "carry <= sum[BITS];", "carry <= 1'b0;"),
+    "unshaped_is_shaped": ("first", "dac_shaper", "begins || order == 2'd0", "begins"),
+    "first_order_is_second": ("second", "dac_shaper", "begins || !order[1]", "begins"),
+    "second_order_without_its_zero": ("scanner", "dac_shaper", "word[14] || word[1:0] == 2'd2", "word[14]"),
+    "product_of_three_digits": ("scanner", "dac_shaper", "step != 3'd0 && step != 3'd5", "step != 3'd0 && step < 3'd4"),
     "a_line_settles_too_long": ("windows", "dac_markers", "settle_left <= 1;", "settle_left <= 0;"),
 }  # fmt: skip
 

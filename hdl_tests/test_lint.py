@@ -35,6 +35,18 @@ SEQUENCERS: dict[str, Mapping[str, int | str]] = {
         for words, converter in ((8, 8), (8, 24), (12, 12), (16, 20), (18, 18), (22, 14), (24, 8), (24, 24))
         for kind in ("digits", "plain", "low_area")
     },
+    **{
+        f"order_{order}_words_{words}_converter_{converter}_{kind}": {
+            "DAC_BITS": converter,
+            "X_WORD_BITS": words,
+            "SHAPING": order,
+            "PLAIN_MULTIPLIER": kind == "plain",
+            "LOW_AREA": kind == "low_area",
+        }
+        for words, converter in ((16, 16), (24, 8), (8, 24))
+        for order in (1, 2, 3)
+        for kind in ("digits", "plain", "low_area")
+    },
     "short": {"TICK_BITS": 6, "LINE_BITS": 4, "PERIOD_BITS": 9, "COUNT_BITS": 4, "X_INDEX_BITS": 4, "Y_INDEX_BITS": 3},
     "long": {"TICK_BITS": 30, "LINE_BITS": 16, "COUNT_BITS": 32, "X_INDEX_BITS": 14, "Y_INDEX_BITS": 5},
     "power_up_codes": {"X_POWER_UP_CODE": "64'hffff", "Y_POWER_UP_CODE": "64'h8000"},

@@ -5,6 +5,7 @@ import struct
 from binascii import crc32
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -35,7 +36,7 @@ _BYTES = bytes.fromhex(MADE["boot_image"])
 BOOT_IMAGE = ProgramImage(ImageInfo(bytes(32), len(_BYTES), crc32(_BYTES), TOLD.x, TOLD.y), _BYTES)
 SHORTER = "Shorter tables: BEGIN"  # from there on the dialogue is for devices that take them
 # Not for this device: it has no key and no limits to narrow, keeps images, checks less, and waits for no tick to act.
-LACKS = ("key", "narrows", "keeps tables", "checks", "plays", "queue of 8")
+LACKS = ("key", "narrows", "keeps tables", "checks", "plays", "queue of 8", "shaping")
 
 
 def other_word(at: int, word: int) -> ProgramImage:
@@ -200,6 +201,27 @@ def refused_by_the_sequencer(loader: Loader, words: list[int]) -> None:
 @pytest.mark.parametrize("what", [settle_lines, refused_by_the_sequencer])
 def test_what_does_not_fit_is_refused_with_a_reason(what: Callable[[Loader, list[int]], None], loader: Loader) -> None:
     what(loader, [])
+
+
+@pytest.mark.rest
+@pytest.mark.parametrize("order", [0, 2])
+def test_shaped_output_goes_by_the_order_of_the_sequencer(order: int, tmp_path: Path) -> None:
+    """HELLO says the order; a program of a higher one, or with another word, is refused by the sequencer."""
+    x, y = ((limits.code_min, limits.code_max, limits.max_step) for limits in (TOLD.x_limits, TOLD.y_limits))
+    loader = Loader(
+        tmp_path, boot_program(MADE), (x, y), TOLD.harmonics, TOLD.update_rate_hz, LOW_AREA=1, SHAPING=order
+    )
+    with Simulation(loader.compiled, []) as simulation:
+        talk = Talk()
+        LoaderDevice(simulation, loader.info, 1).tick(50)
+        (hello,) = talk.answers(simulation.talk(talk.hello()))
+        assert DeviceInfo.unpack(hello.payload).shaping == order
+        for word in (0, 1, 2, 3, 4, 0x0102, 0x8003):
+            image = other_word(2 * PAGE_WORDS + AXIS_WORDS.index("shaping"), word)
+            wire = upload(simulation, talk, image)
+            simulation.ticks(20)
+            good = word <= order
+            assert talk.refusals(wire + simulation.talk()) == ([] if good else [(Reason.REFUSED, 0)]), word
 
 
 # Frames

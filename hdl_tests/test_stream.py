@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from programs import random_dual
+from programs import random_dual, shaped
 from sets import common
 from stream_benches import HARMONICS, equal, with_sine
 from stream_configurations import (
@@ -18,6 +18,9 @@ from stream_configurations import (
     LEAST_PACE,
     LEAST_PACES,
     LOW_AREA,
+    SCANNER,
+    SCANNER_PACE,
+    SMALL,
 )
 from stream_plans import PLANS, planned
 from stream_scripts import (
@@ -28,6 +31,7 @@ from stream_scripts import (
     play,
     random_play,
     random_renderings,
+    swaps_at_every_tick,
     sweep,
 )
 
@@ -83,6 +87,22 @@ def test_everything_that_a_host_may_ask(variant: str, tmp_path: Path) -> None:
         script.wait_ticks(200)
     played = equal(bench, script)
     assert played.fault_counts[0] == 15 < script.counts[0]  # a counter stays at its highest count
+
+
+@pytest.mark.common
+@pytest.mark.parametrize(("order", "pace"), [(1, 1), (2, 1), (3, SCANNER_PACE)])
+def test_remainders_begin_anew_with_every_program(order: int, pace: int, tmp_path: Path) -> None:
+    """Programs of different orders take turns, each begun in every tick of the other's line."""
+    rng, script = np.random.default_rng(order), Script()
+    programs = [random_dual(rng, SMALL, (8, 12), kind="tame", lines=(1, 2)) for _ in range(2)]
+    first, second = programs[0], shaped(rng, programs[1], order)
+    while second.x.output.shaping.order != order:
+        second = shaped(rng, programs[1], order)
+    script.tick_every(pace)
+    swaps_at_every_tick(script, (first, second))
+    swaps_at_every_tick(script, (second, shaped(rng, first, order)))
+    equal(SequencerBench("icarus", SMALL, tmp_path, {"SHAPING": order}), script)
+    assert script.swaps > 16
 
 
 # Long runs on Verilator.
@@ -177,7 +197,10 @@ def test_an_underrun_is_a_fault(tmp_path: Path) -> None:
 
 
 @pytest.mark.common
-def test_a_tick_that_comes_too_early_is_a_fault(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("least", "parameters"), [(LEAST_PACE, LOW_AREA), (SCANNER_PACE, SCANNER)], ids=["low_area", "scanner"]
+)
+def test_a_tick_that_comes_too_early_is_a_fault(least: int, parameters: dict[str, int], tmp_path: Path) -> None:
     """With a tick a clock earlier than the least pace every second one is refused, and the others go on as if alone."""
     plan = planned(tmp_path, PLANS["settle_0"])
     program = plan.program
@@ -186,13 +209,13 @@ def test_a_tick_that_comes_too_early_is_a_fault(tmp_path: Path) -> None:
     script.load(program)
     script.request("commit", program=program)
     script.wait(5)
-    script.tick_every(2 * (LEAST_PACE - 1))
+    script.tick_every(2 * (least - 1))
     script.wait(1)  # the program is taken
     script.request("arm", "trigger")
     script.wait_ticks(2 * plan.schedule.ticks)
-    tick_every = script.commands.index(4 << 60 | 2 * (LEAST_PACE - 1))
-    script.commands[tick_every] -= LEAST_PACE - 1
-    bench = SequencerBench("icarus", SequencerShape.of((program.x, program.y)), tmp_path / "bench", LOW_AREA)
+    tick_every = script.commands.index(4 << 60 | 2 * (least - 1))
+    script.commands[tick_every] -= least - 1
+    bench = SequencerBench("icarus", SequencerShape.of((program.x, program.y)), tmp_path / "bench", parameters)
     played = bench.play(script)
     expected = np.array(script.expected, dtype=np.uint64)
     assert played.fault_counts == (0, 0, len(expected) - 1, 0)

@@ -18,6 +18,10 @@
 
 #include "annexin_200nm.h"
 
+#ifdef ANNEXIN_200NM_SHAPING
+#error "this example plays no shaped output: the C sequencer dac_*.c does"
+#endif
+
 enum { PHASE_BITS = 32, FRACTION_BITS = 15 };
 
 /* The constants of an axis. Words are fetched by a function, since tables have 8, 16 or 32 bits. */
@@ -59,13 +63,22 @@ static int64_t shift_round(int64_t value, int bits)
     return (value + (INT64_C(1) << (bits - 1))) >> bits;
 }
 
-/* The table value at a position, with guard_bits below the LSB of a word. */
+/* The table value at a position: 2^guard_bits, or of a spline 12, for the LSB of a word. */
 static int64_t sample_at(const struct axis *axis, const struct position *at)
 {
     uint32_t index = at->count, fraction = 0;
     if (axis->interpolated) {
         index = at->phase >> (PHASE_BITS - axis->index_bits);
         fraction = (at->phase >> (PHASE_BITS - axis->index_bits - FRACTION_BITS)) & ((1u << FRACTION_BITS) - 1u);
+    }
+    if (axis->interpolated == 3) { /* a cubic spline */
+        int64_t c[4];
+        for (uint32_t i = 0; i < 4; i++)
+            c[i] = axis->word((index + i) % axis->length);
+        int64_t sample = 16 * (c[3] - c[0] + 3 * (c[1] - c[2]));
+        sample = 24 * (c[0] - 2 * c[1] + c[2]) + shift_round(sample * fraction, 16);
+        sample = 12 * (c[2] - c[0]) + shift_round(sample * fraction, 16);
+        return 2 * (c[0] + 4 * c[1] + c[2]) + shift_round(sample * fraction, 16);
     }
     const int64_t here = axis->word(index);
     const int64_t there = axis->word(index + 1 < axis->length ? index + 1 : 0);

@@ -1,5 +1,5 @@
 /* One axis: the code of one tick, and the fast path for many ticks at once. */
-#include "dac_axis.h"
+#include "dac_run.h"
 
 bool dac_axis_serves(const dac_converter *c)
 {
@@ -14,22 +14,27 @@ bool dac_axis_approach(dac_axis *axis, const dac_bank_axis *bank, int32_t target
     return axis->code == target;
 }
 
-/* The sample at a position, of which it takes the upper word. */
-static inline int32_t sample_at(const dac_bank_axis *bank, uint32_t high)
-{
-    const uint32_t index = high >> 15; /* the fraction behind it is 0 in a direct table */
-    const unsigned guard = DAC_GUARD(bank);
-    return dac_between(bank->table[index], bank->table[index + 1], high & 0x7fffu, guard, DAC_HALF(guard));
-}
-
 static inline int32_t code_of(const dac_bank_axis *bank, int32_t sample)
 {
     return (int32_t)(((int64_t)bank->gain * sample + bank->offset) >> bank->gain_q); /* 28 bits or fewer */
 }
 
+/* The code of this tick, before the clamp. */
+static inline int32_t unclamped(dac_axis *axis, const dac_bank_axis *bank)
+{
+    const int32_t sample = dac_sample_at(bank, axis->at.high);
+#if DAC_SHAPING
+    if (bank->order != 0)
+        return dac_axis_shaped_code(axis, bank, sample);
+#else
+    (void)axis;
+#endif
+    return code_of(bank, sample);
+}
+
 bool dac_axis_step(dac_axis *axis, const dac_bank_axis *bank, bool *outside)
 {
-    const int32_t code = code_of(bank, sample_at(bank, axis->at.high));
+    const int32_t code = unclamped(axis, bank);
     const int32_t clamped = code < bank->code_min ? bank->code_min : code > bank->code_max ? bank->code_max : code;
 
     if (clamped != code)
@@ -49,70 +54,56 @@ bool dac_axis_step(dac_axis *axis, const dac_bank_axis *bank, bool *outside)
  * Why 64 bits are enough. A position of 96 bits, cut to 64 and rounded up, is at most two units of 2^-32 above the exact one, and
  * every tick adds one more; run_most ticks are so few that these cannot reach the next fraction, which is 1 / period away or more. */
 
-#if defined(__ARM_FEATURE_UNALIGNED) && !defined(__ARM_BIG_ENDIAN) && DAC_TABLE_STORAGE_BITS == 16
-/* Reads two neighbouring words with one load. */
-struct pair {
-    int32_t words;
-} __attribute__((packed, may_alias));
-#define NEIGHBOURS(table, index, here, there)                                                                         \
-    const int32_t words = ((const struct pair *)((table) + (index)))->words;                                          \
-    const int32_t here = (int16_t)words, there = words >> 16
-#else
-#define NEIGHBOURS(table, index, here, there) const int32_t here = (table)[index], there = (table)[(index) + 1]
-#endif
-
-/* Hides a value from the optimiser, so that the compiler neither computes it in advance nor computes it again. */
-#if defined(__GNUC__)
-#define OPAQUE(value) __asm__("" : "+r"(value))
-#else
-#define OPAQUE(value) (void)0
-#endif
-
-static uint32_t block_of(uint32_t ticks)
-{
-    return ticks < DAC_RUN ? ticks : DAC_RUN;
-}
-
-/* Whether a window with this lower end is inside the limits. */
-static bool has_room(const dac_bank_axis *bank, int32_t base)
-{
-    return (uint32_t)(base - bank->code_min) <= (uint32_t)bank->run_room;
-}
-
 #if DAC_LONG_MULTIPLY
 
 /* Plays from position `at` until a code leaves the window; returns the number of ticks played. */
-static uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
-                     uint32_t ticks)
+static inline uint32_t play_along(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
+                                  uint32_t ticks, bool cubic)
 {
     const dac_word *const table = bank->table;
     /* Read again for every sample: a constant would take two registers, which the loop does not have. */
     const volatile int64_t offset = bank->run_offset;
-    const int32_t gain = bank->run_gain;
+    int32_t gain = bank->run_gain;
     const unsigned guard = DAC_GUARD(bank);
     dac_wide half = DAC_HALF(guard);
     uint32_t done = 0;
     int32_t code = axis->code;
+#if DAC_SPLINE
+    dac_track track;
 
-    OPAQUE(half);
+    if (cubic)
+        track = dac_track_of(table, at, step);
+#endif
+
+    DAC_OPAQUE(half);
     while (done < ticks) {
-        const uint32_t length = block_of(ticks - done);
+        const uint32_t length = dac_block_of(ticks - done);
         const int32_t base = code - bank->run_half;
         dac_output *stop = out + length * DAC_STRIDE;
         uint32_t strayed = 0;
 
-        if (!has_room(bank, base))
+        if (!dac_has_room(bank, base))
             break;
         do {
-            const uint32_t high = (uint32_t)(at >> 32);
-            NEIGHBOURS(table, high >> 15, here, there);
-            const int32_t sample = dac_between(here, there, high & 0x7fffu, guard, half);
+            int32_t sample;
+#if DAC_SPLINE
+            if (cubic) {
+                DAC_OPAQUE(gain);
+                sample = dac_track_on(&track);
+            } else
+#endif
+            {
+                const uint32_t high = (uint32_t)(at >> 32);
+                DAC_NEIGHBOURS(table, high >> 15, here, there);
+                sample = dac_between(here, there, high & 0x7fffu, guard, half);
+            }
             code = (int32_t)((offset + (int64_t)gain * sample) >> 32);
             strayed |= (uint32_t)(code - base);
             *out = (dac_output)code;
-            at += step;
+            if (!cubic)
+                at += step;
             out += DAC_STRIDE;
-            OPAQUE(out);
+            DAC_OPAQUE(out);
         } while (out != stop);
         if (strayed >> bank->run_bits != 0)
             break;
@@ -120,6 +111,16 @@ static uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uin
         done += length;
     }
     return done;
+}
+
+static uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
+                     uint32_t ticks)
+{
+#if DAC_SPLINE
+    if (bank->cubic)
+        return play_along(axis, bank, at, step, out, ticks, true);
+#endif
+    return play_along(axis, bank, at, step, out, ticks, false);
 }
 
 #else
@@ -132,20 +133,6 @@ static uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uin
  * bits, so that the 21 bits of `rise` are below 2^(spread + 1) only if |s - s0| <= 2^spread (spread <= 19). Then T(s) differs from
  * T(s0) by |gain| 2^spread <= 2^31 at most, and is within -2^31..2^32: its lower 32 bits are below 2^31 only if it is in 0..2^31. */
 
-#define SAMPLE_BITS 20 /* of 16 and 4 guard bits */
-#define ABOVE (32 - (SAMPLE_BITS + 1)) /* where the sum of an interpolation has the LSB of the sample */
-
-/* A Cortex-M0 adds and compares with all of its registers, and does everything else with eight: what is only added or compared is
- * put aside, and the step is read again for every sample. */
-#if defined(__GNUC__) && defined(__thumb__) && !defined(__thumb2__) && !defined(__OPTIMIZE_SIZE__)
-#define ASIDE(value) __asm__("" : "+h"(value))
-#define PUT_ASIDE(low, base, stop) ASIDE(low); ASIDE(base); ASIDE(stop)
-#define READ_AGAIN volatile
-#else
-#define PUT_ASIDE(low, base, stop) (void)0
-#define READ_AGAIN
-#endif
-
 /* From `rise` to the output, and on to the next tick. */
 #define PUT_CODE                                                                                                      \
     last = gain * rise + rest;                                                                                        \
@@ -155,49 +142,49 @@ static uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uin
     *out = (dac_output)last;                                                                                          \
     at += advance;                                                                                                    \
     out += DAC_STRIDE;                                                                                                \
-    OPAQUE(out)
+    DAC_OPAQUE(out)
 
 static uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
                      uint32_t ticks)
 {
     const dac_word *const table = bank->table;
-    const READ_AGAIN uint64_t advance = step;
+    const DAC_READ_AGAIN uint64_t advance = step;
     const uint32_t gain = (uint32_t)bank->gain, spread = UINT32_C(1) << bank->run_spread;
     const unsigned gain_q = bank->gain_q;
-    const int32_t begin = sample_at(bank, (uint32_t)(at >> 32));
+    const int32_t begin = dac_sample_at(bank, (uint32_t)(at >> 32));
     uint32_t done = 0, sample = (uint32_t)begin, last;
 
     if ((uint32_t)(code_of(bank, begin) - axis->code + bank->run_half) >> bank->run_bits != 0)
         return 0;
     while (done < ticks) {
-        const uint32_t length = block_of(ticks - done);
+        const uint32_t length = dac_block_of(ticks - done);
         int32_t base = axis->code - bank->run_half;
         const uint32_t origin = sample - spread;
-        uint32_t low = (UINT32_C(1) << (ABOVE - 1)) - (origin << ABOVE);
+        uint32_t low = (UINT32_C(1) << (DAC_ABOVE - 1)) - (origin << DAC_ABOVE);
         uint32_t rest = gain * origin + (uint32_t)bank->offset - ((uint32_t)base << gain_q);
         dac_output *stop = out + length * DAC_STRIDE;
         uint32_t strayed = 0, risen = 0, rise;
 
-        if (!has_room(bank, base))
+        if (!dac_has_room(bank, base))
             break;
 #if !defined(__OPTIMIZE_SIZE__) /* what is small has the second loop only */
         if ((at + (DAC_RUN - 1) * step) >> 47 == at >> 47) { /* all between the same two words */
-            NEIGHBOURS(table, (uint32_t)(at >> 47), here, there);
+            DAC_NEIGHBOURS(table, (uint32_t)(at >> 47), here, there);
             const uint32_t slope = (uint32_t)(there - here);
             low += (uint32_t)here << 15;
             do {
-                PUT_ASIDE(low, base, stop);
-                rise = (slope * ((uint32_t)(at >> 32) & 0x7fffu) + low) >> ABOVE;
+                DAC_PUT_ASIDE(low, base, stop);
+                rise = (slope * ((uint32_t)(at >> 32) & 0x7fffu) + low) >> DAC_ABOVE;
                 PUT_CODE;
             } while (out != stop);
         } else
 #endif
         {
             do {
-                PUT_ASIDE(low, base, stop);
+                DAC_PUT_ASIDE(low, base, stop);
                 const uint32_t high = (uint32_t)(at >> 32);
-                NEIGHBOURS(table, high >> 15, here, there);
-                rise = ((uint32_t)(there - here) * (high & 0x7fffu) + ((uint32_t)here << 15) + low) >> ABOVE;
+                DAC_NEIGHBOURS(table, high >> 15, here, there);
+                rise = ((uint32_t)(there - here) * (high & 0x7fffu) + ((uint32_t)here << 15) + low) >> DAC_ABOVE;
                 PUT_CODE;
             } while (out != stop);
         }
@@ -212,6 +199,12 @@ static uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uin
 
 #endif
 
+#if DAC_SHAPING
+#define PLAY(bank) ((bank)->order != 0 ? dac_axis_shaped_play : play)
+#else
+#define PLAY(bank) play
+#endif
+
 uint32_t dac_axis_run(dac_axis *axis, const dac_bank_axis *bank, dac_output *out, uint32_t ticks)
 {
     const uint64_t step = bank->holds ? 0 : ((uint64_t)bank->step.high << 32 | bank->step.low >> 32) + 1;
@@ -220,7 +213,7 @@ uint32_t dac_axis_run(dac_axis *axis, const dac_bank_axis *bank, dac_output *out
     while (done < ticks) {
         const uint64_t at = ((uint64_t)axis->at.high << 32 | axis->at.low >> 32) + 1;
         const uint32_t most = ticks - done < bank->run_most ? ticks - done : bank->run_most;
-        const uint32_t played = play(axis, bank, at, step, out + done * DAC_STRIDE, most);
+        const uint32_t played = PLAY(bank)(axis, bank, at, step, out + done * DAC_STRIDE, most);
 
         dac_axis_skip(axis, bank, played);
         done += played;

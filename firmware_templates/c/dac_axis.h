@@ -62,6 +62,52 @@ static inline int32_t dac_between(int32_t here, int32_t there, uint32_t fraction
     return (int32_t)(rise + (dac_wide)here * ((dac_wide)1 << guard));
 }
 
+#if DAC_SPLINE
+/* lower + value * half / 2^32, to nearest, ties up; |value| <= 2^27. */
+static inline int32_t dac_horner(int32_t lower, int32_t value, int32_t half)
+{
+    /* Instructions that compilers do not find here: they know too much of the factors. */
+#if defined(__GNUC__) && defined(__thumb2__) && defined(__ARM_FEATURE_DSP)
+    int32_t sum;
+    __asm__("smmlar %0, %1, %2, %3" : "=r"(sum) : "r"(value), "r"(half), "r"(lower));
+    return sum;
+#elif defined(__GNUC__) && defined(__thumb2__)
+    uint32_t rest = UINT32_C(0x80000000);
+    __asm__("smlal %0, %1, %2, %3" : "+r"(rest), "+r"(lower) : "r"(value), "r"(half));
+    return lower;
+#else
+    const int64_t start = (int64_t)lower * (INT64_C(1) << 32) + INT64_C(0x80000000);
+    return (int32_t)((start + (int64_t)value * half) >> 32);
+#endif
+}
+
+#define DAC_SPLINE_UNIT 12 /* units of a sample for the LSB of a word */
+
+/* The segment of a cubic spline that begins at a word, by powers of half of the fraction. */
+typedef struct {
+    int32_t b0, b1, b2, b3;
+} dac_segment;
+
+static inline dac_segment dac_segment_of(const dac_word *words)
+{
+    const int32_t first = words[0], second = words[1], third = words[2], fourth = words[3], ends = first + third;
+    const dac_segment s = {
+        2 * ends + 8 * second,
+        12 * (third - first),
+        24 * (ends - 2 * second),
+        16 * (fourth - first + 3 * (second - third)),
+    };
+    return s;
+}
+
+/* The sample at the half of a fraction, which has its 15 bits above 16 zeros. */
+static inline int32_t dac_along(const dac_segment *s, uint32_t half_fraction)
+{
+    const int32_t half = (int32_t)half_fraction;
+    return dac_horner(s->b0, dac_horner(s->b1, dac_horner(s->b2, s->b3, half), half), half);
+}
+#endif
+
 static inline dac_output dac_coded(const dac_axis *axis, int32_t code)
 {
     return (dac_output)(((uint32_t)code ^ axis->flip) << axis->shift);
@@ -80,6 +126,14 @@ bool dac_axis_approach(dac_axis *axis, const dac_bank_axis *bank, int32_t target
 /* Writes the codes of up to `ticks` ticks to out[0], out[DAC_STRIDE].., not coded yet; returns how many were played. It ends before
  * ticks on which the clamp or the slew guard might have to act: the caller plays these itself. The ticks are those of one period. */
 uint32_t dac_axis_run(dac_axis *axis, const dac_bank_axis *bank, dac_output *out, uint32_t ticks);
+
+#if DAC_SHAPING
+/* Of a program that shapes (dac_shaping.c): the code of a sample, before the clamp; and what dac_axis_run() does from position
+ * `at` on, as far as 64 bits of position are enough. */
+int32_t dac_axis_shaped_code(dac_axis *axis, const dac_bank_axis *bank, int32_t sample);
+uint32_t dac_axis_shaped_play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
+                         uint32_t ticks);
+#endif
 
 /* Returns the position `ticks` ticks later; ticks below 2^24. */
 void dac_axis_skip(dac_axis *axis, const dac_bank_axis *bank, uint32_t ticks);

@@ -178,6 +178,7 @@ bool dac_synthesize(dac_word *table, uint32_t room, unsigned index_bits, unsigne
     r.half = UINT32_C(1) << (bits - 1);
     r.mean = (int64_t)words[0] * (INT64_C(1) << 30) + (INT64_C(1) << (60 - bits));
     render(&r, 32 - index_bits);
-    table[r.length] = table[0];
+    for (unsigned i = 0; i < DAC_WORDS_BEHIND; i++)
+        table[r.length + i] = table[i];
     return true;
 }

@@ -10,6 +10,9 @@ enum { CRC, PROGRAM, FOURIER, RENDER, WORD, RANGE, SLEW, JUMP };
 struct output {
     const dac_word *table;
     uint32_t length;
+#if DAC_SPLINE
+    bool cubic;
+#endif
     unsigned guard, gain_q;
     int32_t gain, code_min, code_max, park_code;
     int64_t offset; /* offset plus half an LSB */
@@ -32,6 +35,9 @@ static struct output output_of(const dac_link *l, unsigned axis)
     const dac_axis_program *const p = axis == 0 ? &program.x : &program.y;
     o.table = p->table;
     o.length = p->length;
+#if DAC_SPLINE
+    o.cubic = (p->index_bits & DAC_CUBIC) != 0;
+#endif
     o.guard = p->bits > 21 ? 25u - p->bits : 4u;
     o.gain_q = p->gain_q;
     o.gain = p->gain_word;
@@ -51,6 +57,9 @@ static struct output playing_of(const dac_link *l, unsigned axis)
 
     o.table = b->table;
     o.length = b->length;
+#if DAC_SPLINE
+    o.cubic = b->cubic != 0;
+#endif
     o.guard = b->guard;
     o.gain_q = b->gain_q;
     o.gain = b->gain;
@@ -74,7 +83,21 @@ static int32_t code(const struct output *o, int32_t sample)
 
 static int32_t sample_of(const struct output *o, int32_t word)
 {
+#if DAC_SPLINE
+    if (o->cubic)
+        return word * DAC_SPLINE_UNIT;
+#endif
     return word * (INT32_C(1) << o->guard);
+}
+
+/* The code at the first advance of a period. */
+static int32_t first_code(const struct output *o)
+{
+#if DAC_SPLINE
+    if (o->cubic)
+        return code(o, dac_segment_of(o->table).b0);
+#endif
+    return code(o, sample_of(o, o->table[0]));
 }
 
 static uint32_t distance(int32_t a, int32_t b)
@@ -137,6 +160,39 @@ static bool good_output(const dac_link *l, const dac_link_image *image, unsigned
         && p->max_step >= 1 && p->max_step < INT32_C(1) << 24;
 }
 
+static uint32_t order_of(const dac_link_image *image, unsigned axis)
+{
+    return dac_link_program_word(image, axis + 1, DAC_LINK_SHAPING_WORD) & 3;
+}
+
+static uint32_t zero_of(const dac_link_image *image, unsigned axis)
+{
+    return dac_link_program_word(image, axis + 1, DAC_LINK_SHAPING_WORD) >> 8;
+}
+
+static bool good_shaping(const dac_link_image *image, unsigned axis)
+{
+    const uint32_t order = order_of(image, axis), zero = zero_of(image, axis);
+    const uint32_t most_zero = order == 3 ? 128 : 0;
+
+    if (order > DAC_SHAPING || zero > most_zero)
+        return false;
+    return dac_link_program_word(image, axis + 1, DAC_LINK_SHAPING_WORD) == (order | zero << 8);
+}
+
+/* By how many whole codes shaping can move a code, and by how many more a step. */
+static uint32_t code_excess(const dac_link_image *image, unsigned axis)
+{
+    const uint32_t order = order_of(image, axis);
+    return order < 3 ? order : 2 + (zero_of(image, axis) >> 6);
+}
+
+static uint32_t step_excess(const dac_link_image *image, unsigned axis)
+{
+    const uint32_t order = order_of(image, axis);
+    return order < 3 ? 2 * order : 4 + ((zero_of(image, axis) + 31) >> 5);
+}
+
 static dac_link_finding check_program(const dac_link *l)
 {
     const dac_link_image *const image = &l->image[l->idle];
@@ -149,6 +205,9 @@ static dac_link_finding check_program(const dac_link *l)
     for (unsigned axis = 0; axis < 2; axis++)
         if (!good_output(l, image, axis))
             return finding(DAC_LINK_OUTPUT, axis, 0);
+    for (unsigned axis = 0; axis < 2; axis++)
+        if (!good_shaping(image, axis))
+            return finding(DAC_LINK_SHAPING, axis, 0);
     for (unsigned axis = 0; axis < 2; axis++) {
         const dac_link_limits *const limits = axis == 0 ? &l->x_limits : &l->y_limits;
         if (dac_link_program_word(image, axis + 1, DAC_LINK_CODE_MIN) < limits->code_min
@@ -198,7 +257,7 @@ static void render(const dac_link *l, unsigned axis)
     const uint8_t *const shape = dac_link_shape(&l->image[l->idle], axis);
 
     if (part_of(l, axis)->harmonics != 0)
-        (void)dac_synthesize(here->table[l->idle], here->room, shape[0], shape[1], here->fourier, part_of(l, axis)->harmonics,
+        (void)dac_synthesize(here->table[l->idle], here->room, dac_link_index_bits(&l->image[l->idle], axis), shape[1], here->fourier, part_of(l, axis)->harmonics,
                              l->config->sine, l->config->sine_index_bits);
 }
 
@@ -216,19 +275,21 @@ static dac_link_finding check_words(dac_link *l, unsigned axis, bool *done)
         if (table[c->at] < -half || table[c->at] >= half)
             return finding(DAC_LINK_WORD, axis, c->at);
     *done = c->at == part->words;
-    if (*done)
-        table[part->words] = table[0]; /* the sequencer reads the first word behind the last */
+    if (*done) /* the sequencer reads the first words behind the last */
+        for (unsigned i = 0; i < DAC_WORDS_BEHIND; i++)
+            table[part->words + i] = table[i];
     return nothing;
 }
 
 static dac_link_finding check_range(dac_link *l, unsigned axis, bool *done)
 {
     const struct output o = output_of(l, axis);
+    const int32_t outside = OUTSIDE + (int32_t)code_excess(&l->image[l->idle], axis);
     dac_link_check *const c = &l->check;
 
     for (const uint32_t end = slice(l, o.length); c->at != end; c->at++) {
         const int64_t at = unclamped(&o, sample_of(&o, o.table[c->at]));
-        if (at < o.code_min - OUTSIDE || at > o.code_max + OUTSIDE)
+        if (at < o.code_min - outside || at > o.code_max + outside)
             return finding(DAC_LINK_RANGE, axis, c->at);
     }
     *done = c->at == o.length;
@@ -242,6 +303,12 @@ static int32_t advance_code(const dac_link *l, const struct output *o, unsigned 
     if (index_bits == 0)
         return code(o, sample_of(o, o->table[l->check.at]));
     const uint32_t index = phase >> (32 - index_bits);
+#if DAC_SPLINE
+    if (o->cubic) {
+        const dac_segment segment = dac_segment_of(o->table + index);
+        return code(o, dac_along(&segment, (phase << index_bits >> 17) << 16));
+    }
+#endif
     const int32_t here = o->table[index], there = o->table[(index + 1) & (o->length - 1)];
     return code(o, dac_between(here, there, phase << index_bits >> 17, o->guard, DAC_HALF(o->guard)));
 }
@@ -253,7 +320,8 @@ static dac_link_finding check_advances(dac_link *l, unsigned axis, uint32_t adva
     const uint32_t step = dac_link_program_word(image, axis + 1, DAC_LINK_PHASE_STEP);
     const uint32_t remainder = dac_link_program_word(image, axis + 1, DAC_LINK_PHASE_REMAINDER);
     const uint32_t max_step = dac_link_program_word(image, axis + 1, DAC_LINK_MAX_STEP);
-    const unsigned index_bits = dac_link_shape(image, axis)[0];
+    const uint32_t excess = step_excess(image, axis);
+    const unsigned index_bits = dac_link_index_bits(image, axis);
     const struct output o = output_of(l, axis);
     dac_link_check *const c = &l->check;
 
@@ -261,7 +329,7 @@ static dac_link_finding check_advances(dac_link *l, unsigned axis, uint32_t adva
         const int32_t now = advance_code(l, &o, index_bits);
         if (c->at == 0)
             c->first = now;
-        else if (distance(now, c->before) > max_step)
+        else if (distance(now, c->before) + excess > max_step)
             return finding(DAC_LINK_SLEW, axis, c->at - 1);
         c->before = now;
         c->phase += step;
@@ -272,7 +340,7 @@ static dac_link_finding check_advances(dac_link *l, unsigned axis, uint32_t adva
         }
     }
     *done = c->at == advances;
-    return *done && distance(c->first, c->before) > max_step ? finding(DAC_LINK_SLEW, axis, advances - 1) : nothing;
+    return *done && distance(c->first, c->before) + excess > max_step ? finding(DAC_LINK_SLEW, axis, advances - 1) : nothing;
 }
 
 /* For a longer period: the steepest segment. */
@@ -292,10 +360,15 @@ static dac_link_finding check_segments(dac_link *l, unsigned axis, uint32_t adva
     *done = c->at == o.length;
     if (!*done)
         return nothing;
+#if DAC_SPLINE
+    const uint64_t gain = distance(o.gain, 0), rise = (uint64_t)sample_of(&o, (int32_t)c->rise);
+#else
     const uint64_t gain = distance(o.gain, 0), rise = (uint64_t)c->rise << o.guard;
+#endif
     const uint64_t max_step = dac_link_program_word(&l->image[l->idle], axis + 1, DAC_LINK_MAX_STEP);
+    const uint64_t excess = step_excess(&l->image[l->idle], axis);
     const uint64_t slack = 2 + (gain * (2 + (rise >> 14)) >> o.gain_q);
-    return (gain * rise * o.length) >> o.gain_q <= advances * (max_step + slack)
+    return ((gain * rise * o.length) >> o.gain_q) + advances * excess <= advances * (max_step + slack)
         ? nothing : finding(DAC_LINK_SLEW, axis, c->steepest);
 }
 
@@ -330,11 +403,11 @@ static dac_link_finding check_jump(dac_link *l, bool *done)
         return nothing;
     for (unsigned axis = 0; axis < 2; axis++) {
         const struct output old = playing_of(l, axis), next = output_of(l, axis);
-        const int32_t begin = code(&next, sample_of(&next, next.table[0]));
+        const int32_t begin = first_code(&next);
         if ((dac_sequencer_status(s).markers & DAC_PLAYING) == 0) {
             jump[axis] = distance(next.park_code, old.park_code);
         } else if (axis == 0) {
-            jump[0] = distance(code(&old, sample_of(&old, old.table[0])), begin);
+            jump[0] = distance(first_code(&old), begin);
         } else {
             const uint32_t low = distance(code(&old, sample_of(&old, c->lowest)), begin);
             const uint32_t high = distance(code(&old, sample_of(&old, c->highest)), begin);

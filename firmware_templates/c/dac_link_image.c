@@ -20,7 +20,7 @@ uint32_t dac_link_most_bytes(const dac_link_config *config)
 
 uint32_t dac_link_table_words(const dac_link_image *image, unsigned axis)
 {
-    const unsigned index_bits = dac_link_shape(image, axis)[0];
+    const unsigned index_bits = dac_link_index_bits(image, axis);
 
     if (index_bits != 0)
         return UINT32_C(1) << index_bits;
@@ -196,5 +196,9 @@ void dac_link_program_of(const dac_link *l, dac_program *p)
         a->word_bits = here->converter.word_bits;
         a->twos_complement = here->converter.twos_complement;
         a->left_aligned = here->converter.left_aligned;
+#if DAC_SHAPING
+        a->shaping_order = dac_link_program_word(image, page, DAC_LINK_SHAPING_WORD) & 3;
+        a->shaping_zero = (uint8_t)(dac_link_program_word(image, page, DAC_LINK_SHAPING_WORD) >> 8);
+#endif
     }
 }

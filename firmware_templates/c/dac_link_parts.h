@@ -39,7 +39,8 @@ enum {
     DAC_LINK_WITHDRAWN,
     DAC_LINK_READBACK,
     DAC_LINK_TICKS,
-    DAC_LINK_REFUSED
+    DAC_LINK_REFUSED,
+    DAC_LINK_SHAPING
 };
 
 typedef struct {
@@ -95,7 +96,7 @@ enum { DAC_LINK_LINE_TICKS, DAC_LINK_FRAME_LINES, DAC_LINK_SETTLE_LINES, DAC_LIN
        DAC_LINK_BACKWARD = 6, DAC_LINK_UP = 8, DAC_LINK_DOWN = 10, DAC_LINK_PIXELS = 12, DAC_LINK_Y_STEPS };
 enum { DAC_LINK_PHASE_STEP, DAC_LINK_PHASE_REMAINDER, DAC_LINK_PHASE_PERIOD, DAC_LINK_GAIN, DAC_LINK_OFFSET_LOW,
        DAC_LINK_OFFSET_HIGH, DAC_LINK_CODE_MIN, DAC_LINK_CODE_MAX, DAC_LINK_MAX_STEP, DAC_LINK_PARK_CODE,
-       DAC_LINK_ORDER };
+       DAC_LINK_ORDER, DAC_LINK_SHAPING_WORD };
 
 static inline bool dac_link_permits(const dac_link *l)
 {
@@ -113,10 +114,16 @@ static inline uint32_t dac_link_program_word(const dac_link_image *image, unsign
     return dac_link_get(image->program + 64 * page + 4 * word);
 }
 
-/* index_bits, word_bits, dac_bits of an axis, and a zero. */
+/* index_bits, word_bits, dac_bits of an axis, and a zero; DAC_CUBIC is part of the index_bits. */
 static inline const uint8_t *dac_link_shape(const dac_link_image *image, unsigned axis)
 {
     return image->info + DAC_LINK_SHAPES + 4 * axis;
+}
+
+/* The index_bits without DAC_CUBIC. */
+static inline unsigned dac_link_index_bits(const dac_link_image *image, unsigned axis)
+{
+    return dac_link_shape(image, axis)[0] & (DAC_SPLINE ? DAC_CUBIC - 1u : 255u);
 }
 
 /* dac_link_answer.c */

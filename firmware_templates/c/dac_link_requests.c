@@ -37,7 +37,8 @@ static void put_device(const dac_link *l, uint8_t *at)
     at[3] = MOST_DATA;
     at[4] = (uint8_t)c->harmonics;
     at[5] = (uint8_t)(c->harmonics >> 8);
-    at[6] = at[7] = 0;
+    at[6] = DAC_SHAPING;
+    at[7] = DAC_SPLINE ? 3 : 0; /* the highest degree */
     dac_link_put(at + 8, dac_link_most_bytes(c));
     put_shape(at + 12, &c->x);
     put_shape(at + 16, &c->y);

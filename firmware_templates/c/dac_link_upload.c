@@ -11,7 +11,13 @@ dac_link_finding dac_link_begin(dac_link *l, const uint8_t *info, dac_link_answe
     for (unsigned axis = 0; axis < 2; axis++) {
         const dac_link_axis *const here = dac_link_axis_of(l, axis);
         const uint8_t *const shape = info + DAC_LINK_SHAPES + 4 * axis;
+#if DAC_SPLINE
+        const bool cubic = (shape[0] & DAC_CUBIC) != 0;
+        const unsigned index_bits = shape[0] & (DAC_CUBIC - 1u);
+        const bool fits = shape[0] == 0 || (index_bits >= 3 && index_bits <= here->index_bits && (!cubic || shape[1] <= 21));
+#else
         const bool fits = shape[0] == 0 || (shape[0] >= 3 && shape[0] <= here->index_bits);
+#endif
         if (!fits || shape[1] != here->word_bits || shape[2] != here->converter.bits)
             return dac_link_because(DAC_LINK_SHAPE, axis);
     }

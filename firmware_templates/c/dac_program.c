@@ -20,17 +20,27 @@ static bool good_storage(const dac_axis_program *p)
     return p->storage_bits == DAC_TABLE_STORAGE_BITS && p->bits <= DAC_TABLE_STORAGE_BITS;
 }
 
+#if DAC_SPLINE
+#define INDEX_BITS(p) ((p)->index_bits & ~(unsigned)DAC_CUBIC)
+#define CUBIC(p) (((p)->index_bits & DAC_CUBIC) != 0)
+#else
+#define INDEX_BITS(p) ((p)->index_bits)
+#define CUBIC(p) false
+#endif
+
 static bool good_length(const dac_axis_program *p)
 {
     if (p->index_bits == 0)
         return p->length == p->phase_period && p->length <= UINT32_C(1) << 17;
-    return p->index_bits >= 3 && p->index_bits <= 16 && p->length == UINT32_C(1) << p->index_bits;
+    return INDEX_BITS(p) >= 3 && INDEX_BITS(p) <= 16 && p->length == UINT32_C(1) << INDEX_BITS(p);
 }
 
-/* Every tick reads a word and the next one: behind the last one has to stand the first one again. */
+/* Every tick reads a word and the next one, of a cubic table the next three: behind the last one have to stand the first ones again. */
 static bool good_table(const dac_axis_program *p)
 {
-    return p->table != NULL && p->bits >= 8 && p->bits <= 24 && good_length(p) && p->table[p->length] == p->table[0];
+    return p->table != NULL && p->bits >= 8 && p->bits <= (CUBIC(p) ? 21 : 24) && good_length(p)
+        && p->table[p->length] == p->table[0]
+        && (!CUBIC(p) || (p->table[p->length + 1] == p->table[1] && p->table[p->length + 2] == p->table[2]));
 }
 
 /* x plays one period per line; y plays one period per frame, with one advance per tick, or per line if it is held for a line. */
@@ -58,6 +68,13 @@ static bool good_output(const dac_axis_program *p)
         && p->code_max < INT32_C(1) << p->dac_bits && p->max_step >= 1 && p->max_step < INT32_C(1) << 24;
 }
 
+#if DAC_SHAPING
+static bool good_shaping(const dac_axis_program *p)
+{
+    return (p->shaping_zero == 0 || (p->shaping_order == 3 && p->shaping_zero <= 128)) && p->shaping_order <= DAC_SHAPING;
+}
+#endif
+
 /* Whether a program is for the converter, which dac_sequencer_init() has found good, or has left at 0 bits. */
 static bool same_converter(const dac_axis_program *p, const dac_axis *axis)
 {
@@ -72,7 +89,11 @@ static dac_loaded judge_axis(const dac_axis_program *p, const dac_axis *axis)
     return !same_converter(p, axis) ? DAC_OTHER_CONVERTER
          : !good_storage(p) ? DAC_OTHER_STORAGE
          : !good_table(p) ? DAC_BAD_TABLE
-         : !good_output(p) ? DAC_BAD_OUTPUT : DAC_LOADED;
+         : !good_output(p) ? DAC_BAD_OUTPUT
+#if DAC_SHAPING
+         : !good_shaping(p) ? DAC_BAD_SHAPING
+#endif
+         : DAC_LOADED;
 }
 
 /* numerator 2^`zeros` by divisor < 2^31, rounded up, by long division: 95 bits or fewer, some 12 instructions a bit. */
@@ -97,6 +118,30 @@ static dac_position power_divided(unsigned zeros, uint32_t divisor)
     return quotient;
 }
 
+#if DAC_SHAPING
+/* Gain and offset as dac_axis_shaped_play() needs them: the offset without the half of the rounding, which is fed back. Returns
+ * whether they fit. */
+static bool scale_shaped(dac_bank_axis *b, const dac_axis_program *p)
+{
+#if DAC_TABLE_STORAGE_BITS != 16
+    b->run_gain = p->gain_word;
+    b->run_offset = p->offset_word;
+#elif DAC_LONG_MULTIPLY
+    /* With the 11 bits more of a sample the upper word has the code and its remainder. */
+    const unsigned up = 29u - p->bits;
+    const int32_t most = up > 14 ? INT32_C(1) << (31 - up) : INT32_C(1) << 17;
+    if (p->gain_word >= most || p->gain_word < -most)
+        return false;
+    b->run_gain = p->gain_word * (INT32_C(1) << up);
+    b->run_offset = p->offset_word * ((int64_t)1 << (up + 11));
+#else
+    b->run_gain = p->gain_word * (INT32_C(1) << (16 - p->bits));
+    b->run_offset = p->offset_word * ((int64_t)1 << (16 - p->bits));
+#endif
+    return true;
+}
+#endif
+
 /* Derives the windows of dac_axis_run, if runs are possible. */
 static void allow_runs(dac_bank_axis *b, const dac_axis_program *p)
 {
@@ -105,9 +150,20 @@ static void allow_runs(dac_bank_axis *b, const dac_axis_program *p)
     uint8_t bits = 0;
 
     b->run_most = 0;
+    /* Runs of a spline take products of 64 bits, and less than half a segment from tick to tick. */
+    if (CUBIC(p) && (!DAC_LONG_MULTIPLY || (p->hold_ticks == 1 && p->phase_period <= 2 * p->length)))
+        return;
+#if DAC_SHAPING
+    if (b->order != 0 && !scale_shaped(b, p))
+        return;
+#endif
 #if !DAC_LONG_MULTIPLY
     uint32_t gain = (uint32_t)(p->gain_word < 0 ? -p->gain_word : p->gain_word);
 
+#if DAC_SHAPING
+    if (b->order != 0)
+        gain <<= 16 - p->bits;
+#endif
     b->run_spread = 31;
     for (; gain != 0; gain >>= 1)
         b->run_spread--;
@@ -115,16 +171,25 @@ static void allow_runs(dac_bank_axis *b, const dac_axis_program *p)
         b->run_spread = 19;
 #else
     const unsigned left = 32u - p->gain_q;
-    if (left > 14) /* the gain would not fit */
-        return;
-    b->run_gain = p->gain_word * (INT32_C(1) << left);
-    b->run_offset = b->offset * ((int64_t)1 << left);
+#if DAC_SHAPING
+    if (b->order == 0)
+#endif
+    {
+        if (left > 14) /* the gain would not fit */
+            return;
+        b->run_gain = p->gain_word * (INT32_C(1) << left);
+        b->run_offset = b->offset * ((int64_t)1 << left);
+    }
 #endif
     b->run_most = most > 258 ? 256 : most > 2 ? most - 2 : 0;
     if (widest > p->max_step)
         widest = p->max_step;
     while ((widest + 1) >> (bits + 1) != 0) /* gain_q + bits <= 31, with words of 16 bits */
         bits++;
+#if DAC_SHAPING && !DAC_LONG_MULTIPLY
+    if (b->order != 0 && bits < 4) /* what is fed back may leave half a window */
+        b->run_most = 0;
+#endif
     b->run_bits = bits;
     b->run_half = INT32_C(1) << bits >> 1;
     b->run_room = p->code_max - p->code_min + 1 - (INT32_C(1) << bits);
@@ -134,10 +199,18 @@ static void derive(dac_bank_axis *b, const dac_axis_program *p)
 {
     const dac_position word = {UINT32_C(1) << 15, 0};
 
-    b->step = p->index_bits ? power_divided(79u + p->index_bits, p->phase_period) : word;
+    b->step = p->index_bits ? power_divided(79u + INDEX_BITS(p), p->phase_period) : word;
     b->table = p->table;
     b->length = p->length;
     b->holds = p->hold_ticks != 1;
+#if DAC_SPLINE
+    b->cubic = CUBIC(p);
+#endif
+#if DAC_SHAPING
+    b->order = p->shaping_order;
+    b->zero = p->shaping_zero;
+    b->remainder_bits = (uint8_t)(28 - p->dac_bits);
+#endif
     b->guard = (uint8_t)guard_bits(p);
     b->gain = p->gain_word;
     b->gain_q = p->gain_q;

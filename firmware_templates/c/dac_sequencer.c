@@ -129,6 +129,16 @@ static void to_start(dac_axis *axis)
     axis->at.high = 0;
 }
 
+/* Begins with remainders of 0, if there are any. */
+static void forget(dac_axis *axis)
+{
+#if DAC_SHAPING
+    axis->shaper.back = axis->shaper.newest = axis->shaper.older = UINT32_C(1) << (27 - axis->bits);
+#else
+    (void)axis;
+#endif
+}
+
 /* Starts at line 0 of the active program. */
 static void begin(dac_sequencer *s)
 {
@@ -136,6 +146,8 @@ static void begin(dac_sequencer *s)
     s->line = 0;
     to_start(&s->x);
     to_start(&s->y);
+    forget(&s->x);
+    forget(&s->y);
     s->settle_left = s->now->schedule.settle_lines;
     s->catching_up = true;
 }
@@ -347,15 +359,24 @@ void dac_sequencer_step(dac_sequencer *s, dac_tick *out)
 static uint32_t run(dac_sequencer *s, dac_output *x, dac_output *y, uint32_t most)
 {
     const dac_bank *const bank = s->now;
+#if DAC_SHAPING
+    const dac_axis before = s->x;
+#else
     const dac_position at = s->x.at;
     const int32_t code = s->x.code;
+#endif
     const uint32_t x_ticks = dac_axis_run(&s->x, &bank->x, x, most);
     const uint32_t ticks = dac_axis_run(&s->y, &bank->y, y, x_ticks);
 
     if (ticks != x_ticks) { /* y stopped earlier, at a tick that needs a step; x goes back */
+#if DAC_SHAPING
+        s->x = before; /* only who plays again finds its remainders */
+        (void)dac_axis_run(&s->x, &bank->x, x, ticks);
+#else
         s->x.at = at;
         s->x.code = ticks != 0 ? (int32_t)x[(ticks - 1) * DAC_STRIDE] : code;
         dac_axis_skip(&s->x, &bank->x, ticks);
+#endif
     }
     return ticks;
 }

@@ -45,8 +45,22 @@ extern "C" {
 #define DAC_OUTPUT_STORAGE_BITS 16 /* bits of a converter word in memory: 16, or 32 for converters with more than 16 bits */
 #endif
 
+#ifndef DAC_SPLINE
+#define DAC_SPLINE 0 /* 1: plays cubic tables too, of words of up to 21 bits */
+#endif
+#define DAC_CUBIC 128 /* of a cubic table: added to its index_bits */
+/* Words of a table that stand behind its last one: its first ones again. */
+#define DAC_WORDS_BEHIND (DAC_SPLINE ? 3 : 1)
+
 #ifndef DAC_STRIDE
 #define DAC_STRIDE 2 /* distance of two words of an axis in a buffer: 2 if x and y alternate, 1 if each has its own buffer */
+#endif
+
+#ifndef DAC_SHAPING
+#define DAC_SHAPING 0 /* highest order of shaped output: 0 none, 1 first, 2 second, 3 scanner */
+#endif
+#if DAC_SHAPING < 0 || DAC_SHAPING > 3
+#error "DAC_SHAPING is 0, 1, 2 or 3"
 #endif
 
 #if DAC_TABLE_STORAGE_BITS == 16
@@ -73,11 +87,11 @@ typedef struct {
 
 /* One axis. The table stays where it is, in flash or in memory of the application, until its bank is idle again. */
 typedef struct {
-    const dac_word *table; /* its words, and behind the last one the first one again */
-    uint32_t length;       /* words without that one: 2^index_bits, or phase_period if not interpolated */
+    const dac_word *table; /* its words, and behind the last one the first one again; of a cubic table the first three */
+    uint32_t length;       /* words without these: 2^index_bits, or phase_period if not interpolated */
     uint8_t storage_bits;  /* bits of a word in memory: DAC_STORAGE_BITS(table) */
     uint8_t bits;          /* bits of a word, 8..24; it has min(4, 25 - bits) guard bits */
-    uint8_t index_bits;    /* 3..16, or 0 if not interpolated */
+    uint8_t index_bits;    /* 3..16, or 0 if not interpolated; and DAC_CUBIC for a cubic table */
     uint32_t phase_period; /* advances per period, up to 2^31 - 1 */
     uint32_t hold_ticks;   /* ticks per advance: 1, or for y the ticks of a line */
     int32_t gain_word;     /* signed 18 bits */
@@ -87,10 +101,14 @@ typedef struct {
     int32_t max_step;      /* codes per tick, at least 1 */
     uint8_t dac_bits, word_bits;           /* bits of a code, 8..24, and of a converter word */
     bool twos_complement, left_aligned;
+#if DAC_SHAPING
+    uint8_t shaping_order; /* 0 off, 1 first, 2 second, 3 scanner; at most DAC_SHAPING */
+    uint8_t shaping_zero;  /* 0..128, with order 3 only */
+#endif
 } dac_axis_program;
 
 /* Words of memory of an interpolated table. */
-#define DAC_TABLE_ROOM(index_bits) ((UINT32_C(1) << (index_bits)) + 1)
+#define DAC_TABLE_ROOM(index_bits) ((UINT32_C(1) << (index_bits)) + DAC_WORDS_BEHIND)
 
 /* What both axes share. */
 typedef struct {
@@ -119,11 +137,36 @@ typedef struct {
 /* Initialiser for one axis of a program, with the emitted table or your own. */
 #define DAC_AXIS_PROGRAM(AXIS, words)                                                                                 \
     {                                                                                                                 \
-        words, AXIS##_TABLE_LENGTH, DAC_STORAGE_BITS(words), AXIS##_TABLE_BITS, AXIS##_INDEX_BITS,                    \
-        AXIS##_PHASE_PERIOD, AXIS##_HOLD_TICKS, AXIS##_GAIN_WORD, AXIS##_OFFSET_WORD, AXIS##_GAIN_Q,                  \
+        words, AXIS##_TABLE_LENGTH, DAC_STORAGE_BITS(words), AXIS##_TABLE_BITS,                                       \
+        AXIS##_INDEX_BITS + (AXIS##_INTERPOLATED == 3 ? DAC_CUBIC : 0), AXIS##_PHASE_PERIOD, AXIS##_HOLD_TICKS,                          \
+        AXIS##_GAIN_WORD, AXIS##_OFFSET_WORD, AXIS##_GAIN_Q,                                                          \
         AXIS##_CODE_MIN, AXIS##_CODE_MAX, AXIS##_PARK_CODE, AXIS##_MAX_STEP, AXIS##_DAC_BITS, AXIS##_DAC_WORD_BITS,   \
-        AXIS##_DAC_TWOS_COMPLEMENT, AXIS##_DAC_LEFT_ALIGNED                                                           \
+        AXIS##_DAC_TWOS_COMPLEMENT,                                                                                   \
+        (AXIS##_DAC_LEFT_ALIGNED) + 0 * DAC_SHAPED_BY_RUNTIME(DAC_SHAPING_OF(AXIS##_SHAPING_ORDER, AXIS##_SHAPING_ORDER)) \
+        DAC_SHAPING_MEMBERS(AXIS)                                                                                     \
     }
+/* A value of shaping if a header has AXIS_SHAPING_ORDER, 0 if it has none, as that of a scan without shaping: only an order of 1
+ * to 3 makes DAC_SHAPING_GIVEN_... two arguments of one. */
+#define DAC_SHAPING_GIVEN_1 0,
+#define DAC_SHAPING_GIVEN_2 0,
+#define DAC_SHAPING_GIVEN_3 0,
+#define DAC_SHAPING_SECOND(first, second, ...) (second)
+#define DAC_SHAPING_CHOSEN(given, value) DAC_SHAPING_SECOND(given value, 0, 0)
+#define DAC_SHAPING_PASTED(order, value) DAC_SHAPING_CHOSEN(DAC_SHAPING_GIVEN_##order, value)
+#define DAC_SHAPING_OF(order, value) DAC_SHAPING_PASTED(order, value)
+/* Does not compile if a header needs a higher DAC_SHAPING. */
+#ifdef __cplusplus
+#define DAC_SHAPED_BY_RUNTIME(order) sizeof(char[(order) <= DAC_SHAPING ? 1 : -1])
+#else
+#define DAC_SHAPED_BY_RUNTIME(order)                                                                                  \
+    sizeof(struct { int compile_with_the_DAC_SHAPING_of_the_header : (order) <= DAC_SHAPING ? 1 : -1; })
+#endif
+#if DAC_SHAPING
+#define DAC_SHAPING_MEMBERS(AXIS)                                                                                     \
+    , DAC_SHAPING_OF(AXIS##_SHAPING_ORDER, AXIS##_SHAPING_ORDER), DAC_SHAPING_OF(AXIS##_SHAPING_ORDER, AXIS##_SHAPING_ZERO)
+#else
+#define DAC_SHAPING_MEMBERS(AXIS)
+#endif
 /* Bits of a word of a table in memory. Does not compile if they are not DAC_TABLE_STORAGE_BITS: older compilers only warn of
  * the other pointer, and the runtime would read behind the table. (C++ refuses the other pointer by itself.) */
 #ifdef __cplusplus
@@ -178,7 +221,8 @@ typedef enum {
     DAC_BAD_TABLE,       /* missing, length or width out of range, or the word behind the last one is not the first */
     DAC_BAD_PERIOD,      /* the period does not fit the schedule */
     DAC_BAD_OUTPUT,      /* gain, offset, codes or step out of range */
-    DAC_OTHER_STORAGE    /* the runtime was compiled with another DAC_TABLE_STORAGE_BITS than the table, or too narrow a one */
+    DAC_OTHER_STORAGE,   /* the runtime was compiled with another DAC_TABLE_STORAGE_BITS than the table, or too narrow a one */
+    DAC_BAD_SHAPING      /* an order above DAC_SHAPING, or no zero of that order */
 } dac_loaded;
 
 /* Output of one tick. */
@@ -213,15 +257,21 @@ typedef struct {
 /* One axis of a bank: its program, and values derived from it when it was loaded. */
 typedef struct {
     uint8_t holds, guard, gain_q, run_bits, run_spread;
+#if DAC_SPLINE
+    uint8_t cubic;
+#endif
+#if DAC_SHAPING
+    uint8_t order, zero, remainder_bits;
+#endif
     const dac_word *table;
     uint32_t length;            /* words of the table, without the one behind the last */
-    int32_t gain, run_gain;     /* with gain_q and with 32 fraction bits */
+    int32_t gain, run_gain;     /* with gain_q and, if not shaped, with 32 fraction bits */
     int32_t code_min, code_max, max_step, park_code;
     int32_t run_half, run_room; /* half a window of 2^run_bits codes, and the room for it between the limits */
     uint32_t run_most;          /* maximum ticks of a run; 0: no runs */
     dac_position step;          /* step per advance, rounded up */
     int64_t offset;             /* offset_word and half an LSB */
-    int64_t run_offset;         /* the same with 32 fraction bits */
+    int64_t run_offset;         /* the same with 32 fraction bits; if shaped, offset_word as run_gain needs it */
 } dac_bank_axis;
 
 typedef struct {
@@ -229,12 +279,22 @@ typedef struct {
     dac_bank_axis x, y;
 } dac_bank;
 
+#if DAC_SHAPING
+/* What is fed back to the next code, and the remainders of the last two ticks: all with half a code more than they are. */
+typedef struct {
+    uint32_t back, newest, older;
+} dac_shaper;
+#endif
+
 typedef struct {
     int32_t code;
     uint32_t flip;   /* the bit that two's complement inverts */
     uint8_t shift;   /* shift for left alignment */
     uint8_t bits, word_bits;
     dac_position at;
+#if DAC_SHAPING
+    dac_shaper shaper;
+#endif
 } dac_axis;
 
 typedef struct {
@@ -323,7 +383,7 @@ void dac_sequencer_report(dac_sequencer *s, uint8_t fault);
 /* ANY CALLER: no sequencer is involved. */
 
 /* Computes the 2^index_bits words of a table, index_bits 3..16, from Fourier words a0, a1..aH, b1..bH (Q2.30), equal to the table
- * of the build, and puts the first one behind the last. `room`: words that the table has room for, DAC_TABLE_ROOM(index_bits)
+ * of the build, and puts DAC_WORDS_BEHIND of the first ones behind the last. `room`: words that the table has room for, DAC_TABLE_ROOM(index_bits)
  * or more. `sine` is the emitted table NAME_sine of a length of 2^sine_index_bits, sine_index_bits >= index_bits.
  * Returns false, and writes nothing, if the accumulator could overflow (the magnitudes of the words sum to 4 or more) or a size is
  * out of range. Not re-entrant on the same table; the table must not be playing. */

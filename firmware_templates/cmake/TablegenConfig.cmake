@@ -10,7 +10,8 @@
 #
 # builds the scan file into DIRECTORY (by default tablegen/NAME in the binary directory), and makes a library NAME of
 # its C sources: NAME.c, unless the scan is header-only, and the runtime dac_*.c. Who links to it finds the headers, and
-# is compiled with the DAC_TABLE_STORAGE_BITS and DAC_OUTPUT_STORAGE_BITS that the scan needs.
+# is compiled with the DAC_TABLE_STORAGE_BITS and DAC_OUTPUT_STORAGE_BITS that the scan needs, with its DAC_SHAPING, and
+# with DAC_SPLINE for cubic tables.
 #
 # TABLEGEN, which may be given on the command line of cmake, is the program; a list is one with its first arguments.
 #
@@ -106,5 +107,21 @@ function(tablegen_build scan)
     endforeach()
     target_compile_definitions("${arg_TARGET}" PUBLIC DAC_${kind}_STORAGE_BITS=${storage})
   endforeach()
+  foreach(axis x y)
+    string(JSON mode GET "${manifest}" axes ${axis} table mode)
+    if(mode STREQUAL "cubic")
+      target_compile_definitions("${arg_TARGET}" PUBLIC DAC_SPLINE=1)
+    endif()
+  endforeach()
+  set(shaping 0)
+  foreach(axis x y)
+    string(JSON order ERROR_VARIABLE none GET "${manifest}" axes ${axis} output shaping order)
+    if(order GREATER shaping) # what is not there is no number
+      set(shaping ${order})
+    endif()
+  endforeach()
+  if(shaping)
+    target_compile_definitions("${arg_TARGET}" PUBLIC DAC_SHAPING=${shaping})
+  endif()
   add_dependencies("${arg_TARGET}" "${arg_TARGET}_tablegen")
 endfunction()

@@ -10,7 +10,9 @@
 #
 #   build/scan_SOURCES     the C sources: NAME.c, unless the scan is header-only, and the runtime dac_*.c
 #   build/scan_HEADERS     NAME.h, dac_*.h; compile with -Ibuild/scan
-#   build/scan_CPPFLAGS    -DDAC_TABLE_STORAGE_BITS=.. -DDAC_OUTPUT_STORAGE_BITS=..: the widths that this scan needs, for all files
+#   build/scan_CPPFLAGS    -DDAC_TABLE_STORAGE_BITS=.. -DDAC_OUTPUT_STORAGE_BITS=..: the widths that this scan needs, for all files;
+#                          and -DDAC_SPLINE=1 for cubic tables
+#                          and -DDAC_SHAPING=.. where its output is shaped
 #   build/scan_VERILOG     dac_*.v
 #   build/scan_MEMORY      the .mem files
 #   build/scan_FILES       all files of the build, NAME.vh, manifest.json and those of other formats too
@@ -43,9 +45,8 @@ tablegen_goals := $(if $(MAKECMDGOALS),$(filter-out $(TABLEGEN_IDLE_GOALS),$(MAK
 tablegen_listed = $(shell \
     sed -n 's/^ *"\([A-Za-z0-9_-]*\.[A-Za-z0-9.]*\)": "[0-9a-f]\{64\}",*$$/\1/p' $(1)/manifest.json 2>/dev/null)
 
-# $(call tablegen_width,KIND,HEADER): the option of a compiler, from the constant of a header.
-tablegen_width = $(shell sed -n 's/^#define [A-Z0-9_]*_$(1)_STORAGE_BITS \([0-9]*\)$$/-DDAC_$(1)_STORAGE_BITS=\1/p' \
-    $(2) /dev/null 2>/dev/null)
+# $(call tablegen_option,NAME,HEADER): the option of a compiler, from the constant of a header.
+tablegen_option = $(shell sed -n 's/^#define [A-Z0-9_]*_$(1) \([0-9]*\)$$/-DDAC_$(1)=\1/p' $(2) /dev/null 2>/dev/null)
 
 .PHONY: tablegen-incomplete
 
@@ -63,7 +64,7 @@ endif
 $(2)_FILES := $(2)/manifest.json $$(addprefix $(2)/,$$(call tablegen_listed,$(2)))
 $(2)_SOURCES := $$(filter %.c,$$($(2)_FILES))
 $(2)_HEADERS := $$(filter %.h,$$($(2)_FILES))
-$(2)_CPPFLAGS := $$(foreach kind,TABLE OUTPUT,$$(call tablegen_width,$$(kind),$$(filter-out $(2)/dac_%,$$($(2)_HEADERS))))
+$(2)_CPPFLAGS := $$(foreach option,TABLE_STORAGE_BITS OUTPUT_STORAGE_BITS SHAPING SPLINE,$$(call tablegen_option,$$(option),$$(filter-out $(2)/dac_%,$$($(2)_HEADERS))))
 $(2)_VERILOG := $$(filter %.v,$$($(2)_FILES))
 $(2)_MEMORY := $$(filter %.mem,$$($(2)_FILES))
 

@@ -14,8 +14,9 @@ module dac_axis #(
     parameter DAC_BITS = 16,
     parameter PERIOD_BITS = 31,
     parameter PLAIN_MULTIPLIER = 0,  // 1: multiplier blocks; 0: look-up tables
+    parameter SHAPING = 0,           // highest order of shaping; with 3, ticks are at least 6 clocks apart
     parameter [63:0] POWER_UP_CODE = 0,
-    parameter LATENCY = PLAIN_MULTIPLIER ? 22 : 34  // derived: do not set it
+    parameter LATENCY = (PLAIN_MULTIPLIER ? 22 : 34) + (SHAPING != 0 ? 1 : 0)  // derived: do not set it
 ) (
     input  wire                  clock,
     // writes to a register or a table word of the idle program
@@ -30,6 +31,7 @@ module dac_axis #(
     input  wire [LATENCY-4:0]    ticks,
     input  wire [LATENCY-4:0]    loads,     // a new program begins
     input  wire [LATENCY-4:0]    runnings,  // 1: a scan plays; 0: the axis goes to the park code
+    input  wire                  begins,    // with the tick of LATENCY - 11 clocks ago a scan or a program begins
     input  wire                  bank,      // the bank that plays
     input  wire                  restart,   // advance 0 of a period
     input  wire                  advance,   // the tick advances the phase
@@ -96,13 +98,13 @@ module dac_axis #(
     wire target_clamped;
 
     dac_output #(
-        .SAMPLE_BITS(SAMPLE_BITS), .DAC_BITS(DAC_BITS), .PLAIN_MULTIPLIER(PLAIN_MULTIPLIER),
+        .SAMPLE_BITS(SAMPLE_BITS), .DAC_BITS(DAC_BITS), .PLAIN_MULTIPLIER(PLAIN_MULTIPLIER), .SHAPING(SHAPING),
         .POWER_UP_CODE(POWER_UP_CODE)
     ) out (
         .clock(clock), .write(write), .write_address(write_address), .write_data(write_data),
-        .loads(loads[TARGET_AT:SAMPLE_AT-1]), .sample(sample), .running(runnings[TARGET_AT-2]),
-        .target(target), .max_step(max_step), .step_inverse(step_inverse),
-        .clamped(target_clamped)
+        .loads(loads[TARGET_AT:SAMPLE_AT-1]), .begins(begins), .tick(ticks[TARGET_AT-6]),
+        .sample(sample), .running(runnings[TARGET_AT-2]), .target(target), .max_step(max_step),
+        .step_inverse(step_inverse), .clamped(target_clamped)
     );
     dac_slew #(.BITS(DAC_BITS), .POWER_UP(POWER_UP_CODE)) guard (
         .clock(clock), .valid(ticks[TARGET_AT]), .target(target), .max_step(max_step),

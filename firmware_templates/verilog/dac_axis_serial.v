@@ -13,6 +13,7 @@ module dac_axis_serial #(
     parameter WORD_BITS = 16,
     parameter DAC_BITS = 16,
     parameter PERIOD_BITS = 31,
+    parameter SHAPING = 0,          // highest order of shaping, which takes two clocks more
     parameter [63:0] POWER_UP_CODE = 0
 ) (
     input  wire                  clock,
@@ -27,6 +28,7 @@ module dac_axis_serial #(
     input  wire                  loaded,    // the bank holds a program
     input  wire                  tick,
     input  wire                  restart,   // with the tick: advance 0 of a period
+    input  wire                  begins,    // with the tick: a scan or a program begins
     input  wire                  advance,   // with the tick: the tick advances the phase
     input  wire                  running,   // a scan plays; stable from the tick until done
     output reg                   done,      // one clock: the code is valid
@@ -36,7 +38,7 @@ module dac_axis_serial #(
 );
     localparam [3:0] PHASE_STEP = 4'd0, PHASE_REMAINDER = 4'd1, PHASE_PERIOD = 4'd2, GAIN = 4'd3;
     localparam [3:0] OFFSET_LOW = 4'd4, OFFSET_HIGH = 4'd5, CODE_MIN = 4'd6, CODE_MAX = 4'd7, MAX_STEP = 4'd8;
-    localparam [3:0] PARK_CODE = 4'd9;
+    localparam [3:0] PARK_CODE = 4'd9, SHAPING_WORD = 4'd11;
 
     localparam GUARD_BITS = WORD_BITS > 21 ? 25 - WORD_BITS : 4;
     localparam SAMPLE_BITS = WORD_BITS + GUARD_BITS;
@@ -46,9 +48,10 @@ module dac_axis_serial #(
     localparam BITS = (WIDEST_1 > WIDEST_2 ? WIDEST_1 : WIDEST_2) + 3;  // fits twice the largest value, and the sign
 
     // The words of both programs. To round, half a unit is added: LOW_HALF to the low word of the offset, or HIGH_HALF
-    // where that bit lies above the 18 bits of the low word. The period is stored inverted, because it is subtracted.
-    localparam LOW_HALF = GAIN_Q < 19 ? 1 << (GAIN_Q - 1) : 0;
-    localparam [BITS-1:0] HIGH_HALF = GAIN_Q < 19 ? 0 : {{BITS-1{1'b0}}, 1'b1} << (GAIN_Q - 1);
+    // where that bit lies above the 18 bits of the low word; or dac_shaper has it. The period is stored inverted,
+    // because it is subtracted.
+    localparam LOW_HALF = GAIN_Q < 19 && SHAPING == 0 ? 1 << (GAIN_Q - 1) : 0;
+    localparam [BITS-1:0] HIGH_HALF = GAIN_Q < 19 || SHAPING != 0 ? 0 : {{BITS-1{1'b0}}, 1'b1} << (GAIN_Q - 1);
     reg [31:0] words [0:31];
     reg [31:0] word;
     reg [3:0] address;
@@ -73,13 +76,17 @@ module dac_axis_serial #(
     localparam [5:0] MULTIPLY = 6'd20;
     localparam [5:0] HIGH = 6'd29, SUM = 6'd30, ROUND = 6'd31, LOW_LIMIT = 6'd32, HIGH_LIMIT = 6'd33, TARGET = 6'd34;
     localparam [5:0] UPPER = 6'd35, HOLD_UPPER = 6'd36, HOLD_LOWER = 6'd37, DONE = 6'd38;
+    localparam [5:0] MORE = 6'd39, SHAPED = 6'd40;  // between ROUND and LOW_LIMIT, with SHAPING
+    localparam [5:0] WITH_SHAPING = 6'd4;           // the word is there
     reg [5:0] step;
     reg advances;
     initial begin
         step = WAIT;
         advances = 1'b0;
     end
-    wire [5:0] next = step == WAIT ? (tick ? REST : WAIT) : step == DONE ? WAIT : step + 1;
+    wire shapes = SHAPING != 0;
+    wire [5:0] next = step == WAIT ? (tick ? REST : WAIT) : step == DONE ? WAIT : shapes && step == ROUND ? MORE :
+                      shapes && step == SHAPED ? LOW_LIMIT : step + 1;
     // These flags are registered one clock ahead, to keep them off the path of the sum.
     reg wrapping, shifts, interpolates, subtracts, compares_above, compares_below;
     initial begin
@@ -112,7 +119,8 @@ module dac_axis_serial #(
             ROUND: address = CODE_MAX;
             HIGH_LIMIT: address = PARK_CODE;
             TARGET, UPPER: address = MAX_STEP;
-            default: address = OFFSET_HIGH;
+            default: address = shapes && step == PHASE ? SHAPING_WORD : shapes && step == MORE ? CODE_MIN :
+                               shapes && step == SHAPED ? CODE_MAX : OFFSET_HIGH;
         endcase
     end
 
@@ -170,6 +178,23 @@ module dac_axis_serial #(
     wire [BITS+17:0] rounded = $signed(whole) >>> GAIN_Q;
     wire unused = &{wrapping, word, word_wider, word_sign, rounded};
 
+    wire [2:0] more;
+    wire carried;
+    generate
+        if (SHAPING != 0) begin : shaped
+            localparam REMAINDER_BITS = 28 - DAC_BITS;
+            dac_shaper #(.BITS(REMAINDER_BITS), .SHAPING(SHAPING)) shaper (
+                .clock(clock), .load(step == WITH_SHAPING), .word(word[15:0]), .begins(step == WAIT && tick && begins),
+                .tick(step == ROUND), .fraction(whole[GAIN_Q-1 -: REMAINDER_BITS]), .more(more),
+                .carry(carried)
+            );
+        end else begin : unshaped
+            wire unused_input = begins;
+            assign more = 3'd0;
+            assign carried = 1'b0;
+        end
+    endgenerate
+
     always @(posedge clock) begin
         case (step)
             WAIT: begin
@@ -220,6 +245,11 @@ module dac_axis_serial #(
             default: if (shifts) begin
                 a <= sum >>> 2;
                 q <= {sum[1:0], q[18:2]};
+            end else if (shapes && step == MORE)
+                m <= {{BITS-3{more[2]}}, more} + {{BITS-1{1'b0}}, carried};
+            else if (shapes && step == SHAPED) begin
+                a <= sum;
+                m <= word_wide;
             end
         endcase
     end

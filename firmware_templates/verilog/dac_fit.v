@@ -18,7 +18,8 @@ module dac_fit #(
     parameter LINE_BITS = 16,
     parameter X_PERIOD_BITS = 25,
     parameter Y_PERIOD_BITS = 31,
-    parameter HARMONICS = 0     // 0: there is no renderer, and the number of harmonics is not used
+    parameter HARMONICS = 0,    // 0: there is no renderer, and the number of harmonics is not used
+    parameter SHAPING = 0       // highest order of shaping
 ) (
     input  wire        clock,
     input  wire [31:0] data,        // of the write on the next clock
@@ -32,8 +33,8 @@ module dac_fit #(
     localparam [3:0] LINE_TICKS = 4'd0, FRAME_LINES = 4'd1, SETTLE_LINES = 4'd2, TURN_TICK = 4'd3, TICKS_END = 4'd8;
     localparam [3:0] LINES_END = 4'd12, PIXELS = 4'd12, Y_STEPS = 4'd13;
     localparam [3:0] REMAINDER = 4'd1, PERIOD = 4'd2, GAIN = 4'd3, OFFSET_LOW = 4'd4, OFFSET_HIGH = 4'd5;
-    localparam [3:0] CODES = 4'd6, CODES_END = 4'd10, AXIS_HARMONICS = 4'd10;
-    localparam [31:0] MOST_HARMONICS = HARMONICS;
+    localparam [3:0] CODES = 4'd6, CODES_END = 4'd10, AXIS_HARMONICS = 4'd10, SHAPING_WORD = 4'd11;
+    localparam [31:0] MOST_HARMONICS = HARMONICS, HIGHEST_ORDER = SHAPING;
     localparam X_HIGH_BITS = X_WORD_BITS > 21 ? 25 : X_WORD_BITS + 4;  // of the offset above its low word, signed
     localparam Y_HIGH_BITS = Y_WORD_BITS > 21 ? 25 : Y_WORD_BITS + 4;
 
@@ -46,7 +47,7 @@ module dac_fit #(
     wire within_tick = data >> (TICK_BITS + 1) == 0;
     wire within_line = data >> (LINE_BITS + 1) == 0;
     reg is_tick, is_line, is_line_ticks, is_frame_lines, is_flag, is_short, is_code, is_gain, is_low;
-    reg is_x_high, is_y_high, is_x_period, is_y_period, is_harmonics;
+    reg is_x_high, is_y_high, is_x_period, is_y_period, is_harmonics, is_shaping;
     always @(posedge clock) begin
         is_tick <= within_tick;
         is_line <= within_line;
@@ -62,12 +63,15 @@ module dac_fit #(
         is_x_period <= X_INTERPOLATED != 0 ? within_x_period : within_x_table;
         is_y_period <= Y_INTERPOLATED != 0 ? within_y_period : within_y_table;
         is_harmonics <= HARMONICS == 0 || data <= MOST_HARMONICS;
+        // Only the scanner's order has a zero, of 128 at most.
+        is_shaping <= data[31:16] == 0 && data[7:2] == 0 && (data & 32'd3) <= HIGHEST_ORDER &&
+                      (data[1:0] == 2'd3 ? !(data[15] && data[14:8] != 0) : data[15:8] == 0);
     end
 
     // What it has to fit, by its address; what is not named takes any word. All of this is known on the clock of the
     // write, so that little is left to do on that of a commit.
     reg of_tick, of_line, of_line_ticks, of_frame_lines, of_flag, of_short, of_code, of_gain, of_low, of_high;
-    reg of_x_period, of_y_period, of_harmonics;
+    reg of_x_period, of_y_period, of_harmonics, of_shaping;
     always @(posedge clock) begin
         of_line_ticks <= address == LINE_TICKS;
         of_frame_lines <= address == FRAME_LINES;
@@ -82,13 +86,14 @@ module dac_fit #(
         of_high <= address == OFFSET_HIGH;
         of_code <= address >= CODES && address < CODES_END;
         of_harmonics <= address == AXIS_HARMONICS;
+        of_shaping <= address == SHAPING_WORD;
     end
 
     wire scan_spoils = (of_line_ticks && !is_line_ticks) || (of_frame_lines && !is_frame_lines) ||
                        (of_short && !is_short) || (of_tick && !is_tick) || (of_line && !is_line) ||
                        (of_flag && !is_flag);
     wire axis_spoils = (of_gain && !is_gain) || (of_low && !is_low) || (of_code && !is_code) ||
-                       (of_harmonics && !is_harmonics);
+                       (of_harmonics && !is_harmonics) || (of_shaping && !is_shaping);
     wire x_spoils = axis_spoils || (of_x_period && !is_x_period) || (of_high && !is_x_high);
     wire y_spoils = axis_spoils || (of_y_period && !is_y_period) || (of_high && !is_y_high);
     wire spoils = (scan_write && scan_spoils) || (x_write && x_spoils) || (y_write && y_spoils);

@@ -13,12 +13,13 @@
 module dac_multiply_digits #(
     parameter A_BITS = 17,      // a is signed
     parameter DIGITS = 8,       // -(4^DIGITS - 1) / 3 <= b <= 2 (4^DIGITS - 1) / 3
-    parameter DROP = 10,        // 1 .. A_BITS
+    parameter DROP = 10,        // 0 .. A_BITS
+    parameter LOW_BITS = DROP,  // 1 .. A_BITS
     parameter RESULT_BITS = 23  // at most A_BITS + 2 DIGITS - DROP are of use
 ) (
     input  wire                          clock,
     input  wire signed [A_BITS-1:0]      a,
-    input  wire [DROP-1:0]               low,     // unsigned; comes with a
+    input  wire [LOW_BITS-1:0]           low,     // unsigned; comes with a
     input  wire [2*DIGITS-1:0]           digits,  // the digits of b + 0101..01
     output wire signed [RESULT_BITS-1:0] result
 );
@@ -39,7 +40,7 @@ module dac_multiply_digits #(
             wire signed [A_BITS-1:0] factor;
             wire [KEPT+3:0] finished;
             if (i == 0) begin : first
-                assign so_far = {{A_BITS+1-DROP{1'b0}}, low};
+                assign so_far = {{A_BITS+1-LOW_BITS{1'b0}}, low};
                 assign factor = a;
                 assign finished = {KEPT+4{1'b0}};
             end else begin : later

@@ -11,13 +11,14 @@ module dac_multiply_plain #(
     parameter A_BITS = 17,
     parameter B_BITS = 16,
     parameter DROP = 10,
+    parameter LOW_BITS = DROP,
     parameter RESULT_BITS = 23,
     parameter BLOCK_BITS = 18
 ) (
     input  wire                          clock,
     input  wire signed [A_BITS-1:0]      a,
     input  wire signed [B_BITS-1:0]      b,
-    input  wire [DROP-1:0]               low,
+    input  wire [LOW_BITS-1:0]           low,
     output reg  signed [RESULT_BITS-1:0] result
 );
     localparam SPLIT = A_BITS > BLOCK_BITS ? A_BITS - BLOCK_BITS : 0;  // bits of a that a block has no port for
@@ -32,7 +33,7 @@ module dac_multiply_plain #(
 
     // The lowest bits of a, one row of b each.
     wire signed [PRODUCT_BITS-1:0] rows [0:SPLIT];
-    assign rows[0] = {{PRODUCT_BITS-DROP{1'b0}}, low};
+    assign rows[0] = {{PRODUCT_BITS-LOW_BITS{1'b0}}, low};
     genvar i;
     generate
         for (i = 0; i < SPLIT; i = i + 1) begin : row

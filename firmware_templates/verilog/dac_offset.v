@@ -1,4 +1,5 @@
-// The offset of the output stage: a program register of two words. It holds offset - code_min + a half, to round.
+// The offset of the output stage: a program register of two words. It holds offset - code_min + a half, to round;
+// without the half where dac_shaper has it.
 //
 // The low part is used with the product and the high part after it; each part has its own load.
 
@@ -8,7 +9,8 @@ module dac_offset #(
     parameter BITS = 38,       // bits of the sum, signed; 20 .. 44
     parameter LOW_BITS = 20,
     parameter GAIN_Q = 20,     // fraction bits of the gain
-    parameter CODE_BITS = 16
+    parameter CODE_BITS = 16,
+    parameter HALF = 1
 ) (
     input  wire                     clock,
     input  wire                     write_low,   // bits 17..0
@@ -23,7 +25,7 @@ module dac_offset #(
     wire unused = &data;
     reg [BITS-1:0] idle;
     wire [BITS-1:0] playing =
-        idle + {{BITS-GAIN_Q-CODE_BITS-1{minus_min[CODE_BITS]}}, minus_min, 1'b1, {GAIN_Q-1{1'b0}}};
+        idle + {{BITS-GAIN_Q-CODE_BITS-1{minus_min[CODE_BITS]}}, minus_min, HALF != 0, {GAIN_Q-1{1'b0}}};
 
     initial begin
         low = 0;

@@ -1,5 +1,5 @@
 // From sample to target: clamp(round((gain sample + offset) / 2^GAIN_Q), code_min, code_max), ties up; the park code
-// where no scan plays. Never a wrap.
+// where no scan plays. Never a wrap. With SHAPING, dac_shaper does the rounding.
 //
 // The limits cost no comparison of two words. With code_min taken off the offset, the sign says what is below it;
 // with that taken off the span of the limits, the sign says what is above code_max; and that off code_max is the
@@ -16,14 +16,17 @@ module dac_output #(
     parameter SAMPLE_BITS = 20,
     parameter DAC_BITS = 16,
     parameter PLAIN_MULTIPLIER = 0,
+    parameter SHAPING = 0,
     parameter [63:0] POWER_UP_CODE = 0,
-    parameter LATENCY = PLAIN_MULTIPLIER ? 8 : 15  // derived: do not set it
+    parameter LATENCY = (PLAIN_MULTIPLIER ? 8 : 15) + (SHAPING != 0 ? 1 : 0)  // derived: do not set it
 ) (
     input  wire                          clock,
     input  wire                          write,
     input  wire [3:0]                    write_address,
     input  wire [31:0]                   write_data,
     input  wire [LATENCY+1:0]            loads,
+    input  wire                          begins,    // with loads[LATENCY-6]: a scan or a program begins
+    input  wire                          tick,      // belongs to the sample of LATENCY - 5 clocks ago
     input  wire signed [SAMPLE_BITS-1:0] sample,
     input  wire                          running,   // a scan plays; belongs to the sample of LATENCY - 2 clocks ago
     output reg  [DAC_BITS-1:0]           target,
@@ -32,14 +35,20 @@ module dac_output #(
     output reg                           clamped    // with its target: a limit has changed it
 );
     localparam [3:0] GAIN = 4'd3, OFFSET_LOW = 4'd4, OFFSET_HIGH = 4'd5;
-    localparam [3:0] CODE_MIN = 4'd6, CODE_MAX = 4'd7, MAX_STEP = 4'd8, PARK_CODE = 4'd9;
+    localparam [3:0] CODE_MIN = 4'd6, CODE_MAX = 4'd7, MAX_STEP = 4'd8, PARK_CODE = 4'd9, SHAPING_WORD = 4'd11;
 
     localparam GAIN_Q = 16 + SAMPLE_BITS - DAC_BITS;
-    localparam LOW_BITS = GAIN_Q < SAMPLE_BITS ? GAIN_Q : SAMPLE_BITS;  // bits of the offset added in the product
-    localparam SUM_BITS = SAMPLE_BITS + 18;  // |gain sample| <= 2^(SAMPLE_BITS + 16), and the offset is below that
+    localparam REMAINDER_BITS = 28 - DAC_BITS;
+    // Shaping needs a multiplicand that has place for all fraction bits of the offset.
+    localparam A_BITS = SHAPING != 0 && !PLAIN_MULTIPLIER && GAIN_Q > SAMPLE_BITS ? GAIN_Q : SAMPLE_BITS;
+    // Bits of the offset that are added in the product.
+    localparam LOW_BITS = SHAPING != 0 || GAIN_Q < SAMPLE_BITS ? GAIN_Q : SAMPLE_BITS;
+    localparam DROP = SHAPING != 0 ? GAIN_Q - REMAINDER_BITS : LOW_BITS;
+    // |gain sample| <= 2^(SAMPLE_BITS + 16), and the offset is below that; what is fed back comes on top.
+    localparam SUM_BITS = SAMPLE_BITS + (SHAPING != 0 ? 19 : 18);
     localparam HIGH_BITS = SUM_BITS - LOW_BITS;
-    localparam CODE_BITS = DAC_BITS + 2;
-    localparam CODE_SHIFT = GAIN_Q - LOW_BITS;
+    localparam PRODUCT_BITS = SUM_BITS - DROP;
+    localparam CODE_BITS = DAC_BITS + (SHAPING != 0 ? 3 : 2);
 
     wire unused = &write_data;
     // Registers of the idle program.
@@ -52,16 +61,18 @@ module dac_output #(
         if (write && write_address == MAX_STEP) idle_step <= write_data[DAC_BITS-1:0];
     end
 
-    wire signed [HIGH_BITS-1:0] product;
+    wire signed [PRODUCT_BITS-1:0] product;
     wire [LOW_BITS-1:0] low;
     wire [HIGH_BITS-1:0] high;
 
     // The offset - code_min + a half, which turns the floor into a rounding.
-    dac_offset #(.BITS(SUM_BITS), .LOW_BITS(LOW_BITS), .GAIN_Q(GAIN_Q), .CODE_BITS(DAC_BITS)) offset (
+    dac_offset #(
+        .BITS(SUM_BITS), .LOW_BITS(LOW_BITS), .GAIN_Q(GAIN_Q), .CODE_BITS(DAC_BITS), .HALF(SHAPING != 0 ? 0 : 1)
+    ) offset (
         .clock(clock),
         .write_low(write && write_address == OFFSET_LOW), .write_high(write && write_address == OFFSET_HIGH),
         .data(write_data[25:0]), .minus_min(minus_min),
-        .load_low(loads[PLAIN_MULTIPLIER ? 1 : 0]), .load_high(loads[LATENCY-5]),
+        .load_low(loads[PLAIN_MULTIPLIER ? 1 : 0]), .load_high(loads[LATENCY-(SHAPING != 0 ? 6 : 5)]),
         .low(low), .high(high)
     );
 
@@ -73,11 +84,13 @@ module dac_output #(
                 .value(gain)
             );
             dac_multiply_plain #(
-                .A_BITS(SAMPLE_BITS), .B_BITS(18), .DROP(LOW_BITS), .RESULT_BITS(HIGH_BITS)
+                .A_BITS(SAMPLE_BITS), .B_BITS(18), .DROP(DROP), .LOW_BITS(LOW_BITS), .RESULT_BITS(PRODUCT_BITS)
             ) multiply (.clock(clock), .a(sample), .b(gain), .low(low), .result(product));
         end else begin : digits
             wire [19:0] recoded = {{2{write_data[17]}}, write_data[17:0]} + {10{2'b01}};
             wire [19:0] gain;
+            wire signed [A_BITS-1:0] multiplicand =
+                {{A_BITS-SAMPLE_BITS+1{sample[SAMPLE_BITS-1]}}, sample[SAMPLE_BITS-2:0]};
             genvar i;
             for (i = 0; i < 10; i = i + 1) begin : digit
                 dac_register #(.BITS(2), .POWER_UP(1)) word (
@@ -86,8 +99,8 @@ module dac_output #(
                 );
             end
             dac_multiply_digits #(
-                .A_BITS(SAMPLE_BITS), .DIGITS(10), .DROP(LOW_BITS), .RESULT_BITS(HIGH_BITS)
-            ) multiply (.clock(clock), .a(sample), .low(low), .digits(gain), .result(product));
+                .A_BITS(A_BITS), .DIGITS(10), .DROP(DROP), .LOW_BITS(LOW_BITS), .RESULT_BITS(PRODUCT_BITS)
+            ) multiply (.clock(clock), .a(multiplicand), .low(low), .digits(gain), .result(product));
         end
     endgenerate
 
@@ -96,8 +109,10 @@ module dac_output #(
     reg [CODE_BITS-1:0] park_room;  // code_max - park_code
     reg [DAC_BITS-1:0] code_max;
     always @(posedge clock) begin
-        if (loads[LATENCY-3]) span <= {2'b00, idle_max} + {minus_min[DAC_BITS], minus_min};
-        if (loads[LATENCY-2]) park_room <= {2'b00, idle_max} + {2'b11, idle_park_inverse} + 1;
+        if (loads[LATENCY-3])
+            span <= {{CODE_BITS-DAC_BITS{1'b0}}, idle_max} + {{CODE_BITS-DAC_BITS-1{minus_min[DAC_BITS]}}, minus_min};
+        if (loads[LATENCY-2])
+            park_room <= {{CODE_BITS-DAC_BITS{1'b0}}, idle_max} + {{CODE_BITS-DAC_BITS{1'b1}}, idle_park_inverse} + 1;
         if (loads[LATENCY-1]) code_max <= idle_max;
         if (loads[LATENCY+1]) begin
             max_step <= idle_step;
@@ -105,13 +120,39 @@ module dac_output #(
         end
     end
 
-    wire signed [HIGH_BITS-1:0] sum = product + $signed(high);
-    wire signed [HIGH_BITS-1:0] rounded = sum >>> CODE_SHIFT;
+    wire [CODE_BITS-1:0] rounded;
+    generate
+        if (SHAPING != 0) begin : shaped
+            reg [9:0] idle_shaping;
+            reg [CODE_BITS-1:0] floor;
+            wire signed [2:0] more;
+            wire carry;
+            initial idle_shaping = 10'd0;
+            always @(posedge clock) begin
+                if (write && write_address == SHAPING_WORD) idle_shaping <= {write_data[15:8], write_data[1:0]};
+                floor <= product[PRODUCT_BITS-1:REMAINDER_BITS] + high;
+            end
+            dac_shaper #(.BITS(REMAINDER_BITS), .SHAPING(SHAPING)) shaper (
+                .clock(clock), .load(loads[LATENCY-6]), .word({idle_shaping[9:2], 6'd0, idle_shaping[1:0]}),
+                .begins(begins), .tick(tick), .fraction(product[REMAINDER_BITS-1:0]), .more(more),
+                .carry(carry)
+            );
+            wire [CODE_BITS:0] with_carry = {floor, 1'b1} + {{CODE_BITS-3{more[2]}}, more, carry};
+            wire unused_carry = with_carry[0];
+            assign rounded = with_carry[CODE_BITS:1];
+        end else begin : unshaped
+            wire signed [HIGH_BITS-1:0] sum = product + $signed(high);
+            wire signed [HIGH_BITS-1:0] code = sum >>> (GAIN_Q - LOW_BITS);
+            wire unused_inputs = &{code, begins, tick, SHAPING_WORD};
+            assign rounded = code[CODE_BITS-1:0];
+        end
+    endgenerate
+
     reg [CODE_BITS-1:0] over_min, held_inverse, room;
     reg [DAC_BITS-1:0] room_inverse;
     reg is_low, was_low, clamps;
     wire [CODE_BITS-1:0] room_left = running ? room : park_room;
-    wire unused_sum = &{rounded, room_left};
+    wire unused_room = &room_left;
 
     initial begin
         // Nothing moves before the first program: the park code is the code at power-up, and the step is 0.
@@ -125,7 +166,7 @@ module dac_output #(
     end
 
     always @(posedge clock) begin
-        over_min <= rounded[CODE_BITS-1:0];
+        over_min <= rounded;
 
         held_inverse <= over_min[CODE_BITS-1] ? {CODE_BITS{1'b1}} : ~over_min;
         is_low <= over_min[CODE_BITS-1];

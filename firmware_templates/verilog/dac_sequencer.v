@@ -6,6 +6,8 @@
 //   scan    `arm` and `trigger` start frames, `park` and `reset` end them. The slew guard limits every step.
 //   tick    is one clock long, at the update rate of the converter. `strobe` comes with the codes and markers of a
 //           tick: 36 clocks after it, 24 with PLAIN_MULTIPLIER = 1, 41 with LOW_AREA = 1 (`busy` is high until then).
+//           With SHAPING it is a clock later, and two with LOW_AREA = 1. Where SHAPING is 3, ticks are at least 6
+//           clocks apart: `busy` is high on the five after a tick.
 //
 // docs/sequencer.md defines what happens on which tick, and every bit of every code. All inputs must be synchronous to
 // `clock`. The design relies on power-up values of its registers, as FPGAs have them: a reset must not move a code.
@@ -29,6 +31,7 @@ module dac_sequencer #(
     parameter FOURIER = 0,           // 1: computes tables from Fourier words
     parameter HARMONICS = 64,        // with FOURIER: largest number of harmonics
     parameter SINE_FILE = "",        // with FOURIER: file with a quarter sine for the longer table
+    parameter SHAPING = 0,           // highest order of shaping: 0 none, 1 first, 2 second, 3 scanner
     parameter [63:0] X_POWER_UP_CODE = 0,  // output code before the first program
     parameter [63:0] Y_POWER_UP_CODE = 0
 ) (
@@ -73,7 +76,7 @@ module dac_sequencer #(
     localparam [2:0] PROGRAM = 3'd0, X_TABLE = 3'd1, Y_TABLE = 3'd2, X_FOURIER = 3'd3, Y_FOURIER = 3'd4;
     localparam [3:0] AXIS_HARMONICS = 4'd10;
     localparam [11:0] SCAN_PAGE = 12'd0, X_PAGE = 12'd1, Y_PAGE = 12'd2;
-    localparam LATENCY = PLAIN_MULTIPLIER ? 22 : 34;
+    localparam LATENCY = (PLAIN_MULTIPLIER ? 22 : 34) + (SHAPING != 0 ? 1 : 0);
     localparam MARKERS_AT = 3;
     localparam X_PERIOD_BITS = TICK_BITS + 1;  // the period of x is a line
 
@@ -131,6 +134,9 @@ module dac_sequencer #(
         if (Y_POWER_UP_CODE >> DAC_BITS != 64'd0) begin : guard_16
             dac_sequencer_Y_POWER_UP_CODE_has_more_than_DAC_BITS stop ();
         end
+        if (SHAPING < 0 || SHAPING > 3) begin : guard_17
+            dac_sequencer_SHAPING_is_not_0_to_3 stop ();
+        end
     endgenerate
 
     // Writes go to the idle bank, one clock late. A commit is as late, so that it never overtakes a write.
@@ -181,7 +187,7 @@ module dac_sequencer #(
         .DAC_BITS(DAC_BITS), .X_INTERPOLATED(X_INTERPOLATED), .X_INDEX_BITS(X_INDEX_BITS), .X_WORD_BITS(X_WORD_BITS),
         .Y_INTERPOLATED(Y_INTERPOLATED), .Y_INDEX_BITS(Y_INDEX_BITS), .Y_WORD_BITS(Y_WORD_BITS), .TICK_BITS(TICK_BITS),
         .LINE_BITS(LINE_BITS), .X_PERIOD_BITS(X_PERIOD_BITS), .Y_PERIOD_BITS(PERIOD_BITS),
-        .HARMONICS(FOURIER ? HARMONICS : 0)
+        .HARMONICS(FOURIER ? HARMONICS : 0), .SHAPING(SHAPING)
     ) fit (
         .clock(clock), .data(write_data), .address(write_address[3:0]), .scan_write(scan_write), .x_write(x_write),
         .y_write(y_write), .discard(reset || withdraw), .fits(fits)
@@ -257,21 +263,22 @@ module dac_sequencer #(
 
             dac_axis_serial #(
                 .INTERPOLATED(X_INTERPOLATED), .INDEX_BITS(X_INDEX_BITS), .WORD_BITS(X_WORD_BITS), .DAC_BITS(DAC_BITS),
-                .PERIOD_BITS(X_PERIOD_BITS), .POWER_UP_CODE(X_POWER_UP_CODE)
+                .PERIOD_BITS(X_PERIOD_BITS), .SHAPING(SHAPING), .POWER_UP_CODE(X_POWER_UP_CODE)
             ) x_axis (
                 .clock(clock), .write(x_write), .write_address(address[3:0]), .write_data(data),
                 .table_write(x_table_write), .table_address(table_address[X_INDEX_BITS-1:0]),
                 .table_data(table_data[X_WORD_BITS-1:0]), .bank(bank), .loaded(loaded), .tick(tick_0), .restart(line_0),
-                .advance(runs_0), .running(runs), .done(x_done), .code(x), .reached(x_reached), .clamped(x_clamped)
+                .begins(begins_0), .advance(runs_0), .running(runs), .done(x_done), .code(x), .reached(x_reached),
+                .clamped(x_clamped)
             );
             dac_axis_serial #(
                 .INTERPOLATED(Y_INTERPOLATED), .INDEX_BITS(Y_INDEX_BITS), .WORD_BITS(Y_WORD_BITS), .DAC_BITS(DAC_BITS),
-                .PERIOD_BITS(PERIOD_BITS), .POWER_UP_CODE(Y_POWER_UP_CODE)
+                .PERIOD_BITS(PERIOD_BITS), .SHAPING(SHAPING), .POWER_UP_CODE(Y_POWER_UP_CODE)
             ) y_axis (
                 .clock(clock), .write(y_write), .write_address(address[3:0]), .write_data(data),
                 .table_write(y_table_write), .table_address(table_address[Y_INDEX_BITS-1:0]),
                 .table_data(table_data[Y_WORD_BITS-1:0]), .bank(bank), .loaded(loaded), .tick(tick_0),
-                .restart(frame_0),
+                .restart(frame_0), .begins(begins_0),
                 .advance(y_advance_0), .running(runs), .done(y_done), .code(y), .reached(y_reached), .clamped(y_clamped)
             );
         end else begin : pipelined
@@ -290,15 +297,34 @@ module dac_sequencer #(
                 loads <= loads_now[LATENCY-1:0];
                 runnings <= runnings_now[LATENCY-1:0];
             end
-            assign busy = 1'b0;
-            assign overrun = 1'b0;
+            if (SHAPING == 3) begin : scanner_shaping
+                reg [3:0] recent;  // ticks; bit i: i + 1 clocks ago
+                reg works;
+                initial begin
+                    recent = 0;
+                    works = 1'b0;
+                end
+                always @(posedge clock) begin
+                    recent <= {recent[2:0], accepted_tick};
+                    works <= accepted_tick || recent != 0;
+                end
+                assign busy = works;
+            end else begin : any_clock
+                assign busy = 1'b0;
+            end
+            assign overrun = tick && busy;
             assign done = ticks_now[LATENCY];
             assign runs_done = runnings_now[LATENCY];
             assign swapped_done = loads_now[LATENCY];
             assign drained = loads_now[LATENCY];
 
-            dac_delay #(.BITS(2), .CLOCKS(LATENCY)) with_tick (
-                .clock(clock), .in({begins_0, clears_0}), .out({begins_done, clears_done})
+            wire begins_shaping;
+            dac_delay #(.BITS(1), .CLOCKS(LATENCY)) with_tick (.clock(clock), .in(clears_0), .out(clears_done));
+            dac_delay #(.BITS(1), .CLOCKS(LATENCY - 11)) to_shapers (
+                .clock(clock), .in(begins_0), .out(begins_shaping)
+            );
+            dac_delay #(.BITS(1), .CLOCKS(11)) from_shapers (
+                .clock(clock), .in(begins_shaping), .out(begins_done)
             );
             dac_delay #(.BITS(5), .CLOCKS(LATENCY - MARKERS_AT)) with_markers (
                 .clock(clock), .in({line_3, frame_3, pixel_3, backward_3, images_3}),
@@ -306,23 +332,25 @@ module dac_sequencer #(
             );
             dac_axis #(
                 .INTERPOLATED(X_INTERPOLATED), .INDEX_BITS(X_INDEX_BITS), .WORD_BITS(X_WORD_BITS), .DAC_BITS(DAC_BITS),
-                .PERIOD_BITS(X_PERIOD_BITS), .PLAIN_MULTIPLIER(PLAIN_MULTIPLIER), .POWER_UP_CODE(X_POWER_UP_CODE)
+                .PERIOD_BITS(X_PERIOD_BITS), .PLAIN_MULTIPLIER(PLAIN_MULTIPLIER), .SHAPING(SHAPING),
+                .POWER_UP_CODE(X_POWER_UP_CODE)
             ) x_axis (
                 .clock(clock), .write(x_write), .write_address(address[3:0]), .table_write(x_table_write),
                 .table_address(table_address[X_INDEX_BITS-1:0]), .write_data(data),
                 .table_data(table_data[X_WORD_BITS-1:0]),
-                .take(take), .ticks(ticks_now[LATENCY-4:0]), .loads(loads_now[LATENCY-4:0]),
+                .take(take), .begins(begins_shaping), .ticks(ticks_now[LATENCY-4:0]), .loads(loads_now[LATENCY-4:0]),
                 .runnings(runnings_now[LATENCY-4:0]),
                 .bank(bank), .restart(line_0), .advance(runs_0), .code(x), .reached(x_reached), .clamped(x_clamped)
             );
             dac_axis #(
                 .INTERPOLATED(Y_INTERPOLATED), .INDEX_BITS(Y_INDEX_BITS), .WORD_BITS(Y_WORD_BITS), .DAC_BITS(DAC_BITS),
-                .PERIOD_BITS(PERIOD_BITS), .PLAIN_MULTIPLIER(PLAIN_MULTIPLIER), .POWER_UP_CODE(Y_POWER_UP_CODE)
+                .PERIOD_BITS(PERIOD_BITS), .PLAIN_MULTIPLIER(PLAIN_MULTIPLIER), .SHAPING(SHAPING),
+                .POWER_UP_CODE(Y_POWER_UP_CODE)
             ) y_axis (
                 .clock(clock), .write(y_write), .write_address(address[3:0]), .table_write(y_table_write),
                 .table_address(table_address[Y_INDEX_BITS-1:0]), .write_data(data),
                 .table_data(table_data[Y_WORD_BITS-1:0]),
-                .take(take), .ticks(ticks_now[LATENCY-4:0]), .loads(loads_now[LATENCY-4:0]),
+                .take(take), .begins(begins_shaping), .ticks(ticks_now[LATENCY-4:0]), .loads(loads_now[LATENCY-4:0]),
                 .runnings(runnings_now[LATENCY-4:0]),
                 .bank(bank), .restart(frame_0), .advance(y_advance_0), .code(y), .reached(y_reached),
                 .clamped(y_clamped)

@@ -28,6 +28,7 @@ module program_loader #(
     parameter LINE_BITS = 16,            // at most 16
     parameter FOURIER = 0,
     parameter HARMONICS = 64,
+    parameter SHAPING = 0,               // highest order of shaped output
     parameter CONVERTER = DAC_BITS,      // bits of the converter word, + 64 two's complement, + 128 left-aligned
     parameter [31:0] X_CODE_MIN = 0,     // limits of every program
     parameter [31:0] X_CODE_MAX = (1 << DAC_BITS) - 1,
@@ -87,7 +88,7 @@ module program_loader #(
     localparam [31:0] Y_HARMONICS = Y_INTERPOLATED ? MOST_HARMONICS : 0;
     localparam [31:0] TOP_CODE = (1 << DAC_BITS) - 1, MOST_TICKS = 1 << TICK_BITS, MOST_LINES = 1 << LINE_BITS;
     localparam [31:0] X_INDEX = X_INDEX_BITS, Y_INDEX = Y_INDEX_BITS, X_WORD = X_WORD_BITS, Y_WORD = Y_WORD_BITS;
-    localparam [31:0] DAC = DAC_BITS, FRAMES = WINDOW, WORD = CONVERTER;
+    localparam [31:0] DAC = DAC_BITS, FRAMES = WINDOW, WORD = CONVERTER, HIGHEST_ORDER = SHAPING;
     localparam [7:0] X_INDEX_WANTED = X_INTERPOLATED ? X_INDEX[7:0] : 8'd0;
     localparam [7:0] Y_INDEX_WANTED = Y_INTERPOLATED ? Y_INDEX[7:0] : 8'd0;
     localparam [7:0] X_WORD_BYTES = X_WORD_BITS <= 16 ? 8'd2 : 8'd3, Y_WORD_BYTES = Y_WORD_BITS <= 16 ? 8'd2 : 8'd3;
@@ -109,14 +110,14 @@ module program_loader #(
     localparam [56*8-1:0] HELLO = {
         UPDATE_RATE, TOP_CODE, Y_MAX_STEP, Y_CODE_MAX, Y_CODE_MIN, TOP_CODE, X_MAX_STEP, X_CODE_MAX, X_CODE_MIN,
         WORD[7:0], DAC[7:0], Y_WORD[7:0], Y_INDEX[7:0], WORD[7:0], DAC[7:0], X_WORD[7:0], X_INDEX[7:0],
-        IMAGE_BYTES, 16'd0, MOST_HARMONICS[15:0], 8'd240, FRAMES[7:0], FEATURES, 8'd1
+        IMAGE_BYTES, 8'd0, HIGHEST_ORDER[7:0], MOST_HARMONICS[15:0], 8'd240, FRAMES[7:0], FEATURES, 8'd1
     };
     function [255:0] reversed(input [255:0] bytes);
         integer i;
         for (i = 0; i < 32; i = i + 1) reversed[8*i +: 8] = bytes[8*(31-i) +: 8];
     endfunction
     wire [4*32-1:0] parts_of_numbers = {X_INDEX, Y_INDEX, X_WORD, Y_WORD};
-    wire [5*32-1:0] parts_of_more = {DAC, FRAMES, WORD, MOST_HARMONICS, RING_AT & PAGE_AT};
+    wire [6*32-1:0] parts_of_more = {DAC, FRAMES, WORD, HIGHEST_ORDER, MOST_HARMONICS, RING_AT & PAGE_AT};
     wire unused = &{parts_of_numbers, parts_of_more, IMAGE_AT};
 
     // An illegal parameter stops the elaboration, by a module that does not exist: its name is the reason. An unknown
@@ -178,6 +179,9 @@ module program_loader #(
         end
         if (Y_MAX_STEP < 32'd1 || Y_MAX_STEP >= 32'd1 << DAC_BITS) begin : guard_18
             program_loader_Y_MAX_STEP_is_not_1_to_the_highest_code stop ();
+        end
+        if (SHAPING < 0 || SHAPING > 3) begin : guard_19
+            program_loader_SHAPING_is_not_0_to_3 stop ();
         end
     endgenerate
 

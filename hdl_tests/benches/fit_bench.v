@@ -15,6 +15,7 @@ module fit_bench;
     parameter X_PERIOD_BITS = 25;
     parameter Y_PERIOD_BITS = 31;
     parameter HARMONICS = 0;
+    parameter SHAPING = 0;
     parameter DEPTH = 1;
 
     reg [39:0] writes [0:DEPTH-1];
@@ -25,7 +26,8 @@ module fit_bench;
     dac_fit #(
         .DAC_BITS(DAC_BITS), .X_INTERPOLATED(X_INTERPOLATED), .X_INDEX_BITS(X_INDEX_BITS), .X_WORD_BITS(X_WORD_BITS),
         .Y_INTERPOLATED(Y_INTERPOLATED), .Y_INDEX_BITS(Y_INDEX_BITS), .Y_WORD_BITS(Y_WORD_BITS), .TICK_BITS(TICK_BITS),
-        .LINE_BITS(LINE_BITS), .X_PERIOD_BITS(X_PERIOD_BITS), .Y_PERIOD_BITS(Y_PERIOD_BITS), .HARMONICS(HARMONICS)
+        .LINE_BITS(LINE_BITS), .X_PERIOD_BITS(X_PERIOD_BITS), .Y_PERIOD_BITS(Y_PERIOD_BITS), .HARMONICS(HARMONICS),
+        .SHAPING(SHAPING)
     ) fit (
         .clock(clock), .data(next[31:0]), .address(next[35:32]), .scan_write(now[38] && now[37:36] == 0),
         .x_write(now[38] && now[37:36] == 1), .y_write(now[38] && now[37:36] == 2),

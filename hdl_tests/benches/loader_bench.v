@@ -33,6 +33,7 @@ module loader_bench #(
     parameter Y_CODE_MAX = 65535,
     parameter Y_MAX_STEP = 65535,
     parameter UPDATE_RATE = 0,
+    parameter SHAPING = 0,
     parameter BOOT_PROGRAM = "",  // none: it starts without one
     parameter BOOT_X = "",
     parameter BOOT_Y = "",
@@ -170,7 +171,7 @@ module loader_bench #(
         .X_INTERPOLATED(X_INTERPOLATED), .X_INDEX_BITS(X_INDEX_BITS), .X_WORD_BITS(X_WORD_BITS),
         .Y_INTERPOLATED(Y_INTERPOLATED), .Y_INDEX_BITS(Y_INDEX_BITS), .Y_WORD_BITS(Y_WORD_BITS), .FOURIER(FOURIER),
         .HARMONICS(HARMONICS), .X_CODE_MIN(X_CODE_MIN), .X_CODE_MAX(X_CODE_MAX), .X_MAX_STEP(X_MAX_STEP),
-        .Y_CODE_MIN(Y_CODE_MIN), .Y_CODE_MAX(Y_CODE_MAX), .Y_MAX_STEP(Y_MAX_STEP), .UPDATE_RATE(UPDATE_RATE),
+        .Y_CODE_MIN(Y_CODE_MIN), .Y_CODE_MAX(Y_CODE_MAX), .Y_MAX_STEP(Y_MAX_STEP), .UPDATE_RATE(UPDATE_RATE), .SHAPING(SHAPING),
         .BOOT_HASH(BOOT_PROGRAM == "" ? 256'd0 : BOOT_HASH)
     ) loader (
         .clock(clock), .reset(reset), .line_in(host_line), .line_out(device_line), .permit(permit), .boot(boot_count),
@@ -202,7 +203,8 @@ module loader_bench #(
     dac_sequencer #(
         .DAC_BITS(DAC_BITS), .X_INTERPOLATED(X_INTERPOLATED), .X_INDEX_BITS(X_INDEX_BITS), .X_WORD_BITS(X_WORD_BITS),
         .Y_INTERPOLATED(Y_INTERPOLATED), .Y_INDEX_BITS(Y_INDEX_BITS), .Y_WORD_BITS(Y_WORD_BITS), .LOW_AREA(LOW_AREA),
-        .PLAIN_MULTIPLIER(PLAIN_MULTIPLIER), .FOURIER(FOURIER), .HARMONICS(HARMONICS), .SINE_FILE(SINE_FILE)
+        .PLAIN_MULTIPLIER(PLAIN_MULTIPLIER), .FOURIER(FOURIER), .HARMONICS(HARMONICS), .SINE_FILE(SINE_FILE),
+        .SHAPING(SHAPING)
     ) sequencer (
         .clock(clock), .reset(1'b0), .write(write), .write_region(region), .write_address(address), .write_data(word),
         .writable(writable), .refused(refused), .commit(commit), .withdraw(withdraw), .committed(committed), .arm(arm),

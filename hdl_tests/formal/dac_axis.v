@@ -13,8 +13,9 @@ module dac_axis #(
     parameter DAC_BITS = 16,
     parameter PERIOD_BITS = 31,
     parameter PLAIN_MULTIPLIER = 0,
+    parameter SHAPING = 0,
     parameter [63:0] POWER_UP_CODE = 0,
-    parameter LATENCY = PLAIN_MULTIPLIER ? 22 : 34
+    parameter LATENCY = (PLAIN_MULTIPLIER ? 22 : 34) + (SHAPING != 0 ? 1 : 0)
 ) (
     input  wire                  clock,
     input  wire                  write,
@@ -27,6 +28,7 @@ module dac_axis #(
     input  wire [LATENCY-4:0]    ticks,
     input  wire [LATENCY-4:0]    loads,
     input  wire [LATENCY-4:0]    runnings,
+    input  wire                  begins,
     input  wire                  bank,
     input  wire                  restart,
     input  wire                  advance,

@@ -9,6 +9,7 @@ module dac_axis_serial #(
     parameter WORD_BITS = 16,
     parameter DAC_BITS = 16,
     parameter PERIOD_BITS = 31,
+    parameter SHAPING = 0,
     parameter [63:0] POWER_UP_CODE = 0
 ) (
     input  wire                  clock,
@@ -22,6 +23,7 @@ module dac_axis_serial #(
     input  wire                  loaded,
     input  wire                  tick,
     input  wire                  restart,
+    input  wire                  begins,
     input  wire                  advance,
     input  wire                  running,
     output wire                  done,

@@ -15,7 +15,8 @@ module dac_fit #(
     parameter LINE_BITS = 16,
     parameter X_PERIOD_BITS = 25,
     parameter Y_PERIOD_BITS = 31,
-    parameter HARMONICS = 0
+    parameter HARMONICS = 0,
+    parameter SHAPING = 0
 ) (
     input  wire        clock,
     input  wire [31:0] data,

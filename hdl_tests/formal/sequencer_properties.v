@@ -10,7 +10,7 @@
 module sequencer_properties
 `include "sequencer_under_test.vh"
 
-    localparam LATENCY = PLAIN_MULTIPLIER ? 22 : 34;
+    localparam LATENCY = (PLAIN_MULTIPLIER ? 22 : 34) + (SHAPING != 0 ? 1 : 0);
 
     wire uut__take, uut__bank, uut__host_write, uut__host_commit;
     wire uut__x_table_write, uut__y_table_write, uut__x_write, uut__y_write, uut__scan_write;

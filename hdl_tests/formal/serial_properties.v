@@ -9,6 +9,7 @@
 module serial_properties #(
     parameter DAC_BITS = 6,
     parameter WORD_BITS = 8,
+    parameter SHAPING = 0,
     parameter POWER_UP_CODE = 5
 ) (
     input wire                 clock,
@@ -22,17 +23,19 @@ module serial_properties #(
     input wire                 loaded,
     input wire                 tick,
     input wire                 restart,
+    input wire                 begins,
     input wire                 advance,
     input wire                 running
 );
     wire done, reached, clamped;
     wire [DAC_BITS-1:0] code;
     dac_axis_serial #(
-        .INDEX_BITS(2), .WORD_BITS(WORD_BITS), .DAC_BITS(DAC_BITS), .PERIOD_BITS(8), .POWER_UP_CODE(POWER_UP_CODE)
+        .INDEX_BITS(2), .WORD_BITS(WORD_BITS), .DAC_BITS(DAC_BITS), .PERIOD_BITS(8), .SHAPING(SHAPING),
+        .POWER_UP_CODE(POWER_UP_CODE)
     ) axis (
         .clock(clock), .write(write), .write_address(write_address), .write_data(write_data),
         .table_write(table_write), .table_address(table_address), .table_data(table_data), .bank(bank),
-        .loaded(loaded), .tick(tick), .restart(restart), .advance(advance), .running(running), .done(done),
+        .loaded(loaded), .tick(tick), .restart(restart), .begins(begins), .advance(advance), .running(running), .done(done),
         .code(code), .reached(reached), .clamped(clamped)
     );
 

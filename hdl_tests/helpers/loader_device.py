@@ -50,6 +50,7 @@ class Loader:
             x_limits=AxisLimits(*limits[0], top),
             y_limits=AxisLimits(*limits[1], top),
             update_rate_hz=update_rate_hz,
+            shaping=int(parameters.get("SHAPING", 0)),
         )
         folder.mkdir(parents=True, exist_ok=True)
         files = {

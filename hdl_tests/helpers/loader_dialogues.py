@@ -45,8 +45,18 @@ def objection(contents: Contents, *others: Any) -> Finding | None:
         or scan("settle_lines") > _MOST_SETTLE_LINES
     ):
         return Reason.SCHEDULE, 0
-    found = first_objection(contents, *others)
-    return None if found and found[0] in _NOT_CHECKED else found
+    found = first_objection(_not_shaped(contents), *others[:3])
+    if found and found[0] not in _NOT_CHECKED:
+        return found
+    shaped = first_objection(contents, *others)
+    return (Reason.REFUSED, 0) if shaped and shaped[0] == Reason.SHAPING else None  # by the sequencer, behind all else
+
+
+def _not_shaped(contents: Contents) -> Contents:
+    words = list(contents.words)
+    for page in (1, 2):
+        words[page * PAGE_WORDS + AXIS_WORDS.index("shaping")] = 0
+    return replace(contents, words=tuple(words))
 
 
 class Dialogue:

@@ -9,10 +9,12 @@ from numpy.random import Generator
 
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.schedule import Schedule, Window
+from tablegen.emit.constants import DEGREES
 from tablegen.fixedpoint.interpolation import guard_bits
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.phase import RationalPhase
-from tablegen.fixedpoint.program import Program
+from tablegen.fixedpoint.program import Mode, Program
+from tablegen.fixedpoint.shaping import Shaping
 from tablegen.fixedpoint.synthesis import FourierWords, synthesize
 from tablegen.verification.bench import SequencerShape
 
@@ -51,6 +53,9 @@ def random_schedule(rng: Generator, ticks: int, lines: int) -> Schedule:
         up=up,
         down=Window(turn_line + down.first, down.count),
     )
+
+
+MODES: dict[int, Mode] = {degree: mode for mode, degree in DEGREES.items()}  # of a shape
 
 
 def random_program(rng: Generator, shape: SequencerShape, axis: str, schedule: Schedule, kind: Kind) -> Program:
@@ -98,13 +103,23 @@ def random_program(rng: Generator, shape: SequencerShape, axis: str, schedule: S
         align="right",
         word_bits=shape.dac_bits,
     )
-    mode: Literal["interpolated", "direct"] = "interpolated" if interpolated else "direct"
-    program = Program(RationalPhase(period), hold, mode, bits, words, output)
+    program = Program(RationalPhase(period), hold, MODES[interpolated], bits, words, output)
     if kind not in ("smooth", "held"):
         return program
     codes = program.codes(np.arange(program.ticks))
     largest = int(np.max(np.abs(codes - np.roll(codes, 1))))
     return replace(program, output=replace(output, max_step=max(largest if kind == "smooth" else largest // 2, 1)))
+
+
+def shaped(rng: Generator, program: DualProgram, highest: int) -> DualProgram:
+    """The program with an order of its own for each axis, up to the highest; the guard stays as it is."""
+    axes = {}
+    for axis in ("x", "y"):
+        order = int(rng.integers(highest + 1))
+        zero = int(rng.choice([0, 1, 64, 127, 128, int(rng.integers(129))])) if order == 3 else 0
+        own: Program = getattr(program, axis)
+        axes[axis] = replace(own, output=replace(own.output, shaping=Shaping(order, zero)))
+    return replace(program, **axes)
 
 
 def random_fourier(rng: Generator, harmonics: int) -> FourierWords:

@@ -34,14 +34,22 @@ class Configuration:
         script = Script((self.parameters.get("X_POWER_UP_CODE", 0), self.parameters.get("Y_POWER_UP_CODE", 0)))
         script.tick_every(self.paces[0])
         script.wait_ticks(5)
-        random_play(rng, script, self.shape, self.samples, self.paces, self.ticks, self.lines)
+        random_play(rng, script, self.shape, self.samples, self.paces, self.ticks, self.lines, self.shaping)
         return script
+
+    @property
+    def shaping(self) -> int:
+        """The highest order that the sequencer has."""
+        return self.parameters.get("SHAPING", 0)
 
 
 PLAIN_MULTIPLIER = {"PLAIN_MULTIPLIER": 1}
 LOW_AREA = {"LOW_AREA": 1}
 LEAST_PACE = Placement("serial").tick_clocks
 LEAST_PACES = (LEAST_PACE, 64)  # clocks from tick to tick, with LOW_AREA
+FIRST, SECOND, SCANNER = ({"SHAPING": order} for order in (1, 2, 3))
+SCANNER_PACE = Placement("pipelined", shaping=3).tick_clocks
+SHAPED_LEAST_PACES = (Placement("serial", shaping=1).tick_clocks, 64)
 CONFIGURATIONS: dict[str, Configuration] = {
     "bits_16": Configuration(SequencerShape(16, 1, 5, 16, 1, 4, 16), samples=12000),
     "bits_16_plain": Configuration(SequencerShape(16, 1, 5, 16, 1, 4, 16), PLAIN_MULTIPLIER, samples=12000),
@@ -65,6 +73,33 @@ CONFIGURATIONS: dict[str, Configuration] = {
     "low_area": Configuration(SequencerShape(16, 1, 5, 16, 1, 4, 16), LOW_AREA, LEAST_PACES, samples=1200),
     "low_area_dac_24": Configuration(SequencerShape(24, 1, 3, 8, 0, 4, 24), LOW_AREA, LEAST_PACES, samples=800),
     "low_area_dac_8": Configuration(SequencerShape(8, 0, 5, 24, 1, 3, 12), LOW_AREA, LEAST_PACES, samples=800),
+    "first": Configuration(SequencerShape(16, 1, 4, 16, 1, 3, 16), FIRST),
+    "first_dac_8_words_24": Configuration(SequencerShape(8, 1, 4, 24, 0, 5, 21), FIRST),
+    "second": Configuration(SequencerShape(16, 1, 4, 16, 0, 5, 14), SECOND),
+    "second_dac_24_words_8_plain": Configuration(
+        SequencerShape(24, 1, 3, 8, 1, 3, 8), SECOND | PLAIN_MULTIPLIER, paces=(1, 2, 7)
+    ),
+    "scanner": Configuration(SequencerShape(16, 1, 4, 16, 1, 3, 16), SCANNER, paces=(SCANNER_PACE, 7, 19)),
+    "scanner_dac_24_words_8": Configuration(SequencerShape(24, 0, 5, 8, 1, 4, 8), SCANNER, paces=(SCANNER_PACE,)),
+    "scanner_dac_23_words_24_plain": Configuration(
+        SequencerShape(23, 1, 3, 24, 1, 3, 24), SCANNER | PLAIN_MULTIPLIER, paces=(SCANNER_PACE, 8)
+    ),
+    "scanner_dac_8_words_22_plain": Configuration(
+        SequencerShape(8, 1, 3, 22, 0, 5, 24), SCANNER | PLAIN_MULTIPLIER, paces=(SCANNER_PACE,)
+    ),
+    "scanner_dac_12": Configuration(SequencerShape(12, 1, 3, 12, 1, 3, 16), SCANNER, paces=(SCANNER_PACE,)),
+    "first_low_area": Configuration(
+        SequencerShape(18, 1, 3, 16, 1, 3, 18), FIRST | LOW_AREA, SHAPED_LEAST_PACES, samples=800
+    ),
+    "scanner_low_area": Configuration(
+        SequencerShape(16, 1, 4, 16, 1, 3, 16), SCANNER | LOW_AREA, SHAPED_LEAST_PACES, samples=1200
+    ),
+    "scanner_low_area_dac_24": Configuration(
+        SequencerShape(24, 1, 3, 8, 0, 4, 24), SCANNER | LOW_AREA, SHAPED_LEAST_PACES, samples=800
+    ),
+    "second_low_area_dac_8": Configuration(
+        SequencerShape(8, 0, 5, 24, 1, 3, 12), SECOND | LOW_AREA, SHAPED_LEAST_PACES, samples=800
+    ),
     "power_up_codes": Configuration(
         SequencerShape(16, 1, 3, 16, 0, 3, 14), {"X_POWER_UP_CODE": 65535, "Y_POWER_UP_CODE": 12345}, paces=(3, 1)
     ),

@@ -42,6 +42,14 @@ SHAPES = {
     "low area": SequencerShape(22, 1, 4, 24, 0, 4, 16),
     "fourier": SequencerShape(16, 1, 4, 16, 1, 3, 14),
     "long table": SequencerShape(24, 1, 12, 24, 1, 2, 24),  # in which every bit of the phase counts
+    "second": SequencerShape(16, 1, 4, 16, 1, 3, 16),
+    "scanner": SequencerShape(18, 1, 3, 16, 1, 3, 18),
+    "low area scanner": SequencerShape(16, 1, 3, 16, 0, 4, 12),
+}
+SHAPED = {  # parameters, paces, samples
+    "second": ({"SHAPING": 2}, (1, 3), 5000),
+    "scanner": ({"SHAPING": 3, "PLAIN_MULTIPLIER": 1}, (Placement("blocks", shaping=3).tick_clocks,), 4000),
+    "low area scanner": ({"SHAPING": 3, "LOW_AREA": 1}, (Placement("serial", shaping=3).tick_clocks,), 800),
 }
 BENCHES = tuple(SHAPES)
 
@@ -64,6 +72,9 @@ def script_of(bench: str) -> Script:
     script = Script()
     if bench == "fourier":
         random_renderings(rng, script, shape, 12, HARMONICS, 1)
+    elif bench in SHAPED:
+        parameters, paces, samples = SHAPED[bench]
+        random_play(rng, script, shape, samples, paces, shaping=parameters["SHAPING"])
     elif bench == "low area":
         script.tick_every(LEAST_PACE)
         tame, smooth = imaging_program(rng, shape, "tame"), imaging_program(rng, shape, "smooth")
@@ -101,6 +112,8 @@ def bench_of(bench: str, folder: Path, mutant: Mutant | None = None) -> Sequence
         sources[sources.index(mutant.path)] = changed
     parameters: dict[str, int | str] = {"PLAIN_MULTIPLIER": int(bench in ("plain", "fourier", "long table"))}
     parameters["LOW_AREA"] = int(bench == "low area")
+    if bench in SHAPED:
+        parameters |= SHAPED[bench][0]
     if bench == "fourier":
         parameters |= with_sine(folder, SHAPES[bench], HARMONICS)
     return SequencerBench("icarus", SHAPES[bench], folder / "bench", parameters, sources)
@@ -222,7 +235,7 @@ def _axis() -> Iterator[Mutant]:
 
 def _output() -> Iterator[Mutant]:
     """Gain, offset, limits; each of their registers a clock early and a clock late."""
-    yield Mutant("the code is rounded down", "dac_offset", "1'b1, {GAIN_Q-1{1'b0}}}", "1'b0, {GAIN_Q-1{1'b0}}}")
+    yield Mutant("the code is rounded down", "dac_offset", "HALF != 0, {GAIN_Q-1{1'b0}}}", "1'b0, {GAIN_Q-1{1'b0}}}")
     yield Mutant(
         "nothing is held at code_min",
         "dac_output",
@@ -250,7 +263,7 @@ def _output() -> Iterator[Mutant]:
         ("span", "loads[LATENCY-3]", "loads[LATENCY-4]", "loads[LATENCY-2]"),
         ("park code", "loads[LATENCY-2]", "loads[LATENCY-3]", "loads[LATENCY-1]"),
         ("code_max", "loads[LATENCY-1]", "loads[LATENCY-2]", "loads[LATENCY]"),
-        ("high offset", "loads[LATENCY-5]", "loads[LATENCY-6]", "loads[LATENCY-4]"),
+        ("high offset", "SHAPING != 0 ? 6 : 5)", "SHAPING != 0 ? 7 : 6)", "SHAPING != 0 ? 5 : 4)"),
         (
             "gain digits",
             "data(recoded[2*i +: 2]), .load(loads[i])",
@@ -282,7 +295,7 @@ def _output() -> Iterator[Mutant]:
     yield Mutant(
         "the multiplier drops the low offset",
         "dac_multiply_digits",
-        "assign so_far = {{A_BITS+1-DROP{1'b0}}, low}",
+        "assign so_far = {{A_BITS+1-LOW_BITS{1'b0}}, low}",
         "assign so_far = {A_BITS+1{1'b0}}",
         "digits",
     )
@@ -290,7 +303,7 @@ def _output() -> Iterator[Mutant]:
     yield Mutant(
         "the multiplier drops the low offset (blocks)",
         "dac_multiply_plain",
-        "{{PRODUCT_BITS-DROP{1'b0}}, low}",
+        "{{PRODUCT_BITS-LOW_BITS{1'b0}}, low}",
         "{PRODUCT_BITS{1'b0}}",
         "plain",
     )
@@ -572,9 +585,10 @@ def _verdict() -> Iterator[Mutant]:
     yield Mutant(
         "what goes with a tick is a clock late",
         "dac_sequencer",
-        "dac_delay #(.BITS(2), .CLOCKS(LATENCY))",
-        "dac_delay #(.BITS(2), .CLOCKS(LATENCY + 1))",
+        "CLOCKS(LATENCY)) with_tick",
+        "CLOCKS(LATENCY + 1)) with_tick",
     )
+    yield Mutant("a beginning is a clock late", "dac_sequencer", "CLOCKS(11)) from", "CLOCKS(12)) from")
     yield Mutant("a strobe without a tick", "dac_verdict", "strobe <= tick;", "strobe <= tick || strobe;")
 
 
@@ -582,10 +596,14 @@ def _low_area() -> Iterator[Mutant]:
     """The serial axis."""
     for breaks, old, new in (
         ("interpolation rounds down", "<< (15 - GUARD_BITS);", "<< 0;"),
-        ("the low word of the offset has no half", "LOW_HALF = GAIN_Q < 19 ? 1 << (GAIN_Q - 1) : 0", "LOW_HALF = 0"),
+        (
+            "the low word of the offset has no half",
+            "LOW_HALF = GAIN_Q < 19 && SHAPING == 0 ? 1 << (GAIN_Q - 1) : 0",
+            "LOW_HALF = 0",
+        ),
         (
             "the wide offset has no half",
-            "HIGH_HALF = GAIN_Q < 19 ? 0 : {{BITS-1{1'b0}}, 1'b1} << (GAIN_Q - 1)",
+            "HIGH_HALF = GAIN_Q < 19 || SHAPING != 0 ? 0 : {{BITS-1{1'b0}}, 1'b1} << (GAIN_Q - 1)",
             "HIGH_HALF = 0",
         ),
         ("the next table word is this one", "{{INDEX_BITS-1{1'b0}}, step == HERE}", "{INDEX_BITS{1'b0}}"),
@@ -614,6 +632,72 @@ def _low_area() -> Iterator[Mutant]:
         ("no clamp is reported at code_min", "running && (is_low || is_high)", "running && is_high"),
     ):
         yield Mutant(breaks, "dac_axis_serial", old, new, "low area")
+
+
+def _shaping() -> Iterator[Mutant]:
+    """What is fed back, and what of a new program meets which of its fractions."""
+    for breaks, old, new in (
+        ("no remainder is kept", "kept <= sum[BITS-1:0];", "kept <= HALF;"),
+        ("remainders of the last program go on", "begins || order == 2'd0", "order == 2'd0"),
+        ("what is off is shaped", "begins || order == 2'd0", "begins"),
+        ("the carry is lost", "carry <= sum[BITS];", "carry <= 1'b0;"),
+        ("whole codes that are fed back are lost", "more <= moved[BITS+2:BITS];", "more <= 3'd0;"),
+        ("the order comes before its program", "if (load) order <=", "order <="),
+        ("the difference of the last program goes on", "begins || !order[1]", "!order[1]"),
+        ("first order is second", "begins || !order[1]", "begins"),
+        (
+            "the difference has no sign",
+            "else if (tick)\n                        difference <= {sum[BITS],",
+            "else if (tick)\n                        difference <= {1'b0,",
+        ),
+    ):
+        yield Mutant(breaks, "dac_shaper", old, new, "second")
+    for breaks, old, new in (
+        (
+            "the difference of the scanner's order has no sign",
+            "(tick) difference <= {sum[BITS],",
+            "(tick) difference <= {1'b0,",
+        ),
+        ("second order has no zero", "word[14] || word[1:0] == 2'd2", "word[14]"),
+        ("the highest digit is that below it", ": digits[7:6]", ": digits[5:4]"),
+        ("a negative digit has no carry", "{term, minus}", "{term, 1'b0}"),
+        ("the last product goes on", "product <= 0;", "product <= product;"),
+        ("products are not negative", "{2{product[BITS+2]}}", "2'b00"),
+        ("a digit is missing", "step != 3'd0 && step != 3'd5", "step != 3'd0 && step < 3'd4"),
+        ("the last difference is not subtracted", "product - {{2{last[BITS]}}, last}", "product"),
+        ("the last difference of the last program goes on", "begins || order != 2'd3", "order != 2'd3"),
+        ("second order subtracts, too", "begins || order != 2'd3", "begins"),
+        ("the digits come before their program", "if (load) digits <=", "digits <="),
+        (
+            "what the last program feeds back goes on",
+            "if (begins)\n                        fed_back <= 0;\n                    else if",
+            "if",
+        ),
+    ):
+        yield Mutant(breaks, "dac_shaper", old, new, "scanner")
+    for breaks, file, old, new in (
+        ("the shaper's tick comes a clock early", "dac_axis", "ticks[TARGET_AT-6]", "ticks[TARGET_AT-7]"),
+        ("the shaper's tick comes a clock late", "dac_axis", "ticks[TARGET_AT-6]", "ticks[TARGET_AT-5]"),
+        ("the shaper's word is two clocks early", "dac_output", ".load(loads[LATENCY-6])", ".load(loads[LATENCY-8])"),
+        ("the shaper's word comes a clock late", "dac_output", ".load(loads[LATENCY-6])", ".load(loads[LATENCY-5])"),
+        ("the half is added twice", "dac_output", "SHAPING != 0 ? 0 : 1)\n    ) offset", "1)\n    ) offset"),
+        ("the beginning comes a clock early", "dac_sequencer", "CLOCKS(LATENCY - 11)", "CLOCKS(LATENCY - 12)"),
+        ("the beginning comes a clock late", "dac_sequencer", "CLOCKS(LATENCY - 11)", "CLOCKS(LATENCY - 10)"),
+    ):
+        yield Mutant(breaks, file, old, new, "second")
+    for breaks, old, new in (
+        ("remainders do not begin", "begins(step == WAIT && tick && begins)", "begins(1'b0)"),
+        ("the shaping of the word before", "WITH_SHAPING = 6'd4", "WITH_SHAPING = 6'd3"),
+        ("the carry is lost", "{BITS-1{1'b0}}, carried}", "{BITS-1{1'b0}}, 1'b0}"),
+        ("the half is added twice", "LOW_HALF = GAIN_Q < 19 && SHAPING == 0", "LOW_HALF = GAIN_Q < 19"),
+        (
+            "the half is added twice, above the low word",
+            "HIGH_HALF = GAIN_Q < 19 || SHAPING != 0",
+            "HIGH_HALF = GAIN_Q < 19",
+        ),
+        ("code_min is not read again", "shapes && step == MORE ? CODE_MIN", "shapes && step == MORE ? CODE_MAX"),
+    ):
+        yield Mutant(breaks, "dac_axis_serial", old, new, "low area scanner")
 
 
 def _fourier() -> Iterator[Mutant]:
@@ -659,7 +743,7 @@ def _fourier() -> Iterator[Mutant]:
 
 
 MUTANTS: tuple[Mutant, ...] = (
-    *_axis(), *_output(), *_scan(), *_markers(), *_verdict(), *_low_area(), *_fourier(),
+    *_axis(), *_output(), *_scan(), *_markers(), *_verdict(), *_low_area(), *_fourier(), *_shaping(),
 )  # fmt: skip
 
 

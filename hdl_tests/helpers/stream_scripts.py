@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.random import Generator
-from programs import Kind, random_dual, random_fourier, rendered
+from programs import Kind, random_dual, random_fourier, rendered, shaped
 
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.registers import PAGE_WORDS, program_words
@@ -95,8 +95,12 @@ def random_play(
     paces: Sequence[int] = (1,),
     ticks: tuple[int, int] = (8, 40),
     lines: tuple[int, int] = (1, 5),
+    shaping: int = 0,
 ) -> None:
-    """Programs back to back, requests at any tick, ticks at all paces that stop and go on; until so many samples."""
+    """Programs back to back, requests at any tick, ticks at all paces that stop and go on; until so many samples.
+
+    Those of a device that shapes have orders up to ``shaping``.
+    """
     pace = _change_pace(rng, script, paces)
     while len(script.expected) < samples:
         if rng.random() < 0.2:
@@ -105,6 +109,8 @@ def random_play(
             script.request("withdraw")
         if not script.waiting:
             program = some_program(rng, shape, ticks, lines)
+            if shaping:
+                program = shaped(rng, program, shaping)
             script.load(program)
             names = {"commit"} | ({"arm", "trigger"} if rng.random() < 0.4 else set())
             script.request(*names, program=program, frames=int(rng.integers(0, 3)))

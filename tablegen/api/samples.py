@@ -44,6 +44,7 @@ class Samples:
 def samples(plan: Plan, axis: Literal["x", "y"], first: int = 0, stop: int | None = None) -> Samples:
     """Ticks [first, stop) of the period of an axis, to its end unless given.
 
+    Of a shaped axis it is the first period since the program began; a code of it needs all before it.
     A slow frame has many ticks: 8 bytes a tick for each number, so give ``stop`` where it has 10^8. Raises
     ``ValueError`` for ticks outside of the period.
     """

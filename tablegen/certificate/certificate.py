@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import log10, sqrt
+from math import floor, log10, sqrt
 
 import numpy as np
 
@@ -15,6 +15,8 @@ from tablegen.certificate.line_errors import (
     refined,
     scaling_error,
 )
+from tablegen.certificate.shaped_errors import ShapedErrors, shaped_errors
+from tablegen.certificate.shaped_periods import largest_and_rms
 from tablegen.compensation.expectation import Expectation
 from tablegen.compensation.line import Sweep
 from tablegen.planning.line_plan import LinePlan, Plan
@@ -30,6 +32,8 @@ class Certificate:
     ``expected`` is what the scanner should do with the line; everything else is of the waveform.
     ``peak_acceleration`` is that of the target, of the line a period squared, where the waveform was made for the
     least; ``optimum`` the least of any, where ``certificate.optimum`` has worked it out.
+    Errors of an axis with a ``shaped`` part are those of the position, and its codes and largest step are bounds: no
+    two of its periods are the same.
     """
 
     ticks: int
@@ -49,6 +53,7 @@ class Certificate:
     expected: Expectation | None = None
     peak_acceleration: float | None = None
     optimum: float | None = None
+    shaped: ShapedErrors | None = None
 
     @property
     def scaling_error_percent(self) -> float:
@@ -102,7 +107,8 @@ def broken_limits(
         limit = plan.limits.max_error_lsb
         if limit is not None and certificate.max_error_lsb > limit:
             why = f"the {axis} axis errs by up to {certificate.max_error_lsb:.4g} LSB, above {limit:g}; "
-            remedy = f"lengthen or widen {axis}.table" if limit > 0.5 else "a code alone is rounded by up to 0.5"
+            remedy = _finer_table(plan.x if axis == "x" else plan.y)
+            remedy = remedy if limit > 0.5 else "a code alone is rounded by up to 0.5"
             problems.append(file.problem("limits.max_error_lsb", why + remedy))
         limit = plan.limits.max_scaling_error_percent
         if limit is None:
@@ -144,6 +150,12 @@ def _foreseen(certificate: Certificate, limit: float) -> str:
     return ""
 
 
+def _finer_table(line: LinePlan, written: str = "lengthen or widen {}") -> str:
+    """How a table is made to err less: one that is written, and one that the build chooses."""
+    table = f"{line.axis}.table"
+    return written.format(table) if line.asked_table is None else f"a lower {table}.max_error_lsb"
+
+
 def _remedy(line: LinePlan, parts: ScalingError) -> str:
     axis = line.axis
     largest = max(parts.band_limit, parts.quantisation, parts.model)
@@ -154,38 +166,42 @@ def _remedy(line: LinePlan, parts: ScalingError) -> str:
     if largest == parts.model:
         return "most of it is dynamics that max_boost_db leaves: fewer harmonics or a lower line rate"
     if abs(line.codes_per_unit) * line.scale > 2.0**line.program.bits:  # a word of the table is more than a code
-        return f"most of it is quantisation: more {axis}.table.bits"
+        return f"most of it is quantisation: {_finer_table(line, 'more {}.bits')}"
     return f"most of it is quantisation: more dac.bits, or an amplifier whose range fits the {axis} scan"
 
 
 def _certify(line: LinePlan) -> Certificate:
-    played, output = EmittedPeriod(line), line.program.output
-    codes, lengths, ticks = played.runs.codes, played.runs.lengths, line.program.ticks
+    played, output, shaping = EmittedPeriod(line), line.program.output, line.program.output.shaping
+    codes = played.runs.codes
     mean, square = played.error_moments()
+    noise = square - mean * mean
+    if played.shaped is not None:
+        square, noise = largest_and_rms(played.shaped.position_errors)[1] ** 2, float(np.var(played.shaped.code_errors))
+    # A rounded code is within half a code of its value, a shaped one within the excess.
+    beyond = floor(shaping.excess + 0.5) if shaping.order else 0
+    low, high = max(int(codes.min()) - beyond, output.code_min), min(int(codes.max()) + beyond, output.code_max)
     resting = line.drive.resting
-    levels = codes - float(output.offset_code)
-    levels -= float(np.sum(lengths * levels)) / ticks
-    levels *= levels
-    power = max(float(np.sum(lengths * levels)) / ticks, 1e-30)
+    power = max(played.power(), 1e-30)
     return Certificate(
-        ticks=ticks,
+        ticks=line.program.ticks,
         max_error_lsb=played.largest_error(),
         rms_error_lsb=sqrt(square),
         scaling=_scaling(line, played),
-        lowest_code=int(codes.min()),
-        highest_code=int(codes.max()),
-        headroom_low=int(codes.min()) - output.code_min,
-        headroom_high=output.code_max - int(codes.max()),
-        largest_step=int(np.max(np.abs(codes - np.roll(codes, 1)))),
+        lowest_code=low,
+        highest_code=high,
+        headroom_low=low - output.code_min,
+        headroom_high=output.code_max - high,
+        largest_step=played.largest_step() + shaping.step_excess,
         max_step=output.max_step,
         peak_slew_v_per_s=line.drive.v_amplitude * line.series.peak_slope() * float(line.rate),
-        beyond_cutoff_db=None if resting else 10.0 * log10(max(square - mean * mean, 1e-30) / power),
-        at_resonance_db=power_at_resonance_db(line, played.runs, power),
+        beyond_cutoff_db=None if resting else 10.0 * log10(max(noise, 1e-30) / power),
+        at_resonance_db=power_at_resonance_db(line, played, power),
         refinement=None
         if line.layer is None
         else {side: refined(line, side, branch) for side, branch in _directions(line).items()},
         expected=certified_expectation(line, played),
         peak_acceleration=None if line.kept_percent is None else line.target.peak_acceleration(),
+        shaped=shaped_errors(line, played, _directions(line)),
     )
 
 

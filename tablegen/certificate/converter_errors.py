@@ -29,27 +29,38 @@ class ConverterErrors:
 
 def converter_errors(line: LinePlan, played: EmittedPeriod) -> ConverterErrors:
     """The errors of the integers of the directions that image, in a position, through the axis' dynamics."""
-    shape, ticks = line.drive.shape, line.program.ticks
+    shape = line.drive.shape
     sides: dict[str, Sweep] = {"forward": shape.forward}
     if line.band_limit.directions == "both":
         sides["backward"] = shape.backward
-    count = min(ticks, _MOST_TICKS)
-    at = (2 * np.arange(count, dtype=np.int64) + 1) * ticks // (2 * count)
-    moved = _moved(line, played.errors(at) / line.codes_per_unit, full=count == ticks)
     position = np.linspace(*line.band_limit.window, _POINTS)
     chord = round(CHORD / (position[1] - position[0]))
     chord = max(1, min(chord, _POINTS - 1))
     span = position[chord] - position[0]
-    rms, scaling, apart = {}, {}, []
-    for side, branch in sides.items():
-        here = np.interp(shape.times(side, position) * count - 0.5, np.arange(count), moved)
-        error = 100.0 * here / branch.slope(position if side == "forward" else 1.0 - position)
-        error -= float(np.mean(error))
-        rms[side] = sqrt(float(np.mean(error * error)))
-        scaling[side] = float(np.ptp(error[chord:] - error[:-chord]) / span)
-        apart.append(error)
-    mismatch = float(np.max(np.abs(apart[0] - apart[-1])))
+    rms: dict[str, float] = {}
+    scaling: dict[str, float] = {}
+    mismatch = 0.0
+    for moved in _periods(line, played):
+        count, apart = len(moved), []
+        for side, branch in sides.items():
+            here = np.interp(shape.times(side, position) * count - 0.5, np.arange(count), moved)
+            error = 100.0 * here / branch.slope(position if side == "forward" else 1.0 - position)
+            error -= float(np.mean(error))
+            rms[side] = max(rms.get(side, 0.0), sqrt(float(np.mean(error * error))))
+            scaling[side] = max(scaling.get(side, 0.0), float(np.ptp(error[chord:] - error[:-chord]) / span))
+            apart.append(error)
+        mismatch = max(mismatch, float(np.max(np.abs(apart[0] - apart[-1]))))
     return ConverterErrors(rms, scaling, mismatch)
+
+
+def _periods(line: LinePlan, played: EmittedPeriod) -> list[Floats]:
+    """Errors of w behind the dynamics: of one period, or of a shaped axis of several, of which the worst counts."""
+    if played.shaped is not None and played.shaped.is_whole:
+        return list(played.shaped.position_errors / line.codes_per_unit)
+    ticks = line.program.ticks
+    count = min(ticks, _MOST_TICKS)
+    at = (2 * np.arange(count, dtype=np.int64) + 1) * ticks // (2 * count)
+    return [_moved(line, played.errors(at) / line.codes_per_unit, full=count == ticks)]
 
 
 def _moved(line: LinePlan, error: Floats, full: bool) -> Floats:

@@ -5,16 +5,21 @@ peak over the imaging window. Of float waveforms the slope is the analytic one; 
 line, since the slope between neighbouring codes means nothing.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
 from math import ceil, floor, log10
 
 import numpy as np
 
+from tablegen.certificate.shaped_periods import ShapedPeriods
 from tablegen.compensation.dynamics import capped_inverse
 from tablegen.compensation.line import Sweep
-from tablegen.fixedpoint.runs import Runs, runs_of
+from tablegen.fixedpoint.runs import runs_of
 from tablegen.numerics.arrays import Floats, Ints, merged
 from tablegen.planning.line_plan import LinePlan
+from tablegen.waveform.extremes import extreme_points, extreme_ticks
 from tablegen.waveform.sampler import Expansion, Sampler, on_grid
 from tablegen.waveform.series import FourierSeries, values
 
@@ -52,8 +57,32 @@ class Refined:
     scaling: float
 
 
+class TickErrors:
+    """Errors of every tick of a period."""
+
+    by_tick = True
+
+    def __init__(self, errors: Floats) -> None:
+        self._errors = errors
+
+    def errors(self, k: Ints) -> Floats:
+        """Those at ticks k."""
+        return self._errors[k]
+
+    def corners(self, first: int, stop: int) -> Ints:
+        """All ticks in [first, stop)."""
+        return np.arange(first, stop)
+
+    def stretches(self, first: int, stop: int) -> Iterator[tuple[int, int]]:
+        """Ticks [first, stop) in parts that are worked out together."""
+        return pairwise([first, *range(first + _CHUNK_RUNS, stop, _CHUNK_RUNS), stop])
+
+
 class EmittedPeriod:
-    """The emitted period beside the float one, at any tick."""
+    """The emitted period beside the float one, at any tick.
+
+    Of a shaped axis this is the period without shaping; ``shaped`` has what is emitted.
+    """
 
     def __init__(self, line: LinePlan) -> None:
         self._line = line
@@ -61,24 +90,22 @@ class EmittedPeriod:
         self._expansions: dict[int, tuple[FourierSeries, Expansion]] = {}
         self._reference = Sampler(line.series, line.program.phase.ticks)
         # Between its extremes the float waveform is monotonic, so that errors are largest where runs begin and end.
-        self.runs = runs_of(line.program).split_at(self._extremes())
-        self._lasts = self.runs.lasts
-        self._first = self.runs.codes - self._asked(self.runs.starts)
-        self._last = self._first if self.runs.by_tick else self.runs.codes - self._asked(self._lasts)
+        self.runs = runs_of(line.program.rounded).split_at(self._extremes())
+        self._by_tick = np.zeros(0)  # errors, where every run is a single tick
+        if self.runs.by_tick:
+            self._by_tick = np.empty(self.runs.ticks)
+            for which in self._chunks():
+                self._by_tick[which] = self.runs.codes[which] - self._asked(self.runs.starts[which])
+        self.shaped: ShapedPeriods | None = None
+        if line.program.output.shaping.order:
+            ticks = np.arange(ShapedPeriods.asked_ticks(line.program), dtype=np.int64)
+            self.shaped = ShapedPeriods(line, self._asked(ticks))
 
     def _extremes(self) -> Ints:
         """The ticks before and behind each extreme of the float waveform."""
-        points = 64 * self._line.series.harmonics
-        w = on_grid(self._line.series, points)
-        turning = (w - np.roll(w, 1)) * (np.roll(w, -1) - w) <= 0.0
-        t = np.flatnonzero(turning) / points
-        for _ in range(3):  # Newton on the slope; where it is flat any tick is as good
-            slope, bend = self.expansion(self._line.series).at(t, 1, 2)
-            step = slope / np.where(bend == 0.0, np.inf, bend)
-            t = t - np.clip(step, -1.0 / points, 1.0 / points)
-        ticks = self._line.program.ticks
-        before = np.floor(t * ticks).astype(np.int64)
-        return merged(before % ticks, (before + 1) % ticks)
+        series, slopes = self._line.series, self.expansion(self._line.series)
+        grid = on_grid(series, extreme_points(series))
+        return extreme_ticks(grid, lambda t: slopes.at(t, 1, 2), self._line.program.ticks)
 
     def expansion(self, series: FourierSeries) -> Expansion:
         """A series of the line, to be asked at any times; it is worked out once."""
@@ -95,26 +122,75 @@ class EmittedPeriod:
 
     def errors(self, k: Ints) -> Floats:
         """Emitted code less the code asked for, unrounded, at ticks k."""
-        return self._first[k] if self.runs.by_tick else self.runs.at(k) - self._asked(k)
+        return self._by_tick[k] if self.runs.by_tick else self.runs.at(k) - self._asked(k)
+
+    @property
+    def by_tick(self) -> bool:
+        """Whether every run is a single tick."""
+        return self.runs.by_tick
+
+    def arriving(self) -> "list[EmittedPeriod | TickErrors]":
+        """What is judged of the errors: the codes' own, or of shaped ones those of the position, period by period.
+
+        Of a shaped period that is too long for that, it is what rounding alone would leave.
+        """
+        if self.shaped is None or not self.shaped.is_whole:
+            return [self]
+        return [TickErrors(errors) for errors in self.shaped.position_errors]
 
     def largest_error(self) -> float:
-        """max |error| over every tick."""
-        return max(float(np.max(np.abs(self._first))), float(np.max(np.abs(self._last))))
+        """max |error| over every tick; of shaped codes of the position."""
+        if self.shaped is not None:
+            return float(np.max(np.abs(self.shaped.position_errors)))
+        return self._figures[0]
 
     def error_moments(self) -> tuple[float, float]:
         """Mean and mean square of the error over every tick; along a run it is the parabola of three of its ticks."""
-        sums = np.zeros(2)
-        for begin in range(0, len(self._first), _CHUNK_RUNS):
-            sums += self._moments(slice(begin, begin + _CHUNK_RUNS))
-        mean, square = sums / self.runs.ticks
-        return float(mean), float(square)
+        return self._figures[1:]
 
-    def _moments(self, which: slice) -> tuple[float, float]:
-        """Sums of the error and of its square over the ticks of some runs."""
-        first, last, starts = self._first[which], self._last[which], self.runs.starts[which]
+    def power(self) -> float:
+        """Mean square of the codes about their mean."""
+        ticks, offset = self.runs.ticks, float(self._line.program.output.offset_code)
+        sums = np.zeros(2)
+        for power in (1, 2):
+            for which in self._chunks():
+                levels = self.runs.codes[which] - offset - sums[0] / ticks * (power - 1)
+                sums[power - 1] += np.sum(self.runs.lengths_of(which) * levels**power)
+        return float(sums[1]) / ticks
+
+    def largest_step(self) -> int:
+        """Between codes that follow each other, the last and the first too, in codes."""
+        codes = self.runs.codes
+        inside = (int(np.max(np.abs(np.diff(codes[at.start : at.stop + 1])), initial=0)) for at in self._chunks())
+        return max(abs(int(codes[0] - codes[-1])), *inside)
+
+    def stretches(self, first: int, stop: int) -> Iterator[tuple[int, int]]:
+        """Ticks [first, stop) in parts whose runs are worked out together."""
+        edges = self.runs.starts[slice(*np.searchsorted(self.runs.starts, (first + 1, stop)))][_CHUNK_RUNS::_CHUNK_RUNS]
+        return pairwise([first, *edges.tolist(), stop])
+
+    def _chunks(self) -> Iterator[slice]:
+        """The runs in parts that are worked out together, in the cache."""
+        return (slice(at, at + _CHUNK_RUNS) for at in range(0, len(self.runs.starts), _CHUNK_RUNS))
+
+    @cached_property
+    def _figures(self) -> tuple[float, float, float]:
+        """The largest error, the mean, and the mean square."""
+        largest, sums = 0.0, np.zeros(2)
+        for which in self._chunks():
+            n, starts = self.runs.lengths_of(which), self.runs.starts[which]
+            first = self._by_tick[which] if self.runs.by_tick else self.runs.codes[which] - self._asked(starts)
+            last = first if self.runs.by_tick else self.runs.codes[which] - self._asked(starts + n - 1)
+            largest = max(largest, float(np.max(np.abs(first))), float(np.max(np.abs(last))))
+            sums += self._moments(which, n, first, last)
+        mean, square = sums / self.runs.ticks
+        return largest, float(mean), float(square)
+
+    def _moments(self, which: slice, n: Ints, first: Floats, last: Floats) -> tuple[float, float]:
+        """Sums of the error and of its square over the ticks of some runs, with the errors of their ends."""
+        starts = self.runs.starts[which]
         if self.runs.by_tick:
             return float(np.sum(first)), float(np.sum(first * first))
-        n = self.runs.lengths_of(which)
         steps = np.maximum(n - 1, 1)  # the parabola is 4 i (steps - i) / steps^2 at tick i, on a straight line
         halfway = n // 2
         straight = first + (last - first) * (halfway / steps)
@@ -130,8 +206,10 @@ class EmittedPeriod:
         """Ticks in [first, stop) at which a run begins or ends."""
         if self.runs.by_tick:
             return np.arange(first, stop)
-        both = (self.runs.starts, self._lasts)
-        return merged(*(ticks[slice(*np.searchsorted(ticks, (first, stop)))] for ticks in both))
+        starts = self.runs.starts
+        begins = starts[slice(*np.searchsorted(starts, (first, stop)))]
+        ends = starts[slice(*np.searchsorted(starts, (first + 1, stop + 1)))] - 1
+        return merged(begins, ends, np.arange(max(first, self.runs.ticks - 1), min(stop, self.runs.ticks)))
 
 
 def scaling_error(line: LinePlan, played: EmittedPeriod, side: str, branch: Sweep) -> ScalingError:
@@ -140,14 +218,14 @@ def scaling_error(line: LinePlan, played: EmittedPeriod, side: str, branch: Swee
     deviation, speed, wanted_speed = _followed(line, played, side, position)
     sweep = position if side == "forward" else 1.0 - position
     steepness = branch.slope(sweep)
-    chords, noise = _chords(line, played, side, position, deviation, steepness)
+    chords = [_chords(line, one, side, position, deviation, steepness) for one in played.arriving()]
     # A triangle leaves the piezo at the inverse of the branch, whose slope is 1 / u'.
     triangle = 1.0 / branch.slope(branch.inverse(sweep))
     middle = float(1.0 / branch.slope(branch.inverse(0.5)))
     return ScalingError(
-        total=_peak_to_peak(chords),
+        total=max(_peak_to_peak(total) for total, _ in chords),
         band_limit=_peak_to_peak(wanted_speed),
-        quantisation=_peak_to_peak(noise),
+        quantisation=max(_peak_to_peak(noise) for _, noise in chords),
         model=_peak_to_peak(speed - wanted_speed),
         size=100.0 * float(deviation[-1] - deviation[0]) / (high - low),
         uncompensated=_peak_to_peak(triangle / middle),
@@ -205,10 +283,24 @@ def _reached(line: LinePlan) -> FourierSeries:
     return FourierSeries(line.target.a0, line.target.a * ratio, line.target.b * ratio)
 
 
+def tick_scaling(line: LinePlan, played: EmittedPeriod, side: str, branch: Sweep, errors: TickErrors) -> float:
+    """The total in percent, peak to peak, where these are the errors of a period."""
+    low, high = line.band_limit.window
+    position = np.linspace(low, high, _POINTS_PER_HARMONIC * line.target.harmonics + 513)
+    deviation, _, _ = _followed(line, played, side, position)
+    steepness = branch.slope(position if side == "forward" else 1.0 - position)
+    return _peak_to_peak(_chords(line, errors, side, position, deviation, steepness)[0])
+
+
 def _chords(
-    line: LinePlan, played: EmittedPeriod, side: str, position: Floats, deviation: Floats, steepness: Floats
+    line: LinePlan,
+    played: EmittedPeriod | TickErrors,
+    side: str,
+    position: Floats,
+    deviation: Floats,
+    steepness: Floats,
 ) -> tuple[Floats, Floats]:
-    """Slope errors (1 is 100 %) of the chords inside the window: of the emitted integers, and of quantisation alone.
+    """The least and the largest slope error (1 is 100 %) of chords inside the window: of the integers, of quantisation.
 
     Of all chords those count that begin or end where a run does: between those the error of a chord is a straight
     line. ``deviation`` and ``steepness`` of the waveform stand at ``position``. A code stands for the middle of its
@@ -221,11 +313,6 @@ def _chords(
     baseline = max(1, min(round(CHORD * share * ticks), stop - first - 1))
     if stop - first < 2:
         return np.zeros(1), np.zeros(1)
-    begin = played.corners(first, stop - baseline)
-    if not played.runs.by_tick:
-        begin = merged(begin, played.corners(first + baseline, stop) - baseline)
-    if not len(begin):
-        begin = np.array([first])
 
     def noise_and_total(k: Ints) -> tuple[Floats, Floats, Floats]:
         t = (k + 0.5) / ticks
@@ -233,27 +320,36 @@ def _chords(
         noise = played.errors(k) / line.codes_per_unit / np.interp(where, position, steepness)
         return where, noise, noise + np.interp(where, position, deviation)
 
-    totals, noises = np.empty(len(begin)), np.empty(len(begin))
-    for at in range(0, len(begin), _CHUNK_RUNS):
-        chunk = slice(at, at + _CHUNK_RUNS)
-        x0, noise0, total0 = noise_and_total(begin[chunk])
-        x1, noise1, total1 = noise_and_total(begin[chunk] + baseline)
-        totals[chunk], noises[chunk] = (total1 - total0) / (x1 - x0), (noise1 - noise0) / (x1 - x0)
-    return totals, noises
+    totals, noises = [], []
+    for low, high in played.stretches(first, stop - baseline):
+        begin = played.corners(low, high)
+        if not played.by_tick:
+            begin = merged(begin, played.corners(low + baseline, high + baseline) - baseline)
+        if not len(begin):
+            begin = np.array([low])
+        x0, noise0, total0 = noise_and_total(begin)
+        x1, noise1, total1 = noise_and_total(begin + baseline)
+        total, noise = (total1 - total0) / (x1 - x0), (noise1 - noise0) / (x1 - x0)
+        totals += [np.min(total), np.max(total)]
+        noises += [np.min(noise), np.max(noise)]
+    return np.array([min(totals), max(totals)]), np.array([min(noises), max(noises)])
 
 
-def power_at_resonance_db(line: LinePlan, runs: Runs, power: float) -> float | None:
+def power_at_resonance_db(line: LinePlan, played: EmittedPeriod, power: float) -> float | None:
     """Power of the emitted codes inside the resonance, at least its nearest harmonic, relative to the scan's."""
     response, ticks = line.drive.response, line.program.ticks
     if response is None or ticks > _MAX_SPECTRUM_TICKS:
         return None
-    rate = float(line.rate)
+    rate, runs = float(line.rate), played.runs
+    shaped = played.shaped if played.shaped is not None and played.shaped.is_whole else None
+    if shaped is not None:
+        rate, ticks = rate * ticks / shaped.ticks, shaped.ticks
     last = (ticks - 1) // 2
     centre, half = response.resonance_hz / rate, response.half_width_hz / rate
     if round(centre) > last:
         return None
     first, stop = max(1, round(centre - half)), min(last, round(centre + half)) + 1
-    codes = np.repeat(runs.codes, runs.lengths) - float(line.program.output.offset_code)
-    spectrum = np.abs(np.fft.rfft(codes)) / ticks
+    codes = np.repeat(runs.codes, runs.lengths) if shaped is None else shaped.judged_codes
+    spectrum = np.abs(np.fft.rfft(codes - float(line.program.output.offset_code))) / ticks
     inside = 2.0 * float(np.sum(spectrum[first:stop] ** 2))
     return 10.0 * log10(max(inside, 1e-30) / power)

@@ -30,6 +30,7 @@ _MOST_TRIALS = 6  # of one key
 _MARGIN = 1.1  # what a first guess allows for: errors of rounding do not scale exactly
 _HARDWARE = re.compile(r"([xy]\.)?(amplifier|dac)\.")
 _SCANNER = "scanner:"  # before a key of the scanner file
+_ROUNDED_LSB = 0.5  # of a code, whatever its table is
 _MOST_BITS = 24
 _LONGEST_TABLE = 65536
 _MOST_HARMONICS = 256  # a fit of more takes seconds
@@ -167,12 +168,15 @@ def _value(value: object) -> str:
 
 def _against_quantisation(setup: Setup, plan: Plan, line: LinePlan, found: Excess) -> Iterator[Iterator[Change]]:
     axis, table = line.axis, line.program
+    if line.asked_table is not None:
+        asked = line.asked_table.max_error_lsb
+        yield ({f"{axis}.table.max_error_lsb": asked / share} for share in (2.0, 4.0) if asked / share > _ROUNDED_LSB)
     bits = ceil(log2(_MARGIN) + log2(abs(found.percent)) - log2(found.limit))  # their quotient may be no float
     words_per_code = 2.0**table.bits / (abs(line.codes_per_unit) * line.scale)
-    if words_per_code < 2.0:
+    if words_per_code < 2.0 and line.asked_table is None:
         yield ({f"{axis}.table.bits": b} for b in range(table.bits + bits, _MOST_BITS + 1))
     length = len(table.words)
-    if table.mode == "interpolated" and length < 64 * line.series.harmonics:
+    if line.asked_table is None and table.mode != "direct" and length < 64 * line.series.harmonics:
         yield ({f"{axis}.table.length": n} for n in (4 * length, 16 * length) if n <= _LONGEST_TABLE)
     yield _amplifiers(setup, plan, line, found)
     hardware = [setup.hardware(one.axis) for one in plan.lines]
@@ -198,7 +202,7 @@ def _amplifiers(setup: Setup, plan: Plan, line: LinePlan, found: Excess) -> Iter
         if not {*gains, *biases} & {*_keys(its.where("amplifier.gain")), *_keys(its.where("amplifier.bias_v"))}:
             continue  # it has an amplifier of its own
         words, output = one.program.words, one.program.output
-        codes = output.code(np.array([words.min(), words.max()]) << one.program.guard)
+        codes = output.code(one.program.resting(np.array([words.min(), words.max()])))
         ends += [one.converter.v_zero + one.converter.v_per_code * code for code in codes.tolist()]
         park_v = getattr(setup.scan, one.axis).park_v
         ends.append(one.drive.v_offset if park_v is None else park_v)
@@ -230,7 +234,7 @@ def _other_bands(setup: Setup, plan: Plan, line: LinePlan) -> Iterator[Iterator[
     if sharp:
         yield narrower
     most = min((line.program.phase.ticks - 1) // 2, max(_MOST_HARMONICS, harmonics))
-    if line.program.mode == "interpolated":
+    if line.program.mode != "direct":
         most = min(most, len(line.program.words) // 2 - 1)
     more = [min(harmonics << i, most) for i in range(1, _MOST_TRIALS + 1)]
     counts = [n for n in dict.fromkeys(more) if n > harmonics]

@@ -8,8 +8,11 @@ import numpy as np
 from tablegen.certificate.certificate import Certificate
 from tablegen.certificate.excess import excess
 from tablegen.certificate.matching import apart_percent
+from tablegen.certificate.shaped_errors import ShapedErrors
+from tablegen.certificate.shaped_periods import Passage
 from tablegen.compensation.expectation import LEVEL_PERCENT, Expectation, Figure
 from tablegen.compensation.hold import hold_inverse
+from tablegen.fixedpoint.shaping import Shaping
 from tablegen.planning.line_plan import LinePlan, Plan
 from tablegen.planning.settling import settling, settling_text
 
@@ -40,7 +43,7 @@ def drive_lines(line: LinePlan) -> list[tuple[str, str]]:
             "harmonics",
             f"{line.series.harmonics}, up to {_hz(line.series.harmonics * float(line.rate))}, {_method(line)}",
         ),
-        ("table", f"{len(line.program.words)} words of {line.program.bits} bits, {line.program.mode}"),
+        ("table", f"{len(line.program.words)} words of {line.program.bits} bits, {line.program.mode}{_chosen(line)}"),
         ("gain, offset", f"{output.gain_word} / 2^{output.gain_q}, code {output.offset_code}"),
     ]
     if line.layer is not None:
@@ -69,6 +72,10 @@ def _method(line: LinePlan) -> str:
     return f"{line.band_limit.method} {low:g}..{high:g} {line.band_limit.directions}{kept}"
 
 
+def _chosen(line: LinePlan) -> str:
+    return "" if line.asked_table is None else f", {line.asked_table}"
+
+
 def _asked(line: LinePlan) -> str:
     same = abs(float(line.rate) - line.requested_hz) <= 1e-12 * line.requested_hz
     return " as asked" if same else f" (asked {_hz(line.requested_hz)})"
@@ -89,9 +96,11 @@ def rate(value: Fraction) -> str:
 def certificate_lines(certificate: Certificate) -> list[tuple[str, str]]:
     """A certificate: label and value."""
     c = certificate
-    rows = [
-        ("error", f"max {c.max_error_lsb:.3f} LSB, rms {c.rms_error_lsb:.3f} LSB, over all {c.ticks} ticks"),
-    ]
+    error = f"max {_lsb(c.max_error_lsb)} LSB, rms {_lsb(c.rms_error_lsb)} LSB"
+    if c.shaped is None:
+        rows = [("error", f"{error}, over all {c.ticks} ticks")]
+    else:
+        rows = [("error", f"{error}, of the position, {behind(c.shaped.passage)}"), *shaped_lines(c.shaped)]
     for side, e in c.scaling.items():
         parts = (
             f"band limit {_percent(e.band_limit)}, quantisation {_percent(e.quantisation)}, model {_percent(e.model)}"
@@ -118,6 +127,44 @@ def certificate_lines(certificate: Certificate) -> list[tuple[str, str]]:
     if c.peak_acceleration is not None:
         rows.append(("acceleration", f"at most {c.peak_acceleration:.4g} of the line a period squared{_optimum(c)}"))
     return rows
+
+
+def behind(passage: Passage) -> str:
+    """Behind what errors of the position are judged."""
+    if passage.band_hz is not None:
+        return f"up to {_hz(passage.band_hz)}: no response is known"
+    if passage.frequency_hz is not None:
+        return f"behind {_hz(passage.frequency_hz)}, Q {passage.quality:g}"
+    return f"behind the response of {passage.points} points"
+
+
+def shaped_lines(shaped: ShapedErrors) -> list[tuple[str, str]]:
+    """What shaping does beside rounding alone, and what it costs: label and value."""
+    was, order = shaped.rounded, shaping_text(shaped.shaping)
+    scaling = "".join(f", scaling {side} {_percent(value)} %" for side, value in was.scaling.items())
+    largest, rms = shaped.code_error_lsb
+    now, before = shaped.changes, was.changes
+    return [
+        ("shaping", f"{order}; judged over {shaped.ticks} ticks"),
+        ("", f"without: max {_lsb(was.max_error_lsb)} LSB, rms {_lsb(was.rms_error_lsb)} LSB{scaling}"),
+        ("", f"codes alone: max {largest:.3f} LSB, rms {rms:.3f} LSB, steps up to {shaped.largest_step} codes"),
+        (
+            "",
+            f"codes change on {now.percent:.3g} % of ticks, by {now.mean_step:.3g} in the mean; "
+            f"without on {before.percent:.3g} %, by {before.mean_step:.3g}",
+        ),
+    ]
+
+
+def shaping_text(shaping: Shaping) -> str:
+    """The order of a shaping, and where its zeros are."""
+    if shaping.order == 3:
+        return f"third order, zeros at 0 Hz and at 2 cos = {shaping.zero}/64"
+    return {0: "off", 1: "first order", 2: "second order"}[shaping.order]
+
+
+def _lsb(value: float) -> str:
+    return f"{value:.3f}" if value >= 0.01 else f"{value:.2g}"
 
 
 def _optimum(c: Certificate) -> str:

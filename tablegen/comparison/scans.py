@@ -6,6 +6,7 @@ import msgspec
 
 from tablegen.comparison.quantity import ComparedQuantity, digest, keys_of
 from tablegen.comparison.scanners import scanner_quantities
+from tablegen.emit.constants import storage_bits
 from tablegen.manifest.fields import ManifestAxis, ManifestFigure, ManifestSequence
 from tablegen.report.subject import PlannedScan, Subject
 
@@ -128,9 +129,10 @@ def _certificate(axis: str, entry: ManifestAxis) -> Iterator[ComparedQuantity]:
     for side, moved in (found.refinement_percent or {}).items():
         for part, value in moved.items():
             yield ComparedQuantity(section, f"refinement {side}, {part}", value, "%")
+    of = "a code" if found.shaped is None else "the position"
     numbers = (
-        ("largest error of a code", found.max_error_lsb, "LSB"),
-        ("rms error of a code", found.rms_error_lsb, "LSB"),
+        (f"largest error of {of}", found.max_error_lsb, "LSB"),
+        (f"rms error of {of}", found.rms_error_lsb, "LSB"),
         ("lowest code", found.lowest_code, ""),
         ("highest code", found.highest_code, ""),
         ("room below", found.headroom_low, "codes"),
@@ -143,6 +145,9 @@ def _certificate(axis: str, entry: ManifestAxis) -> Iterator[ComparedQuantity]:
     for name, number, unit in numbers:
         if number is not None:
             yield ComparedQuantity(section, name, number, unit)
+    if found.shaped is not None:
+        yield ComparedQuantity(section, "rms error of a code", found.shaped.rms_code_error_lsb, "LSB")
+        yield ComparedQuantity(section, "ticks on which the code changes", found.shaped.changes.percent, "%")
 
 
 def _expected(axis: str, entry: ManifestAxis) -> Iterator[ComparedQuantity]:
@@ -171,12 +176,14 @@ def _memory(subject: Subject) -> Iterator[ComparedQuantity]:
     """What a device stores. In C the words of all tables have one type, and a table has one word more than it plays."""
     axes = subject.manifest.axes.x, subject.manifest.axes.y
     tables = [entry.table for entry in axes]
-    bits = 16 if all(table.bits <= 16 for table in tables) else 32
+    bits = storage_bits(max(table.bits for table in tables))
     for axis, table in zip(("x", "y"), tables, strict=True):
         yield ComparedQuantity("memory", f"{axis} table", table.mode)
         yield ComparedQuantity("memory", f"{axis} table, bits a word", table.bits)
         yield ComparedQuantity("memory", f"{axis} table, words", len(table.words))
         yield ComparedQuantity("memory", f"{axis} table, content", digest(table.words))
+        if table.asked is not None:
+            yield ComparedQuantity("memory", f"{axis} table, chosen for an error", table.asked.max_error_lsb, "LSB")
     yield ComparedQuantity("memory", "tables in an FPGA", sum(len(one.words) * one.bits for one in tables), "bits")
     yield ComparedQuantity("memory", "tables in C", sum(len(one.words) + 1 for one in tables) * bits // 8, "bytes")
     words = sum(len(entry.fourier_words) for entry in axes)
@@ -200,6 +207,9 @@ def _output(axis: str, entry: ManifestAxis) -> Iterator[ComparedQuantity]:
     for name, value, unit in numbers:
         yield ComparedQuantity(section, name, value, unit)
     yield ComparedQuantity(section, "coding", output.coding)
+    if output.shaping is not None:
+        yield ComparedQuantity(section, "order of shaping", output.shaping.order)
+        yield ComparedQuantity(section, "zero of shaping", output.shaping.zero)
     if output.channel:
         yield ComparedQuantity(section, "output of the converter", output.channel)
     yield ComparedQuantity(section, "word", f"{output.word_bits} bits, {output.align}")

@@ -19,7 +19,7 @@ from tablegen.compensation.transient import Transient
 from tablegen.driver import Driver
 from tablegen.numerics.arrays import Bools, Floats, FloatsLike
 from tablegen.problems import Document, Problems, Unphysical
-from tablegen.waveform.gentle_fit import AllowedError
+from tablegen.waveform.allowed_error import AllowedError
 from tablegen.waveform.series import FourierSeries
 
 _GRID = 1025  # points on which a sweep is inverted first

@@ -44,6 +44,7 @@ class AxisDac:
     output: Literal["A", "B"] | None = None
     align: Literal["right", "left"] = "right"
     word_bits: int | None = None
+    shaping: Literal["off", "first", "second", "scanner"] = "off"
 
     @property
     def highest_v(self) -> float:

@@ -3,7 +3,7 @@
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ from tablegen.config.names import why_not_a_name
 from tablegen.config.scanner import Offset, Resonance, Scanner
 from tablegen.config.schema import (
     MAXIMUM_NAME,
+    MAXIMUM_SPLINE_BITS,
     BandLimit,
     FastAxis,
     Refinement,
@@ -53,7 +54,11 @@ class Setup:
 
     def hardware(self, axis: str) -> AxisHardware:
         """Converter and amplifier of one axis ("x" or "y"), and where their keys stand."""
-        return hardware_of(self.scan, self.scanner, axis)
+        return self._hardware[axis]
+
+    @cached_property
+    def _hardware(self) -> dict[str, AxisHardware]:
+        return {axis: hardware_of(self.scan, self.scanner, axis) for axis in ("x", "y")}
 
     def hardware_problem(self, axis: str, key: str, why: str) -> Problem:
         """A problem of a key of the hardware such as "amplifier.gain", at the place where that of the axis stands."""
@@ -331,7 +336,9 @@ def _faults(built: Struct) -> list[tuple[str, str]]:
                 }
                 why = f"method = '{built.method}' keeps no scaling error; take method = 'window'"
                 return [(key, why) for key, given in keys.items() if given]
-        case Table() if built.mode == "interpolated" and built.length is not None:
+        case Table() if built.mode == "cubic" and (built.bits or 0) > MAXIMUM_SPLINE_BITS:
+            return [("bits", f"{built.bits} is above the {MAXIMUM_SPLINE_BITS} of mode = 'cubic'")]
+        case Table() if built.mode != "direct" and built.length is not None:
             lower = 1 << (built.length.bit_length() - 1)
             if built.length != lower:
                 return [("length", f"{built.length} is not a power of two; the nearest are {lower} and {2 * lower}")]

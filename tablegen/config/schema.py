@@ -14,21 +14,59 @@ MAXIMUM_NAME = 48
 Identifier = Annotated[str, Meta(min_length=1, max_length=MAXIMUM_NAME, pattern="^[A-Za-z](_?[A-Za-z0-9])*$")]
 Percent = Annotated[float, Meta(gt=0.0, le=1000.0)]
 Harmonics = Annotated[list[Annotated[float, Meta(ge=-0.5, le=0.5)]], Meta(min_length=1, max_length=512)]
+DEFAULT_BITS = 16  # of a table word
 Window = tuple[Annotated[float, Meta(ge=0.0, le=1.0)], Annotated[float, Meta(ge=0.0, le=1.0)]]
+
+
+MAXIMUM_SPLINE_BITS = 21  # the sample of a cubic table has 25 bits then, as that of any other
 
 
 class Table(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """How the waveform is stored on the device."""
 
-    mode: Annotated[
-        Literal["interpolated", "direct"],
-        Meta(description="interpolated: `length` words and linear interpolation; direct: one word per tick"),
-    ] = "interpolated"
-    length: (
-        Annotated[int, Meta(ge=4, le=65536, description="number of words; interpolated: a power of two, default 2048")]
+    mode: (
+        Annotated[
+            Literal["interpolated", "cubic", "direct", "auto"],
+            Meta(
+                description="interpolated: `length` words and linear interpolation; cubic: `length` coefficients of a "
+                "cubic spline; direct: one word per tick; auto: the build finds the least memory for `max_error_lsb`; "
+                "default: interpolated, or auto with an error"
+            ),
+        ]
         | None
     ) = None
-    bits: Annotated[int, Meta(ge=8, le=24, description="bits of a table word")] = 16
+    length: (
+        Annotated[
+            int,
+            Meta(
+                ge=4,
+                le=65536,
+                description="number of words; interpolated, cubic: a power of two, default 2048 and 256",
+            ),
+        ]
+        | None
+    ) = None
+    bits: Annotated[int, Meta(ge=8, le=24, description="bits of a table word; cubic: up to 21; default: 16")] | None = (
+        None
+    )
+    max_error_lsb: (
+        Annotated[
+            float,
+            Meta(
+                gt=0.0,
+                le=1e6,
+                description="the least memory whose emitted codes err by at most this, in LSB of the converter; what "
+                "is given of `mode`, `length` and `bits` is kept; default with auto: 1, or that of `limits` if that "
+                "is less",
+            ),
+        ]
+        | None
+    ) = None
+
+    @property
+    def chosen_by_build(self) -> bool:
+        """Whether the build finds what is not given."""
+        return self.mode == "auto" or self.max_error_lsb is not None
 
 
 class BandLimit(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -210,6 +248,16 @@ class Dac(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     ) = None
     word_bits: (
         Annotated[int, Meta(ge=8, le=32, description="bits of the word that is sent; default: `bits`")] | None
+    ) = None
+    shaping: (
+        Annotated[
+            Literal["off", "first", "second", "scanner"],
+            Meta(
+                description="feeds the remainder of the rounding back, so that its error moves to high frequencies: in "
+                "first or second order, or as the resonance of the axis asks; default: off"
+            ),
+        ]
+        | None
     ) = None
 
 

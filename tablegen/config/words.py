@@ -9,7 +9,7 @@ from typing import Any
 from msgspec import structs
 
 from tablegen.config.frame import RESTING_TURN, ImageFrame, exact, frame_of_image, frame_of_lines, lines_of_image
-from tablegen.config.schema import FastAxis, Scan, SlowAxis, Timing, WrittenScan
+from tablegen.config.schema import DEFAULT_BITS, FastAxis, Scan, SlowAxis, Table, Timing, WrittenScan
 from tablegen.problems import Document, Problems
 
 SIZES = ("size_nm", "size_um", "size_v")
@@ -130,8 +130,8 @@ class _Words:
         return next((key for key in IMAGES if getattr(self._written, key) is not None), None)
 
     def _sized(self, axis: str, scan: Any) -> Any:
-        """An axis with its size and offset in nm, whatever they were given in."""
-        changes: dict[str, Any] = {"size_um": None, "offset_um": None}
+        """An axis with its size and offset in nm, whatever they were given in, and with what tables have by default."""
+        changes: dict[str, Any] = {"size_um": None, "offset_um": None, "table": _table(scan.table)}
         image = self._image
         if image is not None and not (axis == "y" and self._written.y.off):
             given = getattr(self._written, image)
@@ -257,9 +257,16 @@ def _carried(y: SlowAxis, lines: int) -> int:
     carried = [_HARMONICS]
     if y.motion == "step":
         carried.append((lines - 1) // 2)
-    if y.table.mode == "interpolated" and y.table.length is not None:
+    if y.table.mode != "direct" and y.table.length is not None:
         carried.append(y.table.length // 2 - 1)
     return max(min(carried), 1)
+
+
+def _table(table: Table) -> Table:
+    """A table with its defaults, but for one that the build chooses."""
+    if table.chosen_by_build:
+        return structs.replace(table, mode=table.mode or "auto")
+    return structs.replace(table, mode=table.mode or "interpolated", bits=table.bits or DEFAULT_BITS)
 
 
 def _width(axis: FastAxis) -> float:

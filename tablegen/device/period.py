@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from tablegen.device.dual_program import DualProgram
-from tablegen.device.sequencer import pixel_starts
+from tablegen.device.schedule import pixel_starts
 from tablegen.numerics.arrays import Bools, Ints
 
 
@@ -33,7 +33,10 @@ class Period:
 
 
 def period_of(program: DualProgram, axis: Literal["x", "y"], first: int = 0, stop: int | None = None) -> Period:
-    """Ticks [first, stop) of the period of an axis; to its end unless given. Raises ``ValueError`` outside of it."""
+    """Ticks [first, stop) of the period of an axis; to its end unless given. Raises ``ValueError`` outside of it.
+
+    Of a shaped axis they are those of the first period since the program began: no two are the same.
+    """
     schedule = program.schedule
     whole = schedule.ticks if axis == "x" else schedule.frame_ticks
     stop = whole if stop is None else stop
@@ -45,11 +48,11 @@ def period_of(program: DualProgram, axis: Literal["x", "y"], first: int = 0, sto
         starts = [pixel_starts(window, schedule.pixels) for window in (schedule.forward, schedule.backward)]
         pixel = np.isin(tick, np.concatenate(starts))
         backward, at, windows = tick >= schedule.turn_tick, tick, (schedule.forward, schedule.backward)
-        codes = program.x.codes(k)
+        codes = program.x.played(first, stop)
     else:
         pixel = np.zeros(len(k), dtype=np.bool_)
         backward, at, windows = line >= schedule.turn_line, line, (schedule.up, schedule.down)
-        codes = program.y.codes(k)
+        codes = program.y.played(first, stop)
     inside = np.zeros(len(k), dtype=np.bool_)
     for window in windows:
         inside |= (at >= window.first) & (at < window.stop)

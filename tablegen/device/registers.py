@@ -36,6 +36,7 @@ AXIS_WORDS = (
     "max_step",
     "park_code",
     "harmonics",
+    "shaping",
 )
 # The offset has up to 44 bits: the low part has those that a serial gain multiplier produces first.
 OFFSET_LOW_BITS = 18
@@ -81,6 +82,7 @@ def _axis(program: Program, harmonics: int) -> list[int]:
         output.max_step,
         output.park_code,
         harmonics,
+        output.shaping.word,
     ]
 
 

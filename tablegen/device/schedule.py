@@ -80,3 +80,13 @@ class Schedule:
     def pixel_ticks(self) -> Fraction:
         """Ticks per pixel of the forward sweep; pixel p starts at the tick ceil(p pixel_ticks) of the window."""
         return Fraction(self.forward.count, self.pixels)
+
+
+def pixel_starts(window: Window, pixels: int) -> Ints:
+    """Ticks at which pixels start: i-th tick of the window where floor(i pixels / count) exceeds the one before.
+
+    A device adds ``pixels`` to an accumulator and takes off ``count`` when it can: no multiplier.
+    """
+    i = np.arange(window.count, dtype=np.int64)
+    pixel = i * pixels // max(window.count, 1)
+    return window.first + i[np.diff(pixel, prepend=-1) > 0]

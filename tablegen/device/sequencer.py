@@ -10,7 +10,7 @@ from enum import Enum, IntFlag
 import numpy as np
 
 from tablegen.device.dual_program import DualProgram
-from tablegen.device.schedule import Schedule, Window
+from tablegen.device.schedule import Schedule, pixel_starts
 from tablegen.numerics.arrays import Bools, Ints
 
 
@@ -60,18 +60,38 @@ class LineTicks:
     valid: Bools
 
 
-def pixel_starts(window: Window, pixels: int) -> Ints:
-    """Ticks at which pixels start: i-th tick of the window where floor(i pixels / count) exceeds the one before.
+class PlayedLines:
+    """The lines of a program one after another, from its beginning on: remainders of shaped axes run on."""
 
-    A device adds ``pixels`` to an accumulator and takes off ``count`` when it can: no multiplier.
-    """
-    i = np.arange(window.count, dtype=np.int64)
-    pixel = i * pixels // max(window.count, 1)
-    return window.first + i[np.diff(pixel, prepend=-1) > 0]
+    def __init__(self, program: DualProgram) -> None:
+        self._program = program
+        self._remainders = program.x.output.begin(), program.y.output.begin()
+
+    def unclamped(self, line: int) -> tuple[Ints, Ints]:
+        """Codes of x and y on the next line, ``line`` of a frame, before clamp and slew guard; shapes (ticks,)."""
+        ticks = self._program.schedule.ticks
+        x, y = self._remainders
+        return (
+            self._program.x.unclamped(0, ticks, x),
+            self._program.y.unclamped(line * ticks, (line + 1) * ticks, y),
+        )
+
+    def play(self, line: int, settled: bool = True) -> LineTicks:
+        """The next line, which is ``line`` of a frame, as ``play_line`` has it."""
+        return _line_of(self._program, line, settled, self.unclamped(line))
 
 
 def play_line(program: DualProgram, line: int, settled: bool = True) -> LineTicks:
-    """Line ``line`` of a frame in steady state: the slew guard untouched, ``valid`` as after settling."""
+    """Line ``line`` of a frame in steady state: the slew guard untouched, ``valid`` as after settling.
+
+    Raises ``ValueError`` where an axis is shaped: the lines before belong to it, and ``PlayedLines`` plays them.
+    """
+    program.x.require_period()
+    program.y.require_period()
+    return PlayedLines(program).play(line, settled)
+
+
+def _line_of(program: DualProgram, line: int, settled: bool, unclamped: tuple[Ints, Ints]) -> LineTicks:
     schedule = program.schedule
     k = np.arange(schedule.ticks, dtype=np.int64)
     pixel = np.zeros(schedule.ticks, dtype=np.bool_)
@@ -82,8 +102,8 @@ def play_line(program: DualProgram, line: int, settled: bool = True) -> LineTick
             inside[window.first : window.stop] = True
     images = line in schedule.up or line in schedule.down
     return LineTicks(
-        x=program.x.codes(k),
-        y=program.y.codes(line * schedule.ticks + k),
+        x=program.x.output.clamp(unclamped[0]),
+        y=program.y.output.clamp(unclamped[1]),
         line=k == 0,
         frame=(k == 0) & (line == 0),
         pixel=pixel,
@@ -122,6 +142,7 @@ class Sequencer:
         if self.playing is not None:
             self.codes = self.playing.x.output.park_code, self.playing.y.output.park_code
             self.parked = True
+        self._lines: PlayedLines | None = None
         self._line_ticks: LineTicks | None = None
         self._clamped: Bools = np.zeros(0, dtype=np.bool_)
         self._disturbed: Ints = np.zeros(0, dtype=np.int64)  # ticks of the line with a clamp, or a step too large
@@ -188,8 +209,10 @@ class Sequencer:
             return self._rest(swapped)
 
         if self.tick == 0:
-            self._line_ticks = play_line(self.playing, self.line)
-            self._clamped = self._outside(self.playing, self.line)
+            assert self._lines is not None
+            unclamped = self._lines.unclamped(self.line)
+            self._line_ticks = _line_of(self.playing, self.line, True, unclamped)
+            self._clamped = (self._line_ticks.x != unclamped[0]) | (self._line_ticks.y != unclamped[1])
             self._disturbed = self._where_disturbed(self.playing, self._line_ticks)
         line = self._line_ticks
         assert line is not None
@@ -225,13 +248,13 @@ class Sequencer:
         if not self.running or program is None or line is None or self.tick == 0:
             return None
         first = self.tick
-        next_one = int(np.searchsorted(self._disturbed, first + 1))
-        stop = int(self._disturbed[next_one]) if next_one < len(self._disturbed) else program.schedule.ticks
-        part = slice(first, min(first + most, stop))
         targets, steps = (line.x[first], line.y[first]), (program.x.output.max_step, program.y.output.max_step)
         ways = (abs(int(target) - now) for target, now in zip(targets, self.codes, strict=True))
         if self._clamped[first] or any(way > step for way, step in zip(ways, steps, strict=True)):
             return None
+        next_one = int(np.searchsorted(self._disturbed, first + 1))
+        stop = int(self._disturbed[next_one]) if next_one < len(self._disturbed) else program.schedule.ticks
+        part = slice(first, min(first + most, stop))
         valid = line.valid[part] & (self.settle_left == 0 and not self.faults)
         played = LineTicks(
             line.x[part], line.y[part], line.line[part], line.frame[part], line.pixel[part], line.backward[part], valid
@@ -246,6 +269,7 @@ class Sequencer:
         self.tick = self.line = 0
         self.settle_left = program.schedule.settle_lines
         self.catching_up = True
+        self._lines = PlayedLines(program)
 
     def _advance(self, schedule: Schedule) -> None:
         self.tick += 1
@@ -279,17 +303,6 @@ class Sequencer:
             y_now + min(max(y - y_now, -y_step), y_step),
         )
         return self.codes == (x, y)
-
-    @staticmethod
-    def _outside(playing: DualProgram, line: int) -> Bools:
-        """Ticks of a line on which the clamp changes a code of either axis."""
-        schedule = playing.schedule
-        out = np.zeros(schedule.ticks, dtype=np.bool_)
-        k = np.arange(schedule.ticks, dtype=np.int64)
-        for program, at in ((playing.x, k), (playing.y, line * schedule.ticks + k)):
-            code = program.output.unclamped(program.samples(at))
-            out |= (code < program.output.code_min) | (code > program.output.code_max)
-        return out
 
     def _where_disturbed(self, playing: DualProgram, line: LineTicks) -> Ints:
         """Ticks of a line that differ from the one before by more than a step, or that the clamp changes."""

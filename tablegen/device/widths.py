@@ -11,6 +11,7 @@ from tablegen.device.registers import AXIS_WORDS, OFFSET_LOW_BITS, PAGE_WORDS, S
 from tablegen.device.schedule import Schedule
 from tablegen.fixedpoint.interpolation import guard_bits
 from tablegen.fixedpoint.program import Program
+from tablegen.fixedpoint.shaping import Shaping
 
 LEAST_LINE_TICKS = 8
 
@@ -27,7 +28,7 @@ class AxisWidths:
 
 @dataclass(frozen=True)
 class Widths:
-    """Of a device; at most ``harmonics`` are rendered, 0 where it has no renderer."""
+    """Of a device; at most ``harmonics`` are rendered, 0 where it has no renderer; ``shaping`` up to that order."""
 
     dac_bits: int
     tick_bits: int
@@ -35,6 +36,7 @@ class Widths:
     x: AxisWidths
     y: AxisWidths
     harmonics: int = 0
+    shaping: int = 0
 
 
 def misfits(words: Sequence[int], widths: Widths) -> list[str]:
@@ -75,7 +77,16 @@ def _axis(name: str, word: int, own: AxisWidths, widths: Widths) -> bool:
         return _is_signed(word, own.word_bits + guard_bits(own.word_bits))
     if name == "harmonics":
         return not widths.harmonics or word <= widths.harmonics
+    if name == "shaping":
+        return _is_shaping(word, widths.shaping)
     return name == "phase_step" or word < 1 << widths.dac_bits
+
+
+def _is_shaping(word: int, highest: int) -> bool:
+    try:
+        return Shaping.of_word(word).order <= highest
+    except ValueError:
+        return False
 
 
 def _is_signed(word: int, bits: int) -> bool:

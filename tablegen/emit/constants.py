@@ -3,10 +3,13 @@
 from tablegen.device.schedule import Schedule
 from tablegen.emit.content import Content
 from tablegen.fixedpoint.program import Program
+from tablegen.fixedpoint.shaping import Shaping
 from tablegen.fixedpoint.synthesis import FRACTION_BITS
 
 # Constants that may need more than 32 bits: languages that give constants a type give these a wide one in every build.
 WIDE = frozenset({"UPDATE_RATE_MILLIHZ", "PHASE_STEP", "OFFSET_WORD"})
+
+DEGREES = {"direct": 0, "interpolated": 1, "cubic": 3}  # what INTERPOLATED says: the degree between words
 
 
 def scan_constants(content: Content) -> dict[str, int]:
@@ -15,7 +18,13 @@ def scan_constants(content: Content) -> dict[str, int]:
     for axis in content.axes:
         own = axis_constants(axis.program, axis.harmonics)
         constants |= {f"{axis.axis.upper()}_{key}": value for key, value in own.items()}
-    return constants
+    return constants | shaping_constants(content)
+
+
+def shaping_constants(content: Content) -> dict[str, int]:
+    """The highest order of shaping, which a device has to have; none where neither axis shapes."""
+    highest = max(axis.program.output.shaping.order for axis in content.axes)
+    return {"SHAPING": highest} if highest else {}
 
 
 def sequence_constants(schedule: Schedule) -> dict[str, int]:
@@ -46,7 +55,7 @@ def axis_constants(program: Program, harmonics: int) -> dict[str, int]:
         "TABLE_LENGTH": len(program.words),
         "TABLE_BITS": program.bits,
         "INDEX_BITS": program.index_bits,
-        "INTERPOLATED": int(program.mode == "interpolated"),
+        "INTERPOLATED": DEGREES[program.mode],
         "GUARD_BITS": program.guard,
         "HARMONICS": harmonics,
         "FOURIER_LENGTH": 2 * harmonics + 1,
@@ -68,9 +77,19 @@ def axis_constants(program: Program, harmonics: int) -> dict[str, int]:
         "DAC_TWOS_COMPLEMENT": int(output.coding == "twos-complement"),
         "DAC_LEFT_ALIGNED": int(output.align == "left"),
         **({"DAC_OUTPUT": "AB".index(output.channel)} if output.channel else {}),
+        **_own_shaping(output.shaping),
     }
+
+
+def _own_shaping(shaping: Shaping) -> dict[str, int]:
+    return {"SHAPING_ORDER": shaping.order, "SHAPING_ZERO": shaping.zero} if shaping.order else {}
 
 
 def is_wide(name: str) -> bool:
     """Whether a constant of this name, with X_ or Y_ before it or not, is of 64 bits; all others fit 32."""
     return name.removeprefix("X_").removeprefix("Y_") in WIDE
+
+
+def storage_bits(bits: int) -> int:
+    """Bits in which the C holds table words, or converter words, of so many bits."""
+    return 16 if bits <= 16 else 32

@@ -29,13 +29,18 @@ class Waveform:
 
 
 def waveforms(content: Content) -> tuple[Waveform, Waveform]:
-    """A line of x and a frame of y. Raises ``Unphysical`` for a frame of more than 2^22 ticks."""
-    require_short_frame(content)
+    """A line of x and a frame of y. Raises ``Unphysical`` where there is no file of one period."""
+    require_period(content)
     return _waveform(content, "x"), _waveform(content, "y")
 
 
-def require_short_frame(content: Content) -> None:
-    """Raise ``Unphysical`` for a frame that would make a file of hundreds of megabytes."""
+def require_period(content: Content) -> None:
+    """Raise ``Unphysical`` for codes without a period, and for a frame that would make a file of 100 MB and more."""
+    if any(axis.program.output.shaping.order for axis in content.axes):
+        raise Unphysical(
+            "a file of samples has one period, and shaped codes have none: their remainders run on from line to line; "
+            "dac.shaping = 'off' would fit, or formats of tables for a device that shapes"
+        )
     ticks = content.schedule.frame_ticks
     if ticks > MOST_TICKS:
         raise Unphysical(

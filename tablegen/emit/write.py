@@ -4,7 +4,6 @@ import errno
 import os
 import re
 import stat
-import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -57,6 +56,8 @@ def _write(folder: Path, files: Mapping[str, bytes], outdated: Sequence[str]) ->
         if other := other_than_file(folder / name):
             why = f"{folder / name}: is {other}, where a file has to go"
             raise CannotWrite(why) if other == "a directory" else NoPlace(why)
+    import tempfile  # here: most builds change nothing
+
     staged: dict[str, Path] = {}
     try:
         for name in changed:
@@ -94,7 +95,7 @@ def _removed_if_empty(made: Sequence[Path]) -> Iterator[None]:
 
 def _settle_files(paths: Sequence[Path]) -> None:
     """Let the content of files reach the disk: all at once, which takes a disk hardly longer than one of them."""
-    from concurrent.futures import ThreadPoolExecutor  # here: nothing else needs it, and most builds change nothing
+    from concurrent.futures import ThreadPoolExecutor  # here, for the same reason
 
     def sync(path: Path) -> None:
         handle = os.open(path, os.O_RDWR)

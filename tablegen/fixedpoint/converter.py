@@ -1,6 +1,6 @@
 """Volts to codes, and the words of the output stage that scale a table to a drive."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil, floor
 
 from tablegen.config.hardware import AxisAmplifier, AxisDac
@@ -8,6 +8,7 @@ from tablegen.driver import Driver
 from tablegen.fixedpoint.interpolation import guard_bits
 from tablegen.fixedpoint.output import UNIT_GAIN_BITS, Output
 from tablegen.fixedpoint.rounding import round_number
+from tablegen.fixedpoint.shaping import OFF, Shaping
 
 
 @dataclass(frozen=True)
@@ -46,32 +47,38 @@ def fit_gain(amplitude: float, peak: float, bits: int, dac_bits: int) -> tuple[i
     return (gain_word if amplitude > 0.0 else -gain_word), gain_word / unit
 
 
-def make_output(
-    dac: AxisDac,
-    converter: Converter,
-    driver: Driver,
-    v_offset: float,
-    v_park: float,
-    bits: int,
-    gain_word: int,
-    max_step: int,
-) -> Output:
-    """The output stage of one axis; the clamp keeps the piezo in the driver's range, the code in the converter's."""
-    gain_q = UNIT_GAIN_BITS + bits + guard_bits(bits) - dac.bits
+def code_limits(converter: Converter, driver: Driver) -> tuple[int, int]:
+    """The lowest and the highest code that both the driver and the converter reach."""
     ends = sorted((converter.code(driver.v_min), converter.code(driver.v_max)))
     # A millionth of a code forgives the last bits of the voltages, not the voltages.
-    code_min, code_max = max(0, ceil(ends[0] - 1e-6)), min((1 << dac.bits) - 1, floor(ends[1] + 1e-6))
+    return max(0, ceil(ends[0] - 1e-6)), min((1 << converter.bits) - 1, floor(ends[1] + 1e-6))
+
+
+def make_output(dac: AxisDac, converter: Converter, driver: Driver, v_park: float, shaping: Shaping = OFF) -> Output:
+    """The output stage of one axis, whose gain and largest step are not known yet.
+
+    The clamp keeps the piezo in the driver's range, the code in the converter's.
+    """
+    code_min, code_max = code_limits(converter, driver)
     return Output(
-        gain_word=gain_word,
-        gain_q=gain_q,
-        offset_word=round_number(converter.code(v_offset) * float(1 << gain_q)),
+        gain_word=0,
+        gain_q=0,
+        offset_word=0,
         code_min=code_min,
         code_max=code_max,
-        max_step=max_step,
+        max_step=1,
         park_code=min(max(round_number(converter.code(v_park)), code_min), code_max),
         dac_bits=dac.bits,
         coding=dac.coding,
         align=dac.align,
         word_bits=dac.word_bits if dac.word_bits is not None else dac.bits,
         channel=dac.output or "",
+        shaping=shaping,
     )
+
+
+def scaled_output(output: Output, offset: float, bits: int, gain_word: int) -> Output:
+    """An output stage with the gain of a table of so many bits, and an offset in codes."""
+    gain_q = UNIT_GAIN_BITS + bits + guard_bits(bits) - output.dac_bits
+    offset_word = round_number(offset * float(1 << gain_q))
+    return replace(output, gain_word=gain_word, gain_q=gain_q, offset_word=offset_word)

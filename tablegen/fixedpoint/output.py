@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tablegen.fixedpoint.rounding import shift_round
-from tablegen.numerics.arrays import Ints
+from tablegen.fixedpoint.shaping import OFF, Remainders, Shaping, remainder_bits
+from tablegen.numerics.arrays import Floats, Ints
 
 GAIN_BITS = 18  # signed; the narrow port of a DSP block
 # A gain of 2^16 makes a full-scale table a full-scale output; the range is [-2, 2) of that.
@@ -18,7 +19,8 @@ class Output:
 
     Codes are straight binary, 0 at the converter's v_min; ``offset_word`` is the offset in codes with ``gain_q``
     fraction bits, ``offset_code`` the nearest whole code to it. ``channel`` is the output of a dual converter, A or B,
-    where the configuration says it; the arithmetic is the same on both.
+    where the configuration says it; the arithmetic is the same on both. ``shaping`` says what becomes of the remainder
+    of the rounding; ``begin`` and ``shaped`` play it.
     """
 
     gain_word: int
@@ -33,6 +35,7 @@ class Output:
     align: str
     word_bits: int
     channel: str = ""
+    shaping: Shaping = OFF
 
     @property
     def offset_code(self) -> int:
@@ -47,9 +50,29 @@ class Output:
         """
         return shift_round(self.gain_word * sample + self.offset_word, self.gain_q)
 
+    def unrounded(self, sample: Ints) -> Floats:
+        """Codes before the rounding, as real numbers."""
+        return np.asarray((self.gain_word * sample + self.offset_word) / float(1 << self.gain_q))
+
     def code(self, sample: Ints) -> Ints:
-        """Codes as the converter plays them."""
-        return np.clip(self.unclamped(sample), self.code_min, self.code_max)
+        """Codes as the converter plays them, without shaping."""
+        return self.clamp(self.unclamped(sample))
+
+    def clamp(self, codes: Ints) -> Ints:
+        """Codes within the limits of this axis."""
+        return np.clip(codes, self.code_min, self.code_max)
+
+    def begin(self) -> Remainders:
+        """The remainders with which a program begins."""
+        return Remainders(self.shaping, remainder_bits(self.dac_bits))
+
+    def shaped(self, sample: Ints, remainders: Remainders) -> Ints:
+        """Codes before the clamp at consecutive ticks; ``remainders`` run on."""
+        if self.shaping.order == 0:
+            return self.unclamped(sample)
+        half = 1 << (self.gain_q - 1)
+        shift = self.gain_q - remainder_bits(self.dac_bits)
+        return remainders.codes((self.gain_word * sample + self.offset_word + half) >> shift)
 
     def word(self, code: int) -> int:
         """A code as it is sent to the converter: its coding, then its alignment."""

@@ -1,16 +1,25 @@
 """What one axis of a device holds: a period, a table, and an output stage. It plays codes, and nothing else."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
+from tablegen.config.schema import MAXIMUM_SPLINE_BITS
 from tablegen.fixedpoint.interpolation import direct, guard_bits, index_bits_of, interpolate
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.phase import RationalPhase
+from tablegen.fixedpoint.shaping import OFF, Remainders
+from tablegen.fixedpoint.spline import SPLINE_UNIT, cubic
 from tablegen.numerics.arrays import Ints, freeze
 
+Mode = Literal["interpolated", "cubic", "direct"]
 _CHUNK_TICKS = 1 << 14  # ticks that are worked out together, in the cache
+
+
+def sample_gain(mode: Mode) -> float:
+    """What the gain has to make up for: a spline's sample has 12 units for each LSB of a word, others have 2^4."""
+    return float(1 << guard_bits(MAXIMUM_SPLINE_BITS)) / SPLINE_UNIT if mode == "cubic" else 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,12 +27,13 @@ class Program:
     """One axis of a program.
 
     ``phase`` advances once every ``hold`` ticks: 1, or a line's ticks where the slow axis steps once a line.
-    ``words`` are two's complement of ``bits`` bits, int64 of shape (2^P,), or (phase.ticks,) in ``direct`` mode.
+    ``words`` are two's complement of ``bits`` bits, int64 of shape (2^P,), or (phase.ticks,) in ``direct`` mode. In
+    ``cubic`` mode they are the coefficients of a spline.
     """
 
     phase: RationalPhase
     hold: int
-    mode: Literal["interpolated", "direct"]
+    mode: Mode
     bits: int
     words: Ints
     output: Output
@@ -44,18 +54,53 @@ class Program:
     @property
     def index_bits(self) -> int:
         """Bits of the phase that index the table; 0 in ``direct`` mode, which has no phase."""
-        return index_bits_of(len(self.words)) if self.mode == "interpolated" else 0
+        return 0 if self.mode == "direct" else index_bits_of(len(self.words))
+
+    def resting(self, words: Ints) -> Ints:
+        """Samples of tables that hold one word throughout, one for each of ``words``: none of a table goes beyond."""
+        return words * SPLINE_UNIT if self.mode == "cubic" else words << self.guard
+
+    @property
+    def rounded(self) -> "Program":
+        """The same without shaping."""
+        return replace(self, output=replace(self.output, shaping=OFF)) if self.output.shaping.order else self
 
     def samples(self, k: Ints) -> Ints:
         """Samples at ticks k in [0, ticks), with ``guard`` bits below the word's LSB."""
         advance = k if self.hold == 1 else k // self.hold
         if self.mode == "direct":
             return direct(self.words, advance, self.guard)
+        if self.mode == "cubic":
+            return cubic(self.words, self.phase.at(advance))
         return interpolate(self.words, self.phase.at(advance), self.guard)
 
     def codes(self, k: Ints) -> Ints:
-        """Codes at ticks k in [0, ticks), before the slew guard."""
+        """Codes at ticks k in [0, ticks), before the slew guard.
+
+        Raises ``ValueError`` where the output is shaped: a code is then none of its tick, but of all before it too.
+        """
+        self.require_period()
         if len(k) <= _CHUNK_TICKS:
             return self.output.code(self.samples(k))
         chunks = range(0, len(k), _CHUNK_TICKS)
         return np.concatenate([self.output.code(self.samples(k[first : first + _CHUNK_TICKS])) for first in chunks])
+
+    def require_period(self) -> None:
+        """Raise ``ValueError`` where the output is shaped, so that codes depend on all ticks before."""
+        if self.output.shaping.order:
+            raise ValueError("shaped codes are not periodic: they are played from the beginning of a program")
+
+    def unclamped(self, first: int, stop: int, remainders: Remainders) -> Ints:
+        """Codes at ticks [first, stop) of a period before the clamp; ``remainders`` are those before, and run on."""
+        chunks = range(first, stop, _CHUNK_TICKS)
+        samples = (self.samples(np.arange(at, min(at + _CHUNK_TICKS, stop), dtype=np.int64)) for at in chunks)
+        return np.concatenate([self.output.shaped(chunk, remainders) for chunk in samples])
+
+    def played(self, first: int, stop: int) -> Ints:
+        """Codes at ticks [first, stop) since a program began, over as many periods, before the slew guard."""
+        if not self.output.shaping.order:
+            return self.codes(np.arange(first, stop, dtype=np.int64) % self.ticks)
+        remainders, codes = self.output.begin(), []
+        for at in range(0, stop, self.ticks):
+            codes.append(self.unclamped(0, min(self.ticks, stop - at), remainders)[max(first - at, 0) :])
+        return self.output.clamp(np.concatenate(codes or [np.zeros(0, dtype=np.int64)]))

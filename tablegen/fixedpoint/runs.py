@@ -57,7 +57,8 @@ class Runs:
 
 
 def runs_of(program: Program) -> Runs:
-    """The period of a program as runs."""
+    """The period of a program as runs. Raises ``ValueError`` for one that is shaped, which has no period."""
+    program.require_period()
     ticks = program.ticks
     if program.hold == 1 and program.mode == "interpolated":
         runs = _between_words(program)

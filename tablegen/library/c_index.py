@@ -5,8 +5,9 @@ from pathlib import Path
 
 from tablegen.emit.formats.c import literal
 from tablegen.emit.templates import template_text
+from tablegen.fixedpoint.spline import WORDS_BEHIND
 from tablegen.library.entry import Entry
-from tablegen.library.sameness import storage_bits
+from tablegen.library.sameness import words_in_memory
 from tablegen.reading import BUILD_FILE, read_text
 
 _FOLDER = Path(__file__).parent
@@ -14,8 +15,9 @@ _FOLDER = Path(__file__).parent
 
 def c_index(library: str, entries: Sequence[Entry], version: str) -> dict[str, bytes]:
     """``NAME_library.h`` and ``NAME_library.c``; the programs can be played by one runtime."""
-    table, output = storage_bits(entries[0])
+    table, output = words_in_memory(entries[0])
     first = entries[0]
+    behind = WORDS_BEHIND if any(axis.cubic for entry in entries for axis in entry.axes) else 1
     converters = {
         f"{name}_{key}": value
         for name, axis in (("X", first.x), ("Y", first.y))
@@ -30,11 +32,16 @@ def c_index(library: str, entries: Sequence[Entry], version: str) -> dict[str, b
         "version": version,
         "library": library,
         "LIBRARY": library.upper(),
-        "storage": {"TABLE_STORAGE_BITS": table, "OUTPUT_STORAGE_BITS": output},
+        "storage": {
+            "TABLE_STORAGE_BITS": table,
+            "OUTPUT_STORAGE_BITS": output,
+            **({"SPLINE": 1} if behind > 1 else {}),
+        },
+        "shaping": max(axis.shaping_order for entry in entries for axis in entry.axes),
         "converters": converters,
         "most": {
-            "X_TABLE_ROOM": max(entry.x.table_words for entry in entries) + 1,
-            "Y_TABLE_ROOM": max(entry.y.table_words for entry in entries) + 1,
+            "X_TABLE_ROOM": max(entry.x.table_words for entry in entries) + behind,
+            "Y_TABLE_ROOM": max(entry.y.table_words for entry in entries) + behind,
             "LONGEST_NAME": max(len(entry.name) for entry in entries),
         },
         "programs": [

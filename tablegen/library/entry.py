@@ -16,8 +16,8 @@ from tablegen.manifest.format import read_json
 from tablegen.reading import BUILD_FILE, file_sha256, read_bytes
 
 
-class AxisEntry(Struct, frozen=True, kw_only=True):
-    """Of an axis: what a device has to be made for, and what the certificate says."""
+class AxisEntry(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """Of an axis: what a device has to be made for, and what the certificate says. ``shaping_order`` 0: not shaped."""
 
     table_bits: int
     table_words: int
@@ -31,6 +31,8 @@ class AxisEntry(Struct, frozen=True, kw_only=True):
     channel: str
     max_error_lsb: float
     scaling_error_percent: float
+    cubic: bool = False
+    shaping_order: int = 0
 
 
 class Entry(Struct, frozen=True, kw_only=True):
@@ -81,7 +83,7 @@ def make_entry(
             table_bits=program.bits,
             table_words=len(program.words),
             index_bits=program.index_bits,
-            interpolated=program.mode == "interpolated",
+            interpolated=program.mode != "direct",
             harmonics=one.harmonics,
             dac_bits=output.dac_bits,
             word_bits=output.word_bits,
@@ -90,6 +92,8 @@ def make_entry(
             channel=output.channel,
             max_error_lsb=float(f"{errors[one.axis][0]:.6g}"),
             scaling_error_percent=float(f"{errors[one.axis][1]:.6g}"),
+            cubic=program.mode == "cubic",
+            shaping_order=output.shaping.order,
         )
 
     schedule = content.schedule

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from tablegen.emit.constants import storage_bits
 from tablegen.library.entry import AxisEntry, Entry
 
 _OUTPUT: dict[str, Callable[[AxisEntry], Any]] = {
@@ -15,25 +16,25 @@ _OUTPUT: dict[str, Callable[[AxisEntry], Any]] = {
 _VERILOG: dict[str, Callable[[AxisEntry], Any]] = {
     "dac.bits": lambda axis: axis.dac_bits,
     "dac.output": lambda axis: axis.channel,
-    "table.mode": lambda axis: "interpolated" if axis.interpolated else "direct",
+    "table.mode": lambda axis: "cubic" if axis.cubic else "interpolated" if axis.interpolated else "direct",
     "table.bits": lambda axis: axis.table_bits,
     "table.length": lambda axis: axis.table_words if axis.interpolated else None,
 }
 
 
-def storage_bits(entry: Entry) -> tuple[int, int]:
+def words_in_memory(entry: Entry) -> tuple[int, int]:
     """Bits in memory of a table word and of a converter word of the C of one program."""
     table = max(axis.table_bits for axis in entry.axes)
     output = max(axis.word_bits for axis in entry.axes)
-    return (16 if table <= 16 else 32), (16 if output <= 16 else 32)
+    return storage_bits(table), storage_bits(output)
 
 
 def why_not_one_c(entries: Sequence[Entry]) -> str | None:
     """Why one C runtime cannot play all of these, or None."""
     first = entries[0]
     for entry in entries:
-        if storage_bits(entry) != storage_bits(first):
-            return _differ(first, entry, "storage of words", storage_bits(first), storage_bits(entry))
+        if words_in_memory(entry) != words_in_memory(first):
+            return _differ(first, entry, "storage of words", words_in_memory(first), words_in_memory(entry))
     return _first_difference(entries, _OUTPUT)
 
 

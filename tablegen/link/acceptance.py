@@ -15,12 +15,13 @@ from tablegen.fixedpoint.rounding import signed_limits
 from tablegen.fixedpoint.synthesis import FRACTION_BITS
 from tablegen.link.image import Contents
 from tablegen.link.messages import AxisLimits, Reason
-from tablegen.numerics.arrays import Bools, Ints
+from tablegen.numerics.arrays import Bools
 
 _CLAMP_ALLOWANCE_CODES = (
     1  # codes: ticks need not visit a word, and rounding may carry it over a limit that no tick crosses
 )
 _MAXIMUM_STEP = (1 << 24) - 1
+_FIRST = np.zeros(1, dtype=np.int64)  # the first advance of a period
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,10 +36,13 @@ class Playing:
 Finding = tuple[Reason, int]  # a reason and its detail
 
 
-def first_objection(contents: Contents, x: AxisLimits, y: AxisLimits, playing: Playing | None) -> Finding | None:
+def first_objection(
+    contents: Contents, x: AxisLimits, y: AxisLimits, playing: Playing | None, order: int = 0
+) -> Finding | None:
     """The first check that a program fails, in the order of the protocol; None where it passes all of them.
 
-    ``x`` and ``y`` are the limits of the device, ``playing`` what it plays now (None: nothing yet).
+    ``x`` and ``y`` are the limits of the device, ``playing`` what it plays now (None: nothing yet), ``order`` the
+    highest order of shaping that it has.
     """
     if not _schedule_is_good(contents):
         return Reason.SCHEDULE, 0
@@ -46,6 +50,9 @@ def first_objection(contents: Contents, x: AxisLimits, y: AxisLimits, playing: P
         for page in (1, 2):
             if found := checked(contents, page):
                 return found
+    for page in (1, 2):
+        if not _shaping_is_good(contents, page, order):
+            return Reason.SHAPING, page - 1
     for page, limits in ((1, x), (2, y)):
         if contents.axis(page, "code_min") < limits.code_min or contents.axis(page, "code_max") > limits.code_max:
             return Reason.CODES, page - 1
@@ -101,6 +108,13 @@ def _output(contents: Contents, page: int) -> Finding | None:
     return None if good else (Reason.OUTPUT, page - 1)
 
 
+def _shaping_is_good(contents: Contents, page: int, order: int) -> bool:
+    try:
+        return contents.shaping(page).order <= order
+    except ValueError:
+        return False
+
+
 def _fourier(contents: Contents, page: int) -> Finding | None:
     words = contents.x if page == 1 else contents.y
     too_much = contents.axis(page, "harmonics") and int(np.sum(np.abs(words))) >= 4 << FRACTION_BITS
@@ -116,26 +130,24 @@ def _word(contents: Contents, page: int) -> Finding | None:
 def _range(contents: Contents, page: int) -> Finding | None:
     program = contents.program(page)
     output = program.output
-    codes = output.unclamped(program.words << program.guard)
-    return _first(
-        (codes < output.code_min - _CLAMP_ALLOWANCE_CODES) | (codes > output.code_max + _CLAMP_ALLOWANCE_CODES),
-        Reason.RANGE,
-        page,
-    )
+    codes = output.unclamped(program.resting(program.words))
+    outside = _CLAMP_ALLOWANCE_CODES + int(output.shaping.excess)
+    return _first((codes < output.code_min - outside) | (codes > output.code_max + outside), Reason.RANGE, page)
 
 
 def _slew(contents: Contents, page: int) -> Finding | None:
     program = contents.program(page)
     output = program.output
     advances, length = program.phase.ticks, len(program.words)
+    max_step = output.max_step - output.shaping.step_excess
     if advances <= 2 * length:
-        codes = program.codes(np.arange(advances, dtype=np.int64) * program.hold)
-        return _first(np.abs(np.roll(codes, -1) - codes) > output.max_step, Reason.SLEW, page)
-    rise = np.abs(np.roll(program.words, -1) - program.words) << program.guard
+        codes = output.code(program.samples(np.arange(advances, dtype=np.int64) * program.hold))
+        return _first(np.abs(np.roll(codes, -1) - codes) > max_step, Reason.SLEW, page)
+    rise = program.resting(np.abs(np.roll(program.words, -1) - program.words))
     steepest = int(np.argmax(rise))
     most, gain = int(rise[steepest]), abs(output.gain_word)
     slack = 2 + ((gain * (2 + (most >> 14))) >> output.gain_q)
-    if (gain * most * length) >> output.gain_q <= advances * (output.max_step + slack):
+    if (gain * most * length) >> output.gain_q <= advances * (max_step + slack):
         return None
     return Reason.SLEW, page - 1 + 2 * steepest
 
@@ -146,19 +158,14 @@ def _jump(contents: Contents, x: AxisLimits, y: AxisLimits, playing: Playing | N
     for page, limits, old in ((1, x, playing.x), (2, y, playing.y)):
         new = contents.program(page)
         if playing.running:
-            before = _word_codes(old) if page == 2 else _word_codes(old)[:1]
-            begin = int(_word_codes(new)[0])
-            jump = int(np.max(np.abs(before - begin)))
+            # A spline stays between its words, as lines do.
+            before = old.output.code(old.resting(old.words) if page == 2 else old.samples(_FIRST))
+            jump = int(np.max(np.abs(before - new.output.code(new.samples(_FIRST)))))
         else:
             jump = abs(new.output.park_code - old.output.park_code)
         if jump > limits.max_jump:
             return Reason.JUMP, page - 1
     return None
-
-
-def _word_codes(program: Program) -> Ints:
-    """The codes of the words of a table."""
-    return program.output.code(program.words << program.guard)
 
 
 def _first(wrong: Bools, reason: Reason, page: int) -> Finding | None:

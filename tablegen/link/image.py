@@ -2,7 +2,6 @@
 
 import zlib
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -12,8 +11,9 @@ from tablegen.fixedpoint.interpolation import guard_bits
 from tablegen.fixedpoint.output import UNIT_GAIN_BITS, Output
 from tablegen.fixedpoint.phase import RationalPhase
 from tablegen.fixedpoint.program import Program
+from tablegen.fixedpoint.shaping import OFF, Shaping
 from tablegen.fixedpoint.synthesis import FourierWords, synthesize
-from tablegen.link.messages import AxisShape, ImageInfo
+from tablegen.link.messages import CUBIC, AxisShape, ImageInfo
 from tablegen.numerics.arrays import Ints
 
 PROGRAM_WORDS = 3 * PAGE_WORDS
@@ -41,13 +41,16 @@ def make_image(
     words = program_words(program.schedule, program.x, program.y, (harmonics[0], harmonics[1]))
     data = np.array(words, dtype="<u4").tobytes()
     for axis, fourier in ((program.x, x_fourier), (program.y, y_fourier)):
-        data += _bytes(axis.words, _shape(axis).word_bytes) if fourier is None else _bytes(fourier, FOURIER_BYTES)
-    info = ImageInfo(bytes.fromhex(digest), len(data), zlib.crc32(data), _shape(program.x), _shape(program.y))
+        data += _bytes(axis.words, shape_of(axis).word_bytes) if fourier is None else _bytes(fourier, FOURIER_BYTES)
+    shapes = shape_of(program.x), shape_of(program.y)
+    info = ImageInfo(bytes.fromhex(digest), len(data), zlib.crc32(data), *shapes)
     return ProgramImage(info, data)
 
 
-def _shape(axis: Program) -> AxisShape:
-    return AxisShape(axis.index_bits, axis.bits, axis.output.dac_bits)
+def shape_of(axis: Program) -> AxisShape:
+    """The shape of the table of an axis."""
+    index_bits = axis.index_bits + (CUBIC if axis.mode == "cubic" else 0)
+    return AxisShape(index_bits, axis.bits, axis.output.dac_bits)
 
 
 def _bytes(words: Ints, size: int) -> bytes:
@@ -89,16 +92,25 @@ class Contents:
         """The offset of an axis, from its two parts."""
         return (self.signed(page, "offset_high") << OFFSET_LOW_BITS) + self.axis(page, "offset_low")
 
+    def shaping(self, page: int) -> Shaping:
+        """How the output of x (1) or y (2) is shaped. Raises ``ValueError`` where the word says none."""
+        return Shaping.of_word(self.axis(page, "shaping"))
+
     def program(self, page: int) -> Program:
         """What x (1) or y (2) plays, with the table rendered where Fourier words came. Its converter is a plain one.
 
-        Raises ``ValueError`` where it could not be played at all.
+        Its output is not shaped where the word of shaping says none. Raises ``ValueError`` where it could not be played
+        at all.
         """
         shape, words = (self.x_shape, self.x) if page == 1 else (self.y_shape, self.y)
         if self.axis(page, "harmonics"):
             half = len(words) // 2
             fourier = FourierWords(int(words[0]), words[1 : half + 1], words[half + 1 :])
-            words = synthesize(fourier, 1 << shape.index_bits, shape.word_bits)
+            words = synthesize(fourier, 1 << shape.length_bits, shape.word_bits)
+        try:
+            shaping = self.shaping(page)
+        except ValueError:
+            shaping = OFF
         output = Output(
             gain_word=self.signed(page, "gain"),
             gain_q=UNIT_GAIN_BITS + shape.word_bits + guard_bits(shape.word_bits) - shape.dac_bits,
@@ -111,11 +123,11 @@ class Contents:
             coding="offset-binary",
             align="right",
             word_bits=shape.dac_bits,
+            shaping=shaping,
         )
         hold = self.scan("line_ticks") if page == 2 and self.scan("y_steps") else 1
         phase = RationalPhase(self.axis(page, "phase_period"))
-        mode: Literal["interpolated", "direct"] = "interpolated" if shape.index_bits else "direct"
-        return Program(phase, hold, mode, shape.word_bits, words, output)
+        return Program(phase, hold, shape.mode, shape.word_bits, words, output)
 
 
 def _signed(word: int) -> int:
@@ -128,7 +140,7 @@ def layout(words: tuple[int, ...], x: AxisShape, y: AxisShape) -> tuple[int, int
     for page, shape in ((1, x), (2, y)):
         harmonics = words[page * PAGE_WORDS + _HARMONICS_WORD]
         period = words[page * PAGE_WORDS + AXIS_WORDS.index("phase_period")]
-        length = 1 << shape.index_bits if shape.index_bits else period
+        length = 1 << shape.length_bits if shape.index_bits else period
         sizes.append(FOURIER_BYTES * (2 * harmonics + 1) if harmonics else shape.word_bytes * length)
     return sizes[0], sizes[1]
 

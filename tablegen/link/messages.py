@@ -3,7 +3,7 @@
 import struct
 from dataclasses import dataclass, fields
 from enum import IntEnum, IntFlag
-from typing import ClassVar, Self
+from typing import ClassVar, Literal, Self
 
 VERSION = 1
 DATA_BYTES = 240  # maximum payload of DATA
@@ -12,6 +12,8 @@ NONCE_BYTES = 16
 HASH_BYTES = 32
 ANSWER = 0x80
 REFUSAL = 0xFF
+CUBIC = 128  # in the index bits of a shape
+SPLINE_DEGREE = 3
 
 
 class Request(IntEnum):
@@ -63,6 +65,7 @@ class Reason(IntEnum):
     READBACK = 26
     TICKS = 27
     REFUSED = 28
+    SHAPING = 29
 
 
 class Feature(IntFlag):
@@ -121,7 +124,8 @@ class _Struct:
 class AxisShape(_Struct):
     """Bits of the index of the (longest) table, 0 where it is not interpolated; of its words; of a code.
 
-    ``converter``, of a device: bits of the converter's word, + 64 for two's complement, + 128 for left alignment.
+    Those of a cubic table have 128 added. ``converter``, of a device: bits of the converter's word, + 64 for two's
+    complement, + 128 for left alignment.
     """
 
     LAYOUT: ClassVar[struct.Struct] = struct.Struct("<4B")
@@ -130,6 +134,16 @@ class AxisShape(_Struct):
     word_bits: int
     dac_bits: int
     converter: int = 0
+
+    @property
+    def mode(self) -> Literal["interpolated", "cubic", "direct"]:
+        """How the table is played."""
+        return "direct" if not self.index_bits else "cubic" if self.index_bits & CUBIC else "interpolated"
+
+    @property
+    def length_bits(self) -> int:
+        """log2 of the words; 0 of a table that is not interpolated."""
+        return self.index_bits & ~CUBIC
 
     @property
     def word_bytes(self) -> int:
@@ -160,9 +174,9 @@ class AxisLimits(_Struct):
 
 @dataclass(frozen=True, slots=True)
 class DeviceInfo:
-    """What a device is, fixed at its build (56 bytes)."""
+    """What a device is, fixed at its build (56 bytes). ``shaping`` is its highest order of shaped output."""
 
-    LAYOUT: ClassVar[struct.Struct] = struct.Struct("<4B2HI4s4s16s16sI")
+    LAYOUT: ClassVar[struct.Struct] = struct.Struct("<4BH2BI4s4s16s16sI")
 
     version: int
     features: Feature
@@ -175,21 +189,24 @@ class DeviceInfo:
     x_limits: AxisLimits
     y_limits: AxisLimits
     update_rate_hz: int
+    shaping: int = 0
+    degree: int = 0  # highest of a spline; 0 of a device that knows none: lines
 
     def pack(self) -> bytes:
         """As it stands in the answer to HELLO."""
         parts = (self.x.pack(), self.y.pack(), self.x_limits.pack(), self.y_limits.pack())
-        first = (self.version, self.features, self.window, self.data_bytes, self.harmonics, 0, self.image_bytes)
-        return self.LAYOUT.pack(*first, *parts, self.update_rate_hz)
+        first = (self.version, self.features, self.window, self.data_bytes, self.harmonics, self.shaping, self.degree)
+        return self.LAYOUT.pack(*first, self.image_bytes, *parts, self.update_rate_hz)
 
     @classmethod
     def unpack(cls, payload: bytes) -> "DeviceInfo":
         """What the answer to HELLO begins with. Raises ``ValueError`` if it is too short."""
         if len(payload) < cls.LAYOUT.size:
             raise ValueError(f"{len(payload)} bytes, too few for a device")
-        version, features, window, data, harmonics, _, image, x, y, x_limits, y_limits, rate = cls.LAYOUT.unpack_from(
+        version, features, window, data, harmonics, shaping, degree, image, *parts, rate = cls.LAYOUT.unpack_from(
             payload
         )
+        x, y, x_limits, y_limits = parts
         return cls(
             version,
             Feature(features),
@@ -202,6 +219,8 @@ class DeviceInfo:
             AxisLimits.unpack(x_limits),
             AxisLimits.unpack(y_limits),
             rate,
+            shaping,
+            degree,
         )
 
 

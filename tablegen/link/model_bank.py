@@ -6,12 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 
+from tablegen.config.schema import MAXIMUM_SPLINE_BITS
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS
 from tablegen.device.schedule import Schedule, Window
 from tablegen.link.acceptance import Playing, first_objection
 from tablegen.link.image import PROGRAM_BYTES, Contents, layout, make_image, take_apart
-from tablegen.link.messages import AxisLimits, DeviceInfo, DeviceState, ImageInfo, Reason, Upload
+from tablegen.link.messages import SPLINE_DEGREE, AxisLimits, DeviceInfo, DeviceState, ImageInfo, Reason, Upload
 from tablegen.link.players import Player
 
 _MIN_INDEX_BITS = 3  # least index bits of an interpolated table
@@ -89,7 +90,9 @@ class Bank:
         if (held is not None and held.state is not Upload.RECEIVING) or not self._player.writable:
             raise RequestRefused(Reason.BUSY)
         for axis, (ours, theirs) in enumerate(((self._info.x, info.x), (self._info.y, info.y))):
-            fits = theirs.index_bits == 0 or _MIN_INDEX_BITS <= theirs.index_bits <= ours.index_bits
+            fits = theirs.index_bits == 0 or _MIN_INDEX_BITS <= theirs.length_bits <= ours.index_bits
+            if theirs.mode == "cubic":
+                fits = fits and self._info.degree >= SPLINE_DEGREE and theirs.word_bits <= MAXIMUM_SPLINE_BITS
             if not fits or (theirs.word_bits, theirs.dac_bits) != (ours.word_bits, ours.dac_bits):
                 raise RequestRefused(Reason.SHAPE, axis)
         if not PROGRAM_BYTES <= info.image_bytes <= self._info.image_bytes:
@@ -157,7 +160,7 @@ class Bank:
         contents = take_apart(image, held.info.x, held.info.y)
         old = self._player.playing
         playing = None if old is None else Playing(old.x, old.y, self._player.state is DeviceState.PLAYING)
-        if found := first_objection(contents, *self.limits, playing):
+        if found := first_objection(contents, *self.limits, playing, self._info.shaping):
             raise RequestRefused(*found)
         return program_of(contents, self._info.update_rate_hz)
 

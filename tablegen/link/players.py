@@ -220,7 +220,8 @@ class SequencerPlayer(_Queue):
 class LinePlayer(_Queue):
     """Lines, frames, swaps and requests on the ticks of ``SequencerPlayer``, but no codes: there are no faults.
 
-    How long parking takes is reckoned from the code at which it began, exactly where no swap was being caught up with.
+    How long parking takes is reckoned from the code at which it began, exactly where no swap was being caught up with
+    and no axis is shaped.
     """
 
     def __init__(self, boot: DualProgram | None, codes: tuple[int, int] = (0, 0)) -> None:
@@ -343,8 +344,11 @@ class LinePlayer(_Queue):
         """From the last tick that was played."""
         schedule = program.schedule
         k = (self.line * schedule.ticks + self._tick - 1) % schedule.frame_ticks
-        x, y = program.x.codes(np.array([k % schedule.ticks])), program.y.codes(np.array([k]))
-        return _ramp(program, (int(x[0]), int(y[0])))
+        x, y = (
+            int(axis.output.code(axis.samples(np.array([tick])))[0])
+            for axis, tick in ((program.x, k % schedule.ticks), (program.y, k))
+        )
+        return _ramp(program, (x, y))
 
 
 def _ramp(program: DualProgram, codes: tuple[int, int]) -> int:

@@ -12,8 +12,8 @@ from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.program import Program
 from tablegen.link.acceptance import first_objection
 from tablegen.link.errors import Unsuitable
-from tablegen.link.image import FOURIER_BYTES, PROGRAM_BYTES, ProgramImage, make_image, take_apart
-from tablegen.link.messages import AxisShape, DeviceInfo, Feature
+from tablegen.link.image import FOURIER_BYTES, PROGRAM_BYTES, ProgramImage, make_image, shape_of, take_apart
+from tablegen.link.messages import SPLINE_DEGREE, AxisShape, DeviceInfo, Feature
 from tablegen.link.reasons import Limits, explain
 from tablegen.manifest.format import content_hash
 from tablegen.manifest.read import NotABuild, read_build
@@ -97,8 +97,7 @@ def _rendered(axis: Program, words: Ints, info: DeviceInfo | None) -> bool:
             return False
         if not info.features & Feature.TABLES:
             return True
-    table = AxisShape(axis.index_bits, axis.bits, axis.output.dac_bits)
-    return FOURIER_BYTES * len(words) < table.word_bytes * len(axis.words)
+    return FOURIER_BYTES * len(words) < shape_of(axis).word_bytes * len(axis.words)
 
 
 def check(scan: PreparedScan, image: ProgramImage, info: DeviceInfo, limits: Limits, any_rate: bool = False) -> None:
@@ -110,7 +109,7 @@ def check(scan: PreparedScan, image: ProgramImage, info: DeviceInfo, limits: Lim
     for (name, axis, _), shape, theirs in zip(scan.axes, (image.info.x, image.info.y), (info.x, info.y), strict=True):
         found += [f"{name}: {why}" for why in _axis(axis, shape, theirs)]
     contents = take_apart(image.data, image.info.x, image.info.y)
-    if objection := first_objection(contents, *limits, None):
+    if objection := first_objection(contents, *limits, None, info.shaping):
         found.append(explain(*objection, info, contents, limits))
     if found:
         raise Unsuitable(found)
@@ -133,6 +132,12 @@ def _device(image: ProgramImage, info: DeviceInfo, scan: PreparedScan) -> list[s
             f"{len(image.data)} bytes; the device accepts {info.image_bytes}: upload --as fourier, or make the tables "
             "shorter"
         )
+    if info.degree < SPLINE_DEGREE:
+        found += [
+            f"{name}: a cubic table; the device plays none: compile it with DAC_SPLINE=1, or set table.mode"
+            for name, axis, _ in scan.axes
+            if axis.mode == "cubic"
+        ]
     return found
 
 

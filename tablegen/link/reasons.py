@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
 _AXES = "xy"
 Limits = tuple[AxisLimits, AxisLimits]
+_ORDERS = {0: "no shaping", 1: "'first'", 2: "'first' and 'second'", 3: "all orders"}
 
 # For these, `detail` is an axis, plus 2 times the index of a word where there is one.
 _AXIS_REASONS = {
@@ -110,6 +111,14 @@ def _incomplete(detail: int, info: DeviceInfo | None) -> str:
     return f"the device has received {detail} bytes only; repeat the upload to continue"
 
 
+def _shaping(detail: int, info: DeviceInfo | None) -> str:
+    has = "" if info is None else f" It has {_ORDERS.get(info.shaping, f'order {info.shaping}')}."
+    return (
+        f"{_AXES[detail & 1]}: the device cannot shape its output as this scan asks.{has} Build the device with the "
+        "SHAPING of the scan, or set dac.shaping to what the device has"
+    )
+
+
 def _other(detail: int, info: DeviceInfo | None) -> str:
     return f"its sequencer refused the program for an internal reason ({detail}); build for this device"
 
@@ -121,6 +130,7 @@ _SENTENCES: dict[Reason, Callable[[int, DeviceInfo | None], str]] = {
     Reason.HARMONICS: _harmonics,
     Reason.INCOMPLETE: _incomplete,
     Reason.REFUSED: _other,
+    Reason.SHAPING: _shaping,
 }
 
 

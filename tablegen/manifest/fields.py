@@ -9,7 +9,8 @@ from msgspec import Meta, Struct
 from tablegen.device.schedule import MAXIMUM_LINE_TICKS, Schedule, Window
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.phase import MAXIMUM_TICKS, RationalPhase
-from tablegen.fixedpoint.program import Program
+from tablegen.fixedpoint.program import Mode, Program
+from tablegen.fixedpoint.shaping import MAXIMUM_ZERO, OFF, Shaping
 from tablegen.numerics.arrays import Floats, Ints
 
 _CHUNK_PRODUCTS = 1 << 22  # products of harmonics and ticks that are worked out at a time
@@ -104,17 +105,32 @@ class ManifestFourier(Struct):
     max_scaling_error_percent: Annotated[float, Meta(gt=0.0, le=10.0)] | None = None
 
 
+class ManifestAskedTable(Struct):
+    """What was asked of a table that the build chose: its worst error, and the keys that were free."""
+
+    max_error_lsb: Annotated[float, Meta(gt=0.0, le=1e6)]
+    free: list[Literal["mode", "length", "bits"]]
+
+
 class ManifestTable(Struct):
     """The words that are played."""
 
-    mode: Literal["interpolated", "direct"]
+    mode: Mode
     bits: Bits
     guard_bits: Number
     scale: Annotated[float, Meta(gt=0.0, le=1e9)]
     words: Annotated[list[Annotated[int, Meta(ge=-(1 << 23), lt=1 << 23)]], Meta(min_length=1, max_length=1 << 20)]
+    asked: ManifestAskedTable | None = None
 
 
 CONVERTER_KEYS = ("v_zero", "v_per_code", "coding", "align", "word_bits")  # of an output: its converter and amplifier
+
+
+class ManifestShaping(Struct, forbid_unknown_fields=True):
+    """How remainders of the rounding are fed back; without it they are not."""
+
+    order: Annotated[int, Meta(ge=1, le=3)]
+    zero: Annotated[int, Meta(ge=0, le=MAXIMUM_ZERO)]
 
 
 class ManifestOutput(Struct):
@@ -139,6 +155,7 @@ class ManifestOutput(Struct):
     word_bits: Annotated[int, Meta(ge=8, le=32)]
     own_hardware: bool = False
     channel: Literal["", "A", "B"] = ""
+    shaping: ManifestShaping | None = None
 
 
 class ManifestFigure(Struct):
@@ -157,6 +174,44 @@ class ManifestExpected(Struct):
     mismatch_percent: ManifestFigure | None = None
     size_percent: ManifestFigure | None = None
     distance_percent: float | None = None
+
+
+class ManifestPassage(Struct):
+    """What the position follows; of a measured response no more than how many points it has."""
+
+    band_hz: Annotated[float, Meta(gt=0.0)] | None = None
+    frequency_hz: Annotated[float, Meta(gt=0.0)] | None = None
+    quality: Annotated[float, Meta(gt=0.0)] | None = None
+    delay_s: float | None = None
+    points: int | None = None
+
+
+class ManifestChanges(Struct):
+    """How often codes change, and by how many codes."""
+
+    percent: float
+    mean_step: float
+
+
+class ManifestRounded(Struct):
+    """What the scan would be without shaping."""
+
+    max_error_lsb: float
+    rms_error_lsb: float
+    scaling_error_percent: dict[str, float]
+    changes: ManifestChanges
+
+
+class ManifestShaped(Struct):
+    """What shaping does, and what it costs."""
+
+    passage: ManifestPassage
+    ticks: Positive
+    max_code_error_lsb: float
+    rms_code_error_lsb: float
+    largest_step: int
+    changes: ManifestChanges
+    rounded: ManifestRounded
 
 
 class ManifestCertificate(Struct):
@@ -178,6 +233,7 @@ class ManifestCertificate(Struct):
     refinement_percent: dict[str, dict[str, float]] | None = None
     expected: ManifestExpected | None = None
     peak_acceleration: float | None = None
+    shaped: ManifestShaped | None = None
 
 
 class ManifestAxis(Struct):
@@ -224,6 +280,7 @@ class ManifestAxis(Struct):
                 align=output.align,
                 word_bits=output.word_bits,
                 channel=output.channel,
+                shaping=OFF if output.shaping is None else Shaping(output.shaping.order, output.shaping.zero),
             ),
         )
 

@@ -10,7 +10,7 @@ import msgspec
 from msgspec import Struct
 
 from tablegen.config.names import why_not_a_name
-from tablegen.config.schema import DEFAULT_FORMATS
+from tablegen.config.schema import DEFAULT_FORMATS, MAXIMUM_SPLINE_BITS
 from tablegen.device.dual_program import DualProgram
 from tablegen.fixedpoint.interpolation import guard_bits
 from tablegen.fixedpoint.output import GAIN_BITS, UNIT_GAIN_BITS
@@ -140,7 +140,6 @@ def _wrong_axes(manifest: Manifest) -> list[str]:
         words, (low, high) = len(table.words), signed_limits(table.bits)
         period = ticks // axis.line.hold_ticks
         gain_low, gain_high = signed_limits(GAIN_BITS)
-        interpolated = table.mode == "interpolated"
         phase = RationalPhase(max(period, 1))
         for right, why in (
             (axis.line.ticks == ticks, f"line.ticks is {axis.line.ticks}, the schedule has {ticks}"),
@@ -148,8 +147,12 @@ def _wrong_axes(manifest: Manifest) -> list[str]:
             (axis.line.phase_step == phase.step, f"line.phase_step is {axis.line.phase_step}, not {phase.step}"),
             (axis.line.phase_remainder == phase.remainder, "line.phase_remainder does not belong to the period"),
             (
-                words & (words - 1) == 0 and words >= 4 if interpolated else words == period,
+                words == period if table.mode == "direct" else words & (words - 1) == 0 and words >= 4,
                 f"table.words are {words}, for a {table.mode} table of {period} advances",
+            ),
+            (
+                table.mode != "cubic" or table.bits <= MAXIMUM_SPLINE_BITS,
+                f"table.bits is {table.bits}, for a cubic table of up to {MAXIMUM_SPLINE_BITS}",
             ),
             (all(low <= word <= high for word in table.words), f"table.words do not fit {table.bits} bits"),
             (table.guard_bits == guard_bits(table.bits), f"table.guard_bits is {table.guard_bits}"),

@@ -1,6 +1,7 @@
 """The plan and its certificate as plain data: what the manifest says of them."""
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from decimal import ROUND_CEILING, Context, Decimal
 from typing import Any
 
@@ -8,9 +9,11 @@ import numpy as np
 
 from tablegen.certificate.certificate import Certificate
 from tablegen.certificate.line_errors import Refined, ScalingError
+from tablegen.certificate.shaped_errors import ShapedErrors
 from tablegen.compensation.dynamics import capped_inverse
 from tablegen.compensation.expectation import Expectation, Figure
 from tablegen.device.schedule import Schedule, Window
+from tablegen.fixedpoint.shaping import Shaping
 from tablegen.manifest.fields import CONVERTER_KEYS
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, Plan
@@ -30,7 +33,7 @@ def certificate_record(certificate: Certificate) -> dict[str, Any]:
     record: dict[str, Any] = {
         name: _figure(getattr(certificate, name))
         for name in certificate.__dataclass_fields__
-        if name not in ("scaling", "refinement", "expected", "peak_acceleration", "optimum")
+        if name not in ("scaling", "refinement", "expected", "peak_acceleration", "optimum", "shaped")
     }
     if certificate.peak_acceleration is not None:
         record["peak_acceleration"] = _bound(certificate.peak_acceleration)
@@ -40,7 +43,29 @@ def certificate_record(certificate: Certificate) -> dict[str, Any]:
         record["refinement_percent"] = _sides(certificate.refinement)
     if certificate.expected is not None:
         record["expected"] = _expected(certificate.expected)
+    if certificate.shaped is not None:
+        record["shaped"] = _shaped(certificate.shaped)
     return record
+
+
+def _shaped(shaped: ShapedErrors) -> dict[str, Any]:
+    """Behind what it was judged, and the same without shaping."""
+    largest, rms = shaped.code_error_lsb
+    rounded = shaped.rounded
+    return {
+        "passage": {key: value for key, value in asdict(shaped.passage).items() if value is not None},
+        "ticks": shaped.ticks,
+        "max_code_error_lsb": _bound(largest),
+        "rms_code_error_lsb": _figure(rms),
+        "largest_step": shaped.largest_step,
+        "changes": {key: _figure(value) for key, value in asdict(shaped.changes).items()},
+        "rounded": {
+            "max_error_lsb": _bound(rounded.max_error_lsb),
+            "rms_error_lsb": _figure(rounded.rms_error_lsb),
+            "scaling_error_percent": {side: _figure(value) for side, value in rounded.scaling.items()},
+            "changes": {key: _figure(value) for key, value in asdict(rounded.changes).items()},
+        },
+    }
 
 
 def _expected(expectation: Expectation) -> dict[str, Any]:
@@ -129,6 +154,17 @@ def _resonance(line: LinePlan) -> dict[str, Any]:
     return {"resonance": {"hz": response.resonance_hz, "half_width_hz": response.half_width_hz}}
 
 
+def _asked_table(line: LinePlan) -> dict[str, Any]:
+    """What was asked of a table that the build chose; nothing of one that was written."""
+    if line.asked_table is None:
+        return {}
+    return {"asked": {"max_error_lsb": line.asked_table.max_error_lsb, "free": list(line.asked_table.free)}}
+
+
+def _shaping(shaping: Shaping) -> dict[str, Any]:
+    return {"shaping": {"order": shaping.order, "zero": shaping.zero}} if shaping.order else {}
+
+
 def _axis(line: LinePlan) -> dict[str, Any]:
     drive, program, output = line.drive, line.program, line.program.output
     return {
@@ -181,6 +217,7 @@ def _axis(line: LinePlan) -> dict[str, Any]:
             "scale": line.scale,
             "guard_bits": program.guard,
             "words": program.words.tolist(),
+            **_asked_table(line),
         },
         "output": {
             "gain_word": output.gain_word,
@@ -198,5 +235,6 @@ def _axis(line: LinePlan) -> dict[str, Any]:
             "align": output.align,
             "word_bits": output.word_bits,
             **({"channel": output.channel} if output.channel else {}),
+            **_shaping(output.shaping),
         },
     }

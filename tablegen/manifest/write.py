@@ -10,6 +10,8 @@ from tablegen.config.schema import DEFAULT_FORMATS
 from tablegen.manifest.record import certificate_record
 from tablegen.version import __version__
 
+_json = json.JSONEncoder(ensure_ascii=True, allow_nan=False).encode  # one, for there are hundreds of values
+
 
 def manifest_file(
     record: dict[str, Any],
@@ -41,6 +43,6 @@ def _readable(value: Any, indent: str = "") -> str:
     """JSON with a key a line, and arrays of numbers on one line."""
     if isinstance(value, dict) and value:
         inner = indent + "  "
-        items = (f"{inner}{json.dumps(key)}: {_readable(item, inner)}" for key, item in value.items())
+        items = (f"{inner}{_json(key)}: {_readable(item, inner)}" for key, item in value.items())
         return "{\n" + ",\n".join(items) + f"\n{indent}}}"
-    return json.dumps(value, ensure_ascii=True, allow_nan=False)
+    return _json(value)

@@ -31,13 +31,17 @@ def tree_sum(values: Floats) -> Floats:
 
 
 def _tree_sum(values: Floats) -> Floats:
-    size = 1 << max(values.shape[-1] - 1, 0).bit_length()
-    padded = np.zeros((*values.shape[:-1], size))
-    padded[..., : values.shape[-1]] = values
-    while size > 1:
-        size //= 2
-        padded = padded[..., :size] + padded[..., size : 2 * size]
-    return padded[..., 0]
+    count = values.shape[-1]
+    half = (1 << max(count - 1, 0).bit_length()) // 2
+    if not half:
+        return values[..., 0].copy() if count else np.zeros(values.shape[:-1])
+    sums = values[..., :half].copy()
+    sums[..., : count - half] += values[..., half:]
+    sums[..., count - half :] += 0.0  # as if values were followed by zeros
+    while half > 1:
+        half //= 2
+        sums[..., :half] += sums[..., half : 2 * half]
+    return sums[..., 0]
 
 
 def folded_sum(values: Floats) -> Floats:

@@ -1,10 +1,11 @@
 """The scaling error that a waveform may have for the sake of less acceleration: as asked, or what does not show."""
 
 from tablegen.config.schema import BandLimit, Limits
-from tablegen.waveform.gentle_fit import AllowedError
+from tablegen.waveform.allowed_error import AllowedError
 
 CHORD = 0.05  # share of the line over which the certificate measures emitted integers
 _UNLIMITED_PERCENT = 1.0  # the error that nobody is told of
+MOST_HARMONICS = 256  # a search among more takes many seconds
 
 
 def allowed_error(limit: BandLimit, limits: Limits, codes: float, counts_turns: bool) -> AllowedError | None:
@@ -21,3 +22,9 @@ def allowed_error(limit: BandLimit, limits: Limits, codes: float, counts_turns: 
         return None
     most = 0.5 * min(limits.max_scaling_error_percent or _UNLIMITED_PERCENT, _UNLIMITED_PERCENT)
     return AllowedError(min(100.0 * 2.0 / (CHORD * codes), most), limit.harmonics == "fewest")
+
+
+def chosen_by_build(limit: BandLimit) -> bool:
+    """Whether the build finds the number: the fewest, or an error is asked for without any limit of the band."""
+    alone = limit.harmonics is None and limit.cutoff_hz is None
+    return limit.harmonics == "fewest" or (alone and limit.max_scaling_error_percent is not None)

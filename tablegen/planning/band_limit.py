@@ -5,10 +5,9 @@ import numpy as np
 from tablegen.compensation.line import LineShape
 from tablegen.config.schema import BandLimit
 from tablegen.numerics.turns import sinc
-from tablegen.planning.enough_harmonics import straightness
 from tablegen.problems import Unphysical
+from tablegen.waveform.allowed_error import AllowedError
 from tablegen.waveform.closed_form import fourier_series
-from tablegen.waveform.gentle_fit import AllowedError, gentlest
 from tablegen.waveform.refined import RefinedShape
 from tablegen.waveform.series import FourierSeries
 from tablegen.waveform.window_fit import fit_window
@@ -46,6 +45,9 @@ def gently_limited(
     Raises ``Unreachable`` where a firm one cannot be kept.
     """
     if shape.waveform is None:
+        from tablegen.planning.enough_harmonics import straightness  # here: most lines are fitted to their window
+        from tablegen.waveform.gentle_fit import gentlest
+
         try:
             return gentlest(straightness(shape, limit, layer), harmonics, allowed.percent), allowed.percent
         except Unphysical:

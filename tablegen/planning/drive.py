@@ -22,7 +22,7 @@ from tablegen.figures import at_most
 from tablegen.fixedpoint.converter import Converter
 from tablegen.planning.allowed_error import allowed_error
 from tablegen.problems import Problems, Unphysical
-from tablegen.waveform.gentle_fit import AllowedError
+from tablegen.waveform.allowed_error import AllowedError
 
 # An axis at rest plays w = 1/2 throughout; gain and table refer to so small a share of v_max.
 RESTING_SHARE = 2.0**-24

@@ -8,17 +8,10 @@ from tablegen.compensation.line import LineShape
 from tablegen.config.schema import BandLimit
 from tablegen.figures import at_least
 from tablegen.problems import Unphysical
-from tablegen.waveform.gentle_fit import AllowedError, Straightness, Unreachable, fewest_harmonics, least_percent
+from tablegen.waveform.allowed_error import AllowedError
+from tablegen.waveform.gentle_fit import Straightness, Unreachable, fewest_harmonics, least_percent
 from tablegen.waveform.refined import RefinedShape
 from tablegen.waveform.series import FourierSeries
-
-MOST_HARMONICS = 256  # a search among more takes many seconds
-
-
-def chosen_by_build(limit: BandLimit) -> bool:
-    """Whether the build finds the number: the fewest, or an error is asked for without any limit of the band."""
-    alone = limit.harmonics is None and limit.cutoff_hz is None
-    return limit.harmonics == "fewest" or (alone and limit.max_scaling_error_percent is not None)
 
 
 def straightness(shape: LineShape, limit: BandLimit, layer: FourierSeries | None = None) -> Straightness:

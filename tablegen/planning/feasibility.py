@@ -13,18 +13,26 @@ from tablegen.config.load import Setup
 from tablegen.config.schema import FastAxis
 from tablegen.driver import Driver
 from tablegen.figures import at_least, at_most
-from tablegen.fixedpoint.converter import Converter
+from tablegen.fixedpoint.converter import Converter, code_limits
 from tablegen.fixedpoint.interpolation import guard_bits
+from tablegen.fixedpoint.output import GAIN_BITS
+from tablegen.fixedpoint.shaping import Shaping
+from tablegen.fixedpoint.spline import SPLINE_UNIT
+from tablegen.fixedpoint.table_shape import MOST_LENGTH, TableShape
+from tablegen.numerics.arrays import Floats
+from tablegen.planning.allowed_error import MOST_HARMONICS, chosen_by_build
 from tablegen.planning.drive import Drive, outside_driver
-from tablegen.planning.enough_harmonics import MOST_HARMONICS, chosen_by_build
-from tablegen.problems import Problems
+from tablegen.planning.table_maker import StoredWave, TableMaker
+from tablegen.problems import Problems, Unphysical
 from tablegen.waveform.series import FourierSeries
 
 DEFAULT_HARMONICS = 32
 MAXIMUM_HARMONICS = 512
-DEFAULT_LENGTH = 2048
+DEFAULT_LENGTH = {"interpolated": 2048, "cubic": 256}
 MAXIMUM_DIRECT_WORDS = 1 << 20
 ACCUMULATOR_LIMIT = 4  # limit of the synthesis, in units of the table's full scale
+_FULL = 0.999 * ACCUMULATOR_LIMIT
+_GAINS = 1 << (GAIN_BITS - 1)
 
 
 class Feasibility:
@@ -71,9 +79,9 @@ class Feasibility:
             unit = "lines" if self._steps else "ticks"
             fits = self._carried(carried, rate) if carried else "; take more timing.lines"
             self._add(key, f"{harmonics} harmonics are too many; a period of {period} {unit} carries {carried}{fits}")
-        length = self._scan.table.length or DEFAULT_LENGTH
+        length = self._longest_table
         carried = length // 2 - 1
-        if self._scan.table.mode == "interpolated" and harmonics > carried:
+        if self._scan.table.mode != "direct" and harmonics > carried:
             fits = self._carried(carried, rate)
             self._add(key, f"{harmonics} harmonics are too many; a table of {length} words carries {carried}{fits}")
         return harmonics
@@ -81,9 +89,17 @@ class Feasibility:
     def most_harmonics(self, period: int) -> int:
         """The most that the build chooses where it finds the number; at least 1."""
         carried = min((period - 1) // 2, MOST_HARMONICS)
-        if self._scan.table.mode == "interpolated":
-            carried = min(carried, (self._scan.table.length or DEFAULT_LENGTH) // 2 - 1)
+        if self._scan.table.mode != "direct":
+            carried = min(carried, self._longest_table // 2 - 1)
         return max(carried, 1)
+
+    @property
+    def _longest_table(self) -> int:
+        """The most words that a table with a phase can have."""
+        table = self._scan.table
+        if table.length is not None:
+            return table.length
+        return MOST_LENGTH if table.chosen_by_build else DEFAULT_LENGTH.get(table.mode or "", MOST_LENGTH)
 
     def _carried(self, harmonics: int, rate: Fraction) -> str:
         """Which cutoff passes so many, where one was asked for."""
@@ -91,11 +107,11 @@ class Feasibility:
             return ""
         return f", which {at_most(float((harmonics + 1) * rate) * (1 - 1e-9), 6)} Hz pass"
 
-    def table_length(self, period: int) -> int:
-        """Words of the table."""
+    def check_table(self, period: int) -> None:
+        """A ``direct`` table has a word for each of ``period`` advances."""
         table = self._scan.table
-        if table.mode == "interpolated":
-            return table.length or DEFAULT_LENGTH
+        if table.mode != "direct":
+            return
         if table.length not in (None, period):
             self._add(
                 f"{self._axis}.table.length",
@@ -107,10 +123,12 @@ class Feasibility:
                 f"{self._axis}.table.mode",
                 f"'direct' takes {period} words, above {MAXIMUM_DIRECT_WORDS}; use 'interpolated'",
             )
-        return period
 
-    def check_range(self, drive: Drive, converter: Converter, low: float, high: float) -> None:
-        """The drive, for w from ``low`` to ``high``, has to stay inside the driver and inside the converter."""
+    def check_range(self, drive: Drive, converter: Converter, low: float, high: float, shaping: Shaping) -> None:
+        """The drive, for w from ``low`` to ``high``, has to stay inside the driver and inside the converter.
+
+        And what shaping adds to its codes too.
+        """
         self._check_park(drive.driver, converter)
         down, up = drive.v_amplitude * (0.5 - low), drive.v_amplitude * (high - 0.5)
         bottom, top = drive.v_offset - down, drive.v_offset + up
@@ -141,6 +159,24 @@ class Feasibility:
                 f"draw a line; scan more, or use more {self._named('dac.bits')} or less "
                 f"{self._named('amplifier.gain')}",
             )
+        if shaping.order:
+            self._check_room(drive, converter, ends, shaping)
+
+    def _check_room(self, drive: Drive, converter: Converter, ends: list[float], shaping: Shaping) -> None:
+        """No code of shaping may be clamped: the clamp would keep what the next codes are to make up for."""
+        first, last = code_limits(converter, drive.driver)
+        room, there = shaping.excess, min(ends[0] - first, last - ends[1])
+        if there >= room:
+            return
+        self._add_shaping(
+            f"moves codes by up to {room:g}, and the {self._axis} drive comes to {max(there, 0.0):.3g} codes of an end "
+            f"of converter or driver; an order that moves them less, a line that is smaller by "
+            f"{at_least((room - there) * abs(converter.v_per_code))} V at that end, or shaping = 'off' would fit"
+        )
+
+    def _add_shaping(self, why: str) -> None:
+        """At the key of shaping, with its value."""
+        self._add_hardware("dac.shaping", f"'{self._hardware.dac.shaping}' {why}")
 
     @property
     def _size_key(self) -> str:
@@ -173,22 +209,30 @@ class Feasibility:
         return f"or at this offset a line of about {at_most(line_nm, 3)} nm"
 
     def max_step(
-        self, drive: Drive, converter: Converter, series: FourierSeries, largest: float, rate_hz: float, period: int
+        self,
+        drive: Drive,
+        converter: Converter,
+        stored: StoredWave,
+        rate_hz: float,
+        period: int,
+        shape: TableShape,
+        shaping: Shaping,
     ) -> int:
         """The slew guard in codes a tick: the amplifier's slew rate, or twice the steepest step of the line."""
-        slope = drive.v_amplitude * series.peak_slope()
+        slope = drive.v_amplitude * stored.series.peak_slope()
         v_per_code = abs(converter.v_per_code)
-        # The chord of a step is never steeper than the steepest slope; rounding adds to it.
-        words = self._word_codes(drive, converter, largest, period)
-        steepest = ceil(slope / v_per_code / period + words) + 1
-        last = (1 << converter.bits) - 1
-        slew = self._hardware.amplifier.max_slew_v_per_s
+        words = _word_codes(drive, converter, stored.largest, period, shape)
+        rounded = _steepest(drive, converter, stored.series, period, words)
+        steepest = rounded + shaping.step_excess
+        slew, allowed = self._hardware.amplifier.max_slew_v_per_s, self._allowed_step(converter)
         if slew is None:
-            return min(2 * steepest, last)
+            return min(2 * steepest, allowed)
         update_rate = self._hardware.dac.update_rate_hz
-        allowed = min(floor(slew / update_rate / v_per_code), last)
         asked = slope * rate_hz
         if steepest <= allowed and (self._steps or asked <= slew):
+            return allowed
+        if rounded <= allowed and (self._steps or asked <= slew):
+            self._refuse_step(shaping, rounded, allowed, slew, v_per_code, asked / update_rate / v_per_code + words)
             return allowed
         finer = "" if words < 0.5 else f", more {self._axis}.table.bits"
         if self._steps:
@@ -220,25 +264,62 @@ class Feasibility:
             self._add(key, f"the {self._axis} drive {what}; {fits}")
         return max(allowed, 1)
 
-    def _word_codes(self, drive: Drive, converter: Converter, largest: float, period: int) -> float:
-        """Codes that a step can be off since the words of the table are rounded."""
-        table = self._scan.table
-        full_scale = 0.51 * drive.v_amplitude / abs(converter.v_per_code) * largest + 2.0 ** (converter.bits - 17)
-        share = 1.0 if table.mode == "direct" else min(1.0, (table.length or DEFAULT_LENGTH) / period)
-        return full_scale * 2.0 ** (1 - table.bits) * (share + 2.0 ** -guard_bits(table.bits))
+    def _refuse_step(
+        self, shaping: Shaping, rounded: int, allowed: int, slew: float, v_per_code: float, codes: float
+    ) -> None:
+        """The amplifier carries the line, and not what shaping adds; ``codes`` is the steepest step, unrounded."""
+        update_rate = self._hardware.dac.update_rate_hz
+        slower = update_rate * (slew / update_rate / v_per_code - codes) / (shaping.step_excess + 3.0)
+        self._add_shaping(
+            f"adds up to {shaping.step_excess} codes to a step of the {self._axis} axis, which are {rounded} without "
+            f"it, and {slew:.6g} V/s allow {allowed} in a tick; an update_rate_hz of about {at_most(slower)}, an order "
+            "that adds less, or shaping = 'off' would fit"
+        )
 
-    def check_words(self, series: FourierSeries, largest: float) -> None:
-        """The accumulator of the device has to hold the sum of all Fourier words, whatever their signs.
+    def fitting(
+        self, shapes: list[TableShape], drive: Drive, converter: Converter, maker: TableMaker
+    ) -> list[TableShape]:
+        """The tables that a device holds, with their gain, and whose steps the amplifier follows.
 
-        ``largest`` is the largest |2 w - 1|, at least 1: the table is scaled to it.
+        If it follows those of none, all that a device holds, so that this is told of one of them. Raises
+        ``Unphysical`` where a device holds none.
         """
-        sums = abs(2.0 * series.a0 - 1.0) + 2.0 * np.cumsum(np.abs(series.a) + np.abs(series.b))
-        if sums[-1] >= 0.999 * ACCUMULATOR_LIMIT * largest:
+        slew, allowed = self._hardware.amplifier.max_slew_v_per_s, self._allowed_step(converter)
+
+        def follows(shape: TableShape) -> bool:
+            stored = maker.stored(shape)
+            words = _word_codes(drive, converter, stored.largest, maker.phase.ticks, shape)
+            steepest = _steepest(drive, converter, stored.series, maker.phase.ticks, words)
+            return slew is None or steepest + maker.output.shaping.step_excess <= allowed
+
+        held = [shape for shape in shapes if _holds(maker, shape)]
+        if not held:
+            raise Unphysical("no device holds a table of these words and this waveform; leave out what is given of it")
+        return [shape for shape in held if follows(shape)] or held
+
+    def _allowed_step(self, converter: Converter) -> int:
+        """Codes that the amplifier follows in a tick; all, if its slew rate is not known."""
+        last = (1 << converter.bits) - 1
+        slew, v_per_code = self._hardware.amplifier.max_slew_v_per_s, abs(converter.v_per_code)
+        return last if slew is None else min(floor(slew / self._hardware.dac.update_rate_hz / v_per_code), last)
+
+    def check_words(self, stored: StoredWave) -> None:
+        """The accumulator of the device has to hold the sum of all Fourier words, whatever their signs."""
+        series, largest, sums = stored.series, stored.largest, _sums(stored.series)
+        if sums[-1] >= _FULL * largest:
             fits = int(np.searchsorted(sums, 0.99 * ACCUMULATOR_LIMIT * largest))
             self._add(
                 f"{self._axis}.band_limit.harmonics",
                 f"the {series.harmonics} harmonics sum to {sums[-1] / largest:.4g} of the scan, the accumulator of the "
                 f"device holds {ACCUMULATOR_LIMIT}; about {fits} harmonics, or method = 'lanczos', fit",
+            )
+
+    def check_gain(self, gain_word: int) -> None:
+        """The words of a spline exceed the waveform by more, the fewer they are; the gain has to make up for it."""
+        if abs(gain_word) >= _GAINS:
+            self._add(
+                f"{self._axis}.table.length",
+                "the coefficients of so few words exceed the waveform by more than the gain makes up for; take more",
             )
 
     def _slower(self, times: float) -> tuple[str, str]:
@@ -253,6 +334,32 @@ class Feasibility:
         if factor == 1.0:
             return "timing.line_rate_hz", f"{slower} Hz"
         return "timing.line_rate_hz", f"{written.rpartition('.')[2]} = {slower}"
+
+
+def _word_codes(drive: Drive, converter: Converter, largest: float, period: int, shape: TableShape) -> float:
+    """Codes that a step can be off since the words of the table are rounded."""
+    full_scale = 0.51 * drive.v_amplitude / abs(converter.v_per_code) * largest + 2.0 ** (converter.bits - 17)
+    share = 1.0 if shape.mode == "direct" else min(1.0, shape.length / period)
+    # Of two samples: each is within half a unit, and of a spline, which rounds at each degree, within a whole one.
+    rounded = 2.0 / SPLINE_UNIT if shape.mode == "cubic" else 2.0 ** -guard_bits(shape.bits)
+    return full_scale * 2.0 ** (1 - shape.bits) * (share + rounded)
+
+
+def _holds(maker: TableMaker, shape: TableShape) -> bool:
+    """Whether accumulator and gain of a device are wide enough."""
+    stored = maker.stored(shape)
+    return bool(_sums(stored.series)[-1] < _FULL * stored.largest) and abs(maker.gain(shape)[0]) < _GAINS
+
+
+def _sums(series: FourierSeries) -> Floats:
+    """What the Fourier words add up to, harmonic by harmonic, whatever their signs."""
+    sums: Floats = abs(2.0 * series.a0 - 1.0) + 2.0 * np.cumsum(np.abs(series.a) + np.abs(series.b))
+    return sums
+
+
+def _steepest(drive: Drive, converter: Converter, series: FourierSeries, period: int, words: float) -> int:
+    """The steepest step in codes: its chord is never steeper than the steepest slope, and rounding adds to it."""
+    return ceil(drive.v_amplitude * series.peak_slope() / abs(converter.v_per_code) / period + words) + 1
 
 
 def _amplifier_that_fits(dac: AxisDac, amplifier: AxisAmplifier, bottom: float, top: float) -> str:

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from math import ceil
 from typing import Literal
 
 import numpy as np
@@ -14,30 +13,25 @@ from tablegen.config.schema import DEFAULT_FORMATS, BandLimit, FastAxis, Limits,
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.schedule import Schedule
 from tablegen.figures import at_least
-from tablegen.fixedpoint.converter import Converter, fit_gain, make_output
+from tablegen.fixedpoint.converter import Converter, make_output
 from tablegen.fixedpoint.phase import RationalPhase
 from tablegen.fixedpoint.program import Program
-from tablegen.fixedpoint.synthesis import FourierWords, encode, synthesize
+from tablegen.fixedpoint.synthesis import FourierWords
 from tablegen.numerics.arrays import Floats, Ints
+from tablegen.planning.allowed_error import chosen_by_build
 from tablegen.planning.band_limit import band_limited, gently_limited
 from tablegen.planning.drive import Drive, compensate
-from tablegen.planning.enough_harmonics import (
-    EnoughHarmonics,
-    chosen_by_build,
-    plain_line,
-    straightness,
-    with_remedies,
-)
 from tablegen.planning.feasibility import DEFAULT_HARMONICS, Feasibility
 from tablegen.planning.refinement_layer import learnt_layer
 from tablegen.planning.settling import settle_lines
+from tablegen.planning.shaping_choice import chosen_shaping
+from tablegen.planning.table_choice import TableChoice, asked_of, choose, played_modes, possible_shapes, written_shape
+from tablegen.planning.table_maker import StoredWave, TableMaker
+from tablegen.planning.table_search import TableSearch
 from tablegen.planning.timing import make_schedule
 from tablegen.problems import Problems
-from tablegen.waveform.gentle_fit import AllowedError, Unreachable
+from tablegen.waveform.allowed_error import AllowedError
 from tablegen.waveform.series import FourierSeries
-
-# Peaks are rounded up to this grid before they enter the scale: it then does not depend on the last bit of a maximum.
-_PEAK_GRID = 1024
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -49,7 +43,7 @@ class LinePlan:
     that back. ``series`` is the w that is played, ahead of that by the converter's hold: the code of advance k of N is
     that of ``series`` at k / N. ``layer`` is what of the target was learnt from a measurement, and lies over the
     model's shape. ``kept_percent`` is the scaling error for which the target has the least acceleration, None where it
-    has another band limit.
+    has another band limit. ``asked_table`` is what was asked of a table that the build chose, None where it is written.
     """
 
     axis: Literal["x", "y"]
@@ -67,6 +61,7 @@ class LinePlan:
     program: Program
     layer: FourierSeries | None = None
     kept_percent: float | None = None
+    asked_table: TableChoice | None = None
 
     def __repr__(self) -> str:
         table = f"{self.program.mode} table of {len(self.program.words)} x {self.program.bits} bits"
@@ -90,8 +85,8 @@ class LinePlan:
         return self.drive.v_amplitude / self.converter.v_per_code
 
     def codes(self, start: int, stop: int) -> Ints:
-        """The emitted codes at ticks [start, stop)."""
-        return self.program.codes(np.arange(start, stop, dtype=np.int64))
+        """The emitted codes at ticks [start, stop) since the program began."""
+        return self.program.played(start, stop)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -173,11 +168,15 @@ def _line_plan(setup: Setup, axis: Literal["x", "y"], schedule: Schedule, proble
     before = len(problems.found)
     feasible = Feasibility(setup, axis, problems)
     harmonics = feasible.harmonics(rate, period)
-    length = feasible.table_length(period)
+    feasible.check_table(period)
     limit, most = scan.band_limit, feasible.most_harmonics(period)
     key = f"{axis}.band_limit.{'harmonics' if limit.max_scaling_error_percent is None else 'max_scaling_error_percent'}"
     learnt = 1 if scan.refinement is None else len(scan.refinement.a)
-    choice = EnoughHarmonics(limit, harmonics, min(learnt, most), most) if chosen_by_build(limit) else None
+    choice = None
+    if chosen_by_build(limit):
+        from tablegen.planning.enough_harmonics import EnoughHarmonics, plain_line, straightness  # as in ``_gentle``
+
+        choice = EnoughHarmonics(limit, harmonics, min(learnt, most), most)
 
     def for_straight_line(allowed: AllowedError | None) -> int:
         with problems.at(file, key):
@@ -215,23 +214,34 @@ def _line_plan(setup: Setup, axis: Literal["x", "y"], schedule: Schedule, proble
 
     hardware = setup.hardware(axis)
     converter = Converter.of(hardware.dac, hardware.amplifier)
-    w = series.on_grid(32 * harmonics)
-    low, high = float(np.min(w)), float(np.max(w))
-    largest = max(1.0, abs(2.0 * low - 1.0), abs(2.0 * high - 1.0))
-    feasible.check_words(series, largest)
-    feasible.check_range(drive, converter, low, high)
-    max_step = feasible.max_step(drive, converter, series, largest, float(rate), period)
+    park_v = drive.v_offset if scan.park_v is None else scan.park_v
+    shaping = chosen_shaping(setup, axis, drive, problems)
+    maker = TableMaker(
+        series=series,
+        amplitude=0.5 * drive.v_amplitude / converter.v_per_code,
+        offset=converter.code(drive.v_offset),
+        phase=RationalPhase(period),
+        hold=hold,
+        output=make_output(hardware.dac, converter, drive.driver, park_v, shaping),
+    )
+    as_asked = StoredWave(series)
+    feasible.check_words(as_asked)
+    feasible.check_range(drive, converter, *as_asked.reach, shaping)
+    shape, asked = written_shape(scan.table, period), asked_of(scan.table, setup.scan.limits)
+    if asked is not None and len(problems.found) == before:
+        with problems.at(file, f"{axis}.table.{'mode' if scan.table.max_error_lsb is None else 'max_error_lsb'}"):
+            modes = played_modes(setup.scan.emit.formats or DEFAULT_FORMATS)
+            possible = possible_shapes(scan.table, period, harmonics, modes)
+            shapes = feasible.fitting(possible, drive, converter, maker)
+            shape = choose(TableSearch(maker), shapes, asked.max_error_lsb)
+    stored = maker.stored(shape)
+    if shape.mode == "cubic" and len(problems.found) == before:
+        feasible.check_words(stored)
+        feasible.check_gain(maker.gain(shape)[0])
+    max_step = feasible.max_step(drive, converter, stored, float(rate), period, shape, shaping)
     if len(problems.found) > before:
         return None
-
-    bits = scan.table.bits
-    peak = ceil(largest * _PEAK_GRID) / _PEAK_GRID
-    amplitude = 0.5 * drive.v_amplitude / converter.v_per_code  # codes for 2 w - 1 = 1
-    gain_word, scale = fit_gain(amplitude, peak, bits, converter.bits)
-    park_v = drive.v_offset if scan.park_v is None else scan.park_v
-    output = make_output(hardware.dac, converter, drive.driver, drive.v_offset, park_v, bits, gain_word, max_step)
-    fourier = encode(series.a0, series.a, series.b, scale)
-    program = Program(RationalPhase(period), hold, scan.table.mode, bits, synthesize(fourier, length, bits), output)
+    table = maker.limited(max_step).made(shape)
     return LinePlan(
         axis=axis,
         rate=rate,
@@ -243,11 +253,12 @@ def _line_plan(setup: Setup, axis: Literal["x", "y"], schedule: Schedule, proble
         drive_series=at_piezo,
         series=series,
         held_harmonics=held,
-        scale=scale,
-        fourier=fourier,
-        program=program,
+        scale=table.scale,
+        fourier=table.fourier,
+        program=table.program,
         layer=layer,
         kept_percent=kept,
+        asked_table=asked,
     )
 
 
@@ -255,6 +266,9 @@ def _gentle(
     drive: Drive, limit: BandLimit, harmonics: int, layer: FourierSeries | None, most: int, rate_hz: float
 ) -> tuple[FourierSeries, float | None]:
     """Least acceleration at the allowed error. Raises ``Unphysical`` with what would fit."""
+    from tablegen.planning.enough_harmonics import straightness, with_remedies  # here: most lines do without the search
+    from tablegen.waveform.gentle_fit import Unreachable
+
     assert drive.allowed is not None
     try:
         return gently_limited(drive.shape, limit, harmonics, layer, drive.allowed)

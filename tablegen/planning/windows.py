@@ -8,8 +8,7 @@ from math import ceil, floor, gcd, lcm
 
 import numpy as np
 
-from tablegen.device.schedule import Schedule, Window
-from tablegen.device.sequencer import pixel_starts
+from tablegen.device.schedule import Schedule, Window, pixel_starts
 from tablegen.numerics.arrays import Floats
 
 _HALF = Fraction(1, 2)

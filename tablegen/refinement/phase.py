@@ -59,7 +59,9 @@ def phase_by_drive(line: LinePlan, time_s: Floats, drive_v: Floats, delay_s: flo
     amplitude, middle = line.drive.v_amplitude, line.drive.v_offset
 
     def turns(x: Floats, rows: slice = slice(None)) -> Floats:
-        return (time_s[rows] - float(x[1])) / float(x[0])
+        t = time_s[rows] - float(x[1])
+        t /= float(x[0])  # in place: a long trace is hundreds of megabytes
+        return t
 
     def residuals(x: Floats, rows: slice = slice(None)) -> Floats:
         left: Floats = float(x[2]) + float(x[3]) * (_at(w, turns(x, rows)) - 0.5) - drive_v[rows]
@@ -83,9 +85,11 @@ def phase_by_drive(line: LinePlan, time_s: Floats, drive_v: Floats, delay_s: flo
     x, left = found.values, found.residuals
     if len(left) < len(time_s):  # so near the minimum, one step with all samples reaches it
         x = x - _step(residuals, jacobian, x, np.array(scales), len(time_s))
-        left = np.concatenate([residuals(x, rows) for rows in _parts(len(time_s))])
-    relative = float(x[3]) / amplitude
-    departure = _averaged(turns(x), left) / max(abs(relative), 1e-9)
+        left = np.empty(len(time_s))
+        for rows in _parts(len(time_s)):
+            left[rows] = residuals(x, rows)
+    relative, t = float(x[3]) / amplitude, turns(x)
+    departure = _averaged(t, left) / max(abs(relative), 1e-9)
     if abs(float(x[0]) / nominal - 1.0) > _MAX_CLOCK_DIFFERENCE:
         raise Unphysical(
             f"the recorded drive has a period of {x[0]:.6g} s, this scan {nominal:.6g} s; is time_s in seconds?"
@@ -100,9 +104,9 @@ def phase_by_drive(line: LinePlan, time_s: Floats, drive_v: Floats, delay_s: flo
             f"the recorded drive departs from this scan's by {100.0 * departure:.2g} % rms; record the scan as it is "
             f"built from this file"
         )
-    t = turns(x)
     _check_layer(line, t[few], -left[few] / relative)
-    return Phase(t - delay_s / float(x[0]), float(x[0]), (relative, departure))
+    t -= delay_s / float(x[0])
+    return Phase(t, float(x[0]), (relative, departure))
 
 
 def _step(
@@ -147,7 +151,8 @@ def _first_guess(series: FourierSeries, time_s: Floats, drive_v: Floats, nominal
     """Period and a line start, from the angle of the fundamental in pieces of one nominal period each."""
     if not float(np.ptp(drive_v)) > 0.0:
         raise Unphysical("the drive does not move")
-    turns = (time_s - time_s[0]) / nominal_s
+    turns = time_s - time_s[0]
+    turns /= nominal_s
     pieces = max(int(np.floor(turns[-1] + 0.02)), 1)
     angles = []
     edges = np.searchsorted(turns, np.arange(pieces + 1.0))

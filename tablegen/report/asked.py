@@ -1,7 +1,7 @@
 """What was asked for, and what will be played; the files of the build; what verify found."""
 
 from tablegen.certificate.summary import rate
-from tablegen.manifest.fields import ManifestSequence
+from tablegen.manifest.fields import ManifestAxis, ManifestSequence
 from tablegen.planning.line_plan import LinePlan
 from tablegen.planning.settling import settling, settling_text
 from tablegen.report.blocks import Bullets, Grid, Paragraph, Section, TableCell, row
@@ -33,6 +33,7 @@ def asked(subject: Subject) -> Section:
             row(f"{axis} drive", "", f"{drive.v_amplitude:.6g} V peak to peak, turns at {drive.turn:g} of the period"),
             row(f"{axis} imaged", "", f"{low:g}..{high:g} of the line, {entry.fourier.directions}"),
             row(f"{axis} codes", "", _codes(subject, axis)),
+            *_table(axis, entry),
         ]
         if planned is not None:
             rows += _settles(planned.plan.x if axis == "x" else planned.plan.y, subject)
@@ -65,6 +66,16 @@ def _codes(subject: Subject, axis: str) -> str:
         return f"{output.dac_bits} bits"
     share = 100.0 * (found.highest_code - found.lowest_code + 1) / (1 << output.dac_bits)
     return f"{found.lowest_code}..{found.highest_code}, {share:.3g} % of the converter's {output.dac_bits} bits"
+
+
+def _table(axis: str, entry: ManifestAxis) -> list[tuple[TableCell, ...]]:
+    """A table that the build chose."""
+    table = entry.table
+    if table.asked is None:
+        return []
+    wanted = f"the least memory within {table.asked.max_error_lsb:g} LSB"
+    played = f"{len(table.words)} words of {table.bits} bits, {table.mode}: {len(table.words) * table.bits} bits"
+    return [row(f"{axis} table", wanted, played)]
 
 
 def _settles(line: LinePlan, subject: Subject) -> list[tuple[TableCell, ...]]:

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from tablegen.certificate.excess import LARGEST_PERCENT
 from tablegen.config.schema import Limits
-from tablegen.manifest.fields import ManifestAxis, ManifestCertificate, ManifestFigure
+from tablegen.manifest.fields import ManifestAxis, ManifestCertificate, ManifestFigure, ManifestShaped
 from tablegen.report.blocks import Grid, Paragraph, Section, TableCell, row
 from tablegen.report.subject import PlannedScan, Subject
 from tablegen.report.words import figure
@@ -47,9 +47,12 @@ def _slew(planned: PlannedScan | None, axis: str) -> float | None:
 
 def _rows(entry: ManifestAxis, limits: Limits, slew: float | None) -> list[tuple[TableCell, ...]]:
     found, output = entry.certificate, entry.output
-    rows = [_bounded("largest error of a code", found.max_error_lsb, limits.max_error_lsb, "LSB")]
+    of = "a code" if found.shaped is None else "the position"
+    rows = [_bounded(f"largest error of {of}", found.max_error_lsb, limits.max_error_lsb, "LSB")]
     if found.rms_error_lsb is not None:
-        rows.append(row("rms error of a code", f"{found.rms_error_lsb:.3f} LSB", "", ""))
+        rows.append(row(f"rms error of {of}", f"{figure(found.rms_error_lsb, 3)} LSB", "", ""))
+    if found.shaped is not None:
+        rows += _shaped(found.shaped)
     for side, error in (found.scaling_error_percent or {}).items():
         most = limits.max_scaling_error_percent
         worst = max(error.get("total", 0.0), error.get("band_limit", 0.0))
@@ -72,6 +75,19 @@ def _rows(entry: ManifestAxis, limits: Limits, slew: float | None) -> list[tuple
         rows.append(row("power beyond the cutoff", f"{found.beyond_cutoff_db:.1f} dB", "", ""))
     if found.at_resonance_db is not None:
         rows.append(row("power at the resonance", f"{found.at_resonance_db:.1f} dB", "", ""))
+    return rows
+
+
+def _shaped(shaped: ManifestShaped) -> list[tuple[TableCell, ...]]:
+    """What shaping is for, and what it costs, beside the same without it."""
+    now, before, rounded = shaped.changes, shaped.rounded.changes, shaped.rounded
+    rows = [row("the same without shaping", f"{figure(rounded.rms_error_lsb, 3)} LSB rms", "", "")]
+    for side, value in rounded.scaling_error_percent.items():
+        rows.append(row(f"scaling error {side} without shaping", f"{figure(value, 4)} %", "", ""))
+    errors = f"{figure(shaped.max_code_error_lsb, 3)} LSB, rms {figure(shaped.rms_code_error_lsb, 3)} LSB"
+    rows.append(row("largest error of a code", errors, "", ""))
+    text = f"{now.percent:.3g} % of ticks, by {now.mean_step:.3g} codes; without shaping {before.percent:.3g} %"
+    rows.append(row("codes change on", f"{text}, by {before.mean_step:.3g}", "", ""))
     return rows
 
 

@@ -43,7 +43,7 @@ def _spectrum(axis: str, entry: ManifestAxis) -> Chart:
     last = series.harmonics * rate
     ticks = entry.line.ticks
     if ticks <= _MOST_SPECTRUM_TICKS:
-        codes = entry.program.codes(np.arange(ticks, dtype=np.int64)) * entry.output.v_per_code
+        codes = entry.program.played(0, ticks) * entry.output.v_per_code
         found = np.abs(np.fft.rfft(codes - np.mean(codes))[1:]) ** 2 / ticks**2 * 4.0 / entry.drive.v_amplitude**2
         noise = np.arange(1, len(found) + 1) > series.harmonics
         f, worst = _worst_of_bins(np.arange(1.0, len(found) + 1.0)[noise] * rate, found[noise] / first)
@@ -91,10 +91,10 @@ def quantisation(subject: Subject) -> Section:
     charts = []
     for axis, entry in subject.axes:
         k = _looked_at(entry.program)
-        error = entry.program.codes(k) - entry.asked(k)
+        shaped = entry.output.shaping is not None
+        error = (entry.program.played(0, len(k)) if shaped else entry.program.codes(k)) - entry.asked(k)
         period_s = entry.line.rate_exact[1] / entry.line.rate_exact[0]
         times, unit = (1e3, "ms") if period_s < 1.0 else (1.0, "s")
-        worst = entry.certificate.max_error_lsb
         charts.append(
             Chart(
                 f"quantisation-{axis}",
@@ -102,7 +102,7 @@ def quantisation(subject: Subject) -> Section:
                 f"time [{unit}]",
                 "error [LSB]",
                 (DrawnCurve("emitted less asked", "other", times * period_s * k / entry.line.ticks, error),),
-                marks=tuple(Mark(at, f"certified {worst:.3f}" if at > 0 else "", "y") for at in (worst, -worst)),
+                marks=() if shaped else _certified(entry.certificate.max_error_lsb),
                 x_range=(0.0, times * period_s),
             )
         )
@@ -119,8 +119,18 @@ def quantisation(subject: Subject) -> Section:
                 y_range=(0.0, 1.1 * float(np.max(share))),
             )
         )
-    thinned = [axis for axis, entry in subject.axes if entry.line.ticks > _MOST_TICKS]
-    words = [f"Of {axis} only some ticks are drawn; the certificate has all of them." for axis in thinned]
+    thinned = [(axis, entry) for axis, entry in subject.axes if entry.line.ticks > _MOST_TICKS]
+    words = [
+        f"Of {axis} only some ticks are drawn; the certificate has all of them."
+        if entry.output.shaping is None
+        else f"Of {axis} only the first {_MOST_TICKS} ticks are drawn."
+        for axis, entry in thinned
+    ]
+    words += [
+        f"The codes of {axis} are shaped: they err by more than rounded ones, where the piezo does not follow."
+        for axis, entry in subject.axes
+        if entry.output.shaping is not None
+    ]
     return Section(
         "quantisation",
         "Quantisation",
@@ -129,9 +139,16 @@ def quantisation(subject: Subject) -> Section:
     )
 
 
+def _certified(worst: float) -> tuple[Mark, ...]:
+    return tuple(Mark(at, f"certified {worst:.3f}" if at > 0 else "", "y") for at in (worst, -worst))
+
+
 def _looked_at(program: Program) -> Ints:
-    """All ticks of a period, or of a long one as many, evenly spread and at odd distances, so that no beat hides."""
-    if program.ticks <= _MOST_TICKS:
-        return np.arange(program.ticks, dtype=np.int64)
+    """All ticks of a period, or of a long one as many, evenly spread and at odd distances, so that no beat hides.
+
+    Of a long one that is shaped the first ones: its codes need all before them.
+    """
+    if program.ticks <= _MOST_TICKS or program.output.shaping.order:
+        return np.arange(min(program.ticks, _MOST_TICKS), dtype=np.int64)
     count = 1 << 13
     return (np.arange(count, dtype=np.int64) * program.ticks) // count

@@ -7,6 +7,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from tablegen.emit.constants import DEGREES
 from tablegen.fixedpoint.program import Program
 from tablegen.resources import verilog_runtime
 from tablegen.verification.simulate import Compiled, Design, SimulationFailed, compile_design
@@ -45,7 +46,7 @@ class SequencerShape:
 
 def _table(programs: tuple[Program, ...]) -> tuple[int, int, int]:
     longest = max(len(program.words) for program in programs)
-    return int(programs[0].mode == "interpolated"), max((longest - 1).bit_length(), 2), programs[0].bits
+    return DEGREES[programs[0].mode], max((longest - 1).bit_length(), 2), programs[0].bits
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from tablegen.emit.constants import DEGREES
 from tablegen.fixedpoint.synthesis import sine_periods
 from tablegen.numerics.arrays import Ints
 from tablegen.resources import c_runtime
@@ -22,6 +23,7 @@ BENCH = (_HERE / "stream_bench.c", _HERE / "stream_bench.h")
 HOST = _HERE / "stream_bench_host.c"
 _SHAPE, _SINE = 5 << 60, 2 << 60 | 5 << 48
 HASH_DIGITS = 64
+CUBIC = DEGREES["cubic"]
 OPTIONS = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wsign-conversion", "-Werror")
 
 
@@ -59,6 +61,8 @@ def defines(shape: SequencerShape, fill: int = 0) -> dict[str, int]:
         "DAC_TABLE_STORAGE_BITS": storage_bits(max(shape.x_word_bits, shape.y_word_bits)),
         "DAC_OUTPUT_STORAGE_BITS": storage_bits(shape.dac_bits),
     }
+    if CUBIC in (shape.x_interpolated, shape.y_interpolated):
+        chosen["DAC_SPLINE"] = 1
     return chosen | ({"BENCH_FILL": fill} if fill else {})
 
 
@@ -74,6 +78,7 @@ def script_words(script: Script, shape: SequencerShape, sine: Ints | None = None
         getattr(shape, f"{axis}_index_bits") if getattr(shape, f"{axis}_interpolated") else 0 for axis in "xy"
     )
     word = shape.dac_bits | shape.x_word_bits << 5 | x_index << 10 | shape.y_word_bits << 15 | y_index << 20
+    word |= (shape.x_interpolated == CUBIC) << 25 | (shape.y_interpolated == CUBIC) << 26
     first = [_SHAPE | word, script.power_up[0] | script.power_up[1] << 24]
     if sine is not None:
         first += [_SINE | at << 32 | int(value) & 0xFFFFFFFF for at, value in enumerate(sine)]
@@ -108,8 +113,13 @@ class CBench:
         sources: Sequence[Path] | None = None,
         fill: int = 0,
         chosen: Mapping[str, int] | None = None,
+        objects: Path | None = None,
     ) -> None:
-        """``sources`` in place of the shipped runtime; what is ``chosen`` in place of what suits the shape."""
+        """``sources`` in place of the shipped runtime; what is ``chosen`` in place of what suits the shape.
+
+        Where there are ``objects``, a directory, the sources are compiled into it, or are there already: from a bench
+        with the same choices but ``fill``, which no source asks for.
+        """
         command = require_compiler(compiler)
         runtime = list(c_runtime() if sources is None else sources)
         folder.mkdir(parents=True, exist_ok=True)
@@ -119,14 +129,15 @@ class CBench:
             *command,
             *options,
             *(f"-D{name}={value}" for name, value in (defines(shape, fill) if chosen is None else chosen).items()),
-            *(f"-I{place}" for place in sorted({str(path.parent) for path in (*runtime, *BENCH)})),
-            *(str(path) for path in (*runtime, BENCH[0], HOST) if path.suffix == ".c"),
-            "-o",
-            str(self.program),
+            *(f"-I{place}" for place in sorted({str(path.parent.absolute()) for path in (*runtime, *BENCH)})),
         ]
-        done = subprocess.run(line, capture_output=True, text=True, check=False)
-        if done.returncode or done.stderr:
-            raise SimulationFailed(f"{' '.join(line)}\n{done.stdout}{done.stderr}".strip())
+        parts = [path.absolute() for path in runtime if path.suffix == ".c"]
+        if objects is not None:
+            if not objects.is_dir():
+                objects.mkdir()
+                _compile([*line, "-c", *map(str, parts)], objects)
+            parts = sorted(objects.glob("*.o"))
+        _compile([*line, *map(str, (*parts, BENCH[0], HOST)), "-o", str(self.program)])
 
     def play(self, script: Script, fourier: bool = False) -> CPlayed:
         """Run a script; raises ``SimulationFailed`` where the bench ends before its script."""
@@ -136,11 +147,19 @@ class CBench:
         """The same for a script as ``script_words`` makes it; a bench fails that takes longer, in seconds."""
         try:
             done = subprocess.run(
-                [str(self.program)], input=words, capture_output=True, text=True, check=False, timeout=timeout
+                [str(self.program)], input=words.encode("ascii"), capture_output=True, check=False, timeout=timeout
             )
         except subprocess.TimeoutExpired:
             raise SimulationFailed(f"the bench did not end in {timeout:.0f} s") from None
         if done.returncode:
-            raise SimulationFailed(done.stderr.strip() or f"the bench ended with status {done.returncode}")
-        capture = np.frombuffer(bytes.fromhex(done.stdout), dtype=">u8").astype(np.uint64)
-        return CPlayed.of(capture, words, self._constants)
+            raise SimulationFailed(
+                done.stderr.decode("utf-8", "replace").strip() or f"the bench ended with status {done.returncode}"
+            )
+        return CPlayed.of(np.frombuffer(done.stdout, dtype="<u8"), words, self._constants)
+
+
+def _compile(line: list[str], place: Path | None = None) -> None:
+    """Run a compiler, in a directory if one is given; raises ``SimulationFailed`` with all that it says."""
+    done = subprocess.run(line, capture_output=True, text=True, check=False, cwd=place)
+    if done.returncode or done.stderr:
+        raise SimulationFailed(f"{' '.join(line)}\n{done.stdout}{done.stderr}".strip())

@@ -6,6 +6,7 @@ twice, a tick a call (``dac_sequencer_step``) and many ticks a call (``dac_seque
 
 import os
 import shlex
+import shutil
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -19,8 +20,9 @@ from tablegen.emit.stored import stored_content
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.program import Program
 from tablegen.manifest.read import NotABuild, StoredBuild
+from tablegen.reading import BUILD_FILE, read_bytes
 from tablegen.verification import worker
-from tablegen.verification.bench import CAPTURE, SCRIPT, SequencerShape
+from tablegen.verification.bench import SCRIPT, SequencerShape
 from tablegen.verification.build import Outcome, PlayJob, differing_check
 from tablegen.verification.c_bench import CBench, CPlayed, require_compiler, script_words, storage_bits
 from tablegen.verification.capture import make_capture
@@ -38,7 +40,7 @@ from tablegen.verification.directory import copies, some
 from tablegen.verification.placement import Placement
 from tablegen.verification.session import make_session
 from tablegen.verification.simulate import SimulationFailed
-from tablegen.verification.stream import Script, Words, read_capture, read_states
+from tablegen.verification.stream import Script, Words, read_states
 
 _UNTOLD = ("armed", "running")  # what the status of the C sequencer does not tell
 _MAX_TABLE_WORDS = 1 << 17  # words of a direct table that dac_sequencer_load() accepts
@@ -71,7 +73,7 @@ class CTarget:
                     f"{folder}: the table of {name} has {len(axis.table.words)} words, the C sequencer plays at most "
                     f"{_MAX_TABLE_WORDS}; mode = 'interpolated' needs fewer"
                 )
-        if self.fourier and not any(axis.table.mode == "interpolated" for _, axis in stored.axes):
+        if self.fourier and not any(axis.table.mode != "direct" for _, axis in stored.axes):
             raise NotABuild(
                 f"{folder}: both tables are direct, and no device renders those; verify it without --fourier"
             )
@@ -136,10 +138,12 @@ class CTarget:
     def _defines(self, stored: StoredBuild) -> dict[str, int]:
         """What a firmware for this build is compiled with, and what the bench is."""
         axes = [axis for _, axis in stored.axes]
-        rendered = [len(axis.table.words) for axis in axes if self.fourier and axis.table.mode == "interpolated"]
+        rendered = [len(axis.table.words) for axis in axes if self.fourier and axis.table.mode != "direct"]
         return {
             "DAC_TABLE_STORAGE_BITS": storage_bits(max(axis.table.bits for axis in axes)),
             "DAC_OUTPUT_STORAGE_BITS": storage_bits(max(axis.output.word_bits for axis in axes)),
+            **({"DAC_SPLINE": 1} if any(axis.table.mode == "cubic" for axis in axes) else {}),
+            **({"DAC_SHAPING": order} if (order := _highest_order(stored)) else {}),
             "BENCH_EMITTED": 1,
             "BENCH_TABLE_WORDS": max([*rendered, *map(_variation_words, (stored.program.x, stored.program.y))]),
             "BENCH_CONSTANTS": len(scan_constants(stored_content(stored))),
@@ -153,9 +157,14 @@ def header_constants(content: Content) -> dict[str, int]:
     return own | digits
 
 
+def _highest_order(stored: StoredBuild) -> int:
+    """What the runtime of a build that shapes is compiled for."""
+    return max(program.output.shaping.order for program in (stored.program.x, stored.program.y))
+
+
 def _variation_words(own: Program) -> int:
     """Words that the table of a variation may have."""
-    return len(own.words) if own.mode == "interpolated" else max(len(own.words), 8)
+    return len(own.words) if own.mode != "direct" else max(len(own.words), 8)
 
 
 def _states(script: Script, played: CPlayed) -> Check:
@@ -175,16 +184,21 @@ def play_job(folder: Path, job: dict[str, Any]) -> dict[str, Any]:
 
         played = CortexMBench(shape, place, None, _options(), sources, fill, defines).run(text)
     else:
-        bench = CBench(shape, place, _compiler(), _options(os.environ.get("CFLAGS", "")), sources, fill, defines)
+        objects = folder / "objects"
+        if not fill:  # the first; a directory that is kept may have those of another build
+            shutil.rmtree(objects, ignore_errors=True)
+        bench = CBench(
+            shape, place, _compiler(), _options(os.environ.get("CFLAGS", "")), sources, fill, defines, objects
+        )
         played = bench.run(text, timeout=60.0 + job["ticks"] / _MIN_TICKS_PER_SECOND)
-    (folder / _record_of(fill)).write_text(played.capture.astype(">u8").tobytes().hex("\n", 8) + "\n", "ascii")
+    (folder / _record_of(fill)).write_bytes(played.capture.tobytes())
     return {"counts": played.counts, "states": played.states, "constants": played.constants}
 
 
 def _played(work: Path, job: dict[str, Any]) -> CPlayed:
     """What the bench stored, two words a tick, counts of faults, states, and the constants of the header."""
     status = worker.run(work, __name__, job)
-    return CPlayed(read_capture(work / _record_of(job["fill"])), **status)
+    return CPlayed(np.frombuffer(read_bytes(work / _record_of(job["fill"]), BUILD_FILE), dtype=np.uint64), **status)
 
 
 def _sources(folder: Path, work: Path, stored: StoredBuild, fourier: bool) -> tuple[list[Path], list[str]]:
@@ -213,7 +227,7 @@ def _options(flags: str = "") -> list[str]:
 
 
 def _record_of(fill: int) -> str:
-    return f"fill_{CAPTURE}" if fill else f"step_{CAPTURE}"
+    return "fill_capture.bin" if fill else "step_capture.bin"
 
 
 def _bench_program(stored: StoredBuild, fourier: bool) -> str:
@@ -229,7 +243,7 @@ def _bench_program(stored: StoredBuild, fourier: bool) -> str:
     ]
     rendered = []
     for axis, content in stored.axes:
-        rendered.append(fourier and content.table.mode == "interpolated")
+        rendered.append(fourier and content.table.mode != "direct")
         of = f"{capital}_{axis.upper()}"
         words = f"{name}_{axis}_fourier, {of}_HARMONICS" if rendered[-1] else "NULL, 0"
         lines += [

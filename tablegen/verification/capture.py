@@ -5,8 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from tablegen.device.dual_program import DualProgram
+from tablegen.fixedpoint.program import Program
 from tablegen.manifest.read import StoredBuild
 from tablegen.numerics.arrays import Bools, Ints
+from tablegen.verification.shaped import shaped_codes
 from tablegen.verification.stream import FLAGS, Script, Words
 
 UNDEFINED = np.uint64((1 << 64) - 1)  # how a capture is read where the simulator has an unknown bit
@@ -17,14 +19,15 @@ _MASK = {"x": (0, 0xFFFFFF), "y": (24, 0xFFFFFF), "markers": (48, 0xFF), "faults
 class Capture:
     """The words that left the device, those of the model, and where in its program the model was.
 
-    ``place`` is the tick of the frame, -1 where nothing plays. ``which`` is the program in the bank, by its number in
-    ``programs``; the first is none. ``steady`` says where the output had caught up with it, ``own`` where it is the
-    program of the build.
+    ``place`` is the tick of the frame, -1 where nothing plays, and ``since`` the tick since the program began.
+    ``which`` is the program in the bank, by its number in ``programs``; the first is none. ``steady`` says where the
+    output had caught up with it, ``own`` where it is the program of the build.
     """
 
     got: Words
     wanted: Words
     place: Ints
+    since: Ints
     which: Ints
     steady: Bools
     own: Bools
@@ -66,17 +69,20 @@ def make_capture(stored: StoredBuild, script: Script, got: Words) -> Capture:
     which = np.searchsorted(firsts, index, side="right") - 1
     steady = np.zeros(len(wanted), dtype=np.bool_)
     own = np.zeros(len(wanted), dtype=np.bool_)
+    since = np.zeros(len(wanted), dtype=np.int64)
     for number, (first, stop) in enumerate(zip(firsts, [*firsts[1:], len(wanted)], strict=True)):
         program = programs[number]
         if program is None:
             continue
         own[first:stop] = program is stored.program
-        steady[first:stop] = _caught_up(program, place[first:stop], wanted[first:stop])
+        since[first:stop] = _since_begin(program, place[first:stop])
+        steady[first:stop] = _caught_up(program, place[first:stop], since[first:stop], wanted[first:stop])
     length = min(len(wanted), len(got))
     return Capture(
         got[:length],
         wanted[:length],
         place[:length],
+        since[:length],
         which[:length],
         steady[:length],
         own[:length],
@@ -85,17 +91,26 @@ def make_capture(stored: StoredBuild, script: Script, got: Words) -> Capture:
     )
 
 
-def _caught_up(program: DualProgram, place: Ints, wanted: Words) -> Bools:
-    """Where the codes of the model had caught up with one program, which nothing interrupts but rests and starts."""
-    if not len(place):
-        return np.zeros(0, dtype=np.bool_)
-    frame_ticks = program.schedule.frame_ticks
+def _since_begin(program: DualProgram, place: Ints) -> Ints:
+    """Ticks since one program began, which nothing interrupts but rests and starts."""
     # A scan begins where a frame does and the tick before was not the last of one.
-    begins = (place == 0) & (np.concatenate([[-1], place[:-1]]) != frame_ticks - 1)
+    begins = (place == 0) & (np.concatenate([[-1], place[:-1]]) != program.schedule.frame_ticks - 1)
+    index = np.arange(len(place))
+    return index - np.maximum.accumulate(np.where(begins, index, 0))
+
+
+def _caught_up(program: DualProgram, place: Ints, since: Ints, wanted: Words) -> Bools:
+    """Where the codes of the model had caught up with one program."""
     reached = place >= 0
     for axis, one in (("x", program.x), ("y", program.y)):
-        reached[reached] = one.codes(place[reached] % one.ticks) == part(axis, wanted)[reached]
+        reached[reached] = _codes(one, place[reached], since[reached]) == part(axis, wanted)[reached]
     index = np.arange(len(place))
-    begun = np.maximum.accumulate(np.where(begins, index, 0))
     # Caught up is for good: one right tick since the program began, this one included, is enough.
-    return (place >= 0) & (np.maximum.accumulate(np.where(reached, index, -1)) >= begun)
+    return (place >= 0) & (np.maximum.accumulate(np.where(reached, index, -1)) >= index - since)
+
+
+def _codes(program: Program, place: Ints, since: Ints) -> Ints:
+    """The codes at ticks of a frame, and since the program began."""
+    if not program.output.shaping.order:
+        return program.codes(place % program.ticks)
+    return shaped_codes(program, int(np.max(since, initial=-1)) + 1)[since]

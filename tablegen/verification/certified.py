@@ -5,13 +5,14 @@ the ways in which the build measures itself.
 """
 
 from collections.abc import Mapping
-from math import log10, tau
+from math import floor, log10, tau
 
 import numpy as np
 
 from tablegen.fixedpoint.runs import runs_of
 from tablegen.manifest.fields import ManifestAxis, ManifestSeries
 from tablegen.numerics.arrays import Floats, Ints
+from tablegen.verification.shaped import MOST_TICKS, ShapedPlay, code_excess, step_excess
 
 _MOST_ADVANCES = 1 << 22  # of a period whose every advance is looked at
 _SLOPE_POINTS = 32  # per period of the highest harmonic
@@ -55,7 +56,7 @@ class PlayedPeriod:
     """The codes of a period, and how far they are from the waveform, at ticks."""
 
     def __init__(self, axis: ManifestAxis) -> None:
-        self.axis, self.program = axis, axis.program
+        self.axis, self.program = axis, axis.program.rounded
         self.runs = runs_of(self.program)
         self.is_whole = self.program.phase.ticks <= _MOST_ADVANCES
         points = self.program.phase.ticks if self.is_whole else _GRID
@@ -63,10 +64,23 @@ class PlayedPeriod:
         self._asked = (drive.v_offset + drive.v_amplitude * (w - 0.5) - output.v_zero) / output.v_per_code
         self._slope = np.zeros(0) if self.is_whole else on_grid(played_series(axis), points, 1)
 
+    def shaped_by(self, update_rate_hz: float) -> ShapedPlay | None:
+        """What is played of a shaped axis; None of any other."""
+        if self.axis.output.shaping is None:
+            return None
+        ticks = np.arange(min(self.program.ticks, MOST_TICKS), dtype=np.int64)
+        asked = self.runs.at(ticks) - self.errors(ticks)
+        return ShapedPlay(self.axis, asked, update_rate_hz)
+
     @property
     def codes_per_unit(self) -> float:
         """Codes that w = 0 and w = 1 are apart."""
         return self.axis.drive.v_amplitude / self.axis.output.v_per_code
+
+    @property
+    def edges(self) -> Ints:
+        """Ticks at which a run of one code begins or ends."""
+        return np.union1d(self.runs.starts, self.runs.lasts)
 
     def errors(self, k: Ints) -> Floats:
         """Code less the unrounded code of the waveform, at ticks k, of any period."""
@@ -105,8 +119,8 @@ class PlayedPeriod:
         before = np.floor((near + inside) / _GRID * self.program.ticks).astype(np.int64)
         return np.unique(np.concatenate([before, before + 1]) % self.program.ticks)
 
-    def figures(self, rate_hz: float) -> dict[str, float | int | None]:
-        """All figures but those of the scaling error."""
+    def figures(self, rate_hz: float, shaped: ShapedPlay | None = None) -> dict[str, float | int | None]:
+        """All figures but those of the scaling error; where the position cannot be known, without its errors."""
         axis, runs, output = self.axis, self.runs, self.axis.output
         codes, share = runs.codes, runs.lengths / runs.ticks
         largest, mean, square = self.error_moments()
@@ -114,8 +128,11 @@ class PlayedPeriod:
         power = max(float(np.sum(share * centred**2)), _LEAST_POWER)
         points = _SLOPE_POINTS * axis.fourier.harmonics
         slope = float(np.max(np.abs(on_grid(played_series(axis), points, 1))))
-        low, high = int(codes.min()), int(codes.max())
-        return {
+        beyond = floor(code_excess(axis) + 0.5) if shaped is not None else 0
+        low = max(int(codes.min()) - beyond, output.code_min)
+        high = min(int(codes.max()) + beyond, output.code_max)
+        noise = square - mean * mean if shaped is None else float(np.var(shaped.code_errors))
+        found: dict[str, float | int | None] = {
             "ticks": runs.ticks,
             "max_error_lsb": largest,
             "rms_error_lsb": float(np.sqrt(square)),
@@ -123,27 +140,42 @@ class PlayedPeriod:
             "highest_code": high,
             "headroom_low": low - output.code_min,
             "headroom_high": output.code_max - high,
-            "largest_step": int(np.max(np.abs(codes - np.roll(codes, 1)))),
+            "largest_step": int(np.max(np.abs(codes - np.roll(codes, 1)))) + step_excess(axis),
             "max_step": output.max_step,
             "peak_slew_v_per_s": axis.drive.v_amplitude * slope * rate_hz,
-            "beyond_cutoff_db": self._beyond_cutoff(square - mean * mean, power),
-            "at_resonance_db": self._at_resonance(rate_hz, power),
+            "beyond_cutoff_db": self._beyond_cutoff(noise, power),
+            "at_resonance_db": self._at_resonance(rate_hz, power, shaped),
         }
+        if shaped is not None:
+            errors = shaped.position_errors
+            del found["max_error_lsb"], found["rms_error_lsb"]
+            if errors is not None:
+                found |= {"max_error_lsb": float(np.max(np.abs(errors)))}
+                found |= {"rms_error_lsb": float(np.sqrt(np.mean(errors * errors)))}
+        return found
+
+    def largest_code_error(self) -> float:
+        """No code of this axis is further from the waveform than this, in LSB, shaped or not."""
+        shaped = 0.0 if self.axis.output.shaping is None else 0.5 + code_excess(self.axis)
+        return self.error_moments()[0] + shaped
 
     def _beyond_cutoff(self, square: float, power: float) -> float | None:
         return None if self.axis.resting else 10.0 * log10(max(square, _LEAST_POWER) / power)
 
-    def _at_resonance(self, rate_hz: float, power: float) -> float | None:
+    def _at_resonance(self, rate_hz: float, power: float, shaped: ShapedPlay | None) -> float | None:
         resonance, ticks = self.axis.drive.resonance, self.program.ticks
         if resonance is None or ticks > _MOST_ADVANCES:
             return None
+        codes = np.repeat(self.runs.codes, self.runs.lengths)
+        if shaped is not None and shaped.is_whole:
+            codes = shaped.codes
+            rate_hz, ticks = rate_hz * ticks / len(codes), len(codes)
         last = (ticks - 1) // 2
         centre, half = resonance.hz / rate_hz, resonance.half_width_hz / rate_hz
         if round(centre) > last:
             return None
         n = slice(max(1, round(centre - half)), min(last, round(centre + half)) + 1)
-        codes = np.repeat(self.runs.codes, self.runs.lengths) - float(self.runs.codes[0])
-        inside = 2.0 * float(np.sum(np.abs(np.fft.rfft(codes)[n] / ticks) ** 2))
+        inside = 2.0 * float(np.sum(np.abs(np.fft.rfft(codes - float(self.runs.codes[0]))[n] / ticks) ** 2))
         return 10.0 * log10(max(inside, _LEAST_POWER) / power)
 
 

@@ -10,6 +10,7 @@ from tablegen.manifest.fields import ManifestAxis
 from tablegen.manifest.read import StoredBuild
 from tablegen.numerics.arrays import Floats, Ints
 from tablegen.verification.capture import UNDEFINED, Capture, part, without_faults
+from tablegen.verification.shaped import shaped_codes
 from tablegen.verification.stream import FAULTS, FLAGS, STATES, Sample, StoredState
 
 _FLOAT_TOLERANCE_LSB = 1e-6  # the last bits of two ways to evaluate the float waveform
@@ -82,7 +83,25 @@ def _model(capture: Capture, subject: str) -> Check:
 
 def check_waveform(capture: Capture, stored: StoredBuild, limits: Mapping[str, float]) -> list[Check]:
     """Codes of the build's program against the float waveform; ``limits`` of x and y in LSB."""
-    return [_float(capture, axis, content, limits[axis]) for axis, content in stored.axes]
+    checks = [_float(capture, axis, content, limits[axis]) for axis, content in stored.axes]
+    return checks + [_shaped(capture, axis, content) for axis, content in stored.axes if content.output.shaping]
+
+
+def _shaped(capture: Capture, axis: Literal["x", "y"], content: ManifestAxis) -> Check:
+    """Codes of the build's program against shaped ones that were worked out in another way than the model's."""
+    at = np.flatnonzero(capture.own & capture.steady & capture.known)
+    since = capture.since[at]
+    wanted = shaped_codes(content.program, int(np.max(since, initial=-1)) + 1)[since]
+    got = part(axis, capture.got)[at]
+    wrong = np.flatnonzero(got != wanted)
+    failure = None
+    if len(wrong):
+        first = int(wrong[0])
+        failure = (
+            f"{axis}: {len(wrong)} of {len(at)} shaped codes are others, the first at "
+            f"{_where(capture, int(at[first]))}: expected {wanted[first]}, got {got[first]}"
+        )
+    return Check(axis, "shaped codes", f"{len(at)} codes", f"{len(wrong)} differ", "0", failure, exercised=len(at) > 0)
 
 
 def _float(capture: Capture, axis: Literal["x", "y"], content: ManifestAxis, limit: float) -> Check:

@@ -7,7 +7,9 @@ import numpy as np
 
 from tablegen.fixedpoint.interpolation import guard_bits
 from tablegen.fixedpoint.output import UNIT_GAIN_BITS
+from tablegen.fixedpoint.program import sample_gain
 from tablegen.fixedpoint.rounding import round_number
+from tablegen.fixedpoint.spline_words import spline_factors
 from tablegen.fixedpoint.synthesis import FourierWords, encode, synthesize
 from tablegen.manifest.fields import CONVERTER_KEYS, Manifest, ManifestAxis
 from tablegen.manifest.read import StoredBuild
@@ -95,7 +97,7 @@ def _axis(manifest: Manifest, name: str, axis: ManifestAxis) -> Found:
     low, high = fourier.window
     rate = Fraction(*manifest.sequence.update_rate_hz) / line.ticks
     amplitude = 0.5 * drive.v_amplitude / output.v_per_code
-    unit = abs(amplitude) * 2.0 ** (UNIT_GAIN_BITS + 1 - output.dac_bits)
+    unit = sample_gain(table.mode) * abs(amplitude) * 2.0 ** (UNIT_GAIN_BITS + 1 - output.dac_bits)
     offset = round_number((drive.v_offset - output.v_zero) / output.v_per_code * float(1 << output.gain_q))
     middle = axis.program.output.offset_code
     words = _fourier_words(axis)
@@ -137,7 +139,11 @@ def _close(a: float, b: float) -> bool:
 def _fourier_words(axis: ManifestAxis) -> FourierWords | None:
     fourier = axis.fourier
     try:
-        return encode(fourier.a0, np.array(fourier.a), np.array(fourier.b), axis.table.scale)
+        a, b = np.array(fourier.a), np.array(fourier.b)
+        if axis.table.mode == "cubic":
+            real, imaginary = spline_factors(len(a), len(axis.table.words))
+            a, b = a * real + b * imaginary, b * real - a * imaginary
+        return encode(fourier.a0, a, b, axis.table.scale)
     except OverflowError:
         return None
 

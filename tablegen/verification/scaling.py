@@ -5,16 +5,17 @@ its beta and u_peak. An operator's waveform is its own shape: such a line has no
 figure is.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import ceil, cos, floor, pi, sin
 
 import numpy as np
 
 from tablegen.manifest.fields import ManifestAxis, ManifestBranch, ManifestSeries
-from tablegen.numerics.arrays import Floats
+from tablegen.numerics.arrays import Floats, Ints
 from tablegen.problems import shortened
 from tablegen.verification.certified import PlayedPeriod, at, on_grid, played_series
+from tablegen.verification.shaped import ShapedPlay
 
 CHORD = 0.05  # share of the line
 OPERATOR = "operator"  # the model whose waveform was found, not worked out of an equation
@@ -167,12 +168,49 @@ def reached(axis: ManifestAxis) -> ManifestSeries:
     return _times(target, factor, np.zeros(len(factor)))
 
 
-def scaling_figures(axis: ManifestAxis, period: PlayedPeriod) -> dict[str, dict[str, float]]:
-    """The parts of the scaling error of each direction that is imaged, in percent; none of an axis at rest."""
+def scaling_figures(
+    axis: ManifestAxis, period: PlayedPeriod, shaped: ShapedPlay | None = None
+) -> dict[str, dict[str, float]]:
+    """The parts of the scaling error of each direction that is imaged, in percent; none of an axis at rest.
+
+    Of a shaped axis they are those of its position, the worst of what was judged; without what cannot be known of it.
+    """
     if axis.resting:
         return {}
     sides = ("forward", "backward") if axis.fourier.directions == "both" else ("forward",)
-    return {side: _direction(axis, period, side) for side in sides}
+    found = {side: _direction(axis, [period], side) for side in sides}
+    if shaped is None or not shaped.is_whole:
+        return found
+    if shaped.position_errors is None:
+        return {
+            side: {name: one[name] for name in one.keys() - {"total", "quantisation"}} for side, one in found.items()
+        }
+    every: list[PlayedPeriod | PositionErrors] = [PositionErrors(period, errors) for errors in shaped.position_errors]
+    return {side: _direction(axis, every, side) for side in sides}
+
+
+def rounded_scaling(axis: ManifestAxis, period: PlayedPeriod, shaped: ShapedPlay) -> dict[str, float] | None:
+    """The total of each direction without shaping; None where it cannot be known."""
+    if not shaped.is_whole or axis.resting:
+        return {}
+    if shaped.rounded_errors is None:
+        return None
+    every: list[PlayedPeriod | PositionErrors] = [PositionErrors(period, errors) for errors in shaped.rounded_errors]
+    sides = ("forward", "backward") if axis.fourier.directions == "both" else ("forward",)
+    return {side: _direction(axis, every, side)["total"] for side in sides}
+
+
+class PositionErrors:
+    """Errors of the position at every tick of a period."""
+
+    def __init__(self, period: PlayedPeriod, errors: Floats) -> None:
+        self._errors = errors
+        self.codes_per_unit = period.codes_per_unit
+        self.edges = np.arange(len(errors), dtype=np.int64)
+
+    def errors(self, k: Ints) -> Floats:
+        """At ticks k, in LSB."""
+        return self._errors[k]
 
 
 def refinement_figures(axis: ManifestAxis) -> dict[str, dict[str, float]] | None:
@@ -202,7 +240,7 @@ def _sweep(axis: ManifestAxis, side: str) -> tuple[ModelBranch | WaveformBranch,
     return branch, position, 1.0 - position, turn + (1.0 - turn) * (1.0 - position)
 
 
-def _direction(axis: ManifestAxis, period: PlayedPeriod, side: str) -> dict[str, float]:
+def _direction(axis: ManifestAxis, periods: "Sequence[PlayedPeriod | PositionErrors]", side: str) -> dict[str, float]:
     branch, position, sweep, times = _sweep(axis, side)
     turn, (low, high) = axis.drive.turn, axis.fourier.window
     shape = branch.value(sweep) if side == "forward" else 1.0 - branch.value(sweep)
@@ -219,13 +257,13 @@ def _direction(axis: ManifestAxis, period: PlayedPeriod, side: str) -> dict[str,
             value - at(layer, times),
         )
     deviation = (value - shape) / steepness
-    total, noise = _chords(axis, period, side, position, deviation, steepness)
+    chords = [_chords(axis, period, side, position, deviation, steepness) for period in periods]
     triangle = 1.0 / branch.slope(branch.inverse(sweep))
     middle = 1.0 / branch.slope(branch.inverse(np.array([0.5])))[0]
     return {
-        "total": _peak_to_peak(total),
+        "total": max(_peak_to_peak(total) for total, _ in chords),
         "band_limit": _peak_to_peak(target_slope / ideal),
-        "quantisation": _peak_to_peak(noise),
+        "quantisation": max(_peak_to_peak(noise) for _, noise in chords),
         "model": _peak_to_peak((arrived_slope - target_slope) / ideal),
         "size": 100.0 * float(deviation[-1] - deviation[0]) / (high - low),
         "uncompensated": _peak_to_peak(triangle / middle),
@@ -233,7 +271,12 @@ def _direction(axis: ManifestAxis, period: PlayedPeriod, side: str) -> dict[str,
 
 
 def _chords(
-    axis: ManifestAxis, period: PlayedPeriod, side: str, position: Floats, deviation: Floats, steepness: Floats
+    axis: ManifestAxis,
+    period: "PlayedPeriod | PositionErrors",
+    side: str,
+    position: Floats,
+    deviation: Floats,
+    steepness: Floats,
 ) -> tuple[Floats, Floats]:
     """Slope errors of chords of 1/20 of the line: of the codes, and of their rounding alone.
 
@@ -248,8 +291,7 @@ def _chords(
     length = max(1, min(round(CHORD * share * ticks), stop - first - 1))
     if stop - first < 2:
         return np.zeros(1), np.zeros(1)
-    edges = np.union1d(period.runs.starts, period.runs.lasts)
-    begins = np.union1d(edges, edges - length)
+    begins = np.union1d(period.edges, period.edges - length)
     begins = begins[(begins >= first) & (begins + length < stop)]
     if not len(begins):
         begins = np.array([first], dtype=np.int64)

@@ -6,6 +6,7 @@ description of what it does. ``stream_bench.v`` plays it and captures; ``compare
 
 import re
 from dataclasses import dataclass, field
+from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,7 @@ _REQUESTS = ("reset", "commit", "withdraw", "arm", "trigger", "park", "clear_fau
 _DRAIN_CLOCKS = 200  # more than any sample takes
 FLAGS = ("line", "frame", "pixel", "backward", "valid", "swapped", "playing", "parked")
 FAULTS = ("slew", "clamp", "overrun", "underrun")
+_flags_of = attrgetter(*FLAGS)
 _VALID = 1 << 48 + FLAGS.index("valid")
 _FAULTS_AT = 56
 STATES = ("writable", "refused", "committed", "armed", "running", "busy")
@@ -33,7 +35,7 @@ Words = NDArray[np.uint64]
 
 def pack(tick: Tick) -> int:
     """A tick as the bench captures it: faults, flags, y code, x code."""
-    flags = sum(1 << i for i, name in enumerate(FLAGS) if getattr(tick, name))
+    flags = sum(1 << i for i, flag in enumerate(_flags_of(tick)) if flag)
     return tick.faults.value << 56 | flags << 48 | tick.y << 24 | tick.x
 
 

@@ -18,7 +18,7 @@ enum { PAGE = 16, SCAN = 0, X = PAGE, Y = 2 * PAGE };                         /*
 enum { STATES = 64, STATE_WORDS = 3, WRITABLE = 1, REFUSED = 2, COMMITTED = 4 };  /* states */
 
 static dac_sequencer sequencer;
-static dac_word x_table[2][BENCH_TABLE_WORDS + 1], y_table[2][BENCH_TABLE_WORDS + 1];
+static dac_word x_table[2][BENCH_TABLE_WORDS + DAC_WORDS_BEHIND], y_table[2][BENCH_TABLE_WORDS + DAC_WORDS_BEHIND];
 
 static uint32_t period, until, ticks_due, commits_in;
 
@@ -98,8 +98,8 @@ static const dac_word *rendered(const dac_axis_program *p, const bench_axis *axi
     if (axis->fourier == NULL)
         return p->table;
     bench_check(p->length <= BENCH_TABLE_WORDS, "a table of this length");
-    bench_check(dac_synthesize(table, BENCH_TABLE_WORDS + 1, p->index_bits, p->bits, axis->fourier, axis->harmonics,
-                               bench_sine, bench_sine_index_bits), "dac_synthesize");
+    bench_check(dac_synthesize(table, BENCH_TABLE_WORDS + DAC_WORDS_BEHIND, p->index_bits & ~(unsigned)DAC_CUBIC, p->bits,
+                               axis->fourier, axis->harmonics, bench_sine, bench_sine_index_bits), "dac_synthesize");
     return table;
 }
 
@@ -131,8 +131,8 @@ static void render(dac_word *table, unsigned index_bits, unsigned bits, const in
     unsigned sine_index_bits = 0;
     while (UINT32_C(5) << sine_index_bits < 4 * sine_words)
         sine_index_bits++;
-    bench_check(dac_synthesize(table, BENCH_TABLE_WORDS + 1, index_bits, bits, fourier, harmonics, sine,
-                               sine_index_bits), "synthesize");
+    bench_check(dac_synthesize(table, BENCH_TABLE_WORDS + DAC_WORDS_BEHIND, index_bits & ~(unsigned)DAC_CUBIC, bits, fourier,
+                               harmonics, sine, sine_index_bits), "synthesize");
 }
 
 /* Converter and tables, before anything else. */
@@ -141,9 +141,9 @@ static void shape(uint64_t word)
     x_converter.bits = x_converter.word_bits = (uint8_t)(word & 31);
     y_converter = x_converter;
     x_bits = word >> 5 & 31;
-    x_index_bits = word >> 10 & 31;
+    x_index_bits = (word >> 10 & 31) | (word >> 25 & 1 ? DAC_CUBIC : 0);
     y_bits = word >> 15 & 31;
-    y_index_bits = word >> 20 & 31;
+    y_index_bits = (word >> 20 & 31) | (word >> 26 & 1 ? DAC_CUBIC : 0);
 }
 
 #endif
@@ -172,7 +172,7 @@ static dac_axis_program axis(unsigned page, dac_word *table, const dac_converter
     p.bits = (uint8_t)bits;
     p.index_bits = (uint8_t)index_bits;
     p.phase_period = r[2];
-    p.length = index_bits ? UINT32_C(1) << index_bits : r[2];
+    p.length = index_bits ? UINT32_C(1) << (index_bits & ~(unsigned)DAC_CUBIC) : r[2];
     p.hold_ticks = page == Y && registers[13] ? registers[0] : 1;
     p.gain_word = (int32_t)r[3];
     p.offset_word = (int64_t)(int32_t)r[5] * (INT64_C(1) << 18) + r[4];
@@ -185,6 +185,10 @@ static dac_axis_program axis(unsigned page, dac_word *table, const dac_converter
     p.word_bits = converter->word_bits;
     p.twos_complement = converter->twos_complement;
     p.left_aligned = converter->left_aligned;
+#if DAC_SHAPING
+    p.shaping_order = r[11] & 3;
+    p.shaping_zero = (uint8_t)(r[11] >> 8);
+#endif
     return p;
 }
 
@@ -199,11 +203,14 @@ static void written(dac_program *p, unsigned idle)
     p->schedule.up = window(8);
     p->schedule.down = window(10);
     p->schedule.pixels = registers[12];
+    bench_check(DAC_SHAPING || (registers[X + 11] == 0 && registers[Y + 11] == 0), "a runtime that shapes");
     p->x = axis(X, x_table[idle], &x_converter, x_bits, x_index_bits);
     p->y = axis(Y, y_table[idle], &y_converter, y_bits, y_index_bits);
     if (p->x.length <= BENCH_TABLE_WORDS && p->y.length <= BENCH_TABLE_WORDS) {
-        x_table[idle][p->x.length] = x_table[idle][0];
-        y_table[idle][p->y.length] = y_table[idle][0];
+        for (unsigned i = 0; i < DAC_WORDS_BEHIND; i++) {
+            x_table[idle][p->x.length + i] = x_table[idle][i];
+            y_table[idle][p->y.length + i] = y_table[idle][i];
+        }
     }
 #ifndef BENCH_EMITTED
     if (registers[X + 10] != 0)
@@ -219,7 +226,7 @@ static void load(uint32_t variation)
         "", "load: DAC_BUSY", "load: DAC_OTHER_CONVERTER",
         "load: DAC_BAD_SCHEDULE", "load: DAC_BAD_TABLE",
         "load: DAC_BAD_PERIOD", "load: DAC_BAD_OUTPUT",
-        "load: DAC_OTHER_STORAGE",
+        "load: DAC_OTHER_STORAGE", "load: DAC_BAD_SHAPING",
     };
     dac_program p;
     const unsigned idle = dac_sequencer_idle(&sequencer);

@@ -6,6 +6,7 @@ is long.
 
 from dataclasses import replace
 from fractions import Fraction
+from math import ceil
 from typing import Literal
 
 import numpy as np
@@ -16,6 +17,7 @@ from tablegen.fixedpoint.interpolation import index_bits_of
 from tablegen.fixedpoint.output import GAIN_BITS, UNIT_GAIN_BITS, Output
 from tablegen.fixedpoint.phase import RationalPhase
 from tablegen.fixedpoint.program import Program
+from tablegen.fixedpoint.shaping import MAXIMUM_ZERO, OFF, Shaping
 from tablegen.numerics.arrays import Ints
 
 Kind = Literal["free", "clamped", "held"]
@@ -25,13 +27,15 @@ _LEAST_CODES = 12  # of its amplitude, unless the converter has fewer
 _MAX_STEP = (1 << 24) - 1  # that a sequencer takes
 _ROOM = 40  # of a guard above the largest step
 _PEAK = 0.9  # of a table's full scale
+_ZERO = 45  # of a shaping of order 3: no power of 2
 
 
 def variation(own: DualProgram, kind: Kind, bank: int, longer: int = 0) -> DualProgram:
     """A program for the device of ``own`` whose tables are those of a bank, 0 or 1; lines ``longer`` by so many ticks.
 
     A ``free`` one neither clamps nor is held back, and images both ways. A ``clamped`` one is held at both limits of
-    both axes, a ``held`` one by the slew guard, up and down; it steps y once a line.
+    both axes, a ``held`` one by the slew guard, up and down; it steps y once a line. For a device that shapes, they
+    have all orders that it has.
     """
     x_words = _room(own.x)
     ticks = min(_LEAST_TICKS + {"free": 24, "clamped": 21, "held": 23}[kind] + longer, x_words)
@@ -39,18 +43,26 @@ def variation(own: DualProgram, kind: Kind, bank: int, longer: int = 0) -> DualP
     steps = kind == "held" or (kind == "free" and longer > 0) or lines * ticks > _room(own.y)
     settle_lines = {"free": 1 - bank, "clamped": 0, "held": 2}[kind]
     schedule = _schedule(ticks, lines, settle_lines, at_once=kind == "free" and bank == 1)
+    y_phase, hold = RationalPhase(lines if steps else lines * ticks), ticks if steps else 1
+    highest = max(own.x.output.shaping.order, own.y.output.shaping.order)
+    x_shaping, y_shaping = _shapings(highest, kind, bank)
     return DualProgram(
-        _axis(own.x, RationalPhase(ticks), 1, kind, bank, roomy=longer > 0),
-        _axis(
-            own.y, RationalPhase(lines if steps else lines * ticks), ticks if steps else 1, kind, bank, roomy=longer > 0
-        ),
+        _axis(own.x, RationalPhase(ticks), 1, kind, bank, x_shaping, roomy=longer > 0),
+        _axis(own.y, y_phase, hold, kind, bank, y_shaping, roomy=longer > 0),
         schedule,
     )
 
 
+def _shapings(highest: int, kind: Kind, bank: int) -> tuple[Shaping, Shaping]:
+    """Of x and y, on a device of this highest order: every order is some variation's, and so is none."""
+    x = {"free": highest, "clamped": highest - 1, "held": highest - 2}[kind] - bank
+    every = [OFF, Shaping(1), Shaping(2), Shaping(3, (MAXIMUM_ZERO, _ZERO)[bank])][: highest + 1]
+    return every[x % len(every)], every[(x + 1) % len(every)]
+
+
 def _room(own: Program) -> int:
     """How many advances a period may have: a word each in a direct table, which is as long as the device's memory."""
-    return 1 << 16 if own.mode == "interpolated" else 1 << max(index_bits_of(len(own.words)), 3)
+    return 1 << 16 if own.mode != "direct" else 1 << max(index_bits_of(len(own.words)), 3)
 
 
 def _schedule(ticks: int, lines: int, settle_lines: int, at_once: bool) -> Schedule:
@@ -72,14 +84,17 @@ def _schedule(ticks: int, lines: int, settle_lines: int, at_once: bool) -> Sched
     )
 
 
-def _axis(own: Program, phase: RationalPhase, hold: int, kind: Kind, bank: int, roomy: bool) -> Program:
+def _axis(
+    own: Program, phase: RationalPhase, hold: int, kind: Kind, bank: int, shaping: Shaping, roomy: bool
+) -> Program:
     """One axis; the guard of a ``roomy`` one is far above its steps, as that of a build is."""
     words = _words(own, phase.ticks, bank)
-    gain, middle = _gain(own.output)
+    room = ceil(shaping.excess) if shaping.order else 0
+    gain, middle = _gain(own.output, room)
     gain_q = own.output.gain_q
     # Nobody's gain or offset: the sign and the bits below a code are others in each bank.
     offset = (middle << gain_q) + (((2 * bank + 1) << gain_q) // 5)
-    wide = replace(own.output, gain_word=-gain if bank else gain, offset_word=offset)
+    wide = replace(own.output, gain_word=-gain if bank else gain, offset_word=offset, shaping=OFF)
     free = Program(phase, hold, own.mode, own.bits, words, _unlimited(wide))
     codes = free.codes(np.arange(free.ticks, dtype=np.int64))
     low, high = int(codes.min()), int(codes.max())
@@ -87,9 +102,12 @@ def _axis(own: Program, phase: RationalPhase, hold: int, kind: Kind, bank: int, 
     rest = (high - low) // 4 if kind == "clamped" else 0
     output = replace(
         wide,
-        code_min=low + rest if rest else max(low - 3 - bank, 0),
-        code_max=high - rest if rest else min(high + 5 + bank, (1 << wide.dac_bits) - 1),
-        max_step=max(largest // 3, 1) if kind == "held" else min((_ROOM if roomy else 1) * largest + 3, _MAX_STEP),
+        code_min=low + rest if rest else max(low - 3 - bank - room, 0),
+        code_max=high - rest if rest else min(high + 5 + bank + room, (1 << wide.dac_bits) - 1),
+        max_step=max(largest // 3, 1)
+        if kind == "held"
+        else min((_ROOM if roomy else 1) * largest + 3 + shaping.step_excess, _MAX_STEP),
+        shaping=shaping,
         park_code=low + (high - low) * (2 + bank) // 6,
     )
     return replace(free, output=replace(output, park_code=min(max(output.park_code, output.code_min), output.code_max)))
@@ -97,7 +115,7 @@ def _axis(own: Program, phase: RationalPhase, hold: int, kind: Kind, bank: int, 
 
 def _words(own: Program, advances: int, bank: int) -> Ints:
     """Two harmonics over most of full scale; a bank each has its own."""
-    length = len(own.words) if own.mode == "interpolated" else advances
+    length = len(own.words) if own.mode != "direct" else advances
     t = np.arange(length) / length
     shape = np.sin(2.0 * np.pi * t + 1.0 + bank) + 0.25 * np.sin(6.0 * np.pi * t + 0.3)
     half = 1 << (own.bits - 1)
@@ -105,13 +123,16 @@ def _words(own: Program, advances: int, bank: int) -> Ints:
     return words
 
 
-def _gain(output: Output) -> tuple[int, int]:
-    """A gain whose codes are few steps of the build away from its park code, and the code in their middle."""
+def _gain(output: Output, room: int) -> tuple[int, int]:
+    """A gain whose codes are few steps of the build away from its park code, and the code in their middle.
+
+    At least ``room`` codes are left to the converter's ends.
+    """
     top = (1 << output.dac_bits) - 1
     amplitude = max(min(top // 5, _RAMP_STEPS * output.max_step), min(_LEAST_CODES, top // 5))
     gain = -(-(amplitude << (UNIT_GAIN_BITS + 1)) // (1 << output.dac_bits))
     gain = min(gain, (1 << (GAIN_BITS - 1)) - 1)
-    reach = (gain << output.dac_bits >> (UNIT_GAIN_BITS + 1)) + 1
+    reach = (gain << output.dac_bits >> (UNIT_GAIN_BITS + 1)) + 1 + room
     return gain, min(max(output.park_code + amplitude // 3, reach), top - reach)
 
 

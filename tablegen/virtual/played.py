@@ -37,13 +37,23 @@ class PlayedDrive:
 
 
 def played(line: LinePlan, most_ticks: int = MAX_TICKS) -> PlayedDrive:
-    """What an undisturbed period of one axis puts out: a line of x, a frame of y."""
+    """What an undisturbed period of one axis puts out: a line of x, a frame of y.
+
+    Of a shaped axis it is the first period since the program began. Where one is too long, its ``volts`` are those that
+    shaped codes have in the mean of the ticks that one stands for.
+    """
     period = line.program.ticks
     count = min(period, most_ticks)
     tick = (2 * np.arange(count, dtype=np.int64) + 1) * period // (2 * count)
-    codes = line.program.codes(tick)
-    period_s = 1.0 / float(line.rate)
-    volts = line.converter.v_zero + line.converter.v_per_code * codes.astype(np.float64)
+    program, period_s = line.program, 1.0 / float(line.rate)
+    if count == period:
+        codes = program.played(0, period)
+        levels = codes.astype(np.float64)
+    else:
+        codes = program.rounded.codes(tick)
+        shaped = program.output.shaping.order > 0
+        levels = program.output.unrounded(program.samples(tick)) if shaped else codes.astype(np.float64)
+    volts = line.converter.v_zero + line.converter.v_per_code * levels
     return PlayedDrive(tick, period_s / count, codes, volts, period_s)
 
 

@@ -36,14 +36,6 @@ _RANGE_MARGIN = 1e-3
 _CERTIFICATE_POINTS = 16, 513  # of a window: so many a harmonic, and so many more
 
 
-@dataclass(frozen=True, slots=True)
-class AllowedError:
-    """A scaling error in percent, peak to peak; one that is not ``firm`` is kept where the harmonics can keep it."""
-
-    percent: float
-    firm: bool
-
-
 @dataclass(frozen=True)
 class Straightness:
     """Where a line of ``shape`` has to be straight: the ``window`` in normalised position, backward too if ``both``.

@@ -1,8 +1,10 @@
-"""Fast evaluation of a waveform at any tick of a period of any length, for the certificate and plots.
+"""Fast evaluation of a waveform at any tick of a period of any length, for the certificate, plots and comparisons.
 
-Nothing that is emitted comes from here: the transform's last bits differ between processors.
+Nothing that is emitted comes from the transform, whose last bits differ between processors: what decides a table takes
+``slow_grid`` in its place.
 """
 
+from collections.abc import Callable
 from math import factorial, tau
 
 import numpy as np
@@ -26,10 +28,24 @@ def _spectrum(series: FourierSeries) -> Complexes:
     return np.concatenate([[series.a0], 0.5 * (series.a - 1j * series.b)])
 
 
-def on_grid(series: FourierSeries, count: int) -> Floats:
-    """w(k / count) for k in [0, count), by a transform; ``count`` is above twice the highest harmonic."""
-    samples: Floats = np.fft.irfft(_spectrum(series), count) * count
+Grid = Callable[[FourierSeries, int, int], Floats]
+
+
+def on_grid(series: FourierSeries, count: int, derivative: int = 0) -> Floats:
+    """w(k / count), or a derivative of it, for k in [0, count), by a transform.
+
+    ``count`` is above twice the highest harmonic.
+    """
+    spectrum = _spectrum(series)
+    if derivative:
+        spectrum = spectrum * (1j * tau * np.arange(series.harmonics + 1)) ** derivative
+    samples: Floats = np.fft.irfft(spectrum, count) * count
     return samples
+
+
+def slow_grid(series: FourierSeries, count: int, derivative: int = 0) -> Floats:
+    """The same from sums in a fixed order: the same bits on every machine."""
+    return series.on_grid(count, derivative)
 
 
 class Expansion:
@@ -71,19 +87,15 @@ class Sampler:
     many harmonics there are.
     """
 
-    def __init__(self, series: FourierSeries, count: int) -> None:
+    def __init__(self, series: FourierSeries, count: int, grid: Grid = on_grid) -> None:
         self._count = count
         blocks = 1 << (_BLOCKS_PER_HARMONIC * series.harmonics - 1).bit_length()
-        spectrum = _spectrum(series)
         if count <= 2 * blocks:
             self._blocks = 0  # few enough to hold them all
-            self._samples = np.fft.irfft(spectrum, count) * count
+            self._samples = grid(series, count, 0)
             return
         self._blocks = blocks
-        rate = 1j * tau * np.arange(series.harmonics + 1)
-        self._terms = [
-            np.fft.irfft(spectrum * rate**m, blocks) * (blocks / factorial(m)) for m in range(_TAYLOR_ORDER + 1)
-        ]
+        self._terms = [grid(series, blocks, m) / factorial(m) for m in range(_TAYLOR_ORDER + 1)]
 
     def at(self, k: Ints) -> Floats:
         """w(k / count) for any k in [0, count)."""

@@ -52,17 +52,27 @@ class FourierSeries:
         """As ``value`` at k / count for k in [0, count), by one table of sines for all harmonics."""
         total = np.full(count, self.a0 if derivative == 0 else 0.0)
         kept = count * self.harmonics <= _KEPT
+        cosines, sines = np.empty(count), np.empty(count)
         for n, (s, c) in enumerate((_kept_waves if kept else _waves)(count, self.harmonics), 1):
-            total += self.term(n, derivative, s, c)
+            a, b = self._factors(n, derivative)
+            np.multiply(c, a, out=cosines)
+            np.multiply(s, b, out=sines)
+            cosines += sines
+            total += cosines
         return total
 
     def term(self, n: int, derivative: int, s: Floats, c: Floats) -> Floats:
         """Harmonic n, or its derivative, where sine and cosine of 2 pi n t are s and c."""
+        a, b = self._factors(n, derivative)
+        return a * c + b * s
+
+    def _factors(self, n: int, derivative: int) -> tuple[float, float]:
+        """Of the cosine and of the sine of harmonic n in a derivative."""
         a, b = float(self.a[n - 1]), float(self.b[n - 1])
         for _ in range(derivative % 4):  # d/dt turns (a, b) into 2 pi n (b, -a)
             a, b = b, -a
         factor = (tau * n) ** derivative
-        return (factor * a) * c + (factor * b) * s
+        return factor * a, factor * b
 
     def peak_slope(self) -> float:
         """max |w'| per period, on a grid of 32 points per period of the highest harmonic."""

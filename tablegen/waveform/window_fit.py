@@ -11,6 +11,8 @@ edges of the window, where it would cost image. The last term is the mean square
 waveforms that are as straight, the one that excites the scanner least. Derivation: docs/waveform.md.
 """
 
+from collections.abc import Sequence
+from functools import lru_cache
 from math import tau
 
 import numpy as np
@@ -29,6 +31,7 @@ SMOOTHNESS = 1e-12
 # Where the fit would leave [0, 1] its extremes are held this far inside.
 _RANGE_MARGIN = 1e-3
 _MAX_RANGE_ROUNDS = 40
+_BLOCK = 1 << 16  # sines and cosines that are worked out together, and kept where they are all of a window: 1 MB
 
 
 def fit_window(shape: WaveformShape, harmonics: int, window: tuple[float, float], both: bool) -> FourierSeries:
@@ -75,19 +78,13 @@ def normal_equations(
     Products of two harmonics depend on the sum and the difference of their numbers alone, so that 4 H + 2 sums
     over the nodes give all (2 H + 1)^2 entries.
     """
-    n = np.arange(2 * harmonics + 1, dtype=np.float64)
-    s, c = sine_and_cosine(n[:, None] * times[None, :])
-    count = len(times)
-
-    def sums(weight: Floats, rows: slice = slice(None)) -> tuple[Floats, Floats]:
-        return tree_sum(c[rows] * weight) / count, tree_sum(s[rows] * weight) / count
-
+    weights = (value_weight, slope_weight, value_weight * value, slope_weight * slope)
+    by_value, by_slope, right_value, right_slope = _sums(times, weights, 2 * harmonics)
     order = np.arange(harmonics + 1)
     minus, plus = order[:, None] - order[None, :], order[:, None] + order[None, :]
     sign = np.sign(minus)
     normal = np.zeros((2 * harmonics + 1, 2 * harmonics + 1))
-    for weight, derivative in ((value_weight, False), (slope_weight, True)):
-        cosines, sines = sums(weight)
+    for (cosines, sines), derivative in ((by_value, False), (by_slope, True)):
         cos_cos = 0.5 * (cosines[np.abs(minus)] + cosines[plus])
         sin_sin = 0.5 * (cosines[np.abs(minus)] - cosines[plus])
         sin_cos = 0.5 * (sines[plus] + sign * sines[np.abs(minus)])  # sin of the row, cosine of the column
@@ -100,9 +97,7 @@ def normal_equations(
         normal[harmonics + 1 :, : harmonics + 1] += sin_cos[1:, :]
         normal[: harmonics + 1, harmonics + 1 :] += sin_cos[1:, :].T
 
-    low = slice(0, harmonics + 1)
-    value_c, value_s = sums(value_weight * value, low)
-    slope_c, slope_s = sums(slope_weight * slope, low)
+    value_c, value_s, slope_c, slope_s = (part[: harmonics + 1] for part in (*right_value, *right_slope))
     rate = tau * order
     right = np.concatenate([value_c - rate * slope_s, (value_s + rate * slope_c)[1:]])
 
@@ -111,6 +106,30 @@ def normal_equations(
     diagonal = np.arange(2 * harmonics + 1)
     normal[diagonal, diagonal] += np.concatenate([energy, energy[1:]])
     return normal, right
+
+
+def _sums(times: Floats, weights: Sequence[Floats], highest: int) -> list[tuple[Floats, Floats]]:
+    """Means over the times of cosine and of sine of harmonics 0..``highest``, times each of the weights."""
+    count = len(times)
+    found = [(np.empty(highest + 1), np.empty(highest + 1)) for _ in weights]
+    rows = max(_BLOCK // count, 1)
+    waves = _kept_waves if count * highest <= _BLOCK else _waves
+    for first in range(0, highest + 1, rows):
+        block = slice(first, min(first + rows, highest + 1))
+        s, c = waves(times.tobytes(), block.start, block.stop)
+        for weight, (cosines, sines) in zip(weights, found, strict=True):
+            cosines[block] = tree_sum(c * weight) / count
+            sines[block] = tree_sum(s * weight) / count
+    return found
+
+
+def _waves(times: bytes, first: int, stop: int) -> tuple[Floats, Floats]:
+    """Sine and cosine of harmonics [first, stop) at times, each (harmonics, times)."""
+    n = np.arange(first, stop, dtype=np.float64)
+    return sine_and_cosine(n[:, None] * np.frombuffer(times)[None, :])
+
+
+_kept_waves = lru_cache(maxsize=4)(_waves)  # in a batch the windows of both axes are often the same
 
 
 def _series(c: Floats, harmonics: int) -> FourierSeries:

@@ -8,6 +8,7 @@ import pytest
 from foreign_plants import V_MAX, BoucWen, ForeignPlant, record
 
 from tablegen.calibration.hysteresis import Trace
+from tablegen.calibration.operator import periodic_line as periodic_line_module
 from tablegen.calibration.operator.fit import fit_operator
 from tablegen.calibration.operator.periodic_line import periodic_line
 from tablegen.calibration.operator.units import check_size
@@ -133,3 +134,17 @@ def test_traces_that_are_all_in_other_units_are_seen_by_the_scanner_file_and_the
     shares = [periodic_line(replace(one, drive_v=one.drive_v / V_MAX), V_MAX) for one in GOOD]
     with pytest.raises(Unphysical, match=r"the largest drive moves by 0\.9 % of v_max; is it in volts at the piezo\?"):
         fit_operator(shares, None, lambda _: 1.0)
+
+
+def counted(missing: float, monkeypatch: pytest.MonkeyPatch) -> set[int]:
+    """Periods of a record of five, 1000 samples each, whose times differ by last bits."""
+    monkeypatch.setattr(periodic_line_module, "_MISSING", missing)
+    count = np.arange(5000)
+    drive = 45.0 + 10.0 * np.abs((count / 500.0) % 2.0 - 1.0)
+    times = [count * (1e-5 * (1.0 + bits * 2.0**-52)) for bits in range(-4, 5)]
+    return {periodic_line(Trace("trace", time, drive, 9.0 * drive), 100.0).periods for time in times}
+
+
+def test_the_last_bit_of_a_time_takes_no_period_away(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert counted(periodic_line_module._MISSING, monkeypatch) == {4}  # the first of five is left out
+    assert counted(1e-3, monkeypatch) == {3, 4}, "a limit of just one sample would not tell"

@@ -2,10 +2,8 @@
 
 import json
 import os
-import pty
 import re
 import resource
-import select
 import signal
 import subprocess
 import sys
@@ -19,6 +17,7 @@ from building import REPOSITORY
 from editing import SCAN, SCANNER, edited, run, write_pair
 from jsonschema import Draft202012Validator
 from limits import PATIENCE_S
+from pseudo_terminal import on_pseudo_terminal
 
 from tablegen import __version__
 
@@ -364,27 +363,9 @@ def test_show_json_is_the_manifest_that_a_build_writes(scan: Path) -> None:
 
 def on_a_terminal(*arguments: str | Path) -> str:
     """What a command prints on a pseudo-terminal."""
-    ours, theirs = pty.openpty()
-    with subprocess.Popen(
-        [sys.executable, "-m", "tablegen", *map(str, arguments)],
-        stdin=subprocess.DEVNULL,
-        stdout=theirs,
-        stderr=theirs,
-        env={**os.environ, "TERM": "xterm", "PYTHONIOENCODING": "utf-8"},
-    ) as process:
-        os.close(theirs)
-        shown = b""
-        while select.select([ours], [], [], 60)[0]:
-            try:
-                more = os.read(ours, 65536)
-            except OSError:  # the other end was closed
-                break
-            if not more:
-                break
-            shown += more
-    os.close(ours)
-    assert process.returncode == 0
-    return shown.decode("utf-8").replace("\r\n", "\n")
+    status, shown = on_pseudo_terminal(arguments, {**os.environ, "TERM": "xterm", "PYTHONIOENCODING": "utf-8"})
+    assert status == 0
+    return shown
 
 
 @pytest.mark.common

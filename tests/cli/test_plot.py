@@ -1,19 +1,13 @@
 """The option --plot: into a file or into the terminal, in colours or without, as wide as the terminal."""
 
-import fcntl
 import os
-import pty
 import re
-import select
-import struct
-import subprocess
 import sys
-import termios
 from pathlib import Path
 
 import pytest
 from editing import run, write_pair
-from limits import PATIENCE_S
+from pseudo_terminal import on_pseudo_terminal
 
 FORWARD, BACKWARD = "\x1b[38;5;32m", "\x1b[38;5;172m"
 
@@ -25,31 +19,11 @@ def scan(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def on_a_terminal(*arguments: str | Path, columns: int = 80, **environment: str) -> str:
-    """What a terminal of a width gets."""
-    ours, theirs = pty.openpty()
-    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
-    given = {key: value for key, value in os.environ.items() if key not in ("COLUMNS", "NO_COLOR")}
-    with subprocess.Popen(
-        [sys.executable, "-m", "tablegen", *map(str, arguments)],
-        stdin=subprocess.DEVNULL,
-        stdout=theirs,
-        stderr=subprocess.PIPE,
-        env={**given, "TERM": "xterm", "PYTHONIOENCODING": "utf-8", **environment},
-    ) as process:
-        os.close(theirs)
-        shown = b""
-        while select.select([ours], [], [], PATIENCE_S)[0]:
-            try:
-                more = os.read(ours, 65536)
-            except OSError:  # the other end was closed
-                break
-            if not more:
-                break
-            shown += more
-        _, err = process.communicate(timeout=PATIENCE_S)
-    os.close(ours)
-    assert process.returncode == 0, err
-    return shown.decode("utf-8").replace("\r\n", "\n")
+    """What a terminal of a width gets of stdout."""
+    without = {key: value for key, value in os.environ.items() if key not in ("COLUMNS", "NO_COLOR", "TERM")}
+    status, shown = on_pseudo_terminal(arguments, {**without, **environment}, columns, stderr_too=False)
+    assert status == 0, shown
+    return shown
 
 
 def plotted(text: str) -> list[str]:

@@ -3,9 +3,6 @@
 import io
 import json
 import os
-import pty
-import select
-import subprocess
 import sys
 from pathlib import Path
 
@@ -13,7 +10,7 @@ import numpy as np
 import pytest
 from editing import SCAN, edited, run, write_pair
 from gwyfile.objects import GwyContainer, GwyDataField
-from limits import PATIENCE_S
+from pseudo_terminal import on_pseudo_terminal
 
 from tablegen.cli.terminal import GuardedStream, erase, guard_streams, redraw, tell, visible
 
@@ -23,26 +20,7 @@ SHOWN = "\\u001b]0;owned\\u0007\\u001b[31m\\u000d\\u009b2J\\u202e\\u007f"
 
 def on_a_terminal(*arguments: str | Path, encoding: str = "utf-8") -> tuple[int, str]:
     """Status, and what a terminal gets of stdout and stderr."""
-    ours, theirs = pty.openpty()
-    with subprocess.Popen(
-        [sys.executable, "-m", "tablegen", *map(str, arguments)],
-        stdin=subprocess.DEVNULL,
-        stdout=theirs,
-        stderr=theirs,
-        env={**os.environ, "TERM": "xterm", "PYTHONIOENCODING": encoding},
-    ) as process:
-        os.close(theirs)
-        shown = b""
-        while select.select([ours], [], [], PATIENCE_S)[0]:
-            try:
-                more = os.read(ours, 65536)
-            except OSError:  # the other end was closed
-                break
-            if not more:
-                break
-            shown += more
-    os.close(ours)
-    return process.returncode, shown.decode("utf-8").replace("\r\n", "\n")
+    return on_pseudo_terminal(arguments, {**os.environ, "TERM": "xterm", "PYTHONIOENCODING": encoding})
 
 
 def steering(text: str) -> list[str]:

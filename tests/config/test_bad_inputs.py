@@ -389,7 +389,15 @@ CHOICES = [
         "x.band_limit.directions = 'backward'",
         says="scan.toml:31: x.band_limit.directions: 'backward' is not one of 'both', 'forward'",
     ),
-    case("x.table.mode = 'cubic'", says="scan.toml:34: x.table.mode: 'cubic' is not one of 'direct', 'interpolated'"),
+    case(
+        "x.table.mode = 'quadratic'",
+        says="scan.toml:34: x.table.mode: 'quadratic' is not one of 'auto', 'cubic', 'direct', 'interpolated'",
+    ),
+    case(
+        "x.table.mode = 'cubic'",
+        "x.table.bits = 24",
+        says="scan.toml:36: x.table.bits: 24 is above the 21 of mode = 'cubic'",
+    ),
     case("y.motion = 'jump'", says="scan.toml:39: y.motion: 'jump' is not one of 'off', 'ramp', 'step'"),
     case(
         scanner="x.hysteresis.model = 'preisach'",
@@ -1383,7 +1391,7 @@ def test_every_fault_of_both_files_is_reported_in_one_run(here: Path) -> None:
         "x.size_v = 20.0",
         "x.turn = 1.5",
         "x.table.length = 1000",
-        "x.table.mode = 'cubic'",
+        "x.table.mode = 'quadratic'",
         "- y.size_nm",
         "y.band_limit.window = [0.9, 0.1]",
     )
@@ -1392,14 +1400,14 @@ def test_every_fault_of_both_files_is_reported_in_one_run(here: Path) -> None:
     outcome = run("build", "scan.toml", "-o", "out")
     assert outcome.messages == [
         "scan.toml:2: name: 'wire' is a reserved word of C, C++, Verilog, SystemVerilog or VHDL",
-        "scan.toml:6: dac.hue: unknown key; known here: align, bits, coding, inverted, output, update_rate_hz, v_max, "
-        "v_min, word_bits",
+        "scan.toml:6: dac.hue: unknown key; known here: align, bits, coding, inverted, output, shaping, "
+        "update_rate_hz, v_max, v_min, word_bits",
         "scan.toml:7: dac.bits: 30 is above 24",
         "scan.toml:14: amplifier.gain: nan is not a finite number",
         "scan.toml:18: timing.lines: missing; give lines or image_lines",
         "scan.toml:23: x.size_v: size_nm is given as well; keep one of the two",
         "scan.toml:26: x.turn: 1.5 is not below 1",
-        "scan.toml:35: x.table.mode: 'cubic' is not one of 'direct', 'interpolated'",
+        "scan.toml:35: x.table.mode: 'quadratic' is not one of 'auto', 'cubic', 'direct', 'interpolated'",
         "scan.toml:39: y: missing; give size_nm or size_v",
         "scan.toml:46: y.band_limit.window: [0.9, 0.1] does not ascend",
         "scanner.toml:3: v_max: -1 is below 0.001",

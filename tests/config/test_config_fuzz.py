@@ -200,7 +200,7 @@ def setups(draw: st.DrawFn) -> tuple[str, str]:
     ]
     for axis in "xy":
         low, high = (one(st.sampled_from((0.0, 0.05, 0.1, 0.3))), one(st.sampled_from((0.7, 0.9, 0.95, 1.0))))
-        mode = one(st.sampled_from(("direct", "interpolated")))
+        mode = one(st.sampled_from(("direct", "interpolated", "auto")))
         directions = "forward" if axis == "y" else one(st.sampled_from(("both", "forward")))
         scan += [
             f"{axis}.size_nm = {number(5.0, 500.0)}",
@@ -215,6 +215,9 @@ def setups(draw: st.DrawFn) -> tuple[str, str]:
             f"- {axis}.table.length" if mode == "direct" else f"{axis}.table.length = {1 << one(st.integers(6, 12))}",
             f"{axis}.table.bits = {one(st.integers(8, 24))}",
         ]
+        if mode == "auto":
+            scan.append(f"{axis}.table.max_error_lsb = {number(0.3, 50.0)}")
+            scan += [f"- {axis}.table.{key}" for key in ("length", "bits") if one(st.booleans())]
     scanner = [f"x.hysteresis.model = '{one(st.sampled_from(('harmonic', 'sinusoidal', 'triangle')))}'"]
     for axis in "xy":
         for side in ("forward", "backward"):

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from variants import plan_of
 
 from tablegen.device.dual_program import DualProgram
-from tablegen.device.schedule import Window
-from tablegen.device.sequencer import Fault, Sequencer, SequencerState, Tick, pixel_starts, play_line
+from tablegen.device.schedule import Window, pixel_starts
+from tablegen.device.sequencer import Fault, Sequencer, SequencerState, Tick, play_line
 
 SMALL = {
     "timing.lines": "6",

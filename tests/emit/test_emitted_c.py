@@ -11,7 +11,7 @@ from typing import Any
 import mpmath
 import numpy as np
 import pytest
-from building import NAME, REPOSITORY, VARIANTS, Build, Variant, build, build_stressed, constants, run, run_clean
+from building import IN_C, NAME, REPOSITORY, VARIANTS, Build, Variant, build, build_stressed, constants, run, run_clean
 from sets import by_tool, common
 
 from tablegen.device.sequencer import play_line
@@ -32,9 +32,9 @@ DIALECTS = {
 STRESS = [(8, 131071), (16, -131072), (21, 131071), (24, -131072), (24, 131071)]
 
 
-@pytest.fixture(scope="module", params=common(("example", "header_only", "direct_steps"), VARIANTS))
+@pytest.fixture(scope="module", params=common(("example", "header_only", "direct_steps", "cubic"), IN_C))
 def built(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Build:
-    return build(tmp_path_factory.mktemp("variant"), VARIANTS[request.param])
+    return build(tmp_path_factory.mktemp("variant"), IN_C[request.param])
 
 
 def sources(built: Build) -> list[Path]:
@@ -95,6 +95,8 @@ def c_constants(manifest: Mapping[str, Any]) -> dict[str, int]:
     axes = manifest["axes"].values()
     for kind, part, key in (("TABLE", "table", "bits"), ("OUTPUT", "output", "word_bits")):
         found[f"{kind}_STORAGE_BITS"] = 16 if max(axis[part][key] for axis in axes) <= 16 else 32
+    if any(axis["table"]["mode"] == "cubic" for axis in axes):
+        found["SPLINE"] = 1
     return found | ({"SINE_INDEX_BITS": index_bits, "SINE_LENGTH": 5 << index_bits >> 2} if index_bits else {})
 
 
@@ -130,7 +132,8 @@ def test_constants_and_tables_equal_the_manifest(built: Build) -> None:
     for axis in manifest["axes"].values():
         fourier = axis["fourier"]
         words = axis["table"]["words"]
-        expected += [*words, words[0], fourier["a0_word"], *fourier["a_words"], *fourier["b_words"]]
+        behind = 3 if axis["table"]["mode"] == "cubic" else 1
+        expected += [*words, *words[:behind], fourier["a0_word"], *fourier["a_words"], *fourier["b_words"]]
     if "SINE_LENGTH" in names:
         expected += sines(names["SINE_INDEX_BITS"], names["SINE_LENGTH"])
     assert digest == manifest["hash"]
@@ -167,10 +170,10 @@ def test_player_is_defined_at_the_ends_of_the_arithmetic(
 
 
 @pytest.mark.common
-@pytest.mark.parametrize("name", ["example", "direct_steps", "left_aligned", "bits_24", "prime_line"])
+@pytest.mark.parametrize("name", ["example", "direct_steps", "left_aligned", "bits_24", "prime_line", "cubic"])
 @pytest.mark.parametrize("dialect", ["gcc-c++17", "clang-c99"])
 def test_player_is_defined_and_the_same_in_other_dialects(tmp_path: Path, name: str, dialect: str) -> None:
-    built = build(tmp_path, VARIANTS[name])
+    built = build(tmp_path, IN_C[name])
     program = compile_player(built, [*DIALECTS[dialect], *SANITIZERS])
     assert np.array_equal(played(program, 4), model(built, 4))
 

@@ -82,6 +82,13 @@ SCANS: dict[str, Variant] = {
         {**NO_LIMITS, "timing.line_rate_hz": 934.5, "x.size_nm": 77.7, "x.band_limit.harmonics": 40},
         {"x.resonance": {"response": "response.csv", "max_boost_db": 3.0}},
     ),
+    "shaped": Variant(
+        {**NO_LIMITS, "x.size_nm": 20.7, "timing.lines": 20, "dac.shaping": "scanner"},
+        {
+            "x.resonance": {"response": "response.csv", "max_boost_db": 3.0},
+            "y.resonance": {"frequency_hz": 9131.7, "quality": 17.3, "delay_s": 1.3e-6},
+        },
+    ),
     "boosted": Variant(
         {**NO_LIMITS, "timing.line_rate_hz": 1990.0, "timing.pixels": 40, "x.size_of": "window", "x.size_nm": 61.0},
         {"x.resonance.max_boost_db": 1.0, "x.resonance.delay_s": 3.3e-6, "x.size.beta": 0.0},
@@ -98,6 +105,9 @@ SCANS: dict[str, Variant] = {
             "x.band_limit.harmonics": "fewest",
             "y.band_limit.harmonics": REMOVED,
         }
+    ),
+    "chosen": Variant(
+        {**NO_LIMITS, "x.table": {"mode": "auto"}, "y.table": {"mode": "interpolated", "max_error_lsb": 0.7}}
     ),
     "gentle operator": Variant(
         {**NO_LIMITS, "x.size_nm": 413.7, "x.offset_v": 46.3, "x.band_limit.max_scaling_error_percent": 1.7},

@@ -116,6 +116,28 @@ VARIANTS: dict[str, Variant] = {
     "low_corner": Variant({"x.offset_v": 11.0, "x.size_nm": 190.0, "y.park_v": 0.0, "timing.lines": 40}),
 }
 
+# With those that no Verilog plays.
+IN_C = {
+    **VARIANTS,
+    "cubic": Variant(
+        {
+            "x.table": {"mode": "cubic", "length": 128, "bits": 14},
+            "y.table": {"mode": "cubic", "length": 256, "bits": 14},
+            "timing.lines": 40,
+            "emit.formats": ["c"],
+        }
+    ),
+    "cubic_wide": Variant(
+        {
+            "dac.bits": 20,
+            "x.table": {"mode": "cubic", "length": 512, "bits": 21},
+            "y.table.bits": 20,
+            "y.motion": "step",
+            "emit": {"header_only": True, "formats": ["c"]},
+        }
+    ),
+}
+
 # In every `make check`, of what is quick.
 FEW = ("example", "bits_24", "direct_steps", "turn_0.7", "left_aligned", "header_only")
 
@@ -242,12 +264,12 @@ def constants(manifest: Mapping[str, Any]) -> dict[str, int]:
 
 def _axis_constants(axis: Mapping[str, Any]) -> dict[str, int]:
     line, table, fourier, output = (axis[key] for key in ("line", "table", "fourier", "output"))
-    interpolated = table["mode"] == "interpolated"
+    degree = {"direct": 0, "interpolated": 1, "cubic": 3}[table["mode"]]
     return {
         "TABLE_LENGTH": len(table["words"]),
         "TABLE_BITS": table["bits"],
-        "INDEX_BITS": len(table["words"]).bit_length() - 1 if interpolated else 0,
-        "INTERPOLATED": int(interpolated),
+        "INDEX_BITS": len(table["words"]).bit_length() - 1 if degree else 0,
+        "INTERPOLATED": degree,
         "GUARD_BITS": table["guard_bits"],
         "HARMONICS": fourier["harmonics"],
         "FOURIER_LENGTH": 1 + len(fourier["a_words"]) + len(fourier["b_words"]),

@@ -9,7 +9,7 @@ from limits import PATIENCE_S
 from stream_laws import steps_are_limited
 
 from tablegen.verification.bench import SequencerShape
-from tablegen.verification.c_bench import CBench, CPlayed, script_words, sine_of
+from tablegen.verification.c_bench import CUBIC, CBench, CPlayed, script_words, sine_of
 from tablegen.verification.stream import Script, compare
 
 SANITIZED = ("-std=c99", "-O1", "-g", "-fsanitize=undefined,address", "-fno-sanitize-recover=all")
@@ -25,14 +25,15 @@ class Benches:
     folder: Path
     options: tuple[str, ...] = SANITIZED
     sources: tuple[Path, ...] | None = None
-    _compiled: dict[tuple[str, int, int, int], CBench] = field(default_factory=dict)
+    _compiled: dict[tuple[str, int, int, int, bool], CBench] = field(default_factory=dict)
 
     def compiled(self, shape: SequencerShape, compiler: str = "gcc", fill: int = 0) -> CBench:
         """The bench for a shape, whatever shape it was compiled for."""
         table, output = storage(max(shape.x_word_bits, shape.y_word_bits)), storage(shape.dac_bits)
-        key = compiler, table, output, fill
+        spline = CUBIC in (shape.x_interpolated, shape.y_interpolated)
+        key = compiler, table, output, fill, spline
         if key not in self._compiled:
-            folder = self.folder / f"{compiler}_{table}_{output}_{fill}"
+            folder = self.folder / f"{compiler}_{table}_{output}_{fill}_{spline}"
             # Each of the two ways of running with another compiler; the processors of the rest have both.
             options = (*self.options, "-DDAC_LONG_MULTIPLY=0") if compiler == "clang" else self.options
             self._compiled[key] = CBench(shape, folder, compiler, options, self.sources, fill)

@@ -14,6 +14,8 @@ from tablegen.device.dual_program import DualProgram
 from tablegen.device.sequencer import Fault, Sequencer, Tick
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.program import Program
+from tablegen.fixedpoint.spline import WORDS_BEHIND
+from tablegen.link.messages import CUBIC
 from tablegen.numerics.arrays import Ints
 from tablegen.resources import c_runtime
 from tablegen.verification.stream import FLAGS
@@ -22,7 +24,7 @@ HERE = Path(__file__).parent
 PROBE = HERE / "c_probe.c"
 OPTIONS = ("-std=c99", "-O1")
 SLEW, CLAMP, OVERRUN, UNDERRUN = 1, 2, 4, 8
-LOADED, BUSY, OTHER_CONVERTER, BAD_SCHEDULE, BAD_TABLE, BAD_PERIOD, BAD_OUTPUT, OTHER_STORAGE = range(8)
+LOADED, BUSY, OTHER_CONVERTER, BAD_SCHEDULE, BAD_TABLE, BAD_PERIOD, BAD_OUTPUT, OTHER_STORAGE, BAD_SHAPING = range(9)
 MARKER = {name: 1 << bit for bit, name in enumerate(FLAGS)}
 NOTHING_PLAYS = 2
 
@@ -54,6 +56,12 @@ class AxisProgram(Structure):
     )
 
 
+class ShapedAxisProgram(AxisProgram):
+    """With DAC_SHAPING."""
+
+    _fields_ = (("shaping_order", c_uint8), ("shaping_zero", c_uint8))
+
+
 class CSchedule(Structure):
     _fields_ = (
         ("line_ticks", c_uint32),
@@ -70,6 +78,10 @@ class CSchedule(Structure):
 
 class CProgram(Structure):
     _fields_ = (("schedule", CSchedule), ("x", AxisProgram), ("y", AxisProgram))
+
+
+class ShapedCProgram(Structure):
+    _fields_ = (("schedule", CSchedule), ("x", ShapedAxisProgram), ("y", ShapedAxisProgram))
 
 
 class Converter(Structure):
@@ -155,22 +167,25 @@ class Library:
         self.dll.dac_sequencer_status.restype = Status
         self.dll.dac_synthesize.restype = c_bool
         self.word_bytes, self.output_bytes = int(self.dll.probe_size(6)), int(self.dll.probe_size(7))
-        self.stride = int(self.dll.probe_size(8))
+        self.stride, self.shaping = int(self.dll.probe_size(8)), int(self.dll.probe_size(9))
         self.word = np.dtype(f"i{self.word_bytes}")
         self.output = np.dtype(f"u{self.output_bytes}")
 
     def axis(self, program: Program) -> CAxis:
-        """An axis as C has it; its table has just the words that it needs, and the first one again."""
-        words = (ctypes.c_int16 if self.word_bytes == 2 else c_int32) * (len(program.words) + 1)
-        table = words(*program.words.tolist(), int(program.words[0]))
+        """An axis as C has it; its table has just the words that it needs, and the first ones again."""
+        cubic = program.mode == "cubic"
+        held = [*program.words.tolist(), *program.words[: WORDS_BEHIND if cubic else 1].tolist()]
+        table = ((ctypes.c_int16 if self.word_bytes == 2 else c_int32) * len(held))(*held)
         output = program.output
+        shaping = {"shaping_order": output.shaping.order, "shaping_zero": output.shaping.zero}
         return CAxis(
-            AxisProgram(
+            (ShapedAxisProgram if self.shaping else AxisProgram)(
+                **(shaping if self.shaping else {}),
                 table=ctypes.addressof(table),
                 length=len(program.words),
                 storage_bits=8 * self.word_bytes,
                 bits=program.bits,
-                index_bits=program.index_bits,
+                index_bits=program.index_bits + (CUBIC if cubic else 0),
                 phase_period=program.phase.ticks,
                 hold_ticks=program.hold,
                 gain_word=output.gain_word,
@@ -188,7 +203,7 @@ class Library:
             table,
         )
 
-    def program(self, program: DualProgram) -> tuple[CProgram, tuple[CAxis, CAxis]]:
+    def program(self, program: DualProgram) -> tuple[CProgram | ShapedCProgram, tuple[CAxis, CAxis]]:
         """A program as C has it, and its axes, which have to live as long as it plays."""
         schedule, axes = program.schedule, (self.axis(program.x), self.axis(program.y))
         windows = (
@@ -196,7 +211,8 @@ class Library:
             for each in (schedule.forward, schedule.backward, schedule.up, schedule.down)
         )  # fmt: skip
         times = schedule.ticks, schedule.lines, schedule.pixels, schedule.settle_lines, schedule.turn_tick
-        return CProgram(CSchedule(*times, *windows), axes[0].program, axes[1].program), axes
+        kind = ShapedCProgram if self.shaping else CProgram
+        return kind(CSchedule(*times, *windows), axes[0].program, axes[1].program), axes
 
 
 def converter_of(output: Output, power_up_code: int = 0) -> Converter:
@@ -220,7 +236,7 @@ class Device:
         function = getattr(self.library.dll, f"dac_sequencer_{name}")
         return lambda *arguments: function(self.state, *arguments)
 
-    def load(self, program: DualProgram | CProgram) -> int:
+    def load(self, program: DualProgram | CProgram | ShapedCProgram) -> int:
         """Load a program."""
         if isinstance(program, DualProgram):
             program, axes = self.library.program(program)

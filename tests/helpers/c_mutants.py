@@ -14,11 +14,12 @@ import c_mutants_axis
 import c_mutants_fourier
 import c_mutants_program
 import c_mutants_sequencer
+import c_mutants_shaping
 import mutants
 from c_benches import FILL, words_of
 from c_faults import Mutant
 from c_library import compile_both
-from c_scripts import IN_C, LONG, everything, long_periods, long_play
+from c_scripts import IN_C, LONG, everything, long_periods, long_play, refused_by_y, shaped_short_lines
 from c_scripts import LONG_PERIODS as PERIODS
 from c_threads import compile_threads
 from c_threads import play as play_threads
@@ -37,8 +38,8 @@ CHECKS = {"checks": (), "checks small": ("-DDAC_SMALL=1",), "checks short": ("-D
 PLAY_S, CHECK_S = 20, 120  # of CPU time: what does not hang takes a second of it, and two
 _PROGRAMS = 3000  # between two threads
 
-PLACES = ("fill", "step", "wide", "short", *CHECKS, "threads")
-_FILES = c_mutants_axis, c_mutants_program, c_mutants_sequencer, c_mutants_fourier
+PLACES = ("fill", "step", "wide", "short", "cubic", "shaped", "shaped short", *CHECKS, "threads")
+_FILES = c_mutants_axis, c_mutants_program, c_mutants_sequencer, c_mutants_fourier, c_mutants_shaping
 MUTANTS: tuple[Mutant, ...] = tuple(mutant for each in _FILES for mutant in each.MUTANTS)
 EQUIVALENT = {**c_mutants_axis.EQUIVALENT, **c_mutants_program.EQUIVALENT, **c_mutants_sequencer.EQUIVALENT}
 
@@ -50,6 +51,19 @@ def scripts(where: str) -> tuple[tuple[Script, SequencerShape], ...]:
         names = ("bits_20", "bits_24", "dac_24_words_8")
         long = [(long_play(name, 9000), LONG[name][0]) for name in names]
         return (*long, (IN_C["bits_24"].script("bits_24"), IN_C["bits_24"].shape))
+    if where == "cubic":
+        names = ("cubic", "cubic_with_few_ticks")
+        wild = SequencerShape(16, 3, 4, 14, 3, 3, 16)
+        long = [(long_play(name, 60_000), LONG[name][0]) for name in names]
+        return (*long, (everything(wild, 1, 500), wild))
+    if where == "shaped":
+        names = ("bits_16", "bits_8", "direct", "many_lines")
+        return (
+            *((long_play(name, 12_000, 0, 3), LONG[name][0]) for name in names),
+            (long_play("bits_16", 20_000, 1, 3), LONG["bits_16"][0]),
+            (refused_by_y(20_000), LONG["many_lines"][0]),
+            (shaped_short_lines(SequencerShape(16, 1, 4, 16, 1, 3, 16), 6000), SequencerShape(16, 1, 4, 16, 1, 3, 16)),
+        )
     shape = SequencerShape(16, 1, 4, 16, 1, 3, 16)
     return (
         (everything(shape, 1, 500), shape),
@@ -100,8 +114,10 @@ def _check(paths: tuple[Path, ...]) -> Verdict:
 
 def _play(where: str, folder: Path, runtime: list[Path]) -> Verdict:
     fill = 0 if where == "step" else FILL
-    playing = scripts("wide" if where == "wide" else "fill")
-    chosen = defines(playing[0][1], fill) | ({"DAC_LONG_MULTIPLY": 0} if where == "short" else {})
+    shaped = where.startswith("shaped")
+    playing = scripts("shaped" if shaped else where if where in ("wide", "cubic") else "fill")
+    chosen = defines(playing[0][1], fill) | ({"DAC_LONG_MULTIPLY": 0} if where.endswith("short") else {})
+    chosen |= {"DAC_SHAPING": 3} if shaped else {}
     bench = CBench(playing[0][1], folder, "gcc", OPTIONS, runtime, chosen=chosen)
     bench.program = program_within(PLAY_S, bench.program)
     for script, shape in playing:

@@ -36,6 +36,45 @@ MUTANTS: tuple[Mutant, ...] = (
             "words are not aligned": ("<< axis->shift)", "<< 0)"),
         },
     ),
+    *changed(
+        "dac_run.h",
+        "fill",
+        {
+            "a run's window reaches below the limit": (
+                "(uint32_t)(base - bank->code_min) <= (uint32_t)bank->run_room",
+                "base <= bank->code_min + bank->run_room",
+            ),
+            "runs do not heed the limits": ("(uint32_t)(base - bank->code_min) <= (uint32_t)bank->run_room", "true"),
+            "a run that ends early is a whole one": ("ticks < DAC_RUN ? ticks : DAC_RUN", "DAC_RUN"),
+        },
+    ),
+    *changed(
+        "dac_run.h",
+        "step",
+        {
+            "a step reads no next word": ("bank->table[index + 1]", "bank->table[index]"),
+        },
+    ),
+    *changed(
+        "dac_run.h",
+        "checks",
+        {
+            "a run's window reaches above the limit": (
+                "<= (uint32_t)bank->run_room;",
+                "<= (uint32_t)bank->run_room + 1;",
+            ),
+        },
+    ),
+    *changed(
+        "dac_axis.c",
+        "short",
+        {
+            "short: the sample is rounded down": (
+                "(UINT32_C(1) << (DAC_ABOVE - 1)) - (origin << DAC_ABOVE)",
+                "0u - (origin << DAC_ABOVE)",
+            ),
+        },
+    ),
     *removed(
         "dac_axis.c",
         "fill",
@@ -47,11 +86,6 @@ MUTANTS: tuple[Mutant, ...] = (
         "dac_axis.c",
         "fill",
         {
-            "a run's window reaches below the limit": (
-                "(uint32_t)(base - bank->code_min) <= (uint32_t)bank->run_room",
-                "base <= bank->code_min + bank->run_room",
-            ),
-            "runs do not heed the limits": ("(uint32_t)(base - bank->code_min) <= (uint32_t)bank->run_room", "true"),
             "runs do not heed the slew guard": ("if (strayed >> bank->run_bits != 0)", "if (false)"),
             "a run's window is twice as wide": (
                 "if (strayed >> bank->run_bits != 0)",
@@ -65,7 +99,6 @@ MUTANTS: tuple[Mutant, ...] = (
                 "axis->code = code;\n        done += length;",
                 "done += length;",
             ),
-            "a run that ends early is a whole one": ("ticks < DAC_RUN ? ticks : DAC_RUN", "DAC_RUN"),
             "runs move y while it is held": ("step = bank->holds ? 0 : ", "step = "),
             "y is skipped while it is held": (
                 "    if (bank->holds)\n        return;\n    const uint64_t first",
@@ -75,6 +108,47 @@ MUTANTS: tuple[Mutant, ...] = (
                 "bank->step.high * ticks + (uint32_t)(second >> 32)",
                 "bank->step.high * ticks",
             ),
+        },
+    ),
+    *changed(
+        "dac_axis.h",
+        "cubic",
+        {
+            "a spline's sums are rounded down": (" + INT64_C(0x80000000);", ";"),
+            "a spline's ties are rounded down": ("INT64_C(0x80000000);", "INT64_C(0x7fffffff);"),
+            "a spline's value has no middle": ("2 * ends + 8 * second", "2 * ends + 4 * second"),
+            "a spline's slope is the way to the next word": ("12 * (third - first)", "12 * (third - second)"),
+            "a spline has no curvature": ("24 * (ends - 2 * second)", "0"),
+            "a spline is quadratic": ("16 * (fourth - first + 3 * (second - third))", "0"),
+        },
+    ),
+    *changed(
+        "dac_axis.c",
+        "cubic",
+        {
+            "runs of lines are those of splines": (
+                "    if (bank->cubic)\n        return play_along",
+                "    return play_along",
+            ),
+        },
+    ),
+    *changed(
+        "dac_run.h",
+        "cubic",
+        {
+            "runs of splines begin with the segment after it": (
+                "words = table + (at >> 47);",
+                "words = table + (at >> 47) + 1;",
+            ),
+            "runs of splines go on with the same segment": ("words + (goes_on ? 1 : 0)", "words"),
+            "runs of splines leave a segment out": ("words + (goes_on ? 1 : 0)", "words + 1"),
+            "runs of splines stay in a segment": ("track->segment = dac_segment_of(track->next++);", "(void)0;"),
+            "runs of splines begin a tick early": ("(at - step) << 17", "at << 17"),
+            "runs of splines have a bit more of fraction": (
+                "(uint32_t)(track->way >> 49) << 16",
+                "(uint32_t)(track->way >> 48) << 15",
+            ),
+            "steps of splines are those of lines": ("    if (bank->cubic) {\n", "    if (false) {\n"),
         },
     ),
     *removed(
@@ -92,7 +166,6 @@ MUTANTS: tuple[Mutant, ...] = (
             "there is no guard downwards": ("rise < -most ? -most : rise", "rise"),
             "the guard is one off downwards": ("rise < -most ? -most", "rise < -most ? 1 - most"),
             "a code is always there": ("return axis->code == target;", "return true;"),
-            "a step reads no next word": ("bank->table[index + 1]", "bank->table[index]"),
             "nothing is held at code_min": ("code < bank->code_min ? bank->code_min : code >", "code >"),
             "nothing is held at code_max": (": code > bank->code_max ? bank->code_max : code;", ": code;"),
             "the upper limit is one off": (
@@ -125,10 +198,6 @@ MUTANTS: tuple[Mutant, ...] = (
         "dac_axis.c",
         "short",
         {
-            "short: the sample is rounded down": (
-                "(UINT32_C(1) << (ABOVE - 1)) - (origin << ABOVE)",
-                "0u - (origin << ABOVE)",
-            ),
             "short: only the last code counts": ("    strayed |= last; ", "    strayed = last; "),
             "short: a window is twice as wide": (
                 "strayed >> gain_q >> bank->run_bits != 0",
@@ -157,10 +226,6 @@ MUTANTS: tuple[Mutant, ...] = (
             "a converter too wide for its storage": (
                 "c->word_bits <= DAC_OUTPUT_STORAGE_BITS\n        && ",
                 "true\n        && ",
-            ),
-            "a run's window reaches above the limit": (
-                "<= (uint32_t)bank->run_room;",
-                "<= (uint32_t)bank->run_room + 1;",
             ),
             "runs step by steps rounded down": (
                 "(uint64_t)bank->step.high << 32 | bank->step.low >> 32) + 1",

@@ -11,7 +11,9 @@ MUTANTS: tuple[Mutant, ...] = (
             "odd sines keep their sign": "    odd.a_sin = -odd.a_sin;\n",
             "odd cosines keep their sign": "    odd.b_cos = -odd.b_cos;\n",
             "the mean is lost": "    n0.a_cos += r->mean;\n",
-            "the first word does not stand behind the last": "    table[r.length] = table[0];\n",
+            "the first word does not stand behind the last": (
+                "    for (unsigned i = 0; i < DAC_WORDS_BEHIND; i++)\n        table[r.length + i] = table[i];\n"
+            ),
             "a table without room is rendered": "room < DAC_TABLE_ROOM(index_bits) || ",
         },
     ),

@@ -6,11 +6,10 @@ of a table, at the ends of lines and frames, and where a bank has no runs at all
 """
 
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 from numpy.random import Generator
-from programs import random_dual, random_fourier, random_schedule, rendered
+from programs import MODES, Kind, random_dual, random_fourier, random_schedule, rendered
 from stream_configurations import CONFIGURATIONS, SMALL
 from stream_scripts import play, random_requests, swaps_at_every_tick, sweep
 
@@ -20,6 +19,7 @@ from tablegen.fixedpoint.interpolation import guard_bits
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.phase import RationalPhase
 from tablegen.fixedpoint.program import Program
+from tablegen.fixedpoint.shaping import MAXIMUM_ZERO, Shaping
 from tablegen.numerics.arrays import Ints
 from tablegen.verification.bench import SequencerShape
 from tablegen.verification.stream import Script
@@ -53,6 +53,9 @@ LONG: dict[str, tuple[SequencerShape, tuple[int, int]]] = {
     "direct": (SequencerShape(16, 0, 11, 16, 0, 13, 16), (100, 1200)),
     "longest_table": (SequencerShape(16, 1, 16, 16, 1, 12, 16), (1000, 3000)),
     "many_lines": (SequencerShape(16, 1, 8, 16, 1, 8, 16), (40, 60)),
+    "cubic": (SequencerShape(16, 3, 5, 14, 3, 4, 16), (100, 700)),
+    "cubic_and_lines": (SequencerShape(20, 3, 6, 21, 1, 5, 18), (100, 700)),
+    "cubic_with_few_ticks": (SequencerShape(16, 1, 6, 16, 3, 8, 16), (100, 200)),
 }
 MANY_LINES = {"many_lines": (300, 400)}  # so that y, held for a line each, steps by little
 LONG_PERIODS = SequencerShape(16, 1, 8, 16, 1, 16, 16)
@@ -91,8 +94,7 @@ def long_program(rng: Generator, shape: SequencerShape, axis: str, schedule: Sch
         align="right",
         word_bits=shape.dac_bits,
     )
-    mode: Literal["interpolated", "direct"] = "interpolated" if interpolated else "direct"
-    program = Program(RationalPhase(period), hold, mode, bits, words, output)
+    program = Program(RationalPhase(period), hold, MODES[interpolated], bits, words, output)
     codes = program.codes(np.arange(program.ticks))
     low, high = _limits(rng, codes, top)
     step = _step(rng, codes, top)
@@ -141,14 +143,27 @@ def wave_program(shape: SequencerShape, codes: int, ticks: int = 499) -> DualPro
     return DualProgram(axis, replace(axis, words=np.roll(words, 3)), schedule)
 
 
-def long_play(name: str, samples: int, seed: int = 0) -> Script:
-    """Long lines back to back, with requests at any tick."""
+def shaped(rng: Generator, program: DualProgram, order: int = 3) -> DualProgram:
+    """The program with any shaping of both axes up to an order, off too."""
+
+    def one(axis: Program) -> Program:
+        of = int(rng.integers(0, order + 1))
+        zero = int(rng.choice([0, MAXIMUM_ZERO, rng.integers(0, MAXIMUM_ZERO + 1)])) if of == 3 else 0
+        return replace(axis, output=replace(axis.output, shaping=Shaping(of, zero)))
+
+    return replace(program, x=one(program.x), y=one(program.y))
+
+
+def long_play(name: str, samples: int, seed: int = 0, order: int = 0) -> Script:
+    """Long lines back to back, with requests at any tick; shaped up to an order."""
     shape, ticks = LONG[name]
     rng = np.random.default_rng([seed, *name.encode()])
     script = Script()
     script.tick_every(1)
     while len(script.expected) < samples:
         program = long_dual(rng, shape, ticks, MANY_LINES.get(name, (1, 5)))
+        if order:
+            program = shaped(rng, program, order)
         script.request("withdraw")
         quiet = len(program.x.words) > 2000 or rng.random() < 0.5
         script.tick_every(0 if quiet else 1)
@@ -162,6 +177,37 @@ def long_play(name: str, samples: int, seed: int = 0) -> Script:
             script.wait(int(rng.integers(1, 3 * max(program.schedule.ticks, 600))))
             if rng.random() < 0.3:
                 random_requests(rng, script)
+    return script
+
+
+def shaped_short_lines(shape: SequencerShape, samples: int, order: int = 3) -> Script:
+    """Random programs of all kinds, shaped, that take each other's place while they play."""
+    rng, script = np.random.default_rng([order, shape.dac_bits]), Script()
+    script.tick_every(1)
+    kinds: tuple[Kind, ...] = ("wild", "tame", "smooth", "held")
+    while len(script.expected) < samples:
+        program = shaped(rng, random_dual(rng, shape, kind=kinds[int(rng.integers(0, 4))]), order)
+        script.request("withdraw")
+        script.load(program)
+        script.request("commit", program=program)
+        script.wait_ticks(3)
+        script.request("arm", "trigger", frames=int(rng.choice([0, 1])))
+        script.wait(int(rng.integers(1, 400)))
+    return script
+
+
+def refused_by_y(samples: int) -> Script:
+    """Shaped lines whose y jumps in the middle of runs of x, which x has to take back."""
+    shape, rng, script = LONG["many_lines"][0], np.random.default_rng(8), Script()
+    script.tick_every(1)
+    while len(script.expected) < samples:
+        program = shaped(rng, wave_program(shape, 900, int(rng.integers(1500, 2500))))
+        words = np.zeros(len(program.y.words), np.int64)
+        words[int(rng.integers(30, 200)) :] = 20000
+        play(script, replace(program, y=replace(program.y, words=words)))
+        script.wait_ticks(3 * program.schedule.ticks)
+        script.request("park")
+        script.wait_ticks(2000)
     return script
 
 

@@ -11,8 +11,7 @@ import numpy as np
 from editing import SCAN, SCANNER, edited, write_pair
 
 from tablegen.config.load import Setup, load
-from tablegen.device.schedule import Schedule, Window
-from tablegen.device.sequencer import pixel_starts
+from tablegen.device.schedule import Schedule, Window, pixel_starts
 from tablegen.planning.line_plan import LinePlan
 
 PARTS = 64  # instants a tick

@@ -195,6 +195,13 @@ class LineCheck:
         for codes in self._ramp(before, self._codes)[: -1 if self._play is not None else None]:
             for name, program in self._offered.items():
                 yield name, self._swapped(before, program, codes)
+        if played.generation == self._generation + 1:
+            return
+        # The same, where the program that was triggered came into force after the last line, and has not played one.
+        for between in self._offered.values():
+            for codes in self._ramp(between, parked):
+                for name, program in self._offered.items():
+                    yield name, self._swapped(between, program, codes)
 
     def _program(self, name: str) -> DualProgram:
         if self._play is not None and self.taken[self._generation] == name:

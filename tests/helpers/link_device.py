@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from building import REPOSITORY
-from c_library import OPTIONS, Converter, CProgram, Library, compile_library, converter_of
+from c_library import OPTIONS, Converter, Library, compile_library, converter_of
 from link_talk import IDENTITY, Talk, derived_nonce
 
 from tablegen.device.dual_program import DualProgram
@@ -87,7 +87,7 @@ class _Setup(Structure):
         ("boot_persists", c_uint8),
         ("random", _Random),
         ("sine", POINTER(c_int32)),
-        ("boot_program", POINTER(CProgram)),
+        ("boot_program", c_void_p),
     )
 
 
@@ -130,11 +130,16 @@ class DeviceLibrary(Library):
 
 
 @cache
-def device_library(bits: int = 16) -> DeviceLibrary:
-    """The device as it ships, compiled once a process; for words of up to 16 bits, or of up to 24 (``bits=32``)."""
+def device_library(bits: int = 16, shaping: int = 0, spline: bool = False) -> DeviceLibrary:
+    """The device as it ships, compiled once a process; for words of up to 16 bits, or of up to 24 (``bits=32``).
+
+    ``shaping`` is its highest order.
+    """
     folder = Path(tempfile.mkdtemp(prefix="link_device_"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    return DeviceLibrary(compile_device(folder / "device.so", bits))
+    more = [f"-DDAC_SHAPING={shaping}"] if shaping else []
+    more += ["-DDAC_SPLINE=1"] if spline else []
+    return DeviceLibrary(compile_device(folder / "device.so", bits, more=more))
 
 
 def widest(output: Output) -> AxisLimits:
@@ -146,8 +151,8 @@ class HostDevice:
     """A device whose converters are those of ``like`` and which boots into ``boot``, if that is not None.
 
     ``index_bits`` of the longest tables of x and y default to those of ``like``, ``limits`` to all that its converters
-    can do, ``library`` to ``device_library()``. Nonces are those of ``derived_nonce``, changed by what ``random``
-    gives, or ``nonces``; ``started`` is why the link was not.
+    can do, ``library`` to that of ``device_library`` with the order ``shaping``. Nonces are those of ``derived_nonce``,
+    changed by what ``random`` gives, or ``nonces``; ``started`` is why the link was not.
     ``permits`` is the input of the interlock, if it has one.
     """
 
@@ -171,9 +176,10 @@ class HostDevice:
         identity: bytes = IDENTITY,
         random: Callable[[], bytes] | None = None,
         boot_persists: bool = True,
+        shaping: int = 0,
     ) -> None:
         bits = 16 if max(like.x.bits, like.y.bits, like.x.output.word_bits, like.y.output.word_bits) <= 16 else 32
-        self.library = library or device_library(bits)
+        self.library = library or device_library(bits, shaping, "cubic" in (like.x.mode, like.y.mode))
         self._dll = self.library.dll
         self.boot_count = boot_count
         self._permits = True
@@ -206,8 +212,8 @@ class HostDevice:
         if boot_hash is not None:
             setup.hash[:] = boot_hash
         if boot is not None:
-            program, self._axes = self.library.program(boot)
-            setup.boot_program = ctypes.pointer(program)
+            self._boot_program, self._axes = self.library.program(boot)
+            setup.boot_program = ctypes.addressof(self._boot_program)
         setup.identity_bytes, setup.boot_persists = len(identity), boot_persists
         setup.identity[: len(identity)] = identity
         if nonces is not None:

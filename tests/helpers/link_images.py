@@ -4,6 +4,7 @@ import zlib
 from dataclasses import replace
 
 import numpy as np
+from c_scripts import shaped
 from numpy.random import Generator
 from programs import Kind, random_dual, random_fourier, rendered
 
@@ -26,9 +27,12 @@ def digest(rng: Generator) -> str:
 
 
 def random_image(
-    rng: Generator, shape: SequencerShape, harmonics: int = 0, kind: Kind = "smooth"
+    rng: Generator, shape: SequencerShape, harmonics: int = 0, kind: Kind = "smooth", order: int = 0
 ) -> tuple[ProgramImage, DualProgram]:
-    """An image and the program in it; with ``harmonics`` some axes are Fourier words, where they are interpolated."""
+    """An image and the program in it; with ``harmonics`` some axes are Fourier words, where they are interpolated.
+
+    With an ``order`` both axes are shaped up to it, some of them with less room for their steps than that needs.
+    """
     program = random_dual(rng, shape, kind=kind)
     words: dict[str, Ints | None] = {"x": None, "y": None}
     for axis, interpolated in (("x", shape.x_interpolated), ("y", shape.y_interpolated)):
@@ -37,6 +41,13 @@ def random_image(
             changed = rendered(getattr(program, axis), fourier)
             program = replace(program, **{axis: _guarded(changed)})
             words[axis] = fourier.in_order
+    if order:
+        program = shaped(rng, program, order)
+        for axis in "xy":
+            output = getattr(program, axis).output
+            room = output.shaping.step_excess - int(rng.random() < 0.2)
+            output = replace(output, max_step=max(output.max_step + room, 1))
+            program = replace(program, **{axis: replace(getattr(program, axis), output=output)})
     return make_image(program, digest(rng), words["x"], words["y"]), program
 
 

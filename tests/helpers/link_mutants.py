@@ -211,8 +211,8 @@ MUTANTS = [
     Mutant(
         "a table from the link has no word behind its last",
         CHECK,
-        "        table[part->words] = table[0];",
-        "        ;",
+        "            table[part->words + i] = table[i];",
+        "            ;",
     ),
     Mutant("the same challenges after each start", KEY, "dac_link_put(count, l->boot)", "dac_link_put(count, 0)"),
     Mutant("BLAKE2s does not know its last block", MAC, "compress(m, UINT32_MAX);", "compress(m, 0);"),
@@ -306,13 +306,13 @@ MUTANTS = [
     Mutant(
         "slew of advances is not checked",
         CHECK,
-        "        else if (distance(now, c->before) > max_step)\n",
+        "        else if (distance(now, c->before) + excess > max_step)\n",
         "        else if (false)\n",
     ),
     Mutant(
         "slew from the end to the beginning is not checked",
         CHECK,
-        "*done && distance(c->first, c->before) > max_step ?",
+        "*done && distance(c->first, c->before) + excess > max_step ?",
         "false ?",
     ),
     Mutant("slew of segments is not checked", CHECK, "<= advances * (max_step + slack)\n", "<= UINT64_MAX\n"),

@@ -15,6 +15,7 @@ from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS
 from tablegen.link.frames import Frame, FrameReader
 from tablegen.link.image import ProgramImage
 from tablegen.link.messages import (
+    SPLINE_DEGREE,
     VERSION,
     AxisShape,
     DeviceInfo,
@@ -39,9 +40,11 @@ class Differs(Exception):
 class Dialogue:
     """One that is told by a seed. ``seen`` counts answers by type, and refusals by request and reason."""
 
-    def __init__(self, shape: SequencerShape, seed: int, key: bytes = b"", notes: bool = False, **how: Any) -> None:
+    def __init__(
+        self, shape: SequencerShape, seed: int, key: bytes = b"", notes: bool = False, order: int = 0, **how: Any
+    ) -> None:
         self.rng = np.random.default_rng(seed)
-        self.shape, self.key = shape, key
+        self.shape, self.key, self.order = shape, key, order
         boot = random_dual(self.rng, shape, kind="smooth") if self.rng.random() < 0.9 else None
         like = boot or random_dual(self.rng, shape, kind="smooth")
         limits = (widest(like.x.output), widest(like.y.output))
@@ -59,6 +62,7 @@ class Dialogue:
             interlock=True,
             boot_count=int(self.rng.integers(0, 1 << 32)),
             update_rate_hz=20000,
+            shaping=order,
             **how,
         )
         assert self.device.started is Started.STARTED, self.device.started
@@ -69,8 +73,19 @@ class Dialogue:
         shapes += [AxisShape(index[1], like.y.bits, shape.dac_bits, shape.dac_bits)]
         most = 192 + sum(max(each.word_bytes << each.index_bits, 4 * (2 * HARMONICS + 1)) for each in shapes)
         ring = self.device.library.ring // 256
+        degree = SPLINE_DEGREE if "cubic" in (like.x.mode, like.y.mode) else 0
         info = DeviceInfo(
-            VERSION, features | (Feature.KEY if key else 0), ring, 240, HARMONICS, most, *shapes, *limits, 20000
+            VERSION,
+            features | (Feature.KEY if key else 0),
+            ring,
+            240,
+            HARMONICS,
+            most,
+            *shapes,
+            *limits,
+            20000,
+            order,
+            degree,
         )
         self._clock = 0
         self.device.set_clock(0)
@@ -94,7 +109,7 @@ class Dialogue:
 
     def _some_image(self) -> ProgramImage:
         kind = str(self.rng.choice(["smooth", "smooth", "tame", "wild"]))
-        image, _ = random_image(self.rng, self.shape, HARMONICS, kind)  # type: ignore[arg-type]
+        image, _ = random_image(self.rng, self.shape, HARMONICS, kind, self.order)  # type: ignore[arg-type]
         if self.rng.random() < 0.05:
             data = bytearray(image.data)
             data[4 * (PAGE_WORDS * int(self.rng.integers(1, 3)) + AXIS_WORDS.index("harmonics"))] ^= 9

@@ -26,6 +26,8 @@ def trials() -> Iterator[str]:
             yield f"frame: {golden['name']}"
             check(golden)
     for dialogue in dialogues():
+        if test_c_link.golden_shaping(dialogue["device"]):
+            continue  # the device of the trials does not shape
         yield f"dialogue: {dialogue['name']}"
         test_c_link.test_golden_dialogues(dialogue)
     parts = test_c_link_parts
@@ -85,7 +87,7 @@ def failure(path: Path) -> str:
     """The first trial that a compiled device fails, and why; empty if it passes all of them."""
     library = DeviceLibrary(path)
     for module in (link_device, test_c_link_parts):
-        module.device_library = lambda bits=16: library  # type: ignore[attr-defined]
+        module.device_library = lambda *_: library  # type: ignore[attr-defined]
     name = ""
     try:
         for trial in trials():

@@ -25,6 +25,12 @@ def played_codes(axis: Json) -> list[int]:
     for k in range(period):
         if table["mode"] == "direct":
             sample = words[k] * 2**guard
+        elif table["mode"] == "cubic":
+            place = k * 2**32 // period * len(words) // 2**17
+            c = [words[(place // 2**15 + i) % len(words)] for i in range(4)]
+            sample = 16 * (c[3] - 3 * c[2] + 3 * c[1] - c[0])
+            for lower in (24 * (c[0] - 2 * c[1] + c[2]), 12 * (c[2] - c[0]), 2 * (c[0] + 4 * c[1] + c[2])):
+                sample = lower + floor_shift(sample * (place % 2**15), 16)
         else:
             # floor(k 2^32 / period) in words of the table, with 15 bits of fraction.
             place = k * 2**32 // period * len(words) // 2**17
@@ -43,7 +49,7 @@ def memories(manifest: Json) -> dict[str, tuple[list[int], int]]:
         found[f"{name}_fourier"] = fourier_words(axis), 32
     found["program"] = _registers(manifest), 32
     tables = [axis["table"] for axis in manifest["axes"].values()]
-    lengths = [len(table["words"]) for table in tables if table["mode"] == "interpolated"]
+    lengths = [len(table["words"]) for table in tables if table["mode"] != "direct"]
     if lengths:
         longest = max(lengths)
         found["sine"] = [round(2**30 * sin(tau * j / longest)) for j in range(longest // 4)], 32

@@ -1,8 +1,8 @@
 """The commands of a page of docs/, run in its order in one shell, and what the page shows of their output.
 
 Blocks in `sh` are run, and those in `python`, each as a program. Of blocks in `text` the lines that begin with "$ "
-are run, and what they print is compared: numbers within a tenth, and "..." stands for any lines. A comment
-`<!-- file: NAME -->` before a block makes it a file, `<!-- not run: REASON -->` leaves it out, and so does
+are run, and what they print is compared: whole numbers within 1, others within a tenth, and "..." stands for any lines.
+A comment `<!-- file: NAME -->` before a block makes it a file, `<!-- not run: REASON -->` leaves it out, and so does
 `<!-- tested: WHERE -->`. Any other language has to have one of these.
 """
 
@@ -121,8 +121,13 @@ def different(step: Shown, printed: str) -> list[str]:
 
 
 def same(shown: str, printed: str) -> bool:
-    """Whether a line is that of the page, numbers within a tenth or a hundredth."""
+    """Whether a line is that of the page: whole numbers within 1, as codes are, others within a tenth, or 0.02."""
     if _NUMBER.sub("#", shown) != _NUMBER.sub("#", printed):
         return False
     pairs = zip(_NUMBER.findall(shown), _NUMBER.findall(printed), strict=True)
-    return all(abs(float(one) - float(other)) <= 0.02 + 0.1 * abs(float(one)) for one, other in pairs)
+    return all(abs(float(one) - float(other)) <= _room(one) for one, other in pairs)
+
+
+def _room(number: str) -> float:
+    """How far a number may be from the one of the page."""
+    return 1.0 if number.lstrip("+-").isdigit() else 0.02 + 0.1 * abs(float(number))

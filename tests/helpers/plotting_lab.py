@@ -22,6 +22,7 @@ PLOTTING: dict[str, tuple[str, ...]] = {
     "show": ("show", "scan.toml"),
     "show of a line": ("show", "line.toml"),
     "build": ("build", "scan.toml", "-o", "out", "-q"),
+    "tables": ("tables", "scan.toml"),
     "simulate": ("simulate", "scan.toml", "--no-calibration"),
     "simulate own": ("simulate", "own/scan.toml"),
     "compare": ("compare", "scan.toml", "scan.toml"),

@@ -80,6 +80,7 @@ def _check() -> LineCheck:
 
 @given(_STEPS)
 @example([("trigger", 0), ("commit", 1)])
+@example([("commit", 1), ("trigger", 0), ("commit", 1)])
 @settings(max_examples=60)
 def test_what_the_model_plays_is_right(steps: list[Step]) -> None:
     lines = _played(steps)

@@ -68,7 +68,7 @@ def _without(reason: Reason) -> Callable[..., Finding | None]:
     return fewer
 
 
-_CHECKS = range(Reason.SCHEDULE, Reason.JUMP + 1)
+_CHECKS = (*range(Reason.SCHEDULE, Reason.JUMP + 1), Reason.SHAPING)
 
 
 @pytest.mark.parametrize("reason", [Reason(number) for number in _CHECKS], ids=lambda reason: reason.name.lower())

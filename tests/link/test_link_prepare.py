@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from building import EXAMPLE, VARIANTS, Variant, build, write_variant
+from building import EXAMPLE, IN_C, VARIANTS, Variant, build, write_variant
 from client_rig import info_for
 
 from tablegen.config.load import load
@@ -199,6 +199,15 @@ WRONG = {
 def test_what_would_be_refused_is_said_with_a_remedy(scan: PreparedScan, info: DeviceInfo, case: str) -> None:
     change, form, said = WRONG[case]
     assert objections(scan, change(info), form) == said
+
+
+def test_a_device_without_splines_takes_no_cubic_table(tmp_path: Path) -> None:
+    scan = PreparedScan.of_build(build(tmp_path, IN_C["cubic"]).folder)
+    info = replace(info_for(scan), harmonics=512)
+    said = "a cubic table; the device plays none: compile it with DAC_SPLINE=1, or set table.mode"
+    assert objections(scan, info) == [f"x: {said}", f"y: {said}"]
+    for form in ("table", "fourier", "auto"):
+        assert objections(scan, replace(info, degree=3), form) == []
 
 
 def test_everything_is_said_at_once(scan: PreparedScan, info: DeviceInfo) -> None:

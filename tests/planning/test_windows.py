@@ -10,8 +10,7 @@ from hypothesis import assume, example, given
 from hypothesis import strategies as st
 from variants import plan_of, setup_of
 
-from tablegen.device.schedule import Window
-from tablegen.device.sequencer import pixel_starts
+from tablegen.device.schedule import Window, pixel_starts
 from tablegen.planning.windows import line_windows, matching_lines, retrace_mismatch
 
 LOW, HIGH = Fraction(1, 10), Fraction(9, 10)

@@ -4,12 +4,14 @@ import os
 import subprocess
 import sys
 from dataclasses import dataclass
+from pathlib import Path
 
 import pytest
 from building import HELPERS
 from c_benches import FILL, Benches
 from c_coverage import COVERAGE, Coverage, coverage
 from c_library import compile_both
+from c_mutants import scripts
 from c_scripts import IN_C, LONG, LONG_PERIODS, everything, long_periods, long_play, renderings
 
 from tablegen.resources import c_runtime
@@ -67,3 +69,14 @@ def test_the_fast_path_plays_most_of_long_lines(measured: Measured) -> None:
     """Two axes; some programs have no runs, some clamp all along, some are parked."""
     runs = measured.coverage.of(AXIS, "axis->code = code;")
     assert runs * RUN > measured.ticks // 2
+
+
+def test_every_line_of_shaping_was_run(tmp_path: Path) -> None:
+    """With products of 64 bits and without; ``dac_shaping.c`` is empty in a runtime that does not shape."""
+    for more in ((), ("-DDAC_LONG_MULTIPLY=0",)):
+        benches = Benches(tmp_path / "".join(more), (*COVERAGE, "-DDAC_SHAPING=3", *more))
+        for script, shape in (*scripts("shaped"), (long_play("bits_24", 12_000, 0, 3), LONG["bits_24"][0])):
+            benches.play(script, shape, fill=FILL)
+    found = coverage([tmp_path], ["dac_shaping.c"])
+    assert found.lines
+    assert found.missed() == []

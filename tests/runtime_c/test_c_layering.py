@@ -13,7 +13,13 @@ from tablegen.resources import c_link, c_runtime
 EVERYTHING = [*c_runtime(), *c_link()]
 Graph = Mapping[str, set[str]]
 # What these compile makes other calls.
-CHOICES = {"default": [], "small": ["-DDAC_SMALL=1"], "no_long_multiplication": ["-DDAC_LONG_MULTIPLY=0"]}
+CHOICES = {
+    "default": [],
+    "small": ["-DDAC_SMALL=1"],
+    "no_long_multiplication": ["-DDAC_LONG_MULTIPLY=0"],
+    "spline": ["-DDAC_SPLINE=1"],
+    "shaped": ["-DDAC_SHAPING=3"],
+}
 
 
 def circle(graph: Graph) -> list[str]:

@@ -21,9 +21,15 @@ SHAPES = {
     "12 bits": SequencerShape(12, 1, 4, 10, 1, 3, 14),
     "24 bits": SequencerShape(24, 1, 4, 20, 1, 3, 24),
     "direct": SequencerShape(16, 0, 5, 16, 0, 5, 16),
+    "cubic": SequencerShape(16, 3, 5, 16, 3, 4, 16),
     "mixed": SequencerShape(16, 1, 3, 16, 0, 4, 12),
 }
 SEEDS, STEPS = 6, 250
+
+
+def golden_shaping(name: str) -> int:
+    """The highest order of a device of the golden dialogues."""
+    return DeviceInfo.unpack(bytes.fromhex(GOLDEN["devices"][name]["device"])).shaping
 
 
 def golden_device(name: str) -> HostDevice:
@@ -44,6 +50,7 @@ def golden_device(name: str) -> HostDevice:
         boot_count=made["boot"],
         interlock=Feature.INTERLOCK in info.features,
         nonces=lambda: bytes.fromhex(next(nonces)),
+        shaping=info.shaping,
     )
 
 
@@ -99,6 +106,13 @@ def test_a_random_dialogue_is_that_of_the_model(name: str, key: bytes) -> None:
         Dialogue(SHAPES[name], seed, key).play(STEPS)
 
 
+@pytest.mark.common
+def test_a_random_dialogue_of_a_device_that_shapes() -> None:
+    for name, order in (("16 bits", 3), ("24 bits", 1), ("direct", 2), ("cubic", 2)):
+        for seed in range(SEEDS):
+            Dialogue(SHAPES[name], seed, order=order).play(STEPS)
+
+
 def test_random_dialogues_are_about_everything() -> None:
     """A control of the test above: every request is answered in them, and refused for most reasons."""
     seen: Counter[Any] = Counter()
@@ -113,6 +127,7 @@ def test_random_dialogues_are_about_everything() -> None:
         Reason.IMAGE,
         Reason.TICKS,
         Reason.REFUSED,
+        Reason.SHAPING,
         *range(Reason.SCHEDULE, Reason.WITHDRAWN),
     }  # by others
     assert set(Reason) - reasons <= rare, sorted(set(Reason) - reasons)

@@ -75,9 +75,10 @@ def test_cortex_m_plays_everything_that_a_host_may_ask(
 def test_cortex_m_plays_the_random_programs_of_the_other_sequencers(name: str, tmp_path: Path) -> None:
     configuration = IN_C[name]
     script = configuration.script(name)
-    words = words_of(script, configuration.shape)
+    words, shaping = words_of(script, configuration.shape), (*OPTIONS, f"-DDAC_SHAPING={configuration.shaping}")
     for core, fill in (("cortex-m0plus", 0), ("cortex-m4", FILL)):
-        hold(CortexMBench(configuration.shape, tmp_path, fill=fill, core=core).run(words), script, fill)
+        bench = CortexMBench(configuration.shape, tmp_path, options=shaping, fill=fill, core=core)
+        hold(bench.run(words), script, fill)
 
 
 @pytest.mark.parametrize("name", LONG)
@@ -87,6 +88,18 @@ def test_cortex_m_plays_long_lines(name: str, tmp_path: Path) -> None:
     words = words_of(script, shape)
     for core in ("cortex-m0plus", "cortex-m4", "riscv32"):
         hold(CortexMBench(shape, tmp_path, fill=200, core=core).run(words), script, 200)
+
+
+@pytest.mark.parametrize("level", ["-O2", "-Os"])
+@pytest.mark.parametrize("core", [*CORTEX_M, *RISC_V])
+def test_shaped_output(core: str, level: str, tmp_path: Path) -> None:
+    for name in ("bits_16", "bits_8", "bits_20"):
+        shape, script = LONG[name][0], long_play(name, 6000, 0, 3)
+        words = words_of(script, shape)
+        for fill in (200, 0):
+            place = tmp_path / f"{name}_{fill}"
+            shaping = (*options(level), "-DDAC_SHAPING=3")
+            hold(CortexMBench(shape, place, options=shaping, fill=fill, core=core).run(words), script, fill)
 
 
 @pytest.mark.parametrize("core", [*CORTEX_M, *RISC_V])

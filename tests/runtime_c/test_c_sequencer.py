@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from building import HELPERS, NAME, VARIANTS, build, run_clean
-from c_benches import COMPILERS, FILL, Benches
+from c_benches import COMPILERS, FILL, SANITIZED, Benches
 from c_checks import CHECKS
 from c_devices import Check, Libraries
 from c_library import Converter, CProgram, Library, Twin, compile_both, compile_library, storage
@@ -60,8 +60,10 @@ def everywhere(benches: Benches, script: Script, shape: SequencerShape, fourier:
 
 @pytest.mark.common
 @pytest.mark.parametrize("name", common(FEW, IN_C))
-def test_random_programs(name: str, benches: Benches) -> None:
+def test_random_programs(name: str, benches: Benches, tmp_path: Path) -> None:
     configuration = IN_C[name]
+    if configuration.shaping:
+        benches = Benches(tmp_path, (*SANITIZED, f"-DDAC_SHAPING={configuration.shaping}"))
     capture = everywhere(benches, configuration.script(name), configuration.shape)
     assert len(capture) >= configuration.samples
     seen = occurrences(capture)
@@ -70,7 +72,7 @@ def test_random_programs(name: str, benches: Benches) -> None:
 
 
 @pytest.mark.common
-@pytest.mark.parametrize("name", common(("bits_16", "bits_24", "direct"), LONG))
+@pytest.mark.parametrize("name", common(("bits_16", "bits_24", "direct", "cubic"), LONG))
 def test_long_lines(name: str, benches: Benches) -> None:
     script = long_play(name, 60_000)
     capture = everywhere(benches, script, LONG[name][0])

@@ -23,6 +23,15 @@ CHOICES = {
     "narrow_words_wide_codes": ["-DDAC_OUTPUT_STORAGE_BITS=32", "-DDAC_REQUESTS=128"],
     "no_long_multiplication": ["-DDAC_LONG_MULTIPLY=0"],
     "small": ["-DDAC_SMALL=1", "-Os"],
+    "spline": ["-DDAC_SPLINE=1"],
+    "spline_wide": ["-DDAC_SPLINE=1", "-DDAC_TABLE_STORAGE_BITS=32", "-DDAC_OUTPUT_STORAGE_BITS=32"],
+    "spline_shaped": ["-DDAC_SPLINE=1", "-DDAC_SHAPING=3"],
+    "spline_shaped_no_long_multiplication": ["-DDAC_SPLINE=1", "-DDAC_SHAPING=3", "-DDAC_LONG_MULTIPLY=0"],
+    "first_order": ["-DDAC_SHAPING=1"],
+    "shaped": ["-DDAC_SHAPING=3"],
+    "shaped_wide": ["-DDAC_SHAPING=3", "-DDAC_TABLE_STORAGE_BITS=32", "-DDAC_OUTPUT_STORAGE_BITS=32"],
+    "shaped_no_long_multiplication": ["-DDAC_SHAPING=3", "-DDAC_LONG_MULTIPLY=0"],
+    "shaped_small": ["-DDAC_SHAPING=2", "-DDAC_SMALL=1", "-Os"],
 }
 # 32 bits without a C library for them: the runtime is freestanding, and so are these.
 COMPILERS = {
@@ -92,15 +101,19 @@ def test_analysers_find_a_fault(analyser: str, tmp_path: Path) -> None:
     assert run([*ANALYSERS[analyser], source]).returncode != 0
 
 
-def declared(*headers: str) -> set[str]:
-    """Functions that headers declare, but for those that they define themselves."""
+def declared(*headers: str, shaped: bool = True) -> set[str]:
+    """Functions that headers declare, but for those that they define themselves; of a runtime that shapes or not."""
     text = "".join(HEADERS[name].read_text("utf-8") for name in headers)
     text = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
+    if not shaped:
+        text = re.sub(r"^#if DAC_SHAPING\n.*?^#endif$", "", text, flags=re.DOTALL | re.MULTILINE)
     return set(re.findall(r"^(?!static|#)\w[\w ]*?[ *](dac_\w+)\([^;{]*\);", text, flags=re.MULTILINE))
 
 
 @pytest.mark.common
-@pytest.mark.parametrize("options", [["-O0"], ["-O2"], ["-Os"], ["-O2", *CHOICES["wide"]]], ids=" ".join)
+@pytest.mark.parametrize(
+    "options", [["-O0"], ["-O2"], ["-Os"], ["-O2", *CHOICES["wide"]], ["-O2", *CHOICES["shaped"]]], ids=" ".join
+)
 @pytest.mark.parametrize("compiler", by_tool(["gcc", "clang"]))
 def test_symbols(compiler: str, options: list[str], tmp_path: Path) -> None:
     """Exported is what headers declare, asked for are their own functions, memcpy and memset; no variables."""
@@ -110,7 +123,7 @@ def test_symbols(compiler: str, options: list[str], tmp_path: Path) -> None:
         for line in run_clean(["nm", path]).splitlines():
             *_, kind, name = line.split()
             found.setdefault(kind, set()).add(name)
-    own = declared(*HEADERS)
+    own = declared(*HEADERS, shaped="-DDAC_SHAPING=3" in options)
     assert found.pop("T") == own >= {"dac_sequencer_step", "dac_axis_run", "dac_link_work"}
     assert found.pop("U", set()) <= own | {"memcpy", "memset"}
     assert set(found) <= {"t", "r"}, found

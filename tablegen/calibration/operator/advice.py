@@ -32,7 +32,8 @@ def next_trace(fit: OperatorFit, lines: Sequence[PeriodicLine], driver: Driver |
     """The trace that helps most; ``rate_hz`` is another rate than that of all traces, where they have but one."""
     reach = [(s, c) for s in _STROKES for c in _CENTRES if 0.5 * s <= min(c, 1.0 - c) + 1e-9]
     unknown = _unknown(fit, np.array(reach))
-    best = int(np.argmax(unknown))
+    # Of two that the traces leave equal, as those at equal distances to both sides are, the lower one on every machine.
+    best = int(np.argmax(np.round(unknown, 9)))
     rates = [line.rate_hz for line in lines]
     other = None if max(rates) > _DECADE * min(rates) else 10.0 * max(rates)
     stroke, centre = reach[best]

@@ -15,6 +15,9 @@ from tablegen.problems import Unphysical
 PHASES = 1024  # of the grid
 _MIN_SAMPLES = 40  # samples a period
 _MAX_DRIFT_ORDER = 3
+# Share of a period that may be missing: a record of whole periods ends a sample before their end. It is no sample of a
+# round number of them, where the last bit of the period would decide.
+_MISSING = 1.5e-3
 _LEVEL = 0.25  # of the drive's span: how far about the middle a crossing has to go to count
 _RESONANCE_SHARE = 0.3  # dynamics are taken out up to this share of the resonance; what lies above is noise
 _BACKWARDS = 0.02  # of the span: how far a sweep may go back, as noise of the record does
@@ -107,7 +110,7 @@ def periodic_line(trace: Trace, driver: Driver | float) -> PeriodicLine:
         raise Unphysical(f"a drive of {low:.4g}..{high:.4g} V is outside the driver's {driver}")
     period = _period(time, drive)
     # Whole periods from the first sample on; the grid then begins at a minimum.
-    periods = int((time[-1] - time[0]) / period + 1e-3)
+    periods = int((time[-1] - time[0]) / period + _MISSING)
     if periods < 1:
         raise Unphysical(f"{(time[-1] - time[0]) / period:.3g} of a period are recorded; at least one is needed")
     if len(time) / ((time[-1] - time[0]) / period) < _MIN_SAMPLES:

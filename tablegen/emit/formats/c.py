@@ -6,13 +6,21 @@ from typing import Any
 
 import numpy as np
 
-from tablegen.emit.constants import axis_constants, scan_constants, sequence_constants
+from tablegen.emit.constants import (
+    axis_constants,
+    scan_constants,
+    sequence_constants,
+    shaping_constants,
+    storage_bits,
+)
 from tablegen.emit.content import AxisContent, Content
 from tablegen.emit.format import Comparison, Format, differing
 from tablegen.emit.templates import comment_safe, rows, template
 from tablegen.fixedpoint.output import GAIN_BITS
 from tablegen.fixedpoint.phase import PHASE_BITS
+from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.rounding import signed_limits
+from tablegen.fixedpoint.spline import WORDS_BEHIND
 from tablegen.fixedpoint.synthesis import sine_periods
 from tablegen.numerics.arrays import Ints
 from tablegen.reading import BUILD_FILE, read_text
@@ -125,6 +133,7 @@ def _context(content: Content) -> dict[str, Any]:
         "least_gain": signed_limits(GAIN_BITS)[0],
         "greatest_gain": signed_limits(GAIN_BITS)[1],
         "storage": storage,
+        "shaping": shaping_constants(content),
         "word_type": f"int{storage['TABLE_STORAGE_BITS']}_t",
         "sine": {"constants": _sine_constants(content, sine), "rows": rows(sine)} if len(sine) else None,
         "axes": [_axis(content, axis) for axis in content.axes],
@@ -138,25 +147,33 @@ def _axis(content: Content, axis: AxisContent) -> dict[str, Any]:
         "prefix": prefix,
         "PREFIX": prefix.upper(),
         "constants": axis_constants(axis.program, axis.harmonics),
+        "words_behind": words_behind(axis.program),
         "table_rows": rows(_table(axis)),
         "fourier_rows": rows(axis.fourier_words),
-        "interpolated": axis.program.mode == "interpolated",
+        "mode": axis.program.mode,
+        "shaped": axis.program.output.shaping.order != 0,
         "lines_per_period": "1" if axis.axis == "x" else f"{content.name.upper()}_FRAME_LINES",
     }
 
 
 def _table(axis: AxisContent) -> Ints:
-    """The array of a table: its words, and behind the last one the first one again, so that no index needs a look."""
+    """The array of a table: its words, and behind the last one the first ones again, so that no index needs a look."""
     words = np.asarray(axis.program.words)
-    return np.append(words, words[:1])
+    return np.append(words, words[: words_behind(axis.program)])
+
+
+def words_behind(program: Program) -> int:
+    """How many words stand behind the last one of a table."""
+    return WORDS_BEHIND if program.mode == "cubic" else 1
 
 
 def _storage(content: Content) -> dict[str, int]:
-    """Bits of the words of both tables, and of both converters, in memory: the runtime is compiled for one of each."""
+    """What the runtime is compiled for: bits of words of both tables, and of both converters, in memory; splines."""
     programs = [axis.program for axis in content.axes]
     return {
-        "TABLE_STORAGE_BITS": 16 if max(program.bits for program in programs) <= 16 else 32,
-        "OUTPUT_STORAGE_BITS": 16 if max(program.output.word_bits for program in programs) <= 16 else 32,
+        "TABLE_STORAGE_BITS": storage_bits(max(program.bits for program in programs)),
+        "OUTPUT_STORAGE_BITS": storage_bits(max(program.output.word_bits for program in programs)),
+        **({"SPLINE": 1} if any(program.mode == "cubic" for program in programs) else {}),
     }
 
 

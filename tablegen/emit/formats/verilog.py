@@ -5,11 +5,12 @@ from pathlib import Path
 from typing import Any
 
 from tablegen.device.widths import least_widths
-from tablegen.emit.constants import axis_constants, scan_constants, sequence_constants
+from tablegen.emit.constants import axis_constants, scan_constants, sequence_constants, shaping_constants
 from tablegen.emit.content import AxisContent, Content
 from tablegen.emit.format import Comparison, Format, differing
 from tablegen.emit.memory import memory_files
 from tablegen.emit.templates import comment_safe, template
+from tablegen.problems import Unphysical
 from tablegen.reading import BUILD_FILE, read_text
 from tablegen.resources import resource_folder, verilog_runtime
 
@@ -25,7 +26,13 @@ class Verilog(Format):
     file_names = "NAME.vh, NAME_*.mem, dac_*.v, program_loader.v"
 
     def files(self, content: Content) -> dict[str, bytes]:
-        """The header and the memory files."""
+        """The header and the memory files. Raises ``Unphysical`` for a cubic table, which no Verilog plays."""
+        for axis in content.axes:
+            if axis.program.mode == "cubic":
+                raise Unphysical(
+                    f"the Verilog sequencer plays no cubic tables: leave verilog out, or set {axis.axis}.table.mode to "
+                    "'interpolated'"
+                )
         header = template("verilog/tables.vh.j2", _context(content), literal, range=value_range)
         return {f"{content.name}.vh": header, **_memories(content)}
 
@@ -110,7 +117,7 @@ def _context(content: Content) -> dict[str, Any]:
         "scanner": comment_safe(content.scanner),
         "summary": content.summary,
         "sequence": sequence_constants(content.schedule),
-        "widths": least_widths(content.schedule, content.y.program),
+        "widths": least_widths(content.schedule, content.y.program) | shaping_constants(content),
         "program_memory": f"{content.name}_program.mem",
         "sine_memory": f"{content.name}_sine.mem",
         "sine": content.sine_index_bits,

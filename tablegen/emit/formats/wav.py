@@ -6,7 +6,7 @@ import numpy as np
 
 from tablegen.emit.content import AxisContent, Content
 from tablegen.emit.format import Format
-from tablegen.emit.waveforms import require_short_frame
+from tablegen.emit.waveforms import require_period
 from tablegen.numerics.arrays import Ints
 from tablegen.problems import Unphysical
 
@@ -23,7 +23,7 @@ class Wav(Format):
 
     def files(self, content: Content) -> dict[str, bytes]:
         """One file."""
-        require_short_frame(content)
+        require_period(content)
         bits = 16 if max(axis.program.output.dac_bits for axis in content.axes) <= 16 else 32
         rate = _rate(content, bits // 8 * _CHANNELS)
         axes = sorted(content.axes, key=lambda axis: axis.program.output.channel)  # x is the left one unless it is on B

@@ -1,0 +1,1 @@
+"""What benchmarks/results.py runs: a file each section of the page."""

@@ -1,0 +1,197 @@
+"""The memory that an error takes, for docs/tables.md, and what modes take on devices, for `tablegen tables`.
+
+``python benchmarks/tables.py`` prints the memory, ``--write`` puts it into the page and draws its figure. ``--costs``
+measures what each mode takes: instructions in emulation as ``firmware.py`` does, cells by yosys and nextpnr as
+``resources.py`` does, and writes them where the command reads them.
+"""
+
+import argparse
+import os
+import re
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import firmware
+import resources
+from msgspec import structs
+
+from tablegen.certificate.certificate import certify
+from tablegen.certificate.line_errors import EmittedPeriod
+from tablegen.cli.tables_text import tables_text
+from tablegen.config.load import from_values, load
+from tablegen.config.schema import Table
+from tablegen.emit.render import render
+from tablegen.fixedpoint.program import Mode
+from tablegen.fixedpoint.table_shape import MODES, TableShape
+from tablegen.planning.line_plan import LinePlan, make_plan
+from tablegen.planning.other_table import maker_of, with_table
+from tablegen.planning.table_choice import possible_shapes
+from tablegen.planning.table_search import TableSearch
+from tablegen.report.picture import picture
+from tablegen.report.table_charts import table_charts
+from tablegen.report.table_costs import CELLS, INSTRUCTIONS
+from tablegen.report.table_rows import axis_tables
+from tablegen.resources import c_runtime
+from tablegen.verification.emulate import Processor, compile_bare
+
+HERE = Path(__file__).parent
+EXAMPLE = HERE.parent / "examples" / "annexin_200nm.toml"
+PAGE = HERE.parent / "docs" / "tables.md"
+FIGURE = HERE.parent / "docs" / "figures" / "tables.svg"
+COSTS = HERE.parent / "tablegen" / "report" / "table_costs.py"
+CORES = ("cortex-m4", "cortex-m0plus")
+ERRORS = (2.0, 1.0, 0.75, 0.6, 0.55)
+SINES = ((16, 1000, 1.0), (16, 65536, 1.0), (18, 1000, 0.6), (18, 65536, 0.6), (18, 1000, 0.75))
+# Words of the tables that are counted: how many and how wide they are changes nothing.
+_LENGTHS: dict[Mode, int | None] = {"direct": None, "interpolated": 512, "cubic": 128}
+
+
+def sine(bits: int, ticks: int) -> LinePlan:
+    """A plain sine over 79 % of a converter's range, whose period is so many ticks."""
+    axis = {"size_v": 98.0, "offset_v": 50.0, "band_limit": {"method": "truncate", "harmonics": 1}}
+    scan = {
+        "dac": {"bits": bits, "v_min": 0.0, "v_max": 100.0, "update_rate_hz": 1e6},
+        "amplifier": {"gain": 1.0},
+        "timing": {"pixels": 64, "lines": 4, "line_rate_hz": 1e6 / ticks},
+        "x": axis,
+        "y": {"motion": "off", "offset_v": 50.0},
+    }
+    size = {"size": {"k_nm_per_v": 10.0, "beta": 0.0}}
+    return make_plan(from_values(scan, {"name": "plain", "v_max": 100.0, "x": size, "y": size})).x
+
+
+def smallest(line: LinePlan, error: float) -> dict[Mode, TableShape | None]:
+    """The least memory of each mode that keeps an error."""
+    search = TableSearch(maker_of(line))
+    possible = possible_shapes(Table(), line.program.phase.ticks, line.series.harmonics)
+    return {mode: search.smallest([one for one in possible if one.mode == mode], error) for mode in MODES}
+
+
+def row(name: str, line: LinePlan, error: float) -> str:
+    """The least memory of each mode, and what it errs by."""
+    cells = []
+    for shape in smallest(line, error).values():
+        if shape is None:
+            cells.append("")
+            continue
+        found = EmittedPeriod(with_table(line, shape)).largest_error()
+        cells.append(f"{shape.memory_bits}: {shape.length} x {shape.bits}, {found:.3f}")
+    return f"| {name} | {error:g} | {' | '.join(cells)} |"
+
+
+def memory() -> str:
+    """Both tables of the page."""
+    head = f"| | error [LSB] | {' | '.join(MODES)} |\n|---|---|{'---|' * len(MODES)}"
+    plan = make_plan(load(EXAMPLE))
+    example = [row(line.axis, line, error) for line in plan.lines for error in ERRORS]
+    sines = [row(f"{bits} bits, {ticks} ticks", sine(bits, ticks), error) for bits, ticks, error in SINES]
+    return "\n".join([head, *example, "", head.replace("| |", "| sine |"), *sines, ""])
+
+
+def costs() -> str:
+    """What the modes take, as a table of the page."""
+    head = f"| mode | {' | '.join(f'instructions, {core}' for core in CORES)} | cells, HX8K |"
+    rows = [
+        f"| `{mode}` | {' | '.join(f'{INSTRUCTIONS[mode][core]:g}' for core in CORES)} | {CELLS[mode] or 'none'} |"
+        for mode in MODES
+    ]
+    return "\n".join([head, f"|{'---|' * (len(CORES) + 2)}", *rows, ""])
+
+
+def output() -> str:
+    """What the command prints of x of the example."""
+    setup = load(EXAMPLE)
+    text = tables_text(axis_tables(setup, make_plan(setup).x))
+    return "\n".join(
+        ["```text", "$ tablegen tables examples/annexin_200nm.toml --axis x", *map(str.rstrip, text), "```", ""]
+    )
+
+
+def figure() -> bytes:
+    """The front of both axes of the example, as a picture."""
+    setup = load(EXAMPLE)
+    emit = structs.replace(setup.scan.emit, formats=["c"])  # which plays all modes
+    setup = replace(setup, scan=structs.replace(setup.scan, emit=emit))
+    charts = table_charts("annexin_200nm", [axis_tables(setup, line) for line in make_plan(setup).lines])
+    return picture(charts.charts, "svg", "", charts.columns)
+
+
+def instructions(core: str) -> dict[Mode, float]:
+    """An axis sample of ``fill`` by mode: of x alone, since y keeps lines between its words."""
+    found: dict[Mode, float] = {}
+    for mode in MODES:
+        spline = mode == "cubic"  # the runtime plays it only if it is compiled for it
+        found[mode] = round(2.0 * _fill(core, mode, spline) - _fill(core, "interpolated", spline), 1)
+    return found
+
+
+def _fill(core: str, mode: Mode, spline: bool) -> float:
+    """Mean of a frame of the example, of samples of both axes."""
+    setup = load(EXAMPLE)
+    x = structs.replace(setup.scan.x, table=Table(mode=mode, length=_LENGTHS[mode], bits=16))
+    plan = make_plan(replace(setup, scan=structs.replace(setup.scan, x=x)))
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for file, content in render(plan, certify(plan), ["c"]).items():
+            (folder / file).write_bytes(content)
+        sources = [HERE / "table_count.c", firmware.MEMORY, folder / f"{plan.name}.c", folder / f"{plan.name}.h"]
+        options = ("-std=c99", "-O2", f"-DDAC_SPLINE={int(spline)}")
+        machine = Processor(compile_bare(folder / "count.elf", [*c_runtime(), *sources], core, None, options), core)
+        machine.call("count_start")
+        if int.from_bytes(machine.read("refused", 4), "little"):
+            raise RuntimeError(f"the runtime refuses the program with a {mode} table")
+        fills = plan.schedule.frame_ticks // firmware.TICKS
+        return sum(machine.call("count_fill").instructions for _ in range(fills)) / fills / firmware.TICKS / 2.0
+
+
+def cells() -> dict[Mode, int | None]:
+    """One axis on an HX8K, a sample a clock, by mode."""
+    axis = resources.CASES["axis"]
+    parameters = {"direct": {"INTERPOLATED": 0}, "interpolated": {}}
+    found = {mode: replace(axis, parameters={**axis.parameters, **own}) for mode, own in parameters.items()}
+    return {mode: resources.measure(found[mode]).cells if mode in found else None for mode in MODES}
+
+
+def write_costs() -> None:
+    """Measure what the modes take, and put it where the command reads it."""
+    by_core = {core: instructions(core) for core in CORES}
+    lines = ["INSTRUCTIONS: dict[Mode, dict[str, float]] = {"]
+    for mode in MODES:
+        counts = ", ".join(f'"{core}": {by_core[core][mode]}' for core in CORES)
+        lines.append(f'    "{mode}": {{{counts}}},')
+    lines += ["}", "# Cells of one axis in Verilog on an iCE40 HX8K, a sample a clock; None where it has no such mode."]
+    lines += [
+        "CELLS: dict[Mode, int | None] = {",
+        *(f'    "{mode}": {count},' for mode, count in cells().items()),
+        "}",
+        "",
+    ]
+    before = COSTS.read_text("utf-8").partition("INSTRUCTIONS")[0]
+    COSTS.write_text(before + "\n".join(lines), "utf-8")
+
+
+def main() -> None:
+    """Print, or write."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--write", action="store_true", help=f"put the table into {PAGE.name}, and draw {FIGURE.name}")
+    parser.add_argument("--costs", action="store_true", help=f"measure what the modes take, and write {COSTS.name}")
+    given = parser.parse_args()
+    if given.costs:
+        write_costs()
+        return
+    found = {"memory": memory(), "costs": costs(), "output": output()}
+    print(*found.values(), sep="\n")
+    if given.write:
+        page = PAGE.read_text("utf-8")
+        for mark, text in found.items():
+            marked = re.compile(rf"(?<=<!-- {mark} -->\n).*?(?=<!-- /{mark} -->)", re.DOTALL)
+            page = marked.sub(lambda _, text=text: text, page, count=1)
+        PAGE.write_text(page, "utf-8")
+        FIGURE.write_bytes(figure())
+
+
+if __name__ == "__main__":
+    main()

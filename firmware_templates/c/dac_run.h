@@ -1,0 +1,105 @@
+/* Private to the runtime: what the loops share that play many ticks with one check. */
+#ifndef DAC_RUN_H
+#define DAC_RUN_H
+
+#include "dac_axis.h"
+
+#if defined(__ARM_FEATURE_UNALIGNED) && !defined(__ARM_BIG_ENDIAN) && DAC_TABLE_STORAGE_BITS == 16
+/* Reads two neighbouring words with one load. */
+struct dac_pair {
+    int32_t words;
+} __attribute__((packed, may_alias));
+#define DAC_NEIGHBOURS(table, index, here, there)                                                                     \
+    const int32_t words = ((const struct dac_pair *)((table) + (index)))->words;                                      \
+    const int32_t here = (int16_t)words, there = words >> 16
+#else
+#define DAC_NEIGHBOURS(table, index, here, there) const int32_t here = (table)[index], there = (table)[(index) + 1]
+#endif
+
+/* Hides a value from the optimiser, so that the compiler neither computes it in advance nor computes it again. */
+#if defined(__GNUC__)
+#define DAC_OPAQUE(value) __asm__("" : "+r"(value))
+#else
+#define DAC_OPAQUE(value) (void)0
+#endif
+
+/* The sample at a position, of which it takes the upper word. */
+static inline int32_t dac_sample_at(const dac_bank_axis *bank, uint32_t high)
+{
+    const uint32_t index = high >> 15; /* the fraction behind it is 0 in a direct table */
+#if DAC_SPLINE
+    if (bank->cubic) {
+        const dac_segment segment = dac_segment_of(bank->table + index);
+        return dac_along(&segment, high << 17 >> 1);
+    }
+#endif
+    const unsigned guard = DAC_GUARD(bank);
+    return dac_between(bank->table[index], bank->table[index + 1], high & 0x7fffu, guard, DAC_HALF(guard));
+}
+
+#if DAC_SPLINE
+/* The way of a run along a spline, with less than half a segment between two ticks: a segment is worked out once. */
+typedef struct {
+    dac_segment segment;
+    const dac_word *next; /* the words of the next segment */
+    uint64_t way, step;   /* into the segment, and from tick to tick, in 2^-64 of it */
+} dac_track;
+
+/* Before the first tick, which is at position `at`. */
+static inline dac_track dac_track_of(const dac_word *table, uint64_t at, uint64_t step)
+{
+    const dac_word *const words = table + (at >> 47);
+    const bool goes_on = (at - step) >> 47 == at >> 47;
+    dac_track track;
+
+    track.segment = dac_segment_of(words);
+    track.next = words + (goes_on ? 1 : 0);
+    track.way = (at - step) << 17;
+    track.step = step << 17;
+    return track;
+}
+
+/* Moves to the next tick, and returns its sample. */
+static inline int32_t dac_track_on(dac_track *track)
+{
+    const uint32_t before = (uint32_t)(track->way >> 32);
+
+    track->way += track->step;
+    if ((uint32_t)(track->way >> 32) < before) /* an overflow, since a step is below 2^63 */
+        track->segment = dac_segment_of(track->next++);
+    return dac_along(&track->segment, (uint32_t)(track->way >> 49) << 16);
+}
+
+#endif
+
+/* Ticks of the next block: one check covers it. */
+static inline uint32_t dac_block_of(uint32_t ticks)
+{
+    return ticks < DAC_RUN ? ticks : DAC_RUN;
+}
+
+/* Whether a window with this lower end is inside the limits. */
+static inline bool dac_has_room(const dac_bank_axis *bank, int32_t base)
+{
+    return (uint32_t)(base - bank->code_min) <= (uint32_t)bank->run_room;
+}
+
+#if !DAC_LONG_MULTIPLY
+
+#define DAC_SAMPLE_BITS 20 /* of 16 and 4 guard bits */
+#define DAC_ABOVE (32 - (DAC_SAMPLE_BITS + 1)) /* where the sum of an interpolation has the LSB of the sample */
+
+/* A Cortex-M0 adds and compares with all of its registers, and does everything else with eight: what is only added or compared is
+ * put aside, and the step is read again for every sample. */
+#if defined(__GNUC__) && defined(__thumb__) && !defined(__thumb2__) && !defined(__OPTIMIZE_SIZE__)
+#define DAC_ASIDE(value) __asm__("" : "+h"(value))
+#define DAC_PUT_ASIDE(low, base, stop) DAC_ASIDE(low); DAC_ASIDE(base); DAC_ASIDE(stop)
+#define DAC_READ_AGAIN volatile
+#else
+#define DAC_PUT_ASIDE(low, base, stop) (void)0
+#define DAC_READ_AGAIN
+#endif
+
+#endif
+
+#endif

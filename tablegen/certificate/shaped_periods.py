@@ -1,0 +1,145 @@
+"""Periods of a shaped axis, and what of their errors arrives in the position.
+
+Shaped codes err by more than rounded ones, at frequencies that the piezo does not follow. So they are judged behind the
+response of the axis; where none is known, in the band of the harmonics that are played.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import sqrt
+
+import numpy as np
+
+from tablegen.compensation.dynamics import Measured, SecondOrder
+from tablegen.fixedpoint.program import Program
+from tablegen.numerics.arrays import Floats, Ints
+from tablegen.planning.line_plan import LinePlan
+
+MOST_TICKS = 1 << 20  # that are judged of one period
+_SEVERAL_TICKS = 1 << 18  # of several periods together
+_PERIODS = 17  # at most; of several the first is left out, in which the response settles
+
+
+@dataclass(frozen=True)
+class Passage:
+    """What the position follows: a second-order response, points of a measured one, or a band from 0 Hz.
+
+    Fields that do not apply are None; ``points`` alone says no more than how many there are.
+    """
+
+    band_hz: float | None = None
+    frequency_hz: float | None = None
+    quality: float | None = None
+    delay_s: float | None = None
+    points: int | None = None
+
+    @classmethod
+    def of(cls, line: LinePlan) -> "Passage":
+        """That of an axis."""
+        match line.drive.response:
+            case None:
+                return cls(band_hz=line.series.harmonics * float(line.rate))
+            case SecondOrder() as second:
+                return cls(frequency_hz=second.frequency_hz, quality=second.quality, delay_s=second.delay_s)
+            case Measured() as measured:
+                return cls(points=len(measured.f_hz))
+        raise TypeError(f"{type(line.drive.response)} is no response of a scanner file")  # pragma: no cover
+
+
+@dataclass(frozen=True)
+class Changes:
+    """How often the codes of a converter change, in percent of the ticks, and by how many codes in the mean."""
+
+    percent: float
+    mean_step: float
+
+    @classmethod
+    def of(cls, codes: Ints) -> "Changes":
+        """Of consecutive codes, shape (n,)."""
+        steps = np.abs(np.diff(codes))
+        count = int(np.count_nonzero(steps))
+        share = count / max(len(steps), 1)
+        return cls(100.0 * share, float(np.sum(steps)) / count if count else 0.0)
+
+
+class ShapedPeriods:
+    """``codes``, shape (periods, ticks), since the program began, and as much of one that is too long.
+
+    ``asked`` are the unrounded codes of a period, as much of it.
+    """
+
+    def __init__(self, line: LinePlan, asked: Floats) -> None:
+        program = line.program
+        self._line, self._asked = line, asked
+        ticks = len(asked)
+        self.is_whole = ticks == program.ticks
+        periods = max(1, min(_PERIODS, _SEVERAL_TICKS // ticks))
+        self.codes = program.played(0, periods * ticks).reshape(periods, ticks)
+        self._rounded = program.rounded.codes(np.arange(ticks, dtype=np.int64))
+        self._judged = slice(1 if periods > 1 else 0, None)
+
+    @classmethod
+    def asked_ticks(cls, program: Program) -> int:
+        """Of how many ticks of a period the unrounded codes are needed."""
+        return min(program.ticks, MOST_TICKS)
+
+    @property
+    def ticks(self) -> int:
+        """How many are judged."""
+        return len(self.judged_codes)
+
+    @property
+    def code_errors(self) -> Floats:
+        """Emitted less asked for, of the periods that are judged, shape (periods, ticks)."""
+        return np.asarray(self.codes[self._judged] - self._asked)
+
+    @cached_property
+    def position_errors(self) -> Floats:
+        """The same in the position, in LSB."""
+        return self._arrived(self.codes)
+
+    @cached_property
+    def rounded_errors(self) -> Floats:
+        """Those of the position without shaping."""
+        return self._arrived(np.tile(self._rounded, (len(self.codes), 1)))
+
+    @property
+    def judged_codes(self) -> Ints:
+        """The codes of the periods that are judged, shape (ticks,)."""
+        return self.codes[self._judged].reshape(-1)
+
+    @property
+    def changes(self) -> Changes:
+        """Of the shaped codes."""
+        return Changes.of(self.judged_codes)
+
+    @property
+    def rounded_changes(self) -> Changes:
+        """Of the codes without shaping."""
+        return Changes.of(np.tile(self._rounded, self.ticks // len(self._rounded)))
+
+    def _arrived(self, codes: Ints) -> Floats:
+        errors = (codes - self._asked).reshape(-1)
+        return passed(self._line, errors).reshape(codes.shape)[self._judged]
+
+
+def passed(line: LinePlan, errors: Floats) -> Floats:
+    """What the position makes of errors that begin from rest, one a tick, shape (n,)."""
+    size = 1 << (2 * len(errors) - 1).bit_length()
+    f: Floats = np.arange(size // 2 + 1, dtype=np.float64) * (float(line.rate) * line.program.ticks / size)
+    spectrum = np.fft.rfft(errors, size)
+    response = line.drive.response
+    if response is None:
+        spectrum[f > line.series.harmonics * float(line.rate)] = 0.0
+    else:
+        known = f <= response.highest_hz
+        real, imaginary = response.inverse(f[known])
+        spectrum[known] /= real + 1j * imaginary
+        spectrum[~known] = 0.0
+    found: Floats = np.fft.irfft(spectrum, size)[: len(errors)]
+    return found
+
+
+def largest_and_rms(errors: Floats) -> tuple[float, float]:
+    """The largest magnitude, and the root of the mean square."""
+    return float(np.max(np.abs(errors))), sqrt(float(np.mean(errors * errors)))

@@ -1,0 +1,45 @@
+"""The tables that an axis could have, for the terminal."""
+
+from collections.abc import Iterator
+
+from tablegen.report.table_rows import AxisTables, TableRow
+
+_HEAD = (
+    "     mode           words  bits     packed       in C   error [LSB]    instructions   cells",
+    "                                    [bits]     [bits]     max    rms      M4    M0+    HX8K",
+)
+
+
+def tables_text(tables: AxisTables) -> Iterator[str]:
+    """Title, a line a table, and what to write into the scan file."""
+    yield f"{tables.axis}: {tables.harmonics} harmonics, {tables.ticks} ticks"
+    yield from _HEAD
+    yield from map(_row, tables.rows)
+    if tables.rendered is not None:
+        into = f"rendered on the device into {tables.rendered}: {tables.rendered.memory_bits} bits"
+        yield f"     {'Fourier words':<13}{2 * tables.harmonics + 1:>7}{32:>6}{tables.upload_bits:>11}  {into}"
+    chosen = tables.chosen.shape
+    yield ""
+    yield f"* the least memory within {tables.max_error_lsb:g} LSB. In the scan file, so that each build finds it:"
+    yield from _keys(tables.axis, {"mode": '"auto"', "max_error_lsb": f"{tables.max_error_lsb:g}"})
+    yield "or as it is:"
+    yield from _keys(tables.axis, {"mode": f'"{chosen.mode}"', "length": f"{chosen.length}", "bits": f"{chosen.bits}"})
+    if any(row.planned and not row.chosen for row in tables.rows):
+        yield "= the table of the scan file"
+    if not all(row.played for row in tables.rows):
+        yield "- not played by all formats of the scan file, see [emit] formats: not chosen"
+
+
+def _keys(axis: str, keys: dict[str, str]) -> Iterator[str]:
+    yield f"  [{axis}.table]"
+    yield from (f"  {key} = {value}" for key, value in keys.items())
+
+
+def _row(row: TableRow) -> str:
+    shape, takes = row.shape, row.instructions
+    mark = "*" if row.chosen else "=" if row.planned else " " if row.played else "-"
+    return (
+        f"  {mark}  {shape.mode:<13}{shape.length:>7}{shape.bits:>6}{shape.memory_bits:>11}{row.stored_bits:>11}"
+        f"{row.max_error_lsb:>8.3f}{row.rms_error_lsb:>7.3f}"
+        f"{takes['cortex-m4']:>8.1f}{takes['cortex-m0plus']:>7.1f}{row.cells or '':>8}"
+    )

@@ -1,0 +1,49 @@
+"""From phase to sample by a uniform cubic B-spline: four words a sample, and far fewer words than lines between them.
+
+A spline stays between the least and the greatest of its words, and its slope between the least and the greatest of
+their differences: what a device checks of a table of lines holds for it too.
+"""
+
+from collections.abc import Sequence
+
+from tablegen.fixedpoint.interpolation import FRACTION_BITS, index_bits_of
+from tablegen.fixedpoint.phase import PHASE_BITS
+from tablegen.fixedpoint.rounding import shift_round
+from tablegen.numerics.arrays import Ints
+
+# A sample is the spline's 1/6, 4/6, 1/6 without their divisor, and doubled: 12 units are a word's LSB, where a line
+# has 2^4. The gain makes up for it, by 4/3.
+SPLINE_UNIT = 12
+WORDS_BEHIND = 3  # a segment's words after its first one
+
+
+def cubic(table: Ints, phase: Ints) -> Ints:
+    """Samples at phases in [0, 2^32), from a table of 2^P words of up to 21 bits, 3 <= P <= 17; 12 times the spline.
+
+    The top P bits of a phase are the index of the first of four words, the next 15 the fraction of the segment that
+    is behind it; the rest is dropped. Word k is the coefficient of the B-spline centred on (k - 1) / 2^P.
+    """
+    index_bits = index_bits_of(len(table))
+    index = phase >> (PHASE_BITS - index_bits)
+    fraction = (phase >> (PHASE_BITS - index_bits - FRACTION_BITS)) & ((1 << FRACTION_BITS) - 1)
+    return along([table[(index + ahead) & (len(table) - 1)] for ahead in range(WORDS_BEHIND + 1)], fraction)
+
+
+def along(words: Sequence[Ints], fraction: Ints) -> Ints:
+    """The sample at a fraction in [0, 2^15) of the segment of four words.
+
+    Horner's rule for 12 S = b0 + b1 v + b2 v^2 + b3 v^3 with v = fraction / 2^16; b_k holds the 2^k that the half of
+    each v takes. For words of B bits |b3| <= 2^(B+6), |b2| <= 1.5 2^(B+5), |b1| <= 1.5 2^(B+3), and the sums on the
+    way are no larger than b3, hence each product stays below 2^(B+21). The roundings add up to less than 1, so that a
+    sample never leaves the 12-fold words.
+    """
+    first, second, third, fourth = words
+    outer, inner = fourth - first, second - third
+    b0 = 2 * (first + 4 * second + third)
+    b1 = 12 * (third - first)
+    b2 = 24 * (first - 2 * second + third)
+    b3 = 16 * (outer + 3 * inner)
+    sample = b3
+    for lower in (b2, b1, b0):
+        sample = lower + shift_round(sample * fraction, FRACTION_BITS + 1)
+    return sample

@@ -1,0 +1,34 @@
+"""How a waveform is stored: the mode that plays a table, how many words it has, and how wide they are."""
+
+from dataclasses import dataclass
+
+from tablegen.config.schema import MAXIMUM_SPLINE_BITS
+from tablegen.fixedpoint.program import Mode
+
+MODES: tuple[Mode, ...] = ("direct", "interpolated", "cubic")  # from the simplest to play
+LEAST_BITS = 8
+MOST_BITS: dict[Mode, int] = {"direct": 24, "interpolated": 24, "cubic": MAXIMUM_SPLINE_BITS}
+LEAST_LENGTH = 8  # of what every device renders and plays
+MOST_LENGTH = 1 << 16
+
+
+@dataclass(frozen=True, slots=True)
+class TableShape:
+    """``length`` words of ``bits`` bits, played in a ``mode``."""
+
+    mode: Mode
+    length: int
+    bits: int
+
+    @property
+    def memory_bits(self) -> int:
+        """Bits of all words, packed."""
+        return self.length * self.bits
+
+    @property
+    def order(self) -> tuple[int, int, int, int]:
+        """By memory; of two that need the same, the one that is simpler to play, and then the shorter one."""
+        return self.memory_bits, MODES.index(self.mode), self.length, self.bits
+
+    def __str__(self) -> str:
+        return f"{self.length} words of {self.bits} bits, {self.mode}"

@@ -1,0 +1,68 @@
+"""The worst error of a program over every tick of its period, the same whole number on every machine.
+
+Of a shaped axis it is that of the codes without shaping: what a table is to blame for.
+
+It is what the certificate measures, from sums in a fixed order, rounded to 2^-16 of a code: what decides which table is
+emitted must not depend on the last bits of a transform.
+"""
+
+import numpy as np
+
+from tablegen.fixedpoint.program import Program
+from tablegen.fixedpoint.rounding import round_half_up
+from tablegen.fixedpoint.runs import runs_of
+from tablegen.numerics.arrays import Floats, Ints
+from tablegen.planning.table_maker import TableMaker
+from tablegen.waveform.extremes import extreme_points, extreme_ticks
+from tablegen.waveform.sampler import Sampler, slow_grid
+from tablegen.waveform.series import values
+
+FRACTION_BITS = 16
+_SOME_TICKS = 1 << 12
+_CHUNK_TICKS = 1 << 20  # that are worked out together, for the sake of memory
+
+
+class AskedCodes:
+    """What a line asks for at its ticks, and by how much a program misses that; errors are in 2^-16 of a code."""
+
+    def __init__(self, maker: TableMaker) -> None:
+        self._maker = maker
+        series, period, ticks = maker.series, maker.phase.ticks, maker.phase.ticks * maker.hold
+        self._sampler = Sampler(series, period, slow_grid)
+        grid = slow_grid(series, extreme_points(series))
+
+        def slope_and_bend(t: Floats) -> tuple[Floats, ...]:
+            return values(t, (series, 1), (series, 2))
+
+        self._extremes = extreme_ticks(grid, slope_and_bend, ticks)
+        count = min(period, _SOME_TICKS)
+        self._some = np.arange(count, dtype=np.int64) * period // count * maker.hold
+        self._some_codes = self._at(self._some)
+
+    def _at(self, k: Ints) -> Ints:
+        maker = self._maker
+        w = self._sampler.at(k // maker.hold)
+        codes: Floats = maker.offset + 2.0 * maker.amplitude * (w - 0.5)
+        return round_half_up(codes * float(1 << FRACTION_BITS))
+
+    def least_error(self, program: Program) -> int:
+        """The worst of some ticks: the worst error is at least this."""
+        return _largest(program.rounded.codes(self._some), self._some_codes)
+
+    def worst_error(self, program: Program) -> int:
+        """The worst of all ticks."""
+        program = program.rounded
+        if program.mode == "interpolated" and program.hold == 1:  # along a line codes are in order
+            runs = runs_of(program).split_at(self._extremes)
+            worst = _largest(runs.codes, self._at(runs.starts))
+            return worst if runs.by_tick else max(worst, _largest(runs.codes, self._at(runs.lasts)))
+        advances, worst = program.phase.ticks, 0
+        for first in range(0, advances, _CHUNK_TICKS):
+            k = np.arange(first, min(first + _CHUNK_TICKS, advances), dtype=np.int64) * program.hold
+            worst = max(worst, _largest(program.codes(k), self._at(k)))
+        return worst
+
+
+def _largest(codes: Ints, asked: Ints) -> int:
+    """The largest difference of codes from what was asked for."""
+    return int(np.max(np.abs((codes << FRACTION_BITS) - asked)))

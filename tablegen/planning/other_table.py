@@ -1,0 +1,30 @@
+"""A planned axis with another table: the same waveform and limits, other integers."""
+
+from dataclasses import replace
+
+from tablegen.fixedpoint.table_shape import TableShape
+from tablegen.planning.line_plan import LinePlan
+from tablegen.planning.table_maker import TableMaker
+
+
+def maker_of(line: LinePlan) -> TableMaker:
+    """What makes the tables of a planned axis."""
+    return TableMaker(
+        series=line.series,
+        amplitude=0.5 * line.codes_per_unit,
+        offset=line.converter.code(line.drive.v_offset),
+        phase=line.program.phase,
+        hold=line.program.hold,
+        output=line.program.output,
+    )
+
+
+def with_table(line: LinePlan, shape: TableShape) -> LinePlan:
+    """The axis with a table of that shape; its limits, the slew guard too, stay as they are."""
+    made = maker_of(line).made(shape)
+    return replace(line, program=made.program, fourier=made.fourier, scale=made.scale)
+
+
+def shape_of(line: LinePlan) -> TableShape:
+    """The shape of the table that an axis has."""
+    return TableShape(line.program.mode, len(line.program.words), line.program.bits)

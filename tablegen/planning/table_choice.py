@@ -1,0 +1,95 @@
+"""Which table an axis gets: the one that is written, or the least memory that keeps an error."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import cast
+
+from tablegen.config.schema import DEFAULT_BITS, Limits, Table
+from tablegen.figures import at_least
+from tablegen.fixedpoint.program import Mode
+from tablegen.fixedpoint.table_shape import LEAST_BITS, LEAST_LENGTH, MODES, MOST_BITS, MOST_LENGTH, TableShape
+from tablegen.planning.feasibility import DEFAULT_LENGTH
+from tablegen.planning.table_search import TableSearch
+from tablegen.problems import Unphysical
+
+# A code is rounded by up to 1/2 LSB whatever the table is. With as much again for the table, what is played is one of
+# the two codes that what was asked for lies between.
+DEFAULT_ERROR_LSB = 1.0
+_NOT_PLAYED: dict[str, tuple[Mode, ...]] = {"verilog": ("cubic",)}  # modes by formats whose sequencer has none of them
+
+
+@dataclass(frozen=True)
+class TableChoice:
+    """What was asked of a table that the build chose: the worst error, and the keys that were free."""
+
+    max_error_lsb: float
+    free: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return f"the least memory within {self.max_error_lsb:g} LSB"
+
+
+def asked_of(table: Table, limits: Limits) -> TableChoice | None:
+    """What is asked of a table; None where it is written as it is."""
+    if not table.chosen_by_build:
+        return None
+    given = {"mode": table.mode not in (None, "auto"), "length": table.length, "bits": table.bits}
+    return TableChoice(allowed_lsb(table, limits), tuple(key for key, value in given.items() if not value))
+
+
+def allowed_lsb(table: Table, limits: Limits) -> float:
+    """The worst error of a table that the build chooses."""
+    if table.max_error_lsb is not None:
+        return table.max_error_lsb
+    return min(DEFAULT_ERROR_LSB, limits.max_error_lsb or DEFAULT_ERROR_LSB)
+
+
+def written_shape(table: Table, period: int) -> TableShape:
+    """The shape that is written, or its defaults, for ``period`` advances."""
+    mode = cast(Mode, "interpolated" if table.mode in (None, "auto") else table.mode)
+    length = period if mode == "direct" else table.length or DEFAULT_LENGTH[mode]
+    return TableShape(mode, length, table.bits or DEFAULT_BITS)
+
+
+def played_modes(formats: Iterable[str]) -> tuple[Mode, ...]:
+    """The modes that the devices of all these formats play."""
+    missing = {mode for name in formats for mode in _NOT_PLAYED.get(name, ())}
+    return tuple(mode for mode in MODES if mode not in missing)
+
+
+def possible_shapes(
+    table: Table, period: int, harmonics: int, free_modes: tuple[Mode, ...] = MODES
+) -> list[TableShape]:
+    """Every shape that carries the harmonics, with what is given of a table; ``free_modes`` where no mode is."""
+    modes = free_modes if table.mode in (None, "auto") else (cast(Mode, table.mode),)
+    return [
+        TableShape(mode, length, bits)
+        for mode in modes
+        for length in _lengths(table, mode, period, harmonics, asked=len(modes) == 1)
+        for bits in (range(LEAST_BITS, MOST_BITS[mode] + 1) if table.bits is None else (table.bits,))
+        if bits <= MOST_BITS[mode]
+    ]
+
+
+def _lengths(table: Table, mode: Mode, period: int, harmonics: int, asked: bool) -> list[int]:
+    """Powers of two that carry the harmonics; in ``direct`` mode a word for each advance.
+
+    So many not every device can address, unless that mode was ``asked`` for.
+    """
+    if mode == "direct":
+        fits = table.length in (None, period) and (asked or LEAST_LENGTH <= period <= MOST_LENGTH)
+        return [period] if fits else []
+    lengths = [1 << power for power in range(MOST_LENGTH.bit_length())] if table.length is None else [table.length]
+    return [length for length in lengths if length >= LEAST_LENGTH and harmonics <= length // 2 - 1]
+
+
+def choose(search: TableSearch, shapes: list[TableShape], max_error_lsb: float) -> TableShape:
+    """The least memory that keeps an error. Raises ``Unphysical`` with the least error of any table."""
+    found = search.smallest(shapes, max_error_lsb)
+    if found is None:
+        best = search.best(shapes)
+        raise Unphysical(
+            f"no table keeps {max_error_lsb:g} LSB; the best, {best.shape}, errs by up to "
+            f"{at_least(best.max_error_lsb, 4)} LSB; allow that much"
+        )
+    return found

@@ -1,0 +1,50 @@
+"""Which tables an axis could have, and which of them are worth having."""
+
+from dataclasses import dataclass
+
+from tablegen.config.load import Setup
+from tablegen.config.schema import DEFAULT_FORMATS, FastAxis, Table
+from tablegen.fixedpoint.program import Mode
+from tablegen.fixedpoint.table_shape import TableShape
+from tablegen.planning.feasibility import Feasibility
+from tablegen.planning.line_plan import LinePlan
+from tablegen.planning.other_table import maker_of, shape_of
+from tablegen.planning.table_choice import allowed_lsb, choose, played_modes, possible_shapes
+from tablegen.planning.table_search import TableSearch
+from tablegen.problems import Problems
+
+_TIMES = 8.0  # an error that is so many times what is asked is of no use
+
+
+@dataclass(frozen=True)
+class TableFront:
+    """Tables of an axis by their memory.
+
+    ``chosen`` is the least memory within ``max_error_lsb`` of the modes that all formats of the scan play, ``modes``;
+    ``planned`` the table that the axis has; both are among ``shapes``. Of the others none is larger than one that is as
+    simple to play and errs less than 5 % more. ``rendered`` is the least memory of those that a device renders from
+    Fourier words.
+    """
+
+    max_error_lsb: float
+    shapes: tuple[TableShape, ...]
+    chosen: TableShape
+    rendered: TableShape | None
+    planned: TableShape
+    modes: tuple[Mode, ...]
+
+
+def table_front(setup: Setup, line: LinePlan) -> TableFront:
+    """The tables of a planned axis. Raises ``Unphysical`` where none keeps the error that its scan file asks for."""
+    scan: FastAxis = getattr(setup.scan, line.axis)
+    maker, feasible = maker_of(line), Feasibility(setup, line.axis, Problems())
+    possible = possible_shapes(Table(), line.program.phase.ticks, line.series.harmonics)
+    shapes = feasible.fitting(possible, line.drive, line.converter, maker)
+    search, most = TableSearch(maker), allowed_lsb(scan.table, setup.scan.limits)
+    found = {one.shape for one in search.front(shapes, _TIMES * most)}
+    modes = played_modes(setup.scan.emit.formats or DEFAULT_FORMATS)
+    played = [shape for shape in shapes if shape.mode in modes]
+    chosen = choose(search, played, most)
+    rendered = search.smallest((shape for shape in played if shape.mode != "direct"), most)
+    found |= {chosen, shape_of(line)}
+    return TableFront(most, tuple(sorted(found, key=lambda one: one.order)), chosen, rendered, shape_of(line), modes)

@@ -1,0 +1,89 @@
+"""From a waveform and the shape of a table to the integers that play it."""
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from math import ceil
+
+import numpy as np
+
+from tablegen.fixedpoint.converter import fit_gain, scaled_output
+from tablegen.fixedpoint.output import Output
+from tablegen.fixedpoint.phase import RationalPhase
+from tablegen.fixedpoint.program import Program, sample_gain
+from tablegen.fixedpoint.spline_words import spline_factors
+from tablegen.fixedpoint.synthesis import FourierWords, encode, synthesize
+from tablegen.fixedpoint.table_shape import TableShape
+from tablegen.waveform.series import FourierSeries
+
+# Peaks are rounded up to this grid before they enter the scale: it then does not depend on the last bit of a maximum.
+_PEAK_GRID = 1024
+
+
+@dataclass(frozen=True, eq=False)
+class MadeTable:
+    """A program with its table, the Fourier words that the table comes from, and what both are scaled by."""
+
+    program: Program
+    fourier: FourierWords
+    scale: float
+
+
+@dataclass(frozen=True, eq=False)
+class StoredWave:
+    """The waveform whose values are the words of a table."""
+
+    series: FourierSeries
+
+    @cached_property
+    def reach(self) -> tuple[float, float]:
+        """Its least and its greatest value."""
+        w = self.series.on_grid(32 * self.series.harmonics)
+        return float(np.min(w)), float(np.max(w))
+
+    @property
+    def largest(self) -> float:
+        """The largest |2 w - 1|, at least 1: tables are scaled to it."""
+        return max(1.0, *(abs(2.0 * w - 1.0) for w in self.reach))
+
+
+@dataclass(frozen=True, eq=False)
+class TableMaker:
+    """One axis but for its table: what is the same for every shape of it.
+
+    ``amplitude`` is in codes for 2 w - 1 = 1, negative where the axis is inverted; ``offset`` the code of w = 1/2,
+    unrounded. ``output`` has the limits, whatever its gain is.
+    """
+
+    series: FourierSeries
+    amplitude: float
+    offset: float
+    phase: RationalPhase
+    hold: int
+    output: Output
+    _stored: dict[int, StoredWave] = field(default_factory=dict)  # by the words of a spline, 0 for the waveform itself
+
+    def stored(self, shape: TableShape) -> StoredWave:
+        """What the words of a shape are values of: the waveform, or the spline that is nearest to it."""
+        length = shape.length if shape.mode == "cubic" else 0
+        if length not in self._stored:
+            factors = spline_factors(self.series.harmonics, length) if length else None
+            self._stored[length] = StoredWave(self.series if factors is None else self.series.times(*factors))
+        return self._stored[length]
+
+    def gain(self, shape: TableShape) -> tuple[int, float]:
+        """The gain word of a shape, and what its table is scaled by."""
+        peak = ceil(self.stored(shape).largest * _PEAK_GRID) / _PEAK_GRID
+        return fit_gain(sample_gain(shape.mode) * self.amplitude, peak, shape.bits, self.output.dac_bits)
+
+    def made(self, shape: TableShape) -> MadeTable:
+        """The table of a shape."""
+        gain_word, scale = self.gain(shape)
+        stored = self.stored(shape).series
+        fourier = encode(stored.a0, stored.a, stored.b, scale)
+        words = synthesize(fourier, shape.length, shape.bits)
+        output = scaled_output(self.output, self.offset, shape.bits, gain_word)
+        return MadeTable(Program(self.phase, self.hold, shape.mode, shape.bits, words, output), fourier, scale)
+
+    def limited(self, max_step: int) -> "TableMaker":
+        """With another slew guard, in codes a tick."""
+        return replace(self, output=replace(self.output, max_step=max_step))

@@ -1,0 +1,128 @@
+"""The tables that an axis could have, with what each errs by and takes: as data, for text, JSON and a chart."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from math import sqrt
+from typing import Any, Literal
+
+from tablegen.certificate.line_errors import EmittedPeriod
+from tablegen.config.load import Setup
+from tablegen.emit.constants import storage_bits
+from tablegen.fixedpoint.spline import WORDS_BEHIND
+from tablegen.fixedpoint.synthesis import WORD_BITS
+from tablegen.fixedpoint.table_shape import TableShape
+from tablegen.planning.line_plan import LinePlan
+from tablegen.planning.other_table import with_table
+from tablegen.planning.table_front import table_front
+from tablegen.report.table_costs import CELLS, INSTRUCTIONS
+
+
+@dataclass(frozen=True)
+class TableRow:
+    """A table with its errors over all ticks, in LSB of the converter.
+
+    ``stored_bits`` is what it takes in C: in words of 16 or 32 bits, with the first ones once more behind the last.
+    ``played`` is whether all formats of the scan play it.
+    """
+
+    shape: TableShape
+    max_error_lsb: float
+    rms_error_lsb: float
+    stored_bits: int
+    chosen: bool
+    planned: bool
+    played: bool
+
+    @property
+    def instructions(self) -> dict[str, float]:
+        """A sample in C, by processor."""
+        return INSTRUCTIONS[self.shape.mode]
+
+    @property
+    def cells(self) -> int | None:
+        """One axis in Verilog; None where that has no such mode."""
+        return CELLS[self.shape.mode]
+
+
+@dataclass(frozen=True)
+class AxisTables:
+    """The tables of one axis by memory, the one that is chosen, and Fourier words that a device renders into another.
+
+    ``rendered`` is None where no table that a device renders keeps the error.
+    """
+
+    axis: Literal["x", "y"]
+    harmonics: int
+    ticks: int
+    max_error_lsb: float
+    rows: tuple[TableRow, ...]
+    rendered: TableShape | None
+
+    @property
+    def chosen(self) -> TableRow:
+        """The least memory within the error."""
+        return next(row for row in self.rows if row.chosen)
+
+    @property
+    def upload_bits(self) -> int:
+        """Bits of the Fourier words."""
+        return (2 * self.harmonics + 1) * WORD_BITS
+
+    def record(self) -> dict[str, Any]:
+        """As JSON."""
+        fourier = None
+        if self.rendered is not None:
+            fourier = {"upload_bits": self.upload_bits, "rendered": _shape(self.rendered)}
+        return {
+            "axis": self.axis,
+            "harmonics": self.harmonics,
+            "ticks": self.ticks,
+            "max_error_lsb": self.max_error_lsb,
+            "tables": [
+                {
+                    **_shape(row.shape),
+                    "stored_bits": row.stored_bits,
+                    "max_error_lsb": float(f"{row.max_error_lsb:.6g}"),
+                    "rms_error_lsb": float(f"{row.rms_error_lsb:.6g}"),
+                    "instructions": row.instructions,
+                    "hx8k_cells": row.cells,
+                    "chosen": row.chosen,
+                    "planned": row.planned,
+                    "played": row.played,
+                }
+                for row in self.rows
+            ],
+            "fourier_words": fourier,
+        }
+
+
+def _shape(shape: TableShape) -> dict[str, Any]:
+    return {"mode": shape.mode, "length": shape.length, "bits": shape.bits, "memory_bits": shape.memory_bits}
+
+
+def _behind(shape: TableShape) -> int:
+    """Words that stand behind the last one in C."""
+    return WORDS_BEHIND if shape.mode == "cubic" else 1
+
+
+def axis_tables(setup: Setup, line: LinePlan) -> AxisTables:
+    """The tables of a planned axis. Raises ``Unphysical`` where none keeps the error that its scan file asks for."""
+    front = table_front(setup, line)
+
+    def rows() -> Iterator[TableRow]:
+        for shape in front.shapes:
+            other = with_table(line, shape)
+            played = EmittedPeriod(replace(other, program=other.program.rounded))  # what the table is to blame for
+            yield TableRow(
+                shape,
+                played.largest_error(),
+                sqrt(played.error_moments()[1]),
+                (shape.length + _behind(shape)) * storage_bits(shape.bits),
+                shape == front.chosen,
+                shape == front.planned,
+                shape.mode in front.modes,
+            )
+
+    return AxisTables(
+        line.axis, line.series.harmonics, line.program.ticks, front.max_error_lsb, tuple(rows()), front.rendered
+    )

@@ -1,0 +1,11 @@
+"""What a waveform may err by for the sake of less acceleration."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class AllowedError:
+    """A scaling error in percent, peak to peak; one that is not ``firm`` is kept where the harmonics can keep it."""
+
+    percent: float
+    firm: bool

@@ -1,0 +1,146 @@
+"""``tablegen tables``: rows against certificates, lines to paste, JSON, pictures; what tells of a choice."""
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+from editing import SCAN, edited, run, write_pair
+
+from tablegen.certificate.certificate import certify
+from tablegen.config.load import load
+from tablegen.emit.constants import storage_bits
+from tablegen.fixedpoint.table_shape import MODES
+from tablegen.planning.line_plan import make_plan
+from tablegen.report.table_costs import CELLS, INSTRUCTIONS
+
+C_ALONE = "\n[emit]\nformats = ['c']\n"  # which plays all modes
+AUTO = ("x.table.mode = 'auto'", "- x.table.length", "- x.table.bits")
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """What the command says of x of the example, as JSON."""
+    path = write_pair(tmp_path_factory.mktemp("scan"), f"{SCAN}{C_ALONE}")
+    outcome = run("tables", path, "--axis", "x", "--json")
+    assert outcome.status == 0, outcome.err
+    (axis,) = json.loads(outcome.out)["axes"]
+    return dict(axis)
+
+
+def test_rows_are_what_a_build_of_that_table_has(found: dict[str, Any], tmp_path: Path) -> None:
+    assert len(found["tables"]) > 10
+    for row in found["tables"][::4]:
+        keys = (f"x.table.mode = '{row['mode']}'", f"x.table.bits = {row['bits']}", "- [limits]")
+        text = edited(SCAN, *keys, f"x.table.length = {row['length']}")
+        line = make_plan(load(write_pair(tmp_path, text)))
+        certificate = certify(line)["x"]
+        assert row["max_error_lsb"] == pytest.approx(certificate.max_error_lsb, rel=1e-5)
+        assert row["rms_error_lsb"] == pytest.approx(certificate.rms_error_lsb, rel=1e-5)
+        assert row["memory_bits"] == row["length"] * row["bits"]
+        assert row["stored_bits"] > row["length"] * storage_bits(row["bits"])
+
+
+def test_no_row_is_larger_and_worse_than_one_as_simple(found: dict[str, Any]) -> None:
+    rows = [row for row in found["tables"] if not row["planned"] and not row["chosen"]]
+    for i, row in enumerate(rows):
+        for other in rows[:i]:
+            assert other["memory_bits"] <= row["memory_bits"]
+            if MODES.index(other["mode"]) <= MODES.index(row["mode"]):
+                assert row["max_error_lsb"] < 0.951 * other["max_error_lsb"]
+
+
+def test_the_smallest_is_marked_and_so_is_that_of_the_file(found: dict[str, Any]) -> None:
+    (chosen,) = [row for row in found["tables"] if row["chosen"]]
+    (planned,) = [row for row in found["tables"] if row["planned"]]
+    assert found["max_error_lsb"] == 1.0
+    assert chosen["max_error_lsb"] <= 1.0
+    assert all(row["max_error_lsb"] > 1.0 for row in found["tables"] if row["memory_bits"] < chosen["memory_bits"])
+    assert (planned["mode"], planned["length"], planned["bits"]) == ("interpolated", 2048, 16)
+
+
+def test_what_not_all_formats_play_is_told_and_not_chosen(found: dict[str, Any], tmp_path: Path) -> None:
+    (axis,) = json.loads(run("tables", write_pair(tmp_path), "--axis", "x", "--json").out)["axes"]
+    marks = {(row["mode"], row["played"]) for row in axis["tables"]}
+    assert marks == {("direct", True), ("interpolated", True), ("cubic", False)}
+    assert all(row["played"] for row in found["tables"])
+    (chosen,) = [row for row in axis["tables"] if row["chosen"]]
+    assert (chosen["mode"], chosen["memory_bits"]) == ("interpolated", 8192)
+    assert "\n  -  cubic " in run("tables", tmp_path / "scan.toml", "--axis", "x").out
+
+
+def test_fourier_words_are_as_long_as_they_are_uploaded(found: dict[str, Any]) -> None:
+    fourier = found["fourier_words"]
+    assert fourier["upload_bits"] == (2 * 32 + 1) * 32
+    assert fourier["rendered"] == {"mode": "cubic", "length": 128, "bits": 14, "memory_bits": 1792}
+
+
+def test_the_lines_to_paste_give_the_table_that_is_marked(tmp_path: Path) -> None:
+    text = run("tables", write_pair(tmp_path), "--axis", "x").out
+    (marked,) = re.findall(r"^  \*  (\w+) +(\d+) +(\d+) ", text, re.M)
+    pasted = re.findall(r"^  (\[x\.table\]\n(?:  \w+ = .*\n)+)", text, re.M)
+    assert len(pasted) == 2
+    for block in pasted:
+        lines = re.sub("^  ", "", block, flags=re.M)
+        program = make_plan(load(write_pair(tmp_path, edited(SCAN, "- [x.table]", f"+ {lines}")))).x.program
+        assert (program.mode, f"{len(program.words)}", f"{program.bits}") == marked
+
+
+def test_both_axes_are_told_unless_one_rests_or_is_named(tmp_path: Path) -> None:
+    text = f"{SCAN.split('[y]')[0]}[y]\nmotion = 'off'\noffset_v = 40.0\n"
+    path = write_pair(tmp_path, text)
+    assert [one["axis"] for one in json.loads(run("tables", path, "--json").out)["axes"]] == ["x"]
+    outcome = run("tables", path, "--axis", "y")
+    assert outcome.status == 2
+    assert "y rests in this scan" in outcome.err
+
+
+def test_the_error_asked_for_is_that_of_the_file(tmp_path: Path) -> None:
+    path = write_pair(tmp_path, edited(SCAN, *AUTO, "x.table.max_error_lsb = 0.6"))
+    text = run("tables", path, "--axis", "x").out
+    assert "* the least memory within 0.6 LSB." in text
+    assert "= the table of the scan file" not in text
+    outcome = run("tables", write_pair(tmp_path, edited(SCAN, "limits.max_error_lsb = 0.3")), "--axis", "x")
+    assert outcome.status == 2
+    assert re.search(r"scan\.toml:\d+: x\.table: no table keeps 0\.3 LSB; the best, ", outcome.err)
+
+
+def test_a_scan_that_breaks_a_limit_is_told_all_the_same(tmp_path: Path) -> None:
+    path = write_pair(tmp_path, edited(SCAN, "x.table.length = 128"))
+    assert run("build", path, "-o", tmp_path / "out").status == 3
+    assert run("tables", path, "--axis", "x").status == 0
+
+
+def test_a_picture_has_each_mode(tmp_path: Path) -> None:
+    path, picture = write_pair(tmp_path), tmp_path / "tables.svg"
+    assert run("tables", path, "--axis", "x", "--plot", picture).status == 0
+    drawn = picture.read_text("utf-8")
+    assert all(f'data-name="{mode}"' in drawn for mode in MODES)
+
+
+def test_modes_are_in_the_order_of_what_they_take() -> None:
+    """In C words that are played as they are take what lines between them do: both are runs of codes."""
+    for core in ("cortex-m4", "cortex-m0plus"):
+        direct, interpolated, cubic = (INSTRUCTIONS[mode][core] for mode in MODES)
+        assert direct == pytest.approx(interpolated, abs=0.2)
+        assert interpolated < cubic
+    cells = [count for count in (CELLS[mode] for mode in MODES) if count is not None]
+    assert cells == sorted(cells)
+
+
+def test_show_report_compare_and_the_manifest_say_what_was_asked(tmp_path: Path) -> None:
+    written = write_pair(tmp_path)
+    auto = tmp_path / "auto.toml"
+    auto.write_text(edited(SCAN, *AUTO), "utf-8")
+    program = make_plan(load(auto)).x.program
+    chosen = f"{len(program.words)} words of {program.bits} bits, {program.mode}"
+    assert f"{chosen}, the least memory within 1 LSB" in run("show", auto, "--no-plot").out
+    assert "the least memory within" not in run("show", written, "--no-plot").out
+    manifest = json.loads(run("show", auto, "--json").out)
+    assert manifest["axes"]["x"]["table"]["asked"] == {"max_error_lsb": 1.0, "free": ["mode", "length", "bits"]}
+    compared = run("compare", written, auto).out
+    assert re.search(r"x table, chosen for an error \[LSB\] +(not there|-)? *1", compared), compared
+    page = tmp_path / "page.html"
+    assert run("report", auto, "-o", page).status == 0
+    assert "the least memory within 1 LSB" in page.read_text("utf-8")

@@ -1,0 +1,110 @@
+"""What docs/tables.md says of memory and error, measured again; its figure, and the keys that it shows."""
+
+import importlib
+import re
+import sys
+import tomllib
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+from building import REPOSITORY
+from editing import SCAN, edited, run, write_pair
+
+from tablegen.config.load import load
+from tablegen.planning.line_plan import Plan, make_plan
+from tablegen.report.table_costs import CELLS, INSTRUCTIONS
+
+PAGE = (REPOSITORY / "docs" / "tables.md").read_text("utf-8")
+ROWS = [row for row in PAGE.splitlines() if re.match(r"\| (?:[xy]|\d+ bits, \d+ ticks) \|", row)]
+
+
+@pytest.fixture(scope="module")
+def benchmark() -> ModuleType:
+    """The benchmark, which is no package."""
+    sys.path.insert(0, str(REPOSITORY / "benchmarks"))
+    try:
+        return importlib.import_module("tables")
+    finally:
+        sys.path.remove(str(REPOSITORY / "benchmarks"))
+
+
+@pytest.fixture(scope="module")
+def example() -> Plan:
+    return make_plan(load(REPOSITORY / "examples" / "annexin_200nm.toml"))
+
+
+def test_the_page_has_every_row(benchmark: ModuleType) -> None:
+    names = [f"{axis} | {error:g}" for axis in "xy" for error in benchmark.ERRORS]
+    names += [f"{bits} bits, {ticks} ticks | {error:g}" for bits, ticks, error in benchmark.SINES]
+    assert [row.split(" | ")[:2] for row in ROWS] == [f"| {name}".split(" | ") for name in names]
+
+
+def test_rows_of_x_are_measured(benchmark: ModuleType, example: Plan) -> None:
+    assert [benchmark.row("x", example.x, error) for error in benchmark.ERRORS] == ROWS[: len(benchmark.ERRORS)]
+
+
+@pytest.mark.common
+def test_rows_of_y_are_measured(benchmark: ModuleType, example: Plan) -> None:
+    count = len(benchmark.ERRORS)
+    assert [benchmark.row("y", example.y, error) for error in benchmark.ERRORS] == ROWS[count : 2 * count]
+
+
+@pytest.mark.common
+def test_rows_of_sines_are_measured(benchmark: ModuleType) -> None:
+    rows = [
+        benchmark.row(f"{bits} bits, {ticks} ticks", benchmark.sine(bits, ticks), error)
+        for bits, ticks, error in benchmark.SINES
+    ]
+    assert rows == ROWS[2 * len(benchmark.ERRORS) :]
+
+
+@pytest.mark.common
+def test_the_figure_is_what_the_benchmark_draws(benchmark: ModuleType) -> None:
+    assert benchmark.FIGURE.read_bytes() == benchmark.figure()
+
+
+def test_what_the_modes_take_is_what_the_command_says(benchmark: ModuleType) -> None:
+    assert f"<!-- costs -->\n{benchmark.costs()}<!-- /costs -->" in PAGE
+
+
+@pytest.mark.rest
+def test_instructions_are_counted(benchmark: ModuleType) -> None:
+    """On a Cortex-M4; a cubic table may take 30."""
+    counted = benchmark.instructions("cortex-m4")
+    assert counted == {mode: takes["cortex-m4"] for mode, takes in INSTRUCTIONS.items()}
+    assert counted["cubic"] <= 30.0
+
+
+@pytest.mark.rest
+def test_cells_are_counted(benchmark: ModuleType) -> None:
+    assert benchmark.cells() == CELLS
+
+
+def test_the_output_is_that_of_the_command(benchmark: ModuleType) -> None:
+    shown = re.search(r"<!-- output -->\n```text\n\$ tablegen (.*)\n((?:.*\n)*?)```\n<!-- /output -->", PAGE)
+    assert shown is not None
+    words = shown[1].replace("examples/", f"{REPOSITORY}/examples/").split()
+    outcome = run(*words)
+    assert outcome.status == 0
+    assert [line.rstrip() for line in outcome.out.splitlines()] == shown[2].splitlines()
+    assert benchmark.output() in PAGE
+
+
+def test_a_plain_sine_takes_less_than_was_asked() -> None:
+    """A sine of 16 bits below 1 LSB in 656 bits; of 18 bits below 0.6 LSB in 2 kbit where the phase is exact."""
+    least = {row.split(" | ")[0][2:]: int(row.split(" | ")[-1].split(":")[0]) for row in ROWS if "0.75" not in row}
+    assert least["16 bits, 1000 ticks"] <= 656
+    assert least["16 bits, 65536 ticks"] <= 656
+    assert least["18 bits, 65536 ticks"] <= 2048
+    assert "With 16 bits it takes 512 bits below 1 LSB" in PAGE
+    assert "With 18 bits below 0.6 LSB it takes 1344 bits if the period is a\npower of two" in PAGE
+
+
+def test_what_it_shows_of_a_scan_file_is_one(tmp_path: Path) -> None:
+    blocks = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
+    assert len(blocks) == 2
+    for block in blocks:
+        assert set(tomllib.loads(block)) == {"x"}
+        line = make_plan(load(write_pair(tmp_path, edited(SCAN, "- [x.table]", f"+ {block}")))).x
+        assert line.asked_table is not None
