@@ -45,8 +45,9 @@ typedef int64_t dac_wide;
 #define DAC_GUARD(bank) ((bank)->guard)
 #endif
 
-/* One advance: 96-bit addition. The step is ceil(2^(79 + index bits) / period), so that after k < period advances the
- * position exceeds the exact k 2^(79 + index bits) / period by less than k, and k < 2^64 / period: floors to 2^64 are exact. */
+/* One advance: 96-bit addition. The step is ceil(2^n / period), n = 79 + index bits, or 82 + index bits of a cubic table, so that
+ * after k < period advances the position exceeds the exact k 2^n / period by less than k, and k < 2^64 / period: floors to 2^64
+ * are exact. */
 static inline void dac_advance(dac_position *at, const dac_position *step)
 {
     const uint64_t low = at->low + step->low;
@@ -100,10 +101,10 @@ static inline dac_segment dac_segment_of(const dac_word *words)
     return s;
 }
 
-/* The sample at the half of a fraction, which has its 15 bits above 16 zeros. */
-static inline int32_t dac_along(const dac_segment *s, uint32_t half_fraction)
+/* The sample at a fraction of 18 bits. */
+static inline int32_t dac_along(const dac_segment *s, uint32_t fraction)
 {
-    const int32_t half = (int32_t)half_fraction;
+    const int32_t half = (int32_t)(fraction << 13);
     return dac_horner(s->b0, dac_horner(s->b1, dac_horner(s->b2, s->b3, half), half), half);
 }
 #endif

@@ -14,7 +14,8 @@ dac_link_finding dac_link_begin(dac_link *l, const uint8_t *info, dac_link_answe
 #if DAC_SPLINE
         const bool cubic = (shape[0] & DAC_CUBIC) != 0;
         const unsigned index_bits = shape[0] & (DAC_CUBIC - 1u);
-        const bool fits = shape[0] == 0 || (index_bits >= 3 && index_bits <= here->index_bits && (!cubic || shape[1] <= 21));
+        const bool fits = shape[0] == 0 || (index_bits >= 3 && index_bits <= here->index_bits
+                                            && (!cubic || (index_bits <= 14 && shape[1] <= 21)));
 #else
         const bool fits = shape[0] == 0 || (shape[0] >= 3 && shape[0] <= here->index_bits);
 #endif

@@ -32,7 +32,7 @@ static bool good_length(const dac_axis_program *p)
 {
     if (p->index_bits == 0)
         return p->length == p->phase_period && p->length <= UINT32_C(1) << 17;
-    return INDEX_BITS(p) >= 3 && INDEX_BITS(p) <= 16 && p->length == UINT32_C(1) << INDEX_BITS(p);
+    return INDEX_BITS(p) >= 3 && INDEX_BITS(p) <= (CUBIC(p) ? 14 : 16) && p->length == UINT32_C(1) << INDEX_BITS(p);
 }
 
 /* Every tick reads a word and the next one, of a cubic table the next three: behind the last one have to stand the first ones again. */
@@ -96,7 +96,7 @@ static dac_loaded judge_axis(const dac_axis_program *p, const dac_axis *axis)
          : DAC_LOADED;
 }
 
-/* numerator 2^`zeros` by divisor < 2^31, rounded up, by long division: 95 bits or fewer, some 12 instructions a bit. */
+/* numerator 2^`zeros` by divisor < 2^31, rounded up, by long division: 96 bits or fewer, some 12 instructions a bit. */
 static dac_position power_divided(unsigned zeros, uint32_t divisor)
 {
     dac_position quotient = {0, 0};
@@ -199,7 +199,7 @@ static void derive(dac_bank_axis *b, const dac_axis_program *p)
 {
     const dac_position word = {UINT32_C(1) << 15, 0};
 
-    b->step = p->index_bits ? power_divided(79u + INDEX_BITS(p), p->phase_period) : word;
+    b->step = p->index_bits ? power_divided(79u + (CUBIC(p) ? 3u : 0u) + INDEX_BITS(p), p->phase_period) : word;
     b->table = p->table;
     b->length = p->length;
     b->holds = p->hold_ticks != 1;

@@ -26,13 +26,13 @@ struct dac_pair {
 /* The sample at a position, of which it takes the upper word. */
 static inline int32_t dac_sample_at(const dac_bank_axis *bank, uint32_t high)
 {
-    const uint32_t index = high >> 15; /* the fraction behind it is 0 in a direct table */
 #if DAC_SPLINE
     if (bank->cubic) {
-        const dac_segment segment = dac_segment_of(bank->table + index);
-        return dac_along(&segment, high << 17 >> 1);
+        const dac_segment segment = dac_segment_of(bank->table + (high >> 18));
+        return dac_along(&segment, high & 0x3ffffu);
     }
 #endif
+    const uint32_t index = high >> 15; /* the fraction behind it is 0 in a direct table */
     const unsigned guard = DAC_GUARD(bank);
     return dac_between(bank->table[index], bank->table[index + 1], high & 0x7fffu, guard, DAC_HALF(guard));
 }
@@ -48,14 +48,14 @@ typedef struct {
 /* Before the first tick, which is at position `at`. */
 static inline dac_track dac_track_of(const dac_word *table, uint64_t at, uint64_t step)
 {
-    const dac_word *const words = table + (at >> 47);
-    const bool goes_on = (at - step) >> 47 == at >> 47;
+    const dac_word *const words = table + (at >> 50);
+    const bool goes_on = (at - step) >> 50 == at >> 50;
     dac_track track;
 
     track.segment = dac_segment_of(words);
     track.next = words + (goes_on ? 1 : 0);
-    track.way = (at - step) << 17;
-    track.step = step << 17;
+    track.way = (at - step) << 14;
+    track.step = step << 14;
     return track;
 }
 
@@ -67,7 +67,7 @@ static inline int32_t dac_track_on(dac_track *track)
     track->way += track->step;
     if ((uint32_t)(track->way >> 32) < before) /* an overflow, since a step is below 2^63 */
         track->segment = dac_segment_of(track->next++);
-    return dac_along(&track->segment, (uint32_t)(track->way >> 49) << 16);
+    return dac_along(&track->segment, (uint32_t)(track->way >> 46));
 }
 
 #endif

@@ -46,7 +46,7 @@ extern "C" {
 #endif
 
 #ifndef DAC_SPLINE
-#define DAC_SPLINE 0 /* 1: plays cubic tables too, of words of up to 21 bits */
+#define DAC_SPLINE 0 /* 1: plays cubic tables too, of up to 16384 words of 21 bits */
 #endif
 #define DAC_CUBIC 128 /* of a cubic table: added to its index_bits */
 /* Words of a table that stand behind its last one: its first ones again. */
@@ -246,7 +246,7 @@ typedef struct {
 #define DAC_REQUESTS 8 /* a power of two, at most 128 */
 #endif
 
-/* A place in a period: word index and 15 bits of fraction in `high`, 64 more bits in `low`. */
+/* A place in a period: word index and 15 bits of fraction, of a cubic table 18 bits, in `high`, 64 more bits in `low`. */
 typedef struct {
     uint32_t high;
     uint64_t low;

@@ -23,6 +23,7 @@ from tablegen.config.load import Setup
 from tablegen.config.schema import FastAxis
 from tablegen.figures import at_least, at_most, shown_path
 from tablegen.fixedpoint.phase import MAXIMUM_TICKS
+from tablegen.fixedpoint.table_shape import MOST_LENGTH
 from tablegen.planning.line_plan import LinePlan, Plan, make_plan
 from tablegen.problems import Rejected
 
@@ -32,7 +33,6 @@ _HARDWARE = re.compile(r"([xy]\.)?(amplifier|dac)\.")
 _SCANNER = "scanner:"  # before a key of the scanner file
 _ROUNDED_LSB = 0.5  # of a code, whatever its table is
 _MOST_BITS = 24
-_LONGEST_TABLE = 65536
 _MOST_HARMONICS = 256  # a fit of more takes seconds
 _MARGINS = (0.02, 0.05, 0.1, 0.15, 0.2)  # of the line, outside the imaging window
 
@@ -177,7 +177,7 @@ def _against_quantisation(setup: Setup, plan: Plan, line: LinePlan, found: Exces
         yield ({f"{axis}.table.bits": b} for b in range(table.bits + bits, _MOST_BITS + 1))
     length = len(table.words)
     if line.asked_table is None and table.mode != "direct" and length < 64 * line.series.harmonics:
-        yield ({f"{axis}.table.length": n} for n in (4 * length, 16 * length) if n <= _LONGEST_TABLE)
+        yield ({f"{axis}.table.length": n} for n in (4 * length, 16 * length) if n <= MOST_LENGTH[table.mode])
     yield _amplifiers(setup, plan, line, found)
     hardware = [setup.hardware(one.axis) for one in plan.lines]
     dac = setup.hardware(axis).dac

@@ -18,6 +18,7 @@ from tablegen.config.scanner import Offset, Resonance, Scanner
 from tablegen.config.schema import (
     MAXIMUM_NAME,
     MAXIMUM_SPLINE_BITS,
+    MAXIMUM_SPLINE_LENGTH,
     BandLimit,
     FastAxis,
     Refinement,
@@ -338,6 +339,8 @@ def _faults(built: Struct) -> list[tuple[str, str]]:
                 return [(key, why) for key, given in keys.items() if given]
         case Table() if built.mode == "cubic" and (built.bits or 0) > MAXIMUM_SPLINE_BITS:
             return [("bits", f"{built.bits} is above the {MAXIMUM_SPLINE_BITS} of mode = 'cubic'")]
+        case Table() if built.mode == "cubic" and (built.length or 0) > MAXIMUM_SPLINE_LENGTH:
+            return [("length", f"{built.length} is above the {MAXIMUM_SPLINE_LENGTH} of mode = 'cubic'")]
         case Table() if built.mode != "direct" and built.length is not None:
             lower = 1 << (built.length.bit_length() - 1)
             if built.length != lower:

@@ -19,6 +19,7 @@ Window = tuple[Annotated[float, Meta(ge=0.0, le=1.0)], Annotated[float, Meta(ge=
 
 
 MAXIMUM_SPLINE_BITS = 21  # the sample of a cubic table has 25 bits then, as that of any other
+MAXIMUM_SPLINE_LENGTH = 1 << 14  # index and fraction of a segment are the 32 bits of a phase
 
 
 class Table(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -41,7 +42,8 @@ class Table(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
             Meta(
                 ge=4,
                 le=65536,
-                description="number of words; interpolated, cubic: a power of two, default 2048 and 256",
+                description="number of words; interpolated, cubic: a power of two, default 2048 and 256; "
+                "cubic: up to 16384",
             ),
         ]
         | None

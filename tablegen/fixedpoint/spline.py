@@ -6,7 +6,7 @@ their differences: what a device checks of a table of lines holds for it too.
 
 from collections.abc import Sequence
 
-from tablegen.fixedpoint.interpolation import FRACTION_BITS, index_bits_of
+from tablegen.fixedpoint.interpolation import index_bits_of
 from tablegen.fixedpoint.phase import PHASE_BITS
 from tablegen.fixedpoint.rounding import shift_round
 from tablegen.numerics.arrays import Ints
@@ -15,26 +15,28 @@ from tablegen.numerics.arrays import Ints
 # has 2^4. The gain makes up for it, by 4/3.
 SPLINE_UNIT = 12
 WORDS_BEHIND = 3  # a segment's words after its first one
+# 3 bits more than lines have: a spline has few words, so that the same part of a segment is more of the period.
+SPLINE_FRACTION_BITS = 18
 
 
 def cubic(table: Ints, phase: Ints) -> Ints:
-    """Samples at phases in [0, 2^32), from a table of 2^P words of up to 21 bits, 3 <= P <= 17; 12 times the spline.
+    """Samples at phases in [0, 2^32), from a table of 2^P words of up to 21 bits, 3 <= P <= 14; 12 times the spline.
 
-    The top P bits of a phase are the index of the first of four words, the next 15 the fraction of the segment that
+    The top P bits of a phase are the index of the first of four words, the next 18 the fraction of the segment that
     is behind it; the rest is dropped. Word k is the coefficient of the B-spline centred on (k - 1) / 2^P.
     """
     index_bits = index_bits_of(len(table))
     index = phase >> (PHASE_BITS - index_bits)
-    fraction = (phase >> (PHASE_BITS - index_bits - FRACTION_BITS)) & ((1 << FRACTION_BITS) - 1)
+    fraction = (phase >> (PHASE_BITS - index_bits - SPLINE_FRACTION_BITS)) & ((1 << SPLINE_FRACTION_BITS) - 1)
     return along([table[(index + ahead) & (len(table) - 1)] for ahead in range(WORDS_BEHIND + 1)], fraction)
 
 
 def along(words: Sequence[Ints], fraction: Ints) -> Ints:
-    """The sample at a fraction in [0, 2^15) of the segment of four words.
+    """The sample at a fraction in [0, 2^18) of the segment of four words.
 
-    Horner's rule for 12 S = b0 + b1 v + b2 v^2 + b3 v^3 with v = fraction / 2^16; b_k holds the 2^k that the half of
+    Horner's rule for 12 S = b0 + b1 v + b2 v^2 + b3 v^3 with v = fraction / 2^19; b_k holds the 2^k that the half of
     each v takes. For words of B bits |b3| <= 2^(B+6), |b2| <= 1.5 2^(B+5), |b1| <= 1.5 2^(B+3), and the sums on the
-    way are no larger than b3, hence each product stays below 2^(B+21). The roundings add up to less than 1, so that a
+    way are no larger than b3, hence each product stays below 2^(B+24). The roundings add up to less than 1, so that a
     sample never leaves the 12-fold words.
     """
     first, second, third, fourth = words
@@ -45,5 +47,5 @@ def along(words: Sequence[Ints], fraction: Ints) -> Ints:
     b3 = 16 * (outer + 3 * inner)
     sample = b3
     for lower in (b2, b1, b0):
-        sample = lower + shift_round(sample * fraction, FRACTION_BITS + 1)
+        sample = lower + shift_round(sample * fraction, SPLINE_FRACTION_BITS + 1)
     return sample

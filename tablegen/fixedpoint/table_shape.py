@@ -2,14 +2,14 @@
 
 from dataclasses import dataclass
 
-from tablegen.config.schema import MAXIMUM_SPLINE_BITS
+from tablegen.config.schema import MAXIMUM_SPLINE_BITS, MAXIMUM_SPLINE_LENGTH
 from tablegen.fixedpoint.program import Mode
 
 MODES: tuple[Mode, ...] = ("direct", "interpolated", "cubic")  # from the simplest to play
 LEAST_BITS = 8
 MOST_BITS: dict[Mode, int] = {"direct": 24, "interpolated": 24, "cubic": MAXIMUM_SPLINE_BITS}
 LEAST_LENGTH = 8  # of what every device renders and plays
-MOST_LENGTH = 1 << 16
+MOST_LENGTH: dict[Mode, int] = {"direct": 1 << 16, "interpolated": 1 << 16, "cubic": MAXIMUM_SPLINE_LENGTH}
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 
-from tablegen.config.schema import MAXIMUM_SPLINE_BITS
+from tablegen.config.schema import MAXIMUM_SPLINE_BITS, MAXIMUM_SPLINE_LENGTH
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS
 from tablegen.device.schedule import Schedule, Window
@@ -93,6 +93,7 @@ class Bank:
             fits = theirs.index_bits == 0 or _MIN_INDEX_BITS <= theirs.length_bits <= ours.index_bits
             if theirs.mode == "cubic":
                 fits = fits and self._info.degree >= SPLINE_DEGREE and theirs.word_bits <= MAXIMUM_SPLINE_BITS
+                fits = fits and 1 << theirs.length_bits <= MAXIMUM_SPLINE_LENGTH
             if not fits or (theirs.word_bits, theirs.dac_bits) != (ours.word_bits, ours.dac_bits):
                 raise RequestRefused(Reason.SHAPE, axis)
         if not PROGRAM_BYTES <= info.image_bytes <= self._info.image_bytes:

@@ -10,7 +10,7 @@ import msgspec
 from msgspec import Struct
 
 from tablegen.config.names import why_not_a_name
-from tablegen.config.schema import DEFAULT_FORMATS, MAXIMUM_SPLINE_BITS
+from tablegen.config.schema import DEFAULT_FORMATS, MAXIMUM_SPLINE_BITS, MAXIMUM_SPLINE_LENGTH
 from tablegen.device.dual_program import DualProgram
 from tablegen.fixedpoint.interpolation import guard_bits
 from tablegen.fixedpoint.output import GAIN_BITS, UNIT_GAIN_BITS
@@ -153,6 +153,10 @@ def _wrong_axes(manifest: Manifest) -> list[str]:
             (
                 table.mode != "cubic" or table.bits <= MAXIMUM_SPLINE_BITS,
                 f"table.bits is {table.bits}, for a cubic table of up to {MAXIMUM_SPLINE_BITS}",
+            ),
+            (
+                table.mode != "cubic" or words <= MAXIMUM_SPLINE_LENGTH,
+                f"table.words are {words}, for a cubic table of up to {MAXIMUM_SPLINE_LENGTH}",
             ),
             (all(low <= word <= high for word in table.words), f"table.words do not fit {table.bits} bits"),
             (table.guard_bits == guard_bits(table.bits), f"table.guard_bits is {table.guard_bits}"),

@@ -33,6 +33,7 @@ MAXIMUM_DIRECT_WORDS = 1 << 20
 ACCUMULATOR_LIMIT = 4  # limit of the synthesis, in units of the table's full scale
 _FULL = 0.999 * ACCUMULATOR_LIMIT
 _GAINS = 1 << (GAIN_BITS - 1)
+_LONGEST = max(MOST_LENGTH.values())
 
 
 class Feasibility:
@@ -99,7 +100,7 @@ class Feasibility:
         table = self._scan.table
         if table.length is not None:
             return table.length
-        return MOST_LENGTH if table.chosen_by_build else DEFAULT_LENGTH.get(table.mode or "", MOST_LENGTH)
+        return _LONGEST if table.chosen_by_build else DEFAULT_LENGTH.get(table.mode or "", _LONGEST)
 
     def _carried(self, harmonics: int, rate: Fraction) -> str:
         """Which cutoff passes so many, where one was asked for."""

@@ -77,9 +77,10 @@ def _lengths(table: Table, mode: Mode, period: int, harmonics: int, asked: bool)
     So many not every device can address, unless that mode was ``asked`` for.
     """
     if mode == "direct":
-        fits = table.length in (None, period) and (asked or LEAST_LENGTH <= period <= MOST_LENGTH)
+        fits = table.length in (None, period) and (asked or LEAST_LENGTH <= period <= MOST_LENGTH[mode])
         return [period] if fits else []
-    lengths = [1 << power for power in range(MOST_LENGTH.bit_length())] if table.length is None else [table.length]
+    powers = range(MOST_LENGTH[mode].bit_length())
+    lengths = [1 << power for power in powers] if table.length is None else [table.length]
     return [length for length in lengths if length >= LEAST_LENGTH and harmonics <= length // 2 - 1]
 
 

@@ -398,6 +398,11 @@ CHOICES = [
         "x.table.bits = 24",
         says="scan.toml:36: x.table.bits: 24 is above the 21 of mode = 'cubic'",
     ),
+    case(
+        "x.table.mode = 'cubic'",
+        "x.table.length = 32768",
+        says="scan.toml:35: x.table.length: 32768 is above the 16384 of mode = 'cubic'",
+    ),
     case("y.motion = 'jump'", says="scan.toml:39: y.motion: 'jump' is not one of 'off', 'ramp', 'step'"),
     case(
         scanner="x.hysteresis.model = 'preisach'",

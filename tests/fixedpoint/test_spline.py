@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from tablegen.fixedpoint.phase import RationalPhase
 from tablegen.fixedpoint.rounding import signed_limits
-from tablegen.fixedpoint.spline import SPLINE_UNIT, along, cubic
+from tablegen.fixedpoint.spline import SPLINE_FRACTION_BITS, SPLINE_UNIT, along, cubic
 from tablegen.fixedpoint.spline_words import spline_factors
 from tablegen.waveform.series import FourierSeries
 
@@ -37,8 +37,8 @@ def test_samples_are_those_of_the_recursion(index_bits: int, bits: int, data: st
     word = st.integers(*signed_limits(bits))
     words = data.draw(st.lists(word, min_size=1 << index_bits, max_size=1 << index_bits))
     phase = data.draw(st.integers(0, (1 << 32) - 1))
-    dropped = 32 - index_bits - 15
-    exact = SPLINE_UNIT * spline(words, Fraction(phase >> dropped, 1 << 15))
+    dropped = 32 - index_bits - SPLINE_FRACTION_BITS
+    exact = SPLINE_UNIT * spline(words, Fraction(phase >> dropped, 1 << SPLINE_FRACTION_BITS))
     sample = cubic(np.array(words, dtype=np.int64), np.array([phase]))
     assert abs(int(sample[0]) - exact) < 1
 
@@ -47,17 +47,18 @@ def test_samples_are_those_of_the_recursion(index_bits: int, bits: int, data: st
 def test_extreme_words(bits: int) -> None:
     """No sample leaves the 12-fold of its four words, no sum on the way 32 bits, and no product what is documented."""
     low, high = signed_limits(bits)
-    fraction = np.arange(1 << 15)
+    shift, half = SPLINE_FRACTION_BITS + 1, 1 << SPLINE_FRACTION_BITS
+    fraction = np.arange(1 << SPLINE_FRACTION_BITS)
     for corner in product((low, high), repeat=4):
         sample = along([np.full_like(fraction, word) for word in corner], fraction)
         assert SPLINE_UNIT * min(corner) <= sample.min()
         assert sample.max() <= SPLINE_UNIT * max(corner)
         c0, c1, c2, c3 = corner
         b1, b2, b3 = 12 * (c2 - c0), 24 * (c0 - 2 * c1 + c2), 16 * (c3 - c0 + 3 * (c1 - c2))
-        second = b2 + ((b3 * fraction + (1 << 15)) >> 16)
-        first = b1 + ((second * fraction + (1 << 15)) >> 16)
+        second = b2 + ((b3 * fraction + half) >> shift)
+        first = b1 + ((second * fraction + half) >> shift)
         assert max(abs(b3), int(np.abs(second).max()), int(np.abs(first).max())) <= 1 << (bits + 6)
-        last = 2 * (c0 + 4 * c1 + c2) + ((first * fraction + (1 << 15)) >> 16)
+        last = 2 * (c0 + 4 * c1 + c2) + ((first * fraction + half) >> shift)
         assert np.array_equal(sample, last)
 
 

@@ -137,16 +137,16 @@ MUTANTS: tuple[Mutant, ...] = (
         "cubic",
         {
             "runs of splines begin with the segment after it": (
-                "words = table + (at >> 47);",
-                "words = table + (at >> 47) + 1;",
+                "words = table + (at >> 50);",
+                "words = table + (at >> 50) + 1;",
             ),
             "runs of splines go on with the same segment": ("words + (goes_on ? 1 : 0)", "words"),
             "runs of splines leave a segment out": ("words + (goes_on ? 1 : 0)", "words + 1"),
             "runs of splines stay in a segment": ("track->segment = dac_segment_of(track->next++);", "(void)0;"),
-            "runs of splines begin a tick early": ("(at - step) << 17", "at << 17"),
-            "runs of splines have a bit more of fraction": (
-                "(uint32_t)(track->way >> 49) << 16",
-                "(uint32_t)(track->way >> 48) << 15",
+            "runs of splines begin a tick early": ("(at - step) << 14", "at << 14"),
+            "runs of splines have a bit less of fraction": (
+                "(uint32_t)(track->way >> 46)",
+                "(uint32_t)(track->way >> 47) << 1",
             ),
             "steps of splines are those of lines": ("    if (bank->cubic) {\n", "    if (false) {\n"),
         },

@@ -26,11 +26,11 @@ def played_codes(axis: Json) -> list[int]:
         if table["mode"] == "direct":
             sample = words[k] * 2**guard
         elif table["mode"] == "cubic":
-            place = k * 2**32 // period * len(words) // 2**17
-            c = [words[(place // 2**15 + i) % len(words)] for i in range(4)]
+            place = k * 2**32 // period * len(words) // 2**14
+            c = [words[(place // 2**18 + i) % len(words)] for i in range(4)]
             sample = 16 * (c[3] - 3 * c[2] + 3 * c[1] - c[0])
             for lower in (24 * (c[0] - 2 * c[1] + c[2]), 12 * (c[2] - c[0]), 2 * (c[0] + 4 * c[1] + c[2])):
-                sample = lower + floor_shift(sample * (place % 2**15), 16)
+                sample = lower + floor_shift(sample * (place % 2**18), 19)
         else:
             # floor(k 2^32 / period) in words of the table, with 15 bits of fraction.
             place = k * 2**32 // period * len(words) // 2**17

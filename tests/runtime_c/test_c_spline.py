@@ -1,5 +1,6 @@
 """Cubic tables in the C runtime: what it loads, and what a device that was compiled without them refuses."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -48,6 +49,8 @@ def test_what_is_loaded(tmp_path: Path) -> None:
         assert loaded(with_splines, SHAPE, behind=at) == BAD_TABLE, f"another word {at} behind the last"
     for index_bits in (CUBIC, CUBIC + 2, CUBIC + 3, CUBIC + 5, CUBIC + 17, 64 + 4):
         assert loaded(with_splines, SHAPE, index_bits=index_bits) == BAD_TABLE, index_bits
+    for index_bits, expected in ((14, LOADED), (15, BAD_TABLE)):
+        assert loaded(with_splines, replace(SHAPE, x_index_bits=index_bits)) == expected
     wide = library(tmp_path, 32, spline=True)
     assert loaded(wide, WIDE) == LOADED
     assert loaded(wide, WIDE, bits=22, gain_q=16 + 22 + 3 - 16) == BAD_TABLE
