@@ -169,8 +169,8 @@ def _value(value: object) -> str:
 def _against_quantisation(setup: Setup, plan: Plan, line: LinePlan, found: Excess) -> Iterator[Iterator[Change]]:
     axis, table = line.axis, line.program
     if line.asked_table is not None:
-        asked = line.asked_table.max_error_lsb
-        yield ({f"{axis}.table.max_error_lsb": asked / share} for share in (2.0, 4.0) if asked / share > _ROUNDED_LSB)
+        asked, least = line.asked_table.max_error_lsb, 0.0 if line.asked_table.shaped else _ROUNDED_LSB
+        yield ({f"{axis}.table.max_error_lsb": asked / share} for share in (2.0, 4.0) if asked / share > least)
     bits = ceil(log2(_MARGIN) + log2(abs(found.percent)) - log2(found.limit))  # their quotient may be no float
     words_per_code = 2.0**table.bits / (abs(line.codes_per_unit) * line.scale)
     if words_per_code < 2.0 and line.asked_table is None:

@@ -12,9 +12,10 @@ _HEAD = (
 
 def tables_text(tables: AxisTables) -> Iterator[str]:
     """Title, a line a table, and what to write into the scan file."""
-    yield f"{tables.axis}: {tables.harmonics} harmonics, {tables.ticks} ticks"
+    shaped = "; shaped: errors are those before the rounding" if tables.shaped else ""
+    yield f"{tables.axis}: {tables.harmonics} harmonics, {tables.ticks} ticks{shaped}"
     yield from _HEAD
-    yield from map(_row, tables.rows)
+    yield from (_row(row, 4 if tables.shaped else 3) for row in tables.rows)
     if tables.rendered is not None:
         into = f"rendered on the device into {tables.rendered}: {tables.rendered.memory_bits} bits"
         yield f"     {'Fourier words':<13}{2 * tables.harmonics + 1:>7}{32:>6}{tables.upload_bits:>11}  {into}"
@@ -35,11 +36,11 @@ def _keys(axis: str, keys: dict[str, str]) -> Iterator[str]:
     yield from (f"  {key} = {value}" for key, value in keys.items())
 
 
-def _row(row: TableRow) -> str:
+def _row(row: TableRow, digits: int) -> str:
     shape, takes = row.shape, row.instructions
     mark = "*" if row.chosen else "=" if row.planned else " " if row.played else "-"
     return (
         f"  {mark}  {shape.mode:<13}{shape.length:>7}{shape.bits:>6}{shape.memory_bits:>11}{row.stored_bits:>11}"
-        f"{row.max_error_lsb:>8.3f}{row.rms_error_lsb:>7.3f}"
+        f"{row.max_error_lsb:>8.{digits}f}{row.rms_error_lsb:>7.{digits}f}"
         f"{takes['cortex-m4']:>8.1f}{takes['cortex-m0plus']:>7.1f}{row.cells or '':>8}"
     )

@@ -57,9 +57,9 @@ class Table(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
             Meta(
                 gt=0.0,
                 le=1e6,
-                description="the least memory whose emitted codes err by at most this, in LSB of the converter; what "
-                "is given of `mode`, `length` and `bits` is kept; default with auto: 1, or that of `limits` if that "
-                "is less",
+                description="the least memory whose emitted codes err by at most this, in LSB of the converter, of "
+                "shaped output before the rounding; what is given of `mode`, `length` and `bits` is kept; default "
+                "with auto: 1, or that of `limits` if that is less, and 0.01 of shaped output",
             ),
         ]
         | None

@@ -68,11 +68,12 @@ class Output:
 
     def shaped(self, sample: Ints, remainders: Remainders) -> Ints:
         """Codes before the clamp at consecutive ticks; ``remainders`` run on."""
-        if self.shaping.order == 0:
-            return self.unclamped(sample)
+        return remainders.codes(self.fed(sample)) if self.shaping.order else self.unclamped(sample)
+
+    def fed(self, sample: Ints) -> Ints:
+        """What shaping rounds down: codes with ``remainder_bits`` fraction bits, and half a code more."""
         half = 1 << (self.gain_q - 1)
-        shift = self.gain_q - remainder_bits(self.dac_bits)
-        return remainders.codes((self.gain_word * sample + self.offset_word + half) >> shift)
+        return (self.gain_word * sample + self.offset_word + half) >> (self.gain_q - remainder_bits(self.dac_bits))
 
     def word(self, code: int) -> int:
         """A code as it is sent to the converter: its coding, then its alignment."""

@@ -1,6 +1,6 @@
 """The worst error of a program over every tick of its period, the same whole number on every machine.
 
-Of a shaped axis it is that of the codes without shaping: what a table is to blame for.
+Of a shaped axis it is that of what shaping rounds, before it does: what a table is to blame for.
 
 It is what the certificate measures, from sums in a fixed order, rounded to 2^-16 of a code: what decides which table is
 emitted must not depend on the last bits of a transform.
@@ -9,8 +9,9 @@ emitted must not depend on the last bits of a transform.
 import numpy as np
 
 from tablegen.fixedpoint.program import Program
-from tablegen.fixedpoint.rounding import round_half_up
+from tablegen.fixedpoint.rounding import round_half_up, shift_round
 from tablegen.fixedpoint.runs import runs_of
+from tablegen.fixedpoint.shaping import remainder_bits
 from tablegen.numerics.arrays import Floats, Ints
 from tablegen.planning.table_maker import TableMaker
 from tablegen.waveform.extremes import extreme_points, extreme_ticks
@@ -47,22 +48,33 @@ class AskedCodes:
 
     def least_error(self, program: Program) -> int:
         """The worst of some ticks: the worst error is at least this."""
-        return _largest(program.rounded.codes(self._some), self._some_codes)
+        return _largest(_played(program, self._some), self._some_codes)
 
     def worst_error(self, program: Program) -> int:
         """The worst of all ticks."""
-        program = program.rounded
-        if program.mode == "interpolated" and program.hold == 1:  # along a line codes are in order
+        in_order = program.mode == "interpolated" and program.hold == 1  # the codes along a line
+        if in_order and not program.output.shaping.order:
             runs = runs_of(program).split_at(self._extremes)
-            worst = _largest(runs.codes, self._at(runs.starts))
-            return worst if runs.by_tick else max(worst, _largest(runs.codes, self._at(runs.lasts)))
+            codes = runs.codes << FRACTION_BITS
+            worst = _largest(codes, self._at(runs.starts))
+            return worst if runs.by_tick else max(worst, _largest(codes, self._at(runs.lasts)))
         advances, worst = program.phase.ticks, 0
         for first in range(0, advances, _CHUNK_TICKS):
             k = np.arange(first, min(first + _CHUNK_TICKS, advances), dtype=np.int64) * program.hold
-            worst = max(worst, _largest(program.codes(k), self._at(k)))
+            worst = max(worst, _largest(_played(program, k), self._at(k)))
         return worst
 
 
-def _largest(codes: Ints, asked: Ints) -> int:
-    """The largest difference of codes from what was asked for."""
-    return int(np.max(np.abs((codes << FRACTION_BITS) - asked)))
+def _played(program: Program, k: Ints) -> Ints:
+    """What a program plays at ticks k, in 2^-16 of a code; of a shaped one before the code is rounded."""
+    output = program.output
+    if not output.shaping.order:
+        return program.codes(k) << FRACTION_BITS
+    bits = remainder_bits(output.dac_bits)
+    fine = output.fed(program.samples(k)) - (1 << (bits - 1))
+    return fine << (FRACTION_BITS - bits) if bits <= FRACTION_BITS else shift_round(fine, bits - FRACTION_BITS)
+
+
+def _largest(played: Ints, asked: Ints) -> int:
+    """The largest difference from what was asked for."""
+    return int(np.max(np.abs(played - asked)))

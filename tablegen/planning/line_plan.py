@@ -227,7 +227,7 @@ def _line_plan(setup: Setup, axis: Literal["x", "y"], schedule: Schedule, proble
     as_asked = StoredWave(series)
     feasible.check_words(as_asked)
     feasible.check_range(drive, converter, *as_asked.reach, shaping)
-    shape, asked = written_shape(scan.table, period), asked_of(scan.table, setup.scan.limits)
+    shape, asked = written_shape(scan.table, period), asked_of(scan.table, setup.scan.limits, shaping.order > 0)
     if asked is not None and len(problems.found) == before:
         with problems.at(file, f"{axis}.table.{'mode' if scan.table.max_error_lsb is None else 'max_error_lsb'}"):
             modes = played_modes(setup.scan.emit.formats or DEFAULT_FORMATS)

@@ -15,32 +15,41 @@ from tablegen.problems import Unphysical
 # A code is rounded by up to 1/2 LSB whatever the table is. With as much again for the table, what is played is one of
 # the two codes that what was asked for lies between.
 DEFAULT_ERROR_LSB = 1.0
+# Of shaped output the table's own error, before the rounding that is shaped: little beside what shaping leaves.
+DEFAULT_SHAPED_ERROR_LSB = 0.01
 _NOT_PLAYED: dict[str, tuple[Mode, ...]] = {"verilog": ("cubic",)}  # modes by formats whose sequencer has none of them
 
 
 @dataclass(frozen=True)
 class TableChoice:
-    """What was asked of a table that the build chose: the worst error, and the keys that were free."""
+    """What was asked of a table that the build chose: the worst error, and the keys that were free.
+
+    Of ``shaped`` output it is the error before the rounding.
+    """
 
     max_error_lsb: float
     free: tuple[str, ...]
+    shaped: bool = False
 
     def __str__(self) -> str:
-        return f"the least memory within {self.max_error_lsb:g} LSB"
+        return f"the least memory within {self.max_error_lsb:g} LSB{' before the rounding' if self.shaped else ''}"
 
 
-def asked_of(table: Table, limits: Limits) -> TableChoice | None:
+def asked_of(table: Table, limits: Limits, shaped: bool) -> TableChoice | None:
     """What is asked of a table; None where it is written as it is."""
     if not table.chosen_by_build:
         return None
     given = {"mode": table.mode not in (None, "auto"), "length": table.length, "bits": table.bits}
-    return TableChoice(allowed_lsb(table, limits), tuple(key for key, value in given.items() if not value))
+    free = tuple(key for key, value in given.items() if not value)
+    return TableChoice(allowed_lsb(table, limits, shaped), free, shaped)
 
 
-def allowed_lsb(table: Table, limits: Limits) -> float:
-    """The worst error of a table that the build chooses."""
+def allowed_lsb(table: Table, limits: Limits, shaped: bool) -> float:
+    """The worst error of a table that the build chooses; of shaped output before the rounding."""
     if table.max_error_lsb is not None:
         return table.max_error_lsb
+    if shaped:
+        return DEFAULT_SHAPED_ERROR_LSB
     return min(DEFAULT_ERROR_LSB, limits.max_error_lsb or DEFAULT_ERROR_LSB)
 
 

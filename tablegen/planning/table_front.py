@@ -40,7 +40,7 @@ def table_front(setup: Setup, line: LinePlan) -> TableFront:
     maker, feasible = maker_of(line), Feasibility(setup, line.axis, Problems())
     possible = possible_shapes(Table(), line.program.phase.ticks, line.series.harmonics)
     shapes = feasible.fitting(possible, line.drive, line.converter, maker)
-    search, most = TableSearch(maker), allowed_lsb(scan.table, setup.scan.limits)
+    search, most = TableSearch(maker), allowed_lsb(scan.table, setup.scan.limits, line.program.output.shaping.order > 0)
     found = {one.shape for one in search.front(shapes, _TIMES * most)}
     modes = played_modes(setup.scan.emit.formats or DEFAULT_FORMATS)
     played = [shape for shape in shapes if shape.mode in modes]

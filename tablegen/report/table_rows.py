@@ -1,9 +1,11 @@
 """The tables that an axis could have, with what each errs by and takes: as data, for text, JSON and a chart."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import sqrt
 from typing import Any, Literal
+
+import numpy as np
 
 from tablegen.certificate.line_errors import EmittedPeriod
 from tablegen.config.load import Setup
@@ -15,11 +17,14 @@ from tablegen.planning.line_plan import LinePlan
 from tablegen.planning.other_table import with_table
 from tablegen.planning.table_front import table_front
 from tablegen.report.table_costs import CELLS, INSTRUCTIONS
+from tablegen.waveform.sampler import Sampler
+
+_CHUNK_TICKS = 1 << 16  # that are worked out together
 
 
 @dataclass(frozen=True)
 class TableRow:
-    """A table with its errors over all ticks, in LSB of the converter.
+    """A table with its errors over all ticks, in LSB of the converter; of shaped output before the rounding.
 
     ``stored_bits`` is what it takes in C: in words of 16 or 32 bits, with the first ones once more behind the last.
     ``played`` is whether all formats of the scan play it.
@@ -48,7 +53,7 @@ class TableRow:
 class AxisTables:
     """The tables of one axis by memory, the one that is chosen, and Fourier words that a device renders into another.
 
-    ``rendered`` is None where no table that a device renders keeps the error.
+    ``rendered`` is None where no table that a device renders keeps the error. ``shaped`` is whether the output is.
     """
 
     axis: Literal["x", "y"]
@@ -57,6 +62,7 @@ class AxisTables:
     max_error_lsb: float
     rows: tuple[TableRow, ...]
     rendered: TableShape | None
+    shaped: bool
 
     @property
     def chosen(self) -> TableRow:
@@ -78,6 +84,7 @@ class AxisTables:
             "harmonics": self.harmonics,
             "ticks": self.ticks,
             "max_error_lsb": self.max_error_lsb,
+            "shaped": self.shaped,
             "tables": [
                 {
                     **_shape(row.shape),
@@ -111,12 +118,9 @@ def axis_tables(setup: Setup, line: LinePlan) -> AxisTables:
 
     def rows() -> Iterator[TableRow]:
         for shape in front.shapes:
-            other = with_table(line, shape)
-            played = EmittedPeriod(replace(other, program=other.program.rounded))  # what the table is to blame for
             yield TableRow(
                 shape,
-                played.largest_error(),
-                sqrt(played.error_moments()[1]),
+                *_errors(with_table(line, shape)),
                 (shape.length + _behind(shape)) * storage_bits(shape.bits),
                 shape == front.chosen,
                 shape == front.planned,
@@ -124,5 +128,25 @@ def axis_tables(setup: Setup, line: LinePlan) -> AxisTables:
             )
 
     return AxisTables(
-        line.axis, line.series.harmonics, line.program.ticks, front.max_error_lsb, tuple(rows()), front.rendered
+        line.axis,
+        line.series.harmonics,
+        line.program.ticks,
+        front.max_error_lsb,
+        tuple(rows()),
+        front.rendered,
+        line.program.output.shaping.order > 0,
     )
+
+
+def _errors(line: LinePlan) -> tuple[float, float]:
+    """Largest and rms; of shaped output of what is rounded, since the table is to blame for that."""
+    program = line.program
+    if not program.output.shaping.order:
+        played = EmittedPeriod(line)
+        return played.largest_error(), sqrt(played.error_moments()[1])
+    sampler, largest, squares = Sampler(line.series, program.phase.ticks), 0.0, 0.0
+    for first in range(0, program.ticks, _CHUNK_TICKS):
+        k = np.arange(first, min(first + _CHUNK_TICKS, program.ticks), dtype=np.int64)
+        error = program.output.unrounded(program.samples(k)) - line.float_codes(sampler.at(k // program.hold))
+        largest, squares = max(largest, float(np.max(np.abs(error)))), squares + float(np.sum(error * error))
+    return largest, sqrt(squares / program.ticks)

@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from editing import SCAN, edited, run, write_pair
 
@@ -40,6 +41,25 @@ def test_rows_are_what_a_build_of_that_table_has(found: dict[str, Any], tmp_path
         assert row["rms_error_lsb"] == pytest.approx(certificate.rms_error_lsb, rel=1e-5)
         assert row["memory_bits"] == row["length"] * row["bits"]
         assert row["stored_bits"] > row["length"] * storage_bits(row["bits"])
+
+
+def test_of_shaped_output_errors_are_those_before_the_rounding(tmp_path: Path) -> None:
+    path = write_pair(tmp_path, edited(f"{SCAN}{C_ALONE}", "dac.shaping = 'second'", "x.size_nm = 20"))
+    text, data = run("tables", path, "--axis", "x"), run("tables", path, "--axis", "x", "--json")
+    assert (text.status, data.status) == (0, 0), text.err + data.err
+    assert text.out.splitlines()[0].endswith("; shaped: errors are those before the rounding")
+    (axis,) = json.loads(data.out)["axes"]
+    assert axis["shaped"]
+    assert axis["max_error_lsb"] == 0.01
+    line = make_plan(load(path)).x
+    (planned,) = [row for row in axis["tables"] if row["planned"]]
+    k = np.arange(line.program.ticks)
+    angles = 2.0 * np.pi * np.outer(k / line.program.ticks, np.arange(1, line.series.harmonics + 1))
+    w = line.series.a0 + np.cos(angles) @ line.series.a + np.sin(angles) @ line.series.b
+    errors = line.program.output.unrounded(line.program.samples(k)) - line.float_codes(w)
+    assert planned["max_error_lsb"] == pytest.approx(np.max(np.abs(errors)), rel=1e-5)
+    assert planned["rms_error_lsb"] == pytest.approx(np.sqrt(np.mean(errors**2)), rel=1e-5)
+    assert f"{planned['max_error_lsb']:.4f} {planned['rms_error_lsb']:.4f}" in text.out
 
 
 def test_no_row_is_larger_and_worse_than_one_as_simple(found: dict[str, Any]) -> None:

@@ -49,13 +49,18 @@ def every_shape(line: LinePlan, longest: int) -> list[TableShape]:
 
 
 def worst_of(line: LinePlan, shape: TableShape) -> float:
-    """By numpy's cosine, tick by tick: none of the bounds, runs and expansions of the search."""
+    """By numpy's cosine, tick by tick: none of the bounds, runs and expansions of the search.
+
+    Of shaped output what is rounded: codes cut to 12 bits of fraction, at 16 bits.
+    """
     program, series = maker_of(line).made(shape).program, line.series
     k = np.arange(program.ticks)
     t, n = k // program.hold / program.phase.ticks, np.arange(1, series.harmonics + 1)
     angle = 2.0 * np.pi * np.outer(t, n)
     w = series.a0 + np.cos(angle) @ series.a + np.sin(angle) @ series.b
-    return float(np.max(np.abs(program.codes(k) - line.float_codes(w))))
+    shaped = program.output.shaping.order > 0
+    played = np.floor(program.output.unrounded(program.samples(k)) * 4096) / 4096 if shaped else program.codes(k)
+    return float(np.max(np.abs(played - line.float_codes(w))))
 
 
 @pytest.mark.parametrize("error", [0.55, 0.7, 1.0, 2.5])
@@ -66,6 +71,22 @@ def test_no_table_is_smaller(tmp_path: Path, error: float) -> None:
     keeping = [shape for shape in every_shape(line, 1 << 12) if worst_of(line, shape) <= error]
     assert found == min(keeping, key=lambda shape: shape.order)
     assert found.memory_bits == min(shape.length * shape.bits for shape in keeping)
+
+
+@pytest.mark.parametrize(("asked", "error"), [(None, 0.01), (0.002, 0.002)])
+def test_of_shaped_output_it_is_the_error_before_the_rounding(
+    tmp_path: Path, asked: float | None, error: float
+) -> None:
+    """A table within 1 LSB would be the whole error of what shaping leaves."""
+    edits = {**FEW, **C_ALONE, "x.size_nm": "20.0", "dac.shaping": '"second"', **(asking(asked) if asked else AUTO)}
+    plan = plan_of(tmp_path, edits)
+    found, line = shape_of(plan.x), plan.x
+    keeping = [shape for shape in every_shape(line, 1 << 12) if worst_of(line, shape) <= error]
+    assert found == min(keeping, key=lambda shape: shape.order)
+    assert line.asked_table is not None
+    assert str(line.asked_table) == f"the least memory within {error:g} LSB before the rounding"
+    finest = certify(plan_of(tmp_path, {**edits, **asking(0.0005)}))["x"]
+    assert certify(plan)["x"].rms_error_lsb < 1.05 * finest.rms_error_lsb
 
 
 def test_few_tables_are_made_and_fewer_measured(tmp_path: Path) -> None:
