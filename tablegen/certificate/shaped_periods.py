@@ -22,16 +22,16 @@ _PERIODS = 17  # at most; of several the first is left out, in which the respons
 
 @dataclass(frozen=True)
 class Passage:
-    """What the position follows: a second-order response, points of a measured one, or a band from 0 Hz.
+    """What the position follows: a second-order response, a measured one, or a band from 0 Hz.
 
-    Fields that do not apply are None; ``points`` alone says no more than how many there are.
+    Fields that do not apply are None.
     """
 
     band_hz: float | None = None
     frequency_hz: float | None = None
     quality: float | None = None
     delay_s: float | None = None
-    points: int | None = None
+    response: Measured | None = None
 
     @classmethod
     def of(cls, line: LinePlan) -> "Passage":
@@ -42,7 +42,7 @@ class Passage:
             case SecondOrder() as second:
                 return cls(frequency_hz=second.frequency_hz, quality=second.quality, delay_s=second.delay_s)
             case Measured() as measured:
-                return cls(points=len(measured.f_hz))
+                return cls(response=measured)
         raise TypeError(f"{type(line.drive.response)} is no response of a scanner file")  # pragma: no cover
 
 

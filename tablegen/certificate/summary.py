@@ -135,7 +135,8 @@ def behind(passage: Passage) -> str:
         return f"up to {_hz(passage.band_hz)}: no response is known"
     if passage.frequency_hz is not None:
         return f"behind {_hz(passage.frequency_hz)}, Q {passage.quality:g}"
-    return f"behind the response of {passage.points} points"
+    assert passage.response is not None
+    return f"behind the response of {len(passage.response.f_hz)} points"
 
 
 def shaped_lines(shaped: ShapedErrors) -> list[tuple[str, str]]:

@@ -1,6 +1,7 @@
 """What ``manifest.json`` holds, field by field: types with their ranges, and the programs that these fields are."""
 
 from fractions import Fraction
+from itertools import pairwise
 from typing import Annotated, Literal
 
 import numpy as np
@@ -176,14 +177,28 @@ class ManifestExpected(Struct):
     distance_percent: float | None = None
 
 
+class ManifestResponse(Struct):
+    """Points of a measured response: ascending Hz, gain over that at low frequency, phase in turns."""
+
+    hz: list[Annotated[float, Meta(gt=0.0)]]
+    gain: list[Annotated[float, Meta(gt=0.0)]]
+    phase_turns: list[float]
+
+    def __post_init__(self) -> None:
+        if not 2 <= len(self.hz) == len(self.gain) == len(self.phase_turns):
+            raise ValueError(f"a response of {len(self.hz)}, {len(self.gain)} and {len(self.phase_turns)} points")
+        if any(after <= before for before, after in pairwise(self.hz)):
+            raise ValueError("a response whose frequencies do not ascend")
+
+
 class ManifestPassage(Struct):
-    """What the position follows; of a measured response no more than how many points it has."""
+    """What the position follows: a second-order response, a measured one, or a band from 0 Hz."""
 
     band_hz: Annotated[float, Meta(gt=0.0)] | None = None
     frequency_hz: Annotated[float, Meta(gt=0.0)] | None = None
     quality: Annotated[float, Meta(gt=0.0)] | None = None
     delay_s: float | None = None
-    points: int | None = None
+    response: ManifestResponse | None = None
 
 
 class ManifestChanges(Struct):

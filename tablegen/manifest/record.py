@@ -10,6 +10,7 @@ import numpy as np
 from tablegen.certificate.certificate import Certificate
 from tablegen.certificate.line_errors import Refined, ScalingError
 from tablegen.certificate.shaped_errors import ShapedErrors
+from tablegen.certificate.shaped_periods import Passage
 from tablegen.compensation.dynamics import capped_inverse
 from tablegen.compensation.expectation import Expectation, Figure
 from tablegen.device.schedule import Schedule, Window
@@ -48,12 +49,21 @@ def certificate_record(certificate: Certificate) -> dict[str, Any]:
     return record
 
 
+def _passage(passage: Passage) -> dict[str, Any]:
+    """What applies of it; all points of a measured response."""
+    response = passage.response
+    if response is None:
+        return {key: value for key, value in asdict(passage).items() if value is not None}
+    points = {"hz": response.f_hz, "gain": response.gain, "phase_turns": response.phase_turns}
+    return {"response": {key: value.tolist() for key, value in points.items()}}
+
+
 def _shaped(shaped: ShapedErrors) -> dict[str, Any]:
     """Behind what it was judged, and the same without shaping."""
     largest, rms = shaped.code_error_lsb
     rounded = shaped.rounded
     return {
-        "passage": {key: value for key, value in asdict(shaped.passage).items() if value is not None},
+        "passage": _passage(shaped.passage),
         "ticks": shaped.ticks,
         "max_code_error_lsb": _bound(largest),
         "rms_code_error_lsb": _figure(rms),

@@ -10,8 +10,9 @@ from tablegen.verification.certified import PlayedPeriod, different_figures
 from tablegen.verification.checks import Check
 from tablegen.verification.directory import some
 from tablegen.verification.expectations import wrong_expectations
+from tablegen.verification.passage_checks import wrong_passage
 from tablegen.verification.scaling import knows, peak_acceleration, refinement_figures, rounded_scaling, scaling_figures
-from tablegen.verification.shaped import told_of, wrong_passage
+from tablegen.verification.shaped import told_of
 
 _ROUNDED = 1.0 + 1e-9  # the target is worked out again from what is played
 

@@ -5,14 +5,13 @@ docs/manifest.md says of which ticks the figures are, and behind what.
 """
 
 from functools import cached_property
-from math import isclose
 
 import numpy as np
-import numpy.typing as npt
 
 from tablegen.fixedpoint.program import Program
-from tablegen.manifest.fields import ManifestAxis, ManifestPassage, ManifestShaped
+from tablegen.manifest.fields import ManifestAxis, ManifestShaped
 from tablegen.numerics.arrays import Floats, Ints
+from tablegen.verification.passage import passes
 
 MOST_TICKS = 1 << 20  # of one period
 _SEVERAL_TICKS, _PERIODS = 1 << 18, 17
@@ -103,13 +102,13 @@ class ShapedPlay:
 
     def _behind(self, codes: Ints) -> Floats | None:
         stated = self.axis.certificate.shaped
-        if stated is None or stated.passage.points is not None:
+        if stated is None:
             return None
         errors = (codes - self._asked).reshape(-1)
         size = 2
         while size < 2 * len(errors):
             size *= 2
-        factor = _passage(stated.passage, np.arange(size // 2 + 1, dtype=np.float64) * (self._rate_hz / size))
+        factor = passes(stated.passage, np.arange(size // 2 + 1, dtype=np.float64) * (self._rate_hz / size))
         arrived = np.fft.irfft(np.fft.rfft(errors, size) * factor, size)
         return np.asarray(arrived[: len(errors)].reshape(codes.shape)[self._first :])
 
@@ -142,15 +141,6 @@ def _changes(codes: Ints) -> tuple[float, float]:
     return 100.0 * len(moved) / max(len(steps), 1), float(np.mean(moved)) if len(moved) else 0.0
 
 
-def _passage(passage: ManifestPassage, f_hz: Floats) -> npt.NDArray[np.complex128]:
-    """What a passage makes of errors at frequencies."""
-    if passage.frequency_hz is None or passage.quality is None:
-        return np.asarray(f_hz <= (passage.band_hz or 0.0), dtype=np.complex128)
-    r = f_hz / passage.frequency_hz
-    late = np.exp(-2j * np.pi * f_hz * (passage.delay_s or 0.0))
-    return np.asarray(late / (1.0 - r * r + 1j * r / passage.quality))
-
-
 def told_of(stated: ManifestShaped | None) -> dict[str, float | int | None]:
     """What a certificate states of shaping, by the names of ``figures``."""
     if stated is None:
@@ -161,22 +151,3 @@ def told_of(stated: ManifestShaped | None) -> dict[str, float | int | None]:
     for prefix, changes in (("", stated.changes), ("rounded.", stated.rounded.changes)):
         told |= {f"{prefix}changes.{name}": getattr(changes, name) for name in ("percent", "mean_step")}
     return told | {f"rounded.{name}": getattr(stated.rounded, name) for name in ("max_error_lsb", "rms_error_lsb")}
-
-
-def wrong_passage(axis: ManifestAxis, rate_hz: float) -> list[str]:
-    """A passage that is not the one of the axis: its resonance, or the band of its harmonics."""
-    stated, resonance = axis.certificate.shaped, axis.drive.resonance
-    if (stated is None) != (axis.output.shaping is None):
-        return [
-            "certificate.shaped is there, and the output does not shape" if stated else "certificate.shaped is missing"
-        ]
-    if stated is None or stated.passage.points is not None:
-        return []
-    passage = stated.passage
-    if resonance is None:
-        band = axis.fourier.harmonics * rate_hz
-        right = passage.frequency_hz is None and isclose(passage.band_hz or 0.0, band, rel_tol=1e-9)
-        return [] if right else [f"certificate.shaped.passage is not the band up to {band:.6g} Hz"]
-    half = (passage.frequency_hz or 0.0) / (2.0 * (passage.quality or 1.0))
-    right = isclose(passage.frequency_hz or 0.0, resonance.hz) and isclose(half, resonance.half_width_hz)
-    return [] if right else ["certificate.shaped.passage is not drive.resonance"]

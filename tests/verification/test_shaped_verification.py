@@ -1,7 +1,9 @@
 """Shaped builds verified: codes and figures once more in other ways, and tamperings that are found."""
 
+import json
 import re
 import shutil
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -60,7 +62,10 @@ def test_in_a_band_where_no_response_is_known(tmp_path: Path) -> None:
     assert wrong(made.folder) == []
 
 
-def test_behind_a_measured_response_figures_of_the_position_are_statements(tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A build whose x has a response of 2000 points."""
+    tmp_path = tmp_path_factory.mktemp("measured")
     f = np.linspace(100.0, 240e3, 2000)
     h = 1.0 / (1.0 - (f / 41e3) ** 2 + 1j * f / 41e3 / 7.0)
     columns = zip(f, np.abs(h), np.unwrap(np.angle(h, deg=True), period=360.0), strict=True)
@@ -68,12 +73,63 @@ def test_behind_a_measured_response_figures_of_the_position_are_statements(tmp_p
     (tmp_path / "response.csv").write_text(f"hz,gain,phase_deg\n{rows}", "ascii")
     scanner = {"x.resonance": {"response": "response.csv", "max_boost_db": 3.0}, "y.resonance": SECOND_ORDER}
     made = build(tmp_path, Variant({**SHORT, "dac.shaping": "scanner"}, scanner))
-    assert made.manifest["axes"]["x"]["certificate"]["shaped"]["passage"] == {"points": 2000}
-    assert made.manifest["axes"]["x"]["certificate"]["rms_error_lsb"] < 0.1
-    assert wrong(made.folder) == []
-    for key, value, seen in (("rms_error_lsb", 0.5, False), ("lowest_code", 5, True)):
-        edit_manifest(made.folder, "axes", "x", "certificate", key, value=value)
-        assert bool(wrong(made.folder)) == seen
+    certificate = made.manifest["axes"]["x"]["certificate"]
+    assert list(certificate["shaped"]["passage"]) == ["response"]
+    assert certificate["shaped"]["passage"]["response"]["hz"] == pytest.approx(f, rel=1e-8)
+    assert certificate["rms_error_lsb"] < 0.1
+    return made.folder
+
+
+def test_behind_a_measured_response_every_figure_is_found_again(measured: Path) -> None:
+    assert wrong(measured) == []
+
+
+RESPONSE = ("shaped", "passage", "response")
+
+
+@pytest.mark.parametrize(
+    ("place", "change"),
+    [
+        (("rms_error_lsb",), lambda value: 1.01 * value),
+        (("shaped", "rounded", "max_error_lsb"), lambda value: 0.99 * value),
+        ((*RESPONSE, "gain"), lambda gain: [1.001 * one for one in gain]),
+        ((*RESPONSE, "phase_turns"), lambda turns: [one - 1e-5 * i for i, one in enumerate(turns)]),
+        ((*RESPONSE, "gain"), lambda gain: [*gain[:1000], *(0.5 * one for one in gain[1000:])]),
+        (RESPONSE, lambda response: {key: values[:50] for key, values in response.items()}),
+        (("shaped", "passage"), lambda _: {"frequency_hz": 41e3, "quality": 7.0, "delay_s": 0.0}),
+        (("shaped", "passage"), lambda _: {"band_hz": 12800.0}),
+    ],
+)
+def test_a_tampering_behind_a_measured_response_is_found(
+    place: tuple[str, ...], change: Callable[[Any], Any], measured: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / "out"
+    shutil.copytree(measured, folder)
+    value = json.loads((folder / "manifest.json").read_text("utf-8"))["axes"]["x"]["certificate"]
+    for key in place:
+        value = value[key]
+    edit_manifest(folder, "axes", "x", "certificate", *place, value=change(value))
+    make_right(folder)
+    assert wrong(folder)
+
+
+@pytest.mark.parametrize(
+    "response",
+    [
+        {"hz": [1.0, 2.0], "gain": [1.0], "phase_turns": [0.0, 0.0]},
+        {"hz": [2.0, 1.0], "gain": [1.0, 1.0], "phase_turns": [0.0, 0.0]},
+        {"hz": [1.0], "gain": [1.0], "phase_turns": [0.0]},
+    ],
+)
+def test_a_manifest_with_no_response_is_no_build(
+    response: dict[str, list[float]], measured: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / "out"
+    shutil.copytree(measured, folder)
+    edit_manifest(folder, "axes", "x", "certificate", *RESPONSE, value=response)
+    make_right(folder)
+    with pytest.raises(NotABuild, match="a response"):
+        read_build(folder)
 
 
 @pytest.fixture(scope="module")
