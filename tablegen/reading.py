@@ -9,17 +9,17 @@ import os
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
+
+from msgspec import Struct
 
 from tablegen.user_cache import is_private
 
 _CHUNK_BYTES = 1 << 20
 
 
-@dataclass(frozen=True)
-class Kind:
+class Kind(Struct, frozen=True):
     """A kind of file: what messages call it, and the most bytes that are read of one."""
 
     what: str

@@ -1,9 +1,11 @@
 """The tables that an axis could have, with what each errs by and takes: as data, for text, JSON and a chart."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import sqrt
 from typing import Any, Literal
+
+from msgspec.structs import replace
 
 from tablegen.certificate.line_errors import EmittedPeriod
 from tablegen.config.load import Setup
