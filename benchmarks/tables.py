@@ -114,7 +114,7 @@ def figure() -> bytes:
     """The front of both axes of the example, as a picture."""
     setup = load(EXAMPLE)
     emit = structs.replace(setup.scan.emit, formats=["c"])  # which plays all modes
-    setup = replace(setup, scan=structs.replace(setup.scan, emit=emit))
+    setup = structs.replace(setup, scan=structs.replace(setup.scan, emit=emit))
     charts = table_charts("annexin_200nm", [axis_tables(setup, line) for line in make_plan(setup).lines])
     return picture(charts.charts, "svg", "", charts.columns)
 
@@ -132,7 +132,7 @@ def _fill(core: str, mode: Mode, spline: bool) -> float:
     """Mean of a frame of the example, of samples of both axes."""
     setup = load(EXAMPLE)
     x = structs.replace(setup.scan.x, table=Table(mode=mode, length=_LENGTHS[mode], bits=16))
-    plan = make_plan(replace(setup, scan=structs.replace(setup.scan, x=x)))
+    plan = make_plan(structs.replace(setup, scan=structs.replace(setup.scan, x=x)))
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         for file, content in render(plan, certify(plan), ["c"]).items():

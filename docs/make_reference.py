@@ -13,6 +13,7 @@ from textwrap import fill
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+import msgspec
 from command_pages import CommandPage, Row, pages
 
 import tablegen
@@ -132,10 +133,12 @@ def _docstring(thing: object) -> str:
 
 
 def _fields(kind: type) -> list[str]:
-    """The fields of a dataclass; what they are says the docstring of the class."""
-    if not dataclasses.is_dataclass(kind):
-        return []
-    names = [f"`{field.name}`" for field in dataclasses.fields(kind) if not field.name.startswith("_")]
+    """The fields of a struct or a dataclass; what they are says the docstring of the class."""
+    if issubclass(kind, msgspec.Struct):
+        found: tuple[str, ...] = kind.__struct_fields__
+    else:
+        found = tuple(field.name for field in dataclasses.fields(kind)) if dataclasses.is_dataclass(kind) else ()
+    names = [f"`{name}`" for name in found if not name.startswith("_")]
     return [f"| {', '.join(names)} | fields |"] if names else []
 
 

@@ -4,7 +4,6 @@ import json
 import struct
 from binascii import crc32
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,7 @@ from loader_bridge import BREAK, NO_STOP_BIT, PULSE, Simulation, assembler
 from loader_device import Loader, LoaderDevice, limited, told_to_be
 from loader_dialogues import Dialogue, Differs, objection
 from loader_mutants import MUTANTS, Mutant
+from replacing import replace
 
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS, SCAN_WORDS
 from tablegen.device.widths import AxisWidths, Widths, misfits

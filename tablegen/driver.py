@@ -1,15 +1,15 @@
 """The range of the piezo driver, in which all normalised voltages are shares: equation (2) and its neighbours."""
 
-from dataclasses import dataclass
 from typing import TypeVar
+
+from msgspec import Struct
 
 from tablegen.numerics.arrays import Floats
 
 V = TypeVar("V", float, Floats)  # a voltage or many
 
 
-@dataclass(frozen=True, slots=True)
-class Driver:
+class Driver(Struct, frozen=True):
     """Outputs v_min..v_max in V at the piezo, v_min <= 0 < v_max.
 
     The paper's V_max is ``span``, and its offset voltage counts from v_min: with v_min = 0 they are those of the paper.

@@ -5,8 +5,9 @@ the size, is wrong. Where no percentage is known it is 0.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Literal
+
+from msgspec import Struct
 
 Weight = Literal["limit", "spoils", "expect", "note"]
 Tone = Literal["", "good", "warn", "bad", "quiet"]
@@ -20,8 +21,7 @@ _SIGNS: dict[Weight, str] = {
 }
 
 
-@dataclass(frozen=True)
-class Finding:
+class Finding(Struct, frozen=True):
     """A sentence, how much it weighs, and by what percentage of the scan within that.
 
     ``called`` replaces the words for its weight on a page, ``label`` begins its line in a terminal.

@@ -9,15 +9,17 @@ import os
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
+
+from msgspec import Struct
+
+from tablegen.user_cache import is_private
 
 _CHUNK_BYTES = 1 << 20
 
 
-@dataclass(frozen=True)
-class Kind:
+class Kind(Struct, frozen=True):
     """A kind of file: what messages call it, and the most bytes that are read of one."""
 
     what: str
@@ -58,6 +60,11 @@ def read_bytes(path: str | os.PathLike[str], kind: Kind) -> bytes:
     return b"".join(chunks_of(path, kind))
 
 
+def read_private_bytes(path: str | os.PathLike[str], kind: Kind) -> bytes:
+    """The whole of a file of the user's own that nobody else can write. Raises ``OSError`` for every other one too."""
+    return b"".join(chunks_of(path, kind, private=True))
+
+
 def read_text(path: str | os.PathLike[str], kind: Kind, encoding: str = "utf-8", errors: str = "strict") -> str:
     """The same as text."""
     return read_bytes(path, kind).decode(encoding, errors)
@@ -86,11 +93,14 @@ def size_shown(count: int) -> str:
     return f"{count >> 20} MiB" if count >= 1 << 20 else f"{count >> 10} KiB"
 
 
-def chunks_of(path: str | os.PathLike[str], kind: Kind) -> Iterator[bytes]:
+def chunks_of(path: str | os.PathLike[str], kind: Kind, private: bool = False) -> Iterator[bytes]:
     """The bytes of a file, a part at a time; what ``read_bytes`` refuses is refused before the first part of it."""
     count = 0
     with _opened(path) as handle:
-        size = os.fstat(handle).st_size
+        status = os.fstat(handle)
+        if private and not is_private(status):
+            raise PermissionError(errno.EPERM, "others can write it, or it is another user's")
+        size = status.st_size
         while count <= kind.most_bytes >= size:
             chunk = os.read(handle, min(_CHUNK_BYTES, kind.most_bytes + 1 - count))
             if not chunk:

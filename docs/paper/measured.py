@@ -1,12 +1,13 @@
 """Results of the virtual scanner, computed once: emitted integers at full scale, triangles, calibrations."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import msgspec
 import numpy as np
+from msgspec.structs import replace
 
 from tablegen.calibration.hysteresis import HysteresisFit, Trace, fit_hysteresis
 from tablegen.calibration.operator.fit import OperatorFit, fit_operator

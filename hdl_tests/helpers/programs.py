@@ -1,11 +1,11 @@
 """Programs for the sequencer's benches: random ones, whatever the arithmetic allows, with no plan behind them."""
 
-from dataclasses import replace
 from fractions import Fraction
 from typing import Literal
 
 import numpy as np
 from numpy.random import Generator
+from replacing import replace
 
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.schedule import Schedule, Window

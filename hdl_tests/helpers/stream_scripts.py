@@ -2,11 +2,11 @@
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.random import Generator
 from programs import Kind, random_dual, random_fourier, rendered, shaped
+from replacing import replace
 
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.registers import PAGE_WORDS, program_words

@@ -1,10 +1,10 @@
 """What a build promises, measured on every emitted integer of one whole period of each axis, and the limits on it."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from math import floor, log10, sqrt
 
 import numpy as np
+from msgspec import Struct
 
 from tablegen.certificate.expected import certified_expectation
 from tablegen.certificate.line_errors import (
@@ -23,8 +23,7 @@ from tablegen.planning.line_plan import LinePlan, Plan
 from tablegen.problems import Document, Problem
 
 
-@dataclass(frozen=True)
-class Certificate:
+class Certificate(Struct, frozen=True):
     """The error budget of one axis. Codes and LSB are the converter's; dB are of power, relative to the scan's.
 
     An axis at rest has no scaling errors and no cutoff. ``refinement`` is what the layer of ``tablegen refine`` moves,

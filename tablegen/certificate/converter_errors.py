@@ -4,10 +4,10 @@ The certificate's own figures are of the codes. A resonance makes more of their 
 codes at 1 kHz, several times as much.
 """
 
-from dataclasses import dataclass
 from math import sqrt
 
 import numpy as np
+from msgspec import Struct
 
 from tablegen.certificate.line_errors import CHORD, EmittedPeriod
 from tablegen.compensation.line import Sweep
@@ -18,8 +18,7 @@ _MOST_TICKS = 1 << 20  # of a period whose spectrum is taken; in a longer one a 
 _POINTS = 801  # over the window
 
 
-@dataclass(frozen=True)
-class ConverterErrors:
+class ConverterErrors(Struct, frozen=True):
     """Percent of the line inside the window, as ``Expectation`` has them; ``rms`` and ``scaling`` by direction."""
 
     rms: dict[str, float]

@@ -1,9 +1,9 @@
 """Where what is expected on the scanner should be doubted, or is worse than the waveform's own errors say."""
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from msgspec import Struct
 
 from tablegen.certificate.certificate import Certificate
 from tablegen.certificate.excess import LARGEST_PERCENT
@@ -13,8 +13,7 @@ FAR_PERCENT = 10.0  # of v_max, from the nearest measured line; the traces of `c
 _GRID = 32  # points per period of the highest harmonic
 
 
-@dataclass(frozen=True)
-class Doubt:
+class Doubt(Struct, frozen=True):
     """A sentence about one axis: a figure in percent, above ``limit``; ``kind`` says which figure it is."""
 
     kind: Literal["scaling error", "distance"]

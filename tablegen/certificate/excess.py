@@ -1,8 +1,9 @@
 """Where a scan is worse than it should be: an error above 1 %, or above that of the line without any correction."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Literal
+
+from msgspec import Struct
 
 from tablegen.certificate.line_errors import ScalingError
 
@@ -12,8 +13,7 @@ Cause = Literal["quantisation", "band limit", "model"]
 _CALLED: dict[Cause, str] = {"quantisation": "quantisation", "band limit": "the band limit", "model": "the model"}
 
 
-@dataclass(frozen=True)
-class Excess:
+class Excess(Struct, frozen=True):
     """The worst error of one axis that should be said: its figure in percent, what it is above, and its parts.
 
     ``what`` is "scaling error" (peak to peak) or "size error" (with its sign), ``side`` the direction, ``limit`` the

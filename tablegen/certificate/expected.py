@@ -6,9 +6,8 @@ earlier: at a stroke of V_scan (w_max - w_min). The piezo's loop is that of this
 the branches that were applied.
 """
 
-from dataclasses import replace
-
 import numpy as np
+from msgspec.structs import replace
 
 from tablegen.certificate.converter_errors import converter_errors
 from tablegen.certificate.line_errors import EmittedPeriod

@@ -6,12 +6,12 @@ line, since the slope between neighbouring codes means nothing.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from math import ceil, floor, log10
 
 import numpy as np
+from msgspec import Struct
 
 from tablegen.certificate.shaped_periods import ShapedPeriods
 from tablegen.compensation.dynamics import capped_inverse
@@ -29,8 +29,7 @@ _CHUNK_RUNS = 1 << 14  # runs that are worked out together, in the cache
 _MAX_SPECTRUM_TICKS = 1 << 22  # longest period whose spectrum is taken
 
 
-@dataclass(frozen=True)
-class ScalingError:
+class ScalingError(Struct, frozen=True):
     """Scaling error of one direction in percent: peak to peak over the window, and of the window as a whole.
 
     ``total`` is of the emitted integers through the scanner's model; ``band_limit``, ``quantisation`` and
@@ -46,8 +45,7 @@ class ScalingError:
     uncompensated: float
 
 
-@dataclass(frozen=True)
-class Refined:
+class Refined(Struct, frozen=True):
     """What the layer moves in one direction, by the scanner's model, in percent over the window.
 
     ``position`` is by how much of the line at most, ``scaling`` the scaling error, peak to peak, that it takes away.

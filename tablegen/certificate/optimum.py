@@ -4,10 +4,10 @@ It shares nothing with the fit of the build but the line: other times, other sum
 error and the range are asked for, not the place of the line, so that it is a little below what a build can reach.
 """
 
-from dataclasses import replace
 from math import ceil, tau
 
 import numpy as np
+from msgspec.structs import replace
 
 from tablegen.certificate.certificate import Certificate
 from tablegen.numerics.arrays import Floats

@@ -6,13 +6,14 @@ trials, so that the search ends soon where nothing helps.
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import ceil, copysign, log2
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from msgspec import structs
+from msgspec.structs import replace
 
 from tablegen.certificate.certificate import scaling_errors
 from tablegen.certificate.excess import Cause, Excess, excess

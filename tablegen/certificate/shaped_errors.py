@@ -1,9 +1,9 @@
 """What shaping of an axis does to its errors, and what it costs: what only shaped axes have in their certificate."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
+from msgspec import Struct
 
 from tablegen.certificate.line_errors import EmittedPeriod, TickErrors, tick_scaling
 from tablegen.certificate.shaped_periods import Changes, Passage, largest_and_rms
@@ -12,8 +12,7 @@ from tablegen.fixedpoint.shaping import Shaping
 from tablegen.planning.line_plan import LinePlan
 
 
-@dataclass(frozen=True)
-class Rounded:
+class Rounded(Struct, frozen=True):
     """The same scan without shaping, judged alike: errors of the position in LSB, scaling errors, changes of codes."""
 
     max_error_lsb: float
@@ -22,8 +21,7 @@ class Rounded:
     changes: Changes
 
 
-@dataclass(frozen=True)
-class ShapedErrors:
+class ShapedErrors(Struct, frozen=True):
     """Beside the certificate of a shaped axis, whose errors are those of the position.
 
     ``ticks`` are judged, behind the ``passage``. ``code_error_lsb`` are the largest error of a code and the rms, and

@@ -4,11 +4,11 @@ Shaped codes err by more than rounded ones, at frequencies that the piezo does n
 response of the axis; where none is known, in the band of the harmonics that are played.
 """
 
-from dataclasses import dataclass
 from functools import cached_property
 from math import sqrt
 
 import numpy as np
+from msgspec import Struct
 
 from tablegen.compensation.dynamics import Measured, SecondOrder
 from tablegen.fixedpoint.program import Program
@@ -20,8 +20,7 @@ _SEVERAL_TICKS = 1 << 18  # of several periods together
 _PERIODS = 17  # at most; of several the first is left out, in which the response settles
 
 
-@dataclass(frozen=True)
-class Passage:
+class Passage(Struct, frozen=True):
     """What the position follows: a second-order response, a measured one, or a band from 0 Hz.
 
     Fields that do not apply are None.
@@ -46,8 +45,7 @@ class Passage:
         raise TypeError(f"{type(line.drive.response)} is no response of a scanner file")  # pragma: no cover
 
 
-@dataclass(frozen=True)
-class Changes:
+class Changes(Struct, frozen=True):
     """How often the codes of a converter change, in percent of the ticks, and by how many codes in the mean."""
 
     percent: float

@@ -88,7 +88,8 @@ def build(
     Exit status: 0 done, 1 DIR is not up to date (--check), 2 wrong input, 3 a limit of the
     certificate is exceeded (with --strict: or there is a warning), 4 cannot write.
 
-    `tablegen paths` prints the include files that run this command from make or CMake.
+    `tablegen paths` prints the include files that run this command from make or CMake. Compiled templates are kept in
+    ~/.cache/tablegen; the output does not depend on them.
     """
     if depfile is None and depfile_target is not None:
         raise click.UsageError("--depfile-target needs --depfile FILE")

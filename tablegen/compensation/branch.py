@@ -1,10 +1,9 @@
 """Hysteresis of one direction in the scanner file, and how it depends on the scan size: (22), or as measured."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Annotated, Any
 
-from msgspec import Meta
+from msgspec import Meta, Struct
 
 from tablegen.compensation.hysteresis import beta_at
 from tablegen.compensation.model import Parameters
@@ -57,8 +56,7 @@ class Branch(Parameters, frozen=True):
         return ["u_peak"] if self.u_peak is None else []
 
 
-@dataclass(frozen=True, slots=True)
-class ResidualLaw:
+class ResidualLaw(Struct, frozen=True):
     """beta and u_peak against the normalised scan voltage v.
 
     With ``points``, (v, beta, u_peak) ascending in v, they lie between these; with ``offsets``, between those of two

@@ -1,10 +1,10 @@
 """Linear dynamics of the scanner, and their inverse for each harmonic of the scan."""
 
-from dataclasses import dataclass
 from math import inf, sqrt
 from typing import Protocol
 
 import numpy as np
+from msgspec import Struct
 
 from tablegen.numerics.arrays import Bools, Floats
 from tablegen.numerics.elementary import exp
@@ -31,8 +31,7 @@ class Response(Protocol):
         """Up to which it is known; ``inverse`` refuses what is above."""
 
 
-@dataclass(frozen=True, slots=True)
-class SecondOrder:
+class SecondOrder(Struct, frozen=True):
     """H = exp(-i 2 pi f delay) / (1 - r^2 + i r / Q), r = f / frequency."""
 
     frequency_hz: float
@@ -62,8 +61,7 @@ class SecondOrder:
         return inf
 
 
-@dataclass(frozen=True)
-class Measured:
+class Measured(Struct, frozen=True):
     """A response as measured: ascending Hz, gain relative to that at low frequency, phase in turns."""
 
     f_hz: Floats

@@ -1,14 +1,15 @@
 """What is expected of a line on the scanner, by what a model knows of the piezo, each figure with its uncertainty."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
 from typing import Literal
+
+from msgspec import Struct, field
+from msgspec.structs import replace
 
 LEVEL_PERCENT = 90  # of scans that leave less than a figure and its uncertainty together
 
 
-@dataclass(frozen=True, slots=True)
-class Figure:
+class Figure(Struct, frozen=True):
     """A figure in percent of the line, and what it is uncertain by, in the same unit; None where nobody knows.
 
     The uncertainty is at ``LEVEL_PERCENT``.
@@ -18,8 +19,7 @@ class Figure:
     uncertainty: float | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Expectation:
+class Expectation(Struct, frozen=True):
     """What the scanner should do with the line; a waveform's own errors are the certificate's.
 
     ``rms`` is the residual about the best straight line, ``scaling`` the scaling error, peak to peak, each by

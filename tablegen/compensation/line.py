@@ -7,11 +7,12 @@ whole periodic waveform itself gives a ``WholeLine``.
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
+from msgspec import Struct
 
 from tablegen.compensation.dynamics import Response
 from tablegen.compensation.expectation import Expectation
@@ -58,8 +59,7 @@ class Sweep(ABC):
         raise Unphysical("this model of the piezo has no Fourier series in closed form; use method = 'window'")
 
 
-@dataclass(frozen=True, slots=True)
-class AppliedBranch:
+class AppliedBranch(Struct, frozen=True):
     """Hysteresis of one branch at this scan size; ``u_peak`` in sweep-aligned coordinates."""
 
     beta: float
@@ -74,8 +74,7 @@ class AppliedBranch:
         return cls(float(u[at] - tau[at]), float(u[at]))
 
 
-@dataclass(frozen=True, slots=True)
-class LineShape:
+class LineShape(Struct, frozen=True):
     """The periodic normalised waveform of one line: forward for 0 < t <= turn, backward after, (14) and (17).
 
     ``applied`` is what the manifest and ``tablegen show`` say of the sweeps; without it, it is read off them.
@@ -180,11 +179,10 @@ class SweptSeries(Sweep):
         return self.turn * tau if self.forward else self.turn + (1.0 - self.turn) * tau
 
 
-@dataclass(frozen=True, slots=True)
-class WholeLine(LineShape):
+class WholeLine(LineShape, frozen=True, kw_only=True):
     """A line whose waveform the model itself has worked out, in the harmonics that are played."""
 
-    series: FourierSeries = field(kw_only=True)
+    series: FourierSeries
 
     @classmethod
     def of(cls, series: FourierSeries, turn: float, **more: Any) -> "Self":
@@ -205,8 +203,7 @@ class WholeLine(LineShape):
         return self.series.value(t, 1)
 
 
-@dataclass(frozen=True, slots=True)
-class WantedLine:
+class WantedLine(Struct, frozen=True):
     """What a scan wants of the model of one axis, and where a fault is reported.
 
     ``v`` is the normalised scan voltage V_scan / V_max, in [0, 1], V_max the whole range of the

@@ -1,8 +1,7 @@
 """Dependence of the sensitivity on the offset voltage, equations (1)-(4), and the position that an offset gives."""
 
-from dataclasses import dataclass
-
 import numpy as np
+from msgspec import Struct
 
 from tablegen.driver import Driver
 from tablegen.figures import at_least, at_most
@@ -14,8 +13,7 @@ _MIN_SPAN = 1e-3  # span of p, which runs from -1 to 1; a parabola through point
 _SIMPSON_PANELS = 1024  # panels of Simpson's rule; the integrand is smooth and the error below 1e-13
 
 
-@dataclass(frozen=True, slots=True)
-class OffsetLaw:
+class OffsetLaw(Struct, frozen=True):
     """m(p) = 1 + alpha p + beta p^2, equation (1), with p in [-1, 1]; all dimensionless."""
 
     alpha: float = 0.0

@@ -1,8 +1,9 @@
 """m of (1) where it depends on the scan size too: (1)-(4) as measured at several scan voltages."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
+
+from msgspec import Struct
 
 from tablegen.compensation.offset import OffsetLaw
 from tablegen.compensation.size import SizeLaw
@@ -12,8 +13,7 @@ from tablegen.problems import Unphysical
 _ROUNDS = 40  # of a contraction that leaves a third of an error
 
 
-@dataclass(frozen=True, slots=True)
-class OffsetSurface:
+class OffsetSurface(Struct, frozen=True):
     """m(p, v) = 1 + alpha(v) p + beta(v) p^2 with v = V_scan / V_max in [0, 1].
 
     ``laws`` are (1) as measured at scan voltages, shares of v_max, ascending. Between two of them alpha and beta are

@@ -1,11 +1,10 @@
 """Hysteresis as it was measured at each amplitude, and offset: ``points`` of a branch, in place of the law (22)."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated
 
-from msgspec import Meta
+from msgspec import Meta, Struct
 
 from tablegen.compensation.model import Parameters
 from tablegen.driver import Driver
@@ -43,8 +42,7 @@ def rows_of(points: Sequence[HysteresisPoint], v_max: float) -> Rows:
     return tuple(sorted(found))
 
 
-@dataclass(frozen=True, slots=True)
-class OffsetRows:
+class OffsetRows(Struct, frozen=True):
     """Points of several offsets: the rows of each, by ascending offset as a share of v_max."""
 
     offsets: tuple[tuple[float, Rows], ...]

@@ -1,14 +1,14 @@
 """Nonlinearity of the scan size, equations (5)-(12)."""
 
-from dataclasses import dataclass
 from math import sqrt
+
+from msgspec import Struct
 
 from tablegen.figures import at_most
 from tablegen.problems import Unphysical
 
 
-@dataclass(frozen=True, slots=True)
-class SizeLaw:
+class SizeLaw(Struct, frozen=True):
     """R = alpha V (1 + beta V) up to the threshold, (6), its tangent beyond, (10); V = V_scan / V_max.
 
     ``alpha_nm`` is in nm per full scale. beta = 0 is the linear scanner.

@@ -1,8 +1,7 @@
 """How a line drifts after a change of offset or of size, line after line."""
 
-from dataclasses import dataclass
-
 import numpy as np
+from msgspec import Struct
 
 from tablegen.numerics.arrays import Floats, freeze
 from tablegen.numerics.elementary import exp
@@ -11,8 +10,7 @@ OFFSET_CHANGE = 0.1  # of v_max: the change of offset that drift is stated for, 
 SIZE_CHANGE = 0.5  # of the size: the smaller scan before
 
 
-@dataclass(frozen=True, slots=True)
-class Late:
+class Late(Struct, frozen=True):
     """A term of creep: ``nm`` are still to come at the change, ``after_nm`` at the end of the first sweep.
 
     Either falls by exp(-t / ``tau_s``); in the second is what the memory of hysteresis has brought meanwhile.
@@ -23,8 +21,7 @@ class Late:
     tau_s: float
 
 
-@dataclass(frozen=True, eq=False)
-class Transient:
+class Transient(Struct, frozen=True, eq=False):
     """What is late after a change, and how far hysteresis is from its settled loop in the first sweep forward.
 
     ``memory_nm`` has the first sweep less settled ones, at ``memory_s`` after its beginning, both (n,). Creep with time

@@ -6,10 +6,11 @@ a / U .. 1 - a / U.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from fractions import Fraction
 from math import ceil, floor
 from typing import Literal
+
+from msgspec import Struct
 
 from tablegen.problems import Unphysical
 
@@ -22,8 +23,7 @@ _FLYBACK = 19  # lines up for each line of flyback: about 0.05 of the frame
 _PARTS = 10**9  # windows are given to so many parts, turns to a thousand times as many
 
 
-@dataclass(frozen=True)
-class ImageFrame:
+class ImageFrame(Struct, frozen=True):
     """Line periods of a frame, where y turns, its window, and the line periods at which it images."""
 
     lines: int

@@ -5,8 +5,9 @@ The hardware belongs to the instrument: in the scanner file ``[x.dac]`` goes bef
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple, TypeAlias
+
+from msgspec import Struct
 
 from tablegen.config.decode import decode, meant
 from tablegen.config.scanner import Scanner
@@ -28,8 +29,7 @@ class Place(NamedTuple):
 _Tables: TypeAlias = Mapping[Place, Dac | Amplifier]
 
 
-@dataclass(frozen=True, slots=True)
-class AxisDac:
+class AxisDac(Struct, frozen=True):
     """The converter of one axis; fields as the keys of ``Dac``, ``word_bits`` None where it is that of ``bits``.
 
     ``output`` is None on both axes where neither says it.
@@ -52,8 +52,7 @@ class AxisDac:
         return self.v_max - (self.v_max - self.v_min) / float(1 << self.bits)
 
 
-@dataclass(frozen=True, slots=True)
-class AxisAmplifier:
+class AxisAmplifier(Struct, frozen=True):
     """The amplifier of one axis; fields as the keys of ``Amplifier``."""
 
     gain: float
@@ -61,8 +60,7 @@ class AxisAmplifier:
     max_slew_v_per_s: float | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class AxisHardware:
+class AxisHardware(Struct, frozen=True):
     """Converter and amplifier of one axis; ``places`` says where keys such as "dac.bits" stand: once, or in both files.
 
     Both files then say the same.

@@ -2,12 +2,12 @@
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from tablegen.compensation.model import Parameters
 from tablegen.config.decode import decode, meant
@@ -36,8 +36,7 @@ from tablegen.toml import read_toml
 _LIBRARY = "this file is a library of scans; `tablegen sweep` builds them, each into a directory of its own"
 
 
-@dataclass(frozen=True, repr=False)
-class Setup:
+class Setup(Struct, frozen=True, dict=True):
     """A scan, the scanner it runs on, and where each of their keys stands.
 
     ``choices`` says in sentences what was chosen for what the scan file says of the image.

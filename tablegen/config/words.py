@@ -1,12 +1,11 @@
 """What was said of an image, solved for what a plan takes: sizes of the axes, line periods, turn of y and line rate."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from fractions import Fraction
 from math import floor
 from typing import Any
 
-from msgspec import structs
+from msgspec import Struct, structs
 
 from tablegen.config.frame import RESTING_TURN, ImageFrame, exact, frame_of_image, frame_of_lines, lines_of_image
 from tablegen.config.schema import DEFAULT_BITS, FastAxis, Scan, SlowAxis, Table, Timing, WrittenScan
@@ -21,8 +20,7 @@ _FREEDOM = Fraction(1, 20)  # by which the window of x may be wider or narrower,
 _HARMONICS = 64  # of y, with the margins of a chosen window
 
 
-@dataclass(frozen=True)
-class Solved:
+class Solved(Struct, frozen=True):
     """A scan as it is planned, the keys it stands at, and what was chosen for what was said, in sentences."""
 
     scan: Scan

@@ -1,13 +1,12 @@
 """What a bank of the device holds."""
 
-from dataclasses import dataclass
+from msgspec import Struct
 
 from tablegen.device.schedule import Schedule
 from tablegen.fixedpoint.program import Program
 
 
-@dataclass(frozen=True, eq=False)
-class DualProgram:
+class DualProgram(Struct, frozen=True, eq=False):
     """What a bank holds: both axes and the schedule they share."""
 
     x: Program

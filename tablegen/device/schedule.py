@@ -1,10 +1,10 @@
 """Which tick belongs to which line, pixel and direction; one counter for both axes. Integers alone."""
 
-from dataclasses import dataclass
 from fractions import Fraction
 from math import floor
 
 import numpy as np
+from msgspec import Struct
 
 from tablegen.numerics.arrays import Floats, Ints
 
@@ -12,8 +12,7 @@ MAXIMUM_LINE_TICKS = 1 << 24
 _EXACT = 1 << 53  # integers below it are floats as they are
 
 
-@dataclass(frozen=True, slots=True)
-class Window:
+class Window(Struct, frozen=True):
     """A stretch [first, first + count) of ticks of a line, or of lines of a frame; empty where nothing is imaged."""
 
     first: int
@@ -28,8 +27,7 @@ class Window:
         return self.first <= k < self.stop
 
 
-@dataclass(frozen=True)
-class Schedule:
+class Schedule(Struct, frozen=True):
     """Ticks of a line, lines of a frame, and where they image.
 
     ``forward`` and ``backward`` are in ticks of the line, ``up`` and ``down`` in lines of the frame (y forward and

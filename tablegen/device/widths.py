@@ -5,7 +5,8 @@ another one in its register. Widths are the parameters of ``dac_sequencer``, in 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from tablegen.device.registers import AXIS_WORDS, OFFSET_LOW_BITS, PAGE_WORDS, SCAN_WORDS
 from tablegen.device.schedule import Schedule
@@ -16,8 +17,7 @@ from tablegen.fixedpoint.shaping import Shaping
 LEAST_LINE_TICKS = 8
 
 
-@dataclass(frozen=True)
-class AxisWidths:
+class AxisWidths(Struct, frozen=True):
     """Of an axis: a table of 2^``index_bits`` words, periods below 2^``period_bits``; no harmonics, no renderer."""
 
     interpolated: bool
@@ -26,8 +26,7 @@ class AxisWidths:
     period_bits: int
 
 
-@dataclass(frozen=True)
-class Widths:
+class Widths(Struct, frozen=True):
     """Of a device; at most ``harmonics`` are rendered, 0 where it has no renderer; ``shaping`` up to that order."""
 
     dac_bits: int

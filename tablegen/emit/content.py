@@ -3,8 +3,9 @@
 ``tablegen.emit.render`` makes it from a plan, ``tablegen.emit.stored`` from a manifest.
 """
 
-from dataclasses import dataclass
 from typing import Literal
+
+from msgspec import Struct
 
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.schedule import Schedule
@@ -12,8 +13,7 @@ from tablegen.fixedpoint.program import Program
 from tablegen.numerics.arrays import Ints
 
 
-@dataclass(frozen=True, eq=False)
-class AxisContent:
+class AxisContent(Struct, frozen=True, eq=False):
     """One axis: its program, its Fourier words a0, a1..aH, b1..bH, and the volts of its codes.
 
     The piezo is at ``v_zero + v_per_code * code``, in V.
@@ -31,8 +31,7 @@ class AxisContent:
         return len(self.fourier_words) // 2
 
 
-@dataclass(frozen=True, eq=False)
-class Content:
+class Content(Struct, frozen=True, eq=False):
     """A build as formats see it. What stands in comments alone is empty where a manifest is the source."""
 
     name: str

@@ -7,17 +7,17 @@ no longer made, ``tablegen verify``) goes through all formats of a build alike.
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
+
+from msgspec import Struct
 
 from tablegen.emit.content import Content
 from tablegen.problems import Unphysical
 from tablegen.reading import BUILD_FILE, read_bytes
 
 
-@dataclass(frozen=True)
-class Comparison:
+class Comparison(Struct, frozen=True):
     """Files of a build held against its manifest: what was compared, and every difference in a sentence."""
 
     subject: str

@@ -1,10 +1,10 @@
 """The tables of a build as memories: words of so many bits, and how files spell them."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from msgspec import Struct
 
 from tablegen.device.registers import program_words
 from tablegen.device.schedule import Schedule
@@ -14,8 +14,7 @@ from tablegen.fixedpoint.synthesis import WORD_BITS, sine_quarter
 from tablegen.numerics.arrays import Ints
 
 
-@dataclass(frozen=True, eq=False)
-class Memory:
+class Memory(Struct, frozen=True, eq=False):
     """Words that a device holds in one memory; ``name`` is x, y, x_fourier, y_fourier, program or sine.
 
     ``words`` are integers of ``bits`` bits, in two's complement but for the program's registers, which are unsigned.

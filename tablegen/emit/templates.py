@@ -8,6 +8,12 @@ from tablegen.numerics.arrays import Ints
 from tablegen.resources import resource_folder
 
 _WORDS_PER_ROW = 10
+_SETTINGS: dict[str, Any] = {
+    "trim_blocks": True,
+    "lstrip_blocks": True,
+    "keep_trailing_newline": True,
+    "autoescape": False,
+}
 
 
 def template(
@@ -30,13 +36,13 @@ def template_text(
 def _environment(literal: Callable[[int], str], filters: tuple[tuple[str, Callable[..., object]], ...]) -> Any:
     from jinja2 import Environment, FileSystemLoader, StrictUndefined  # not needed to check what was rendered
 
+    from tablegen.emit.template_cache import TemplateCache
+
     environment = Environment(
         loader=FileSystemLoader(resource_folder("firmware_templates")),
         undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-        autoescape=False,
+        bytecode_cache=TemplateCache(_SETTINGS),
+        **_SETTINGS,
     )
     environment.filters |= {"literal": literal, **dict(filters)}
     return environment

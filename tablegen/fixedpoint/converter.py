@@ -1,7 +1,9 @@
 """Volts to codes, and the words of the output stage that scale a table to a drive."""
 
-from dataclasses import dataclass, replace
 from math import ceil, floor
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from tablegen.config.hardware import AxisAmplifier, AxisDac
 from tablegen.driver import Driver
@@ -11,8 +13,7 @@ from tablegen.fixedpoint.rounding import round_number
 from tablegen.fixedpoint.shaping import OFF, Shaping
 
 
-@dataclass(frozen=True)
-class Converter:
+class Converter(Struct, frozen=True):
     """Volts at the piezo to codes of the converter, as real numbers: code = (V - v_zero) / v_per_code."""
 
     v_zero: float

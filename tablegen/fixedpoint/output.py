@@ -1,8 +1,7 @@
 """From sample to code: gain, offset, rounding, clamp, and the coding of the converter."""
 
-from dataclasses import dataclass
-
 import numpy as np
+from msgspec import Struct
 
 from tablegen.fixedpoint.rounding import shift_round
 from tablegen.fixedpoint.shaping import OFF, Remainders, Shaping, remainder_bits
@@ -13,8 +12,7 @@ GAIN_BITS = 18  # signed; the narrow port of a DSP block
 UNIT_GAIN_BITS = 16
 
 
-@dataclass(frozen=True, slots=True)
-class Output:
+class Output(Struct, frozen=True):
     """code = clamp(round((gain_word sample + offset_word) / 2^gain_q), code_min, code_max), ties up.
 
     Codes are straight binary, 0 at the converter's v_min; ``offset_word`` is the offset in codes with ``gain_q``

@@ -1,8 +1,7 @@
 """Coherent rational phase: phase k of a line of L ticks is exactly floor(k 2^32 / L), without a multiplier."""
 
-from dataclasses import dataclass
-
 import numpy as np
+from msgspec import Struct
 
 from tablegen.numerics.arrays import Ints
 
@@ -10,8 +9,7 @@ PHASE_BITS = 32
 MAXIMUM_TICKS = (1 << 31) - 1
 
 
-@dataclass(frozen=True, slots=True)
-class RationalPhase:
+class RationalPhase(Struct, frozen=True):
     """Phase of a period of ``ticks`` advances, 1 <= ticks <= 2^31 - 1: ticks, or lines where an axis steps once a line.
 
     The device adds ``step`` at every advance, and 1 more whenever the remainder, which grows by ``remainder``

@@ -1,9 +1,10 @@
 """What one axis of a device holds: a period, a table, and an output stage. It plays codes, and nothing else."""
 
-from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
 
 from tablegen.config.schema import MAXIMUM_SPLINE_BITS
 from tablegen.fixedpoint.interpolation import direct, guard_bits, index_bits_of, interpolate
@@ -22,8 +23,7 @@ def sample_gain(mode: Mode) -> float:
     return float(1 << guard_bits(MAXIMUM_SPLINE_BITS)) / SPLINE_UNIT if mode == "cubic" else 1.0
 
 
-@dataclass(frozen=True, eq=False)
-class Program:
+class Program(Struct, frozen=True, eq=False):
     """One axis of a program.
 
     ``phase`` advances once every ``hold`` ticks: 1, or a line's ticks where the slow axis steps once a line.

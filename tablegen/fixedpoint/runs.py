@@ -1,8 +1,7 @@
 """A whole period as runs of one code: every tick accounted for, however many millions there are."""
 
-from dataclasses import dataclass
-
 import numpy as np
+from msgspec import Struct
 
 from tablegen.fixedpoint.interpolation import FRACTION_BITS, between, index_bits_of
 from tablegen.fixedpoint.phase import PHASE_BITS
@@ -12,8 +11,7 @@ from tablegen.numerics.arrays import Ints, merged
 _MIN_TICKS_PER_RUN = 4  # average ticks per run from which runs are cheaper than ticks
 
 
-@dataclass(frozen=True, eq=False)
-class Runs:
+class Runs(Struct, frozen=True, eq=False):
     """Run i plays ``codes[i]`` on the ticks [starts[i], starts[i + 1]), the last up to ``ticks``; none is empty."""
 
     starts: Ints

@@ -4,10 +4,10 @@ Codes of D bits have 28 - D bits below their LSB here. With 4 bits more, for the
 and for what is fed back, everything fits 32 bits, whatever the words of a program are.
 """
 
-from dataclasses import dataclass
 from math import ceil
 
 import numpy as np
+from msgspec import Struct
 
 from tablegen.numerics.arrays import Ints
 
@@ -22,8 +22,7 @@ def remainder_bits(dac_bits: int) -> int:
     return _CODE_AND_REMAINDER_BITS - dac_bits
 
 
-@dataclass(frozen=True, slots=True)
-class Shaping:
+class Shaping(Struct, frozen=True):
     """How the remainders e1, e2, e3 of the last three ticks, the newest first, are fed back.
 
     ``order`` 0 feeds nothing back; 1: e1, a zero of the error's spectrum at DC; 2: 2 e1 - e2, two zeros at DC; 3:

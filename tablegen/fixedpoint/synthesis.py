@@ -1,9 +1,9 @@
 """Fourier words, and the integer synthesis that renders them into table words on the host and on the device alike."""
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from msgspec import Struct
 
 from tablegen.fixedpoint.rounding import round_half_up, round_number, saturate, shift_round, signed_limits
 from tablegen.numerics.arrays import Floats, Ints, freeze, multiples
@@ -16,8 +16,7 @@ ACCUMULATOR_BITS = 64
 _KEPT = 1 << 16  # words of the longest sine table that is kept
 
 
-@dataclass(frozen=True, eq=False)
-class FourierWords:
+class FourierWords(Struct, frozen=True, eq=False):
     """s(t) = (2 w(t) - 1) / scale in Q2.30: s = a0 + sum a_n cos + b_n sin, each an int32 divided by 2^30."""
 
     a0: int

@@ -1,6 +1,6 @@
 """How a waveform is stored: the mode that plays a table, how many words it has, and how wide they are."""
 
-from dataclasses import dataclass
+from msgspec import Struct
 
 from tablegen.config.schema import MAXIMUM_SPLINE_BITS, MAXIMUM_SPLINE_LENGTH
 from tablegen.fixedpoint.program import Mode
@@ -12,8 +12,7 @@ LEAST_LENGTH = 8  # of what every device renders and plays
 MOST_LENGTH: dict[Mode, int] = {"direct": 1 << 16, "interpolated": 1 << 16, "cubic": MAXIMUM_SPLINE_LENGTH}
 
 
-@dataclass(frozen=True, slots=True)
-class TableShape:
+class TableShape(Struct, frozen=True):
     """``length`` words of ``bits`` bits, played in a ``mode``."""
 
     mode: Mode

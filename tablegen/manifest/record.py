@@ -1,11 +1,11 @@
 """The plan and its certificate as plain data: what the manifest says of them."""
 
 from collections.abc import Mapping
-from dataclasses import asdict
 from decimal import ROUND_CEILING, Context, Decimal
 from typing import Any
 
 import numpy as np
+from msgspec.structs import asdict
 
 from tablegen.certificate.certificate import Certificate
 from tablegen.certificate.line_errors import Refined, ScalingError
@@ -33,7 +33,7 @@ def certificate_record(certificate: Certificate) -> dict[str, Any]:
     """A certificate as JSON-ready data, its figures to six significant digits."""
     record: dict[str, Any] = {
         name: _figure(getattr(certificate, name))
-        for name in certificate.__dataclass_fields__
+        for name in certificate.__struct_fields__
         if name not in ("scaling", "refinement", "expected", "peak_acceleration", "optimum", "shaped")
     }
     if certificate.peak_acceleration is not None:
@@ -98,7 +98,7 @@ def _expected(expectation: Expectation) -> dict[str, Any]:
 
 def _sides(figures: Mapping[str, ScalingError] | Mapping[str, Refined]) -> dict[str, dict[str, Any]]:
     return {
-        side: {part: _figure(getattr(one, part)) for part in one.__dataclass_fields__} for side, one in figures.items()
+        side: {part: _figure(getattr(one, part)) for part in one.__struct_fields__} for side, one in figures.items()
     }
 
 

@@ -1,9 +1,11 @@
 """What is applied to one axis, factor by factor: V(t) = V_offset + m g V_scan (w(t) - 1/2)."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+
+from msgspec.structs import replace
 
 from tablegen.compensation import models
 from tablegen.compensation.dynamics import Response, SecondOrder

@@ -1,10 +1,11 @@
 """From a checked configuration to integers: the immutable plan that everything downstream reads."""
 
-from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Literal
 
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
 
 from tablegen.compensation.dynamics import capped_inverse
 from tablegen.compensation.hold import hold_inverse
@@ -34,8 +35,7 @@ from tablegen.waveform.allowed_error import AllowedError
 from tablegen.waveform.series import FourierSeries
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class LinePlan:
+class LinePlan(Struct, frozen=True, eq=False):
     """One axis: what was asked for in volts, the waveform, and the integers that play it.
 
     ``target`` is the band-limited w that the piezo is to follow. ``drive_series`` is the w that has to arrive at the
@@ -89,8 +89,7 @@ class LinePlan:
         return self.program.played(start, stop)
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Plan:
+class Plan(Struct, frozen=True, eq=False):
     """A whole build: both axes and the one schedule they share."""
 
     name: str

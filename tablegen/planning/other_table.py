@@ -1,6 +1,6 @@
 """A planned axis with another table: the same waveform and limits, other integers."""
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from tablegen.fixedpoint.table_shape import TableShape
 from tablegen.planning.line_plan import LinePlan

@@ -1,6 +1,6 @@
 """How many lines a scan has to settle after a change, by the operators of its axes."""
 
-from dataclasses import dataclass
+from msgspec import Struct
 
 from tablegen.compensation.transient import OFFSET_CHANGE
 from tablegen.config.load import Setup
@@ -13,8 +13,7 @@ _SHOWN_NM = 0.005
 BOUND = 0.005  # of the line, by which the image may drift in a frame; a pixel where that is more
 
 
-@dataclass(frozen=True, slots=True)
-class Settling:
+class Settling(Struct, frozen=True):
     """Of one axis, after a change of offset by ``offset_v`` and after a smaller scan.
 
     ``lines`` are enough for the image to drift by no more than ``bound_nm`` in the next frame after either, or

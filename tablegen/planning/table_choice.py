@@ -1,8 +1,9 @@
 """Which table an axis gets: the one that is written, or the least memory that keeps an error."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import cast
+
+from msgspec import Struct
 
 from tablegen.config.schema import DEFAULT_BITS, Limits, Table
 from tablegen.figures import at_least
@@ -20,8 +21,7 @@ DEFAULT_SHAPED_ERROR_LSB = 0.01
 _NOT_PLAYED: dict[str, tuple[Mode, ...]] = {"verilog": ("cubic",)}  # modes by formats whose sequencer has none of them
 
 
-@dataclass(frozen=True)
-class TableChoice:
+class TableChoice(Struct, frozen=True):
     """What was asked of a table that the build chose: the worst error, and the keys that were free.
 
     Of ``shaped`` output it is the error before the rounding.

@@ -1,10 +1,11 @@
 """From a waveform and the shape of a table to the integers that play it."""
 
-from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import ceil
 
 import numpy as np
+from msgspec import Struct, field
+from msgspec.structs import replace
 
 from tablegen.fixedpoint.converter import fit_gain, scaled_output
 from tablegen.fixedpoint.output import Output
@@ -19,8 +20,7 @@ from tablegen.waveform.series import FourierSeries
 _PEAK_GRID = 1024
 
 
-@dataclass(frozen=True, eq=False)
-class MadeTable:
+class MadeTable(Struct, frozen=True, eq=False):
     """A program with its table, the Fourier words that the table comes from, and what both are scaled by."""
 
     program: Program
@@ -28,8 +28,7 @@ class MadeTable:
     scale: float
 
 
-@dataclass(frozen=True, eq=False)
-class StoredWave:
+class StoredWave(Struct, frozen=True, eq=False, dict=True):
     """The waveform whose values are the words of a table."""
 
     series: FourierSeries
@@ -46,8 +45,7 @@ class StoredWave:
         return max(1.0, *(abs(2.0 * w - 1.0) for w in self.reach))
 
 
-@dataclass(frozen=True, eq=False)
-class TableMaker:
+class TableMaker(Struct, frozen=True, eq=False):
     """One axis but for its table: what is the same for every shape of it.
 
     ``amplitude`` is in codes for 2 w - 1 = 1, negative where the axis is inverted; ``offset`` the code of w = 1/2,

@@ -1,8 +1,9 @@
 """The least memory that keeps an error, and the tables than which none is smaller and better."""
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from math import floor
+
+from msgspec import Struct
 
 from tablegen.fixedpoint.table_shape import MODES, TableShape
 from tablegen.planning.emitted_error import FRACTION_BITS, AskedCodes
@@ -12,8 +13,7 @@ _UNIT = 1 << FRACTION_BITS
 _BETTER = (95, 100)  # an error that is less than 5 % smaller is no better
 
 
-@dataclass(frozen=True)
-class FoundTable:
+class FoundTable(Struct, frozen=True):
     """A shape, and the worst error of its table in LSB of the converter."""
 
     shape: TableShape

@@ -1,10 +1,11 @@
 """A round from a loaded scan and a trace to what goes into the scan file, and whether it should."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import msgspec
 import numpy as np
+from msgspec.structs import replace
 
 from tablegen.config.load import Setup
 from tablegen.config.schema import Refinement

@@ -5,11 +5,12 @@ which is smaller than the line that was corrected, since turnarounds are rounded
 although each branch was inverted; the distance is the one that the certificate expects.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import msgspec
 import numpy as np
+from msgspec.structs import replace
 
 from tablegen.compensation import models
 from tablegen.compensation.line import LineShape

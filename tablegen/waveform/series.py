@@ -1,11 +1,11 @@
 """A real, periodic, band-limited waveform: w(t) = a0 + sum_n a_n cos(2 pi n t) + b_n sin(2 pi n t)."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from math import tau
 
 import numpy as np
+from msgspec import Struct
 
 from tablegen.numerics.arrays import Floats, FloatsLike, freeze, multiples
 from tablegen.numerics.turns import sine_and_cosine
@@ -28,8 +28,7 @@ def _kept_waves(count: int, harmonics: int) -> list[tuple[Floats, Floats]]:
     return list(_waves(count, harmonics))
 
 
-@dataclass(frozen=True, eq=False)
-class FourierSeries:
+class FourierSeries(Struct, frozen=True, eq=False, dict=True):
     """Coefficients of one period; ``a[n - 1]`` and ``b[n - 1]`` belong to harmonic n = 1..H. Dimensionless."""
 
     a0: float

@@ -1,12 +1,11 @@
 """Sensor traces to branches: period, turn, alignment, drift, delay; growth with the amplitude; what is refused."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from calibrating import AMPLITUDES, V_MAX, Scanner, branch, grown
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from replacing import replace
 
 from tablegen.calibration.branch import AmplitudeFit, MeasuredBranch
 from tablegen.calibration.estimate import Estimate

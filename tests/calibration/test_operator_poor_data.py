@@ -1,11 +1,11 @@
 """Traces that no operator can be made of are refused by their name, with the reason: each of them one mistake away."""
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from foreign_plants import V_MAX, BoucWen, ForeignPlant, record
+from replacing import replace
 
 from tablegen.calibration.hysteresis import Trace
 from tablegen.calibration.operator import periodic_line as periodic_line_module

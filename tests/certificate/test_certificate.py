@@ -1,10 +1,10 @@
 """The certificate against measurements by other means, and the controls that show that each figure can be bad."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from replacing import replace
 from variants import plan_of, setup_of
 
 from tablegen.certificate.certificate import broken_limits, certify

@@ -4,7 +4,6 @@ import hashlib
 import json
 import re
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,7 @@ import pytest
 from building import REPOSITORY
 from editing import SCAN, SCANNER, edited, run, write_pair
 from operator_files import REVERSIBLE, THRESHOLDS, WEIGHTS, operator_file
+from replacing import replace
 
 from tablegen.certificate.certificate import Certificate, broken_limits, certify
 from tablegen.certificate.converter_errors import converter_errors

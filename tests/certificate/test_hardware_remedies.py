@@ -67,7 +67,7 @@ def test_the_amplifier_of_the_axis_is_named_with_its_file_and_holds(axis: str, s
 
 def test_a_step_above_the_guard_stands_at_the_amplifier_of_its_axis() -> None:
     """A guard that a plan cannot have: the message is at the key that limits it, in the scanner file."""
-    from dataclasses import replace
+    from replacing import replace
 
     setup = setup_of(**{"y.amplifier": {"gain": -20.0, "bias_v": 45.0, "max_slew_v_per_s": 1e6}})
     plan = make_plan(setup)

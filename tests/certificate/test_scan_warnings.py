@@ -2,12 +2,12 @@
 
 import re
 import tomllib
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
+from replacing import replace
 from variants import setup_of
 
 from tablegen.certificate import remedies

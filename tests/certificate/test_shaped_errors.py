@@ -1,12 +1,12 @@
 """The certificate of shaped axes: errors of the position, what rounding would leave, and what shaping costs."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from building import Variant, build, write_variant
+from replacing import replace
 
 from tablegen.certificate.certificate import Certificate, broken_limits, certify
 from tablegen.certificate.line_errors import EmittedPeriod

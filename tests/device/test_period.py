@@ -1,11 +1,11 @@
 """Times of ticks: the float nearest to the exact quotient, whatever the update rate."""
 
-from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
 import pytest
 from building import EXAMPLE
+from replacing import replace
 
 import tablegen
 

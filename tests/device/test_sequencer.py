@@ -235,7 +235,7 @@ def test_a_commit_while_parked_is_taken_at_once(programs: list[DualProgram]) -> 
 
 def test_slew_and_clamp_faults_are_sticky_and_counted(programs: list[DualProgram]) -> None:
     """Programs that a build would refuse: a guard below the steepest step, limits inside the scan."""
-    from dataclasses import replace
+    from replacing import replace
 
     good = programs[0]
     slow = replace(good, x=replace(good.x, output=replace(good.x.output, max_step=300)))

@@ -1,9 +1,8 @@
 """The sequencer with shaped output against a loop of plain integers: remainders run on, and begin at 0."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
+from replacing import replace
 from test_sequencer import SMALL, run, started
 from variants import plan_of
 

@@ -2,12 +2,12 @@
 
 import importlib.util
 import sys
-from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
 import pytest
 from building import REPOSITORY
+from replacing import replace
 
 
 def benchmark(name: str) -> ModuleType:

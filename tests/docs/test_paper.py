@@ -5,7 +5,6 @@ import struct
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +13,7 @@ from building import REPOSITORY
 from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.image import imread
+from replacing import replace
 
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.compensation.size import SizeLaw

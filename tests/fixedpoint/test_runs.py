@@ -1,12 +1,12 @@
 """Runs of one code against the codes of every single tick."""
 
-from dataclasses import replace
 from math import floor
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from replacing import replace
 
 from tablegen.fixedpoint import runs as module
 from tablegen.fixedpoint.interpolation import guard_bits

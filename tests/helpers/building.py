@@ -10,11 +10,12 @@ import shutil
 import subprocess
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from replacing import replace
 
 from tablegen.certificate.certificate import Certificate, certify
 from tablegen.config.load import load

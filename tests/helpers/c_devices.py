@@ -1,13 +1,13 @@
 """Devices of the C sequencer that the checks of its functions begin with, and simple programs for them."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
 from c_library import LOADED, Device, Library, converter_of
 from programs import random_dual
+from replacing import replace
 
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.schedule import Schedule

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from ctypes import addressof, byref, c_int32
-from dataclasses import replace
 
 from c_devices import Libraries, device_for, flat
 from c_library import (
@@ -18,6 +17,7 @@ from c_library import (
     Device,
     Window,
 )
+from replacing import replace
 
 from tablegen.device.schedule import Window as Lines
 

@@ -2,13 +2,13 @@
 
 import ctypes
 from ctypes import c_size_t, c_void_p
-from dataclasses import replace
 
 import numpy as np
 from c_devices import SHAPE, Libraries, flat, gentle, playing
 from c_library import MARKER, AxisProgram, Converter, CProgram, Status, Twin, same
 from c_scripts import long_dual
 from programs import random_fourier
+from replacing import replace
 
 from tablegen.device.schedule import Window as Lines
 from tablegen.fixedpoint.synthesis import sine_periods, synthesize

@@ -1,11 +1,11 @@
 """Requests, banks, status and faults of the C sequencer; checks of ``c_checks``."""
 
 from ctypes import c_uint32
-from dataclasses import replace
 
 import numpy as np
 from c_devices import Libraries, device_for, flat, playing
 from c_library import BUSY, CLAMP, LOADED, MARKER, OVERRUN, SLEW, UNDERRUN, same
+from replacing import replace
 
 from tablegen.device.schedule import Window as Lines
 

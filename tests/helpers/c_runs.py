@@ -2,13 +2,13 @@
 
 import ctypes
 from ctypes import byref, c_int32, c_uint32, c_uint64, c_void_p
-from dataclasses import replace
 from itertools import product
 
 import numpy as np
 from c_devices import Libraries, device_for, flat, playing
 from c_library import LOADED, Device, Library, Twin, same
 from c_scripts import wave_program
+from replacing import replace
 
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.schedule import Schedule

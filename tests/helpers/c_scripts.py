@@ -5,11 +5,10 @@ act. The lines here take it and leave it in every way: at limits, at steps that 
 of a table, at the ends of lines and frames, and where a bank has no runs at all.
 """
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.random import Generator
 from programs import MODES, Kind, random_dual, random_fourier, random_schedule, rendered
+from replacing import replace
 from stream_configurations import CONFIGURATIONS, SMALL
 from stream_scripts import play, random_requests, swaps_at_every_tick, sweep
 

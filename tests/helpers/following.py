@@ -1,7 +1,9 @@
 """What firmware put out against the integer model, where only the ticks tell when a request was heard."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+
+from replacing import replace
 
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.sequencer import Sequencer, Tick

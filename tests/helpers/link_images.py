@@ -1,12 +1,12 @@
 """Images for devices: of random programs, as tables and as Fourier words, and damaged with a CRC that fits."""
 
 import zlib
-from dataclasses import replace
 
 import numpy as np
 from c_scripts import shaped
 from numpy.random import Generator
 from programs import Kind, random_dual, random_fourier, rendered
+from replacing import replace
 
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS, SCAN_WORDS

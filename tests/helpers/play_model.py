@@ -40,8 +40,7 @@ def displacement(series, play, rising, w):
     return np.where(rising, np.maximum(w - play, np.min(grid) + play), np.minimum(w + play, np.max(grid) - play))
 
 
-@dataclass(frozen=True, slots=True)
-class PlayLine(WholeLine):
+class PlayLine(WholeLine, frozen=True, kw_only=True):
     play: float = 0.0
 
     def followed(self, side, position, drive, value, slope):

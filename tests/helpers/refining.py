@@ -2,7 +2,7 @@
 
 import tempfile
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any, Literal
@@ -10,6 +10,7 @@ from typing import Any, Literal
 import msgspec
 import numpy as np
 from editing import SCAN, edited, write_pair
+from replacing import replace
 
 from tablegen.config.load import Setup, load
 from tablegen.config.scanner import Scanner

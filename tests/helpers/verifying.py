@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -18,6 +18,7 @@ import numpy as np
 from building import NAME, Variant, build
 from editing import Outcome
 from limits import PATIENCE_S
+from replacing import replace
 
 from tablegen.fixedpoint.program import Program
 from tablegen.manifest.format import content_hash

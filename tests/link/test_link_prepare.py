@@ -1,12 +1,12 @@
 """What is said of a scan before a device is asked: forms, sizes, what would not fit; and what it reads back."""
 
 import tomllib
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from building import EXAMPLE, IN_C, VARIANTS, Variant, build, write_variant
 from client_rig import info_for
+from replacing import replace
 
 from tablegen.config.load import load
 from tablegen.link.acceptance import first_objection

@@ -7,7 +7,6 @@ mpmath, the waveform and the drive from their factors with numpy; the converter'
 import hashlib
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from fractions import Fraction
 from functools import cache
 from pathlib import Path
@@ -19,6 +18,7 @@ import numpy.typing as npt
 import pytest
 from building import EXAMPLE, FEW, VARIANTS, Build, Variant, build, changed, to_toml
 from manifest_integers import floor_shift, played_codes
+from replacing import replace
 from sets import quick
 
 from tablegen.config.load import load

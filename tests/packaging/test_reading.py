@@ -21,6 +21,7 @@ ALLOWED = {
     ("api/workers.py", "os.fdopen"): "its own stdout, for results",
     ("emit/write.py", "os.open"): "a directory, to bring it to the disk",
     ("emit/write.py", "os.fdopen"): "what it has just made, to write it",
+    ("emit/template_cache.py", "os.fdopen"): "what it has just made, to write it",
     ("emit/directory_lock.py", "os.open"): "a directory, to lock it",
     ("emit/render.py", "read_bytes"): "the runtime, which ships with the package",
     ("verification/worker.py", "open"): "its own log",

@@ -1,12 +1,12 @@
 """The least memory that keeps an error: against every table that there is, with floats of numpy; refusals; advice."""
 
 import re
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from editing import SCAN, edited, write_pair
+from replacing import replace
 from variants import plan_of, setup_of
 
 from tablegen.certificate.certificate import certify

@@ -1,7 +1,6 @@
 """Learning from images of the running scan: what is seen against what is true, what is reached, and what is refused."""
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,6 +18,7 @@ from refining import (
     play,
     scanner,
 )
+from replacing import replace
 
 from tablegen.config.load import Setup
 from tablegen.problems import Unphysical

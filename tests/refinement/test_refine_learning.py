@@ -1,6 +1,5 @@
 """Iterative learning on linear scanners: it converges inside its bound, not outside, and learns no noise."""
 
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -10,6 +9,7 @@ from editing import SCANNER, edited, write_pair
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from refining import scan_text
+from replacing import replace
 
 from tablegen.compensation.dynamics import SecondOrder
 from tablegen.config.load import load

@@ -3,7 +3,6 @@
 import os
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -12,6 +11,7 @@ from link_device import HostDevice
 from link_images import damaged, random_image, random_limits
 from link_programs import make_scan
 from link_talk import Talk, is_answer
+from replacing import replace
 
 from tablegen.device.dual_program import DualProgram
 from tablegen.link.acceptance import Playing, first_objection

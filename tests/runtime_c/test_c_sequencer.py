@@ -8,7 +8,6 @@ sanitizers. ``c_checks`` holds the functions against what the header promises of
 import os
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +30,7 @@ from c_scripts import (
     long_play,
     renderings,
 )
+from replacing import replace
 from sets import LONG_TEST, common
 from stream_configurations import FEW, SWAPS, SWAPS_SLOW, random_swaps
 from stream_laws import follow_their_programs

@@ -1,7 +1,6 @@
 """Shaped output in C against the integer model, tick for tick: all orders, steps and runs, 64 and 32 bits."""
 
 import ctypes
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +10,7 @@ from c_benches import COMPILERS, FILL, SANITIZED, Benches
 from c_devices import device_for, flat
 from c_library import BAD_SHAPING, LOADED, Library, compile_library
 from c_scripts import LONG, every_tick, long_play, refused_by_y, shaped, shaped_short_lines
+from replacing import replace
 from sets import common
 
 from tablegen.device.dual_program import DualProgram

@@ -4,7 +4,6 @@ import json
 import re
 import shutil
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,7 @@ from building import VARIANTS, Variant, build
 from editing import Outcome, run
 from hypothesis import given
 from hypothesis import strategies as st
+from replacing import replace
 from verifying import edit_manifest, failed, make_right, verdicts
 
 from tablegen.fixedpoint.output import Output

@@ -8,7 +8,6 @@ import re
 import shutil
 import signal
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +16,7 @@ from building import IN_C, NAME, VARIANTS, Build, Variant, build
 from editing import Outcome, run
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from replacing import replace
 from sets import common
 from verifying import (
     check_first_difference,

@@ -5,13 +5,13 @@ The limits are the paper's results (figures 5i and 5j), at the paper's condition
 
 import re
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import msgspec
 import numpy as np
 import pytest
 from building import EXAMPLE, REPOSITORY
+from replacing import replace
 
 from tablegen.calibration.hysteresis import HysteresisFit
 from tablegen.calibration.offset_sizes import OffsetSizesFit

@@ -1,11 +1,10 @@
 """Frames of the virtual scanner: of a running build, and of triangles; each pixel where the axes truly were."""
 
-from dataclasses import replace
-
 import msgspec
 import numpy as np
 import pytest
 from refining import scanner, setup_of
+from replacing import replace
 
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import Plan, make_plan

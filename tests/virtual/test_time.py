@@ -3,13 +3,13 @@
 The reference is `fine_time`: emitted codes on a grid of 64 instants a tick, means between the markers of the schedule.
 """
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from fine_time import PARTS, followed, linear_setup, mismatch, staircase
 from numpy.typing import NDArray
+from replacing import replace
 
 from tablegen.config.load import Setup
 from tablegen.driver import Driver

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from itertools import combinations, product
 
 import numpy as np
+from msgspec import structs
 
 from tablegen.calibration.operator.bouc_wen_fit import BoucWenProblem
 from tablegen.calibration.operator.branches import Left, left_of
@@ -116,7 +117,7 @@ def _creep_of(lines: Sequence[PeriodicLine]) -> CreepOf:
 
     def creep(loss: float) -> LogarithmicCreep:
         if loss <= 0.0:
-            return replace(NO_CREEP, reference_hz=reference)
+            return structs.replace(NO_CREEP, reference_hz=reference)
         return LogarithmicCreep(round(loss, 6), fastest, slowest, reference)
 
     return creep
@@ -159,7 +160,7 @@ class _Fitted:
     def weighted(self, share: float, other: "_Fitted") -> "_Fitted":
         """A share of this family, and the rest of another one, for the same lines."""
         loss = share * self.creep.loss_per_decade + (1.0 - share) * other.creep.loss_per_decade
-        creep = replace(self.creep, loss_per_decade=round(loss, 6))
+        creep = structs.replace(self.creep, loss_per_decade=round(loss, 6))
         return _Fitted(self.lines, self.main, self.family.weighted(share, other.family), creep)
 
 

@@ -1,12 +1,12 @@
 """An identified operator: the waveform that it follows straight, found when a scan is built."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import sqrt
 from pathlib import Path
 from typing import Annotated, ClassVar
 
 import numpy as np
-from msgspec import Meta
+from msgspec import Meta, structs
 
 from tablegen.compensation.branches import WithBranches
 from tablegen.compensation.dynamics import capped_inverse
@@ -38,8 +38,7 @@ _SLOWEST_HZ = 0.01  # of frames over which drift is followed
 SIDES = ("forward", "backward")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class OperatorLine(WholeLine):
+class OperatorLine(WholeLine, frozen=True, kw_only=True):
     """The line, what the operator expects of it, and how far it is from what was measured.
 
     ``uncertainty`` is what the operator may be wrong by at this stroke, centre and rate, at ``LEVEL_PERCENT``;
@@ -167,7 +166,7 @@ def _at(operator: Operator, wanted: WantedLine) -> tuple[Operator, float]:
     if wanted.rate_gain is not None:  # (23) says what the rate does to the size; creep then only bends the line
         reference = operator.creep.reference_hz
         factor *= wanted.rate_gain(wanted.rate_hz) / wanted.rate_gain(reference)
-        operator = replace(operator, creep=replace(operator.creep, reference_hz=wanted.rate_hz))
+        operator = replace(operator, creep=structs.replace(operator.creep, reference_hz=wanted.rate_hz))
     return operator, factor
 
 

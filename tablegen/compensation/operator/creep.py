@@ -5,10 +5,11 @@ to the next is ``loss_per_decade`` of the displacement.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
 from math import pi
 
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
 
 from tablegen.numerics.arrays import Floats
 from tablegen.numerics.elementary import exp
@@ -18,8 +19,7 @@ _PERIODS = 10.0  # of a line: terms that are slower only shift it
 _LN10 = 2.302585092994046
 
 
-@dataclass(frozen=True, slots=True)
-class LogarithmicCreep:
+class LogarithmicCreep(Struct, frozen=True):
     """Time constants from ``fastest_s`` to ``slowest_s``; at ``reference_hz`` |C| is taken as 1."""
 
     loss_per_decade: float

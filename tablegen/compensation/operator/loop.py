@@ -1,16 +1,14 @@
 """One settled loop: where the axis is on its way up and on its way down, against the drive."""
 
-from dataclasses import dataclass
-
 import numpy as np
+from msgspec import Struct
 
 from tablegen.numerics.arrays import Floats, FloatsLike, Ints, tree_sum
 
 POINTS = 1025  # points of a branch; linear between them
 
 
-@dataclass(frozen=True, eq=False)
-class Loop:
+class Loop(Struct, frozen=True, eq=False):
     """A line between the normalised drives ``low`` and ``high``.
 
     ``rising`` and ``falling`` are positions from 0 to 1 at ``POINTS`` drives, evenly from ``low`` to ``high``; of these

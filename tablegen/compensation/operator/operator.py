@@ -1,9 +1,10 @@
 """The operator: a hysteresis family, the measured residual over it, the size at every offset, and creep."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from msgspec.structs import replace
 
 from tablegen.compensation.operator.creep import LogarithmicCreep
 from tablegen.compensation.operator.family import Family

@@ -2,7 +2,6 @@
 
 import struct
 import wave
-from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -11,6 +10,7 @@ from building import NAME
 from editing import SCAN, edited, run, write_pair
 from formatted import BUILDS, FEW, Formatted, check_finds_a_flip, formatted
 from manifest_integers import played_codes
+from replacing import replace
 from sets import quick
 
 from tablegen.emit.formats.wav import FORMAT

@@ -2,13 +2,13 @@
 
 import os
 import re
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from building import NAME, VARIANTS, write_variant
 from editing import Outcome, run
 from formatted import BUILDS, FEW, Formatted, formatted
+from replacing import replace
 from sets import quick
 from verifying import verdicts
 
