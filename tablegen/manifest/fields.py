@@ -11,7 +11,7 @@ from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.phase import MAXIMUM_TICKS, RationalPhase
 from tablegen.fixedpoint.program import Mode, Program
 from tablegen.fixedpoint.shaping import MAXIMUM_ZERO, OFF, Shaping
-from tablegen.numerics.arrays import Floats, Ints
+from tablegen.numerics.arrays import Floats, Ints, distinct, multiples
 
 _CHUNK_PRODUCTS = 1 << 22  # products of harmonics and ticks that are worked out at a time
 
@@ -290,16 +290,15 @@ class ManifestAxis(Struct):
         V = v_offset + v_amplitude (w - 1/2), code = (V - v_zero) / v_per_code. Evaluated term by term with exact
         phases, in none of the ways in which the build does it.
         """
-        advances, which = np.unique(k // self.line.hold_ticks, return_inverse=True)
-        period = self.line.ticks // self.line.hold_ticks
+        advance, period = k // self.line.hold_ticks, self.line.ticks // self.line.hold_ticks
+        advances = every = distinct(advance, period)
         n = np.arange(1, self.fourier.harmonics + 1, dtype=np.int64)
         a, b = np.array(self.fourier.a), np.array(self.fourier.b)
         w = np.full(len(advances), self.fourier.a0)
         if period <= 4 * len(advances):  # a cosine of every phase costs less than one of every product
             angle = 2.0 * np.pi / period * np.arange(period)
             cosines, sines = np.cos(angle), np.sin(angle)
-            for harmonic in range(len(n)):
-                phase = advances * n[harmonic] % period
+            for harmonic, phase in enumerate(multiples(advances, period, len(n))):
                 w += a[harmonic] * cosines[phase] + b[harmonic] * sines[phase]
             advances = advances[:0]
         rows = max(_CHUNK_PRODUCTS // len(n), 1)
@@ -308,7 +307,7 @@ class ManifestAxis(Struct):
             w[first : first + rows] += np.cos(angle) @ a + np.sin(angle) @ b
         volts = self.drive.v_offset + self.drive.v_amplitude * (w - 0.5)
         codes: Floats = (volts - self.output.v_zero) / self.output.v_per_code
-        return codes[which.reshape(-1)]
+        return codes[advance if len(every) == period else np.searchsorted(every, advance)]
 
 
 class ManifestSequence(Struct):
