@@ -1,6 +1,7 @@
 """What ``manifest.json`` holds, field by field: types with their ranges, and the programs that these fields are."""
 
 from fractions import Fraction
+from math import isqrt
 from typing import Annotated, Literal
 
 import numpy as np
@@ -11,7 +12,7 @@ from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.phase import MAXIMUM_TICKS, RationalPhase
 from tablegen.fixedpoint.program import Mode, Program
 from tablegen.fixedpoint.shaping import MAXIMUM_ZERO, OFF, Shaping
-from tablegen.numerics.arrays import Floats, Ints, distinct, multiples
+from tablegen.numerics.arrays import Floats, Ints
 
 _CHUNK_PRODUCTS = 1 << 22  # products of harmonics and ticks that are worked out at a time
 
@@ -291,23 +292,37 @@ class ManifestAxis(Struct):
         phases, in none of the ways in which the build does it.
         """
         advance, period = k // self.line.hold_ticks, self.line.ticks // self.line.hold_ticks
-        advances = every = distinct(advance, period)
-        n = np.arange(1, self.fourier.harmonics + 1, dtype=np.int64)
+        if period <= 4 * len(k):
+            return self._codes_of(self._whole_period(period))[advance]
+        advances, which = np.unique(advance, return_inverse=True)
         a, b = np.array(self.fourier.a), np.array(self.fourier.b)
         w = np.full(len(advances), self.fourier.a0)
-        if period <= 4 * len(advances):  # a cosine of every phase costs less than one of every product
-            angle = 2.0 * np.pi / period * np.arange(period)
-            cosines, sines = np.cos(angle), np.sin(angle)
-            for harmonic, phase in enumerate(multiples(advances, period, len(n))):
-                w += a[harmonic] * cosines[phase] + b[harmonic] * sines[phase]
-            advances = advances[:0]
-        rows = max(_CHUNK_PRODUCTS // len(n), 1)
+        rows = max(_CHUNK_PRODUCTS // len(a), 1)
         for first in range(0, len(advances), rows):
-            angle = 2.0 * np.pi / period * (np.outer(advances[first : first + rows], n) % period)
+            angle = self._angles(advances[first : first + rows], period)
             w[first : first + rows] += np.cos(angle) @ a + np.sin(angle) @ b
+        return self._codes_of(w)[which.reshape(-1)]
+
+    def _whole_period(self, period: int) -> Floats:
+        """w of every advance: the angle of each is the sum of one of a few far apart and one of a few that follow."""
+        step = isqrt(period) + 1
+        a, b = np.array(self.fourier.a), np.array(self.fourier.b)
+        far, near = self._angles(np.arange(0, period, step), period), self._angles(np.arange(step), period)
+        cosine, sine = np.cos(near), np.sin(near)
+        w = np.cos(far) @ (a * cosine + b * sine).T + np.sin(far) @ (b * cosine - a * sine).T
+        whole: Floats = self.fourier.a0 + w.reshape(-1)[:period]
+        return whole
+
+    def _angles(self, advances: Ints, period: int) -> Floats:
+        """Phases of all harmonics at some advances in rad, shape (advances, harmonics)."""
+        n = np.arange(1, self.fourier.harmonics + 1, dtype=np.int64)
+        angles: Floats = 2.0 * np.pi / period * (np.outer(advances, n) % period)
+        return angles
+
+    def _codes_of(self, w: Floats) -> Floats:
         volts = self.drive.v_offset + self.drive.v_amplitude * (w - 0.5)
         codes: Floats = (volts - self.output.v_zero) / self.output.v_per_code
-        return codes[advance if len(every) == period else np.searchsorted(every, advance)]
+        return codes
 
 
 class ManifestSequence(Struct):
