@@ -316,8 +316,8 @@ class ManifestAxis(Struct):
     def _angles(self, advances: Ints, period: int) -> Floats:
         """Phases of all harmonics at some advances in rad, shape (advances, harmonics)."""
         n = np.arange(1, self.fourier.harmonics + 1, dtype=np.int64)
-        angles: Floats = 2.0 * np.pi / period * (np.outer(advances, n) % period)
-        return angles
+        phases: Floats = (np.outer(advances, n) % period).astype(np.float64)
+        return 2.0 * np.pi / period * phases
 
     def _codes_of(self, w: Floats) -> Floats:
         volts = self.drive.v_offset + self.drive.v_amplitude * (w - 0.5)
