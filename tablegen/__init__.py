@@ -37,8 +37,8 @@ if TYPE_CHECKING:
     from tablegen.planning.line_plan import Plan
     from tablegen.problems import Problem, Rejected, Unphysical
     from tablegen.verification.build import Report
+    from tablegen.verification.failures import ToolMissing
     from tablegen.verification.run import verify
-    from tablegen.verification.simulate import ToolMissing
 
 _HOMES = {
     "load": "tablegen.api.build",

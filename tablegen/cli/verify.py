@@ -140,8 +140,8 @@ def verify(
             raise click.UsageError(f"{option} is for Verilog; --target {target_name} has no choice of it")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from tablegen.manifest.read import NotABuild
+    from tablegen.verification.failures import ToolMissing
     from tablegen.verification.run import verify as verify_build
-    from tablegen.verification.simulate import ToolMissing
 
     digest = _digest(folder)  # before it is played: whoever changes it meanwhile has verified nothing
     try:

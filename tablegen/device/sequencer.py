@@ -11,6 +11,7 @@ import numpy as np
 
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.schedule import Schedule, pixel_starts
+from tablegen.device.slew import guarded
 from tablegen.numerics.arrays import Bools, Ints
 
 
@@ -145,7 +146,6 @@ class Sequencer:
         self._lines: PlayedLines | None = None
         self._line_ticks: LineTicks | None = None
         self._clamped: Bools = np.zeros(0, dtype=np.bool_)
-        self._disturbed: Ints = np.zeros(0, dtype=np.int64)  # ticks of the line with a clamp, or a step too large
 
     @property
     def state(self) -> SequencerState:
@@ -213,7 +213,6 @@ class Sequencer:
             unclamped = self._lines.unclamped(self.line)
             self._line_ticks = _line_of(self.playing, self.line, True, unclamped)
             self._clamped = (self._line_ticks.x != unclamped[0]) | (self._line_ticks.y != unclamped[1])
-            self._disturbed = self._where_disturbed(self.playing, self._line_ticks)
         line = self._line_ticks
         assert line is not None
         k = self.tick
@@ -238,31 +237,32 @@ class Sequencer:
         self._advance(self.playing.schedule)
         return out
 
-    def undisturbed(self, most: int) -> LineTicks | None:
-        """Play the next ticks of a line at once, at most so many, up to the first one that needs ``step``.
+    def ahead(self, most: int) -> tuple[LineTicks, Ints] | None:
+        """Play the next ticks of a line at once, at most so many: what ``step`` would make of each of them.
 
-        On such ticks the codes are those of the line, and no fault occurs: that is what ``step`` would make of each.
-        None where the next tick is not one.
+        With their faults so far, shape (ticks,). None where a line begins, or none plays.
         """
         line, program = self._line_ticks, self.playing
         if not self.running or program is None or line is None or self.tick == 0:
             return None
-        first = self.tick
-        targets, steps = (line.x[first], line.y[first]), (program.x.output.max_step, program.y.output.max_step)
-        ways = (abs(int(target) - now) for target, now in zip(targets, self.codes, strict=True))
-        if self._clamped[first] or any(way > step for way, step in zip(ways, steps, strict=True)):
-            return None
-        next_one = int(np.searchsorted(self._disturbed, first + 1))
-        stop = int(self._disturbed[next_one]) if next_one < len(self._disturbed) else program.schedule.ticks
-        part = slice(first, min(first + most, stop))
-        valid = line.valid[part] & (self.settle_left == 0 and not self.faults)
-        played = LineTicks(
-            line.x[part], line.y[part], line.line[part], line.frame[part], line.pixel[part], line.backward[part], valid
-        )
-        self.codes, self.catching_up = (int(played.x[-1]), int(played.y[-1])), False
+        part = slice(self.tick, min(self.tick + most, program.schedule.ticks))
+        x = guarded(line.x[part], self.codes[0], program.x.output.max_step)
+        y = guarded(line.y[part], self.codes[1], program.y.output.max_step)
+        reached = (x == line.x[part]) & (y == line.y[part])
+        slewed = ~reached
+        if self.catching_up:  # no fault until the output has reached the waveform
+            slewed &= np.logical_or.accumulate(reached)
+            self.catching_up = not reached.any()
+        faults = np.full(len(x), int(self.faults), dtype=np.int64)
+        for fault, occurs in ((Fault.SLEW, slewed), (Fault.CLAMP, self._clamped[part])):
+            faults |= np.logical_or.accumulate(occurs) * int(fault)
+            self.fault_counts[fault] += int(np.count_nonzero(occurs))
+        valid = line.valid[part] & reached & (faults == 0) & (self.settle_left == 0)
+        played = LineTicks(x, y, line.line[part], line.frame[part], line.pixel[part], line.backward[part], valid)
+        self.codes, self.faults = (int(x[-1]), int(y[-1])), Fault(int(faults[-1]))
         self.tick = part.stop - 1
         self._advance(program.schedule)
-        return played
+        return played, faults
 
     def _begin(self, program: DualProgram) -> None:
         """A program starts at its own line 0, unsettled, and away from where the output is."""
@@ -303,13 +303,6 @@ class Sequencer:
             y_now + min(max(y - y_now, -y_step), y_step),
         )
         return self.codes == (x, y)
-
-    def _where_disturbed(self, playing: DualProgram, line: LineTicks) -> Ints:
-        """Ticks of a line that differ from the one before by more than a step, or that the clamp changes."""
-        out = self._clamped.copy()
-        for program, codes in ((playing.x, line.x), (playing.y, line.y)):
-            out[1:] |= np.abs(np.diff(codes)) > program.output.max_step
-        return np.flatnonzero(out)
 
     def _fault(self, fault: Fault) -> None:
         self.faults |= fault

@@ -3,7 +3,7 @@
 import numpy as np
 from msgspec import Struct
 
-from tablegen.fixedpoint.rounding import shift_round
+from tablegen.fixedpoint.rounding import Integer, shift_round
 from tablegen.fixedpoint.shaping import OFF, Remainders, Shaping, remainder_bits
 from tablegen.numerics.arrays import Floats, Ints
 
@@ -73,8 +73,8 @@ class Output(Struct, frozen=True):
         half = 1 << (self.gain_q - 1)
         return (self.gain_word * sample + self.offset_word + half) >> (self.gain_q - remainder_bits(self.dac_bits))
 
-    def word(self, code: int) -> int:
+    def word(self, code: Integer) -> Integer:
         """A code as it is sent to the converter: its coding, then its alignment."""
         if self.coding == "twos-complement":
-            code ^= 1 << (self.dac_bits - 1)
+            code = code ^ (1 << (self.dac_bits - 1))
         return code << (self.word_bits - self.dac_bits) if self.align == "left" else code

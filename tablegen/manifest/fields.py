@@ -2,6 +2,7 @@
 
 from fractions import Fraction
 from itertools import pairwise
+from math import isqrt
 from typing import Annotated, Literal
 
 import numpy as np
@@ -305,25 +306,38 @@ class ManifestAxis(Struct):
         V = v_offset + v_amplitude (w - 1/2), code = (V - v_zero) / v_per_code. Evaluated term by term with exact
         phases, in none of the ways in which the build does it.
         """
-        advances, which = np.unique(k // self.line.hold_ticks, return_inverse=True)
-        period = self.line.ticks // self.line.hold_ticks
-        n = np.arange(1, self.fourier.harmonics + 1, dtype=np.int64)
+        advance, period = k // self.line.hold_ticks, self.line.ticks // self.line.hold_ticks
+        if period <= 4 * len(k):
+            return self._codes_of(self._whole_period(period))[advance]
+        advances, which = np.unique(advance, return_inverse=True)
         a, b = np.array(self.fourier.a), np.array(self.fourier.b)
         w = np.full(len(advances), self.fourier.a0)
-        if period <= 4 * len(advances):  # a cosine of every phase costs less than one of every product
-            angle = 2.0 * np.pi / period * np.arange(period)
-            cosines, sines = np.cos(angle), np.sin(angle)
-            for harmonic in range(len(n)):
-                phase = advances * n[harmonic] % period
-                w += a[harmonic] * cosines[phase] + b[harmonic] * sines[phase]
-            advances = advances[:0]
-        rows = max(_CHUNK_PRODUCTS // len(n), 1)
+        rows = max(_CHUNK_PRODUCTS // len(a), 1)
         for first in range(0, len(advances), rows):
-            angle = 2.0 * np.pi / period * (np.outer(advances[first : first + rows], n) % period)
+            angle = self._angles(advances[first : first + rows], period)
             w[first : first + rows] += np.cos(angle) @ a + np.sin(angle) @ b
+        return self._codes_of(w)[which.reshape(-1)]
+
+    def _whole_period(self, period: int) -> Floats:
+        """w of every advance: the angle of each is the sum of one of a few far apart and one of a few that follow."""
+        step = isqrt(period) + 1
+        a, b = np.array(self.fourier.a), np.array(self.fourier.b)
+        far, near = self._angles(np.arange(0, period, step), period), self._angles(np.arange(step), period)
+        cosine, sine = np.cos(near), np.sin(near)
+        w = np.cos(far) @ (a * cosine + b * sine).T + np.sin(far) @ (b * cosine - a * sine).T
+        whole: Floats = self.fourier.a0 + w.reshape(-1)[:period]
+        return whole
+
+    def _angles(self, advances: Ints, period: int) -> Floats:
+        """Phases of all harmonics at some advances in rad, shape (advances, harmonics)."""
+        n = np.arange(1, self.fourier.harmonics + 1, dtype=np.int64)
+        phases: Floats = (np.outer(advances, n) % period).astype(np.float64)
+        return 2.0 * np.pi / period * phases
+
+    def _codes_of(self, w: Floats) -> Floats:
         volts = self.drive.v_offset + self.drive.v_amplitude * (w - 0.5)
         codes: Floats = (volts - self.output.v_zero) / self.output.v_per_code
-        return codes[which.reshape(-1)]
+        return codes
 
 
 class ManifestSequence(Struct):

@@ -61,6 +61,15 @@ def merged(*ascending: Ints) -> Ints:
     return values[np.append(True, values[1:] != values[:-1])] if len(values) else values
 
 
+def distinct(k: Ints, count: int) -> Ints:
+    """The values of ``k``, each once, ascending; 0 <= k < count."""
+    if count > 4 * len(k):
+        return np.unique(k)
+    there = np.zeros(count, dtype=np.bool_)  # takes no sorting
+    there[k] = True
+    return np.flatnonzero(there)
+
+
 def multiples(k: Ints, count: int, most: int) -> Iterator[Ints]:
     """n k modulo count for n = 1..most, in one array that is written over; 0 <= k < count."""
     at, step = np.zeros(k.shape, dtype=np.uint64), k.astype(np.uint64)

@@ -10,7 +10,8 @@ from typing import Any
 from tablegen.emit.constants import DEGREES
 from tablegen.fixedpoint.program import Program
 from tablegen.resources import verilog_runtime
-from tablegen.verification.simulate import Compiled, Design, SimulationFailed, compile_design
+from tablegen.verification.failures import SimulationFailed
+from tablegen.verification.simulate import Compiled, Design, compile_design
 from tablegen.verification.stream import Mismatch, Script, Words, compare, read_capture
 
 TEST_MODULE = "tablegen.verification.cocotb_stream"

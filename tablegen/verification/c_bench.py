@@ -3,7 +3,6 @@
 import re
 import shlex
 import shutil
-import subprocess
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,12 +14,13 @@ from tablegen.fixedpoint.synthesis import sine_periods
 from tablegen.numerics.arrays import Ints
 from tablegen.resources import c_runtime
 from tablegen.verification.bench import SequencerShape
-from tablegen.verification.simulate import SimulationFailed, ToolMissing
+from tablegen.verification.c_play import compile_all, run
+from tablegen.verification.failures import ToolMissing
 from tablegen.verification.stream import FAULTS, STATE_WORDS, Script, Words
 
 _HERE = Path(__file__).parent
 BENCH = (_HERE / "stream_bench.c", _HERE / "stream_bench.h")
-HOST = _HERE / "stream_bench_host.c"
+OWN_SOURCES = (BENCH[0], _HERE / "stream_bench_host.c")
 _SHAPE, _SINE = 5 << 60, 2 << 60 | 5 << 48
 HASH_DIGITS = 64
 CUBIC = DEGREES["cubic"]
@@ -101,6 +101,15 @@ def require_compiler(compiler: str) -> list[str]:
     return command
 
 
+def compiler_line(
+    compiler: str, options: Sequence[str], sources: Sequence[Path], chosen: Mapping[str, int]
+) -> list[str]:
+    """The command that compiles a bench but for its files, which find their headers, and what they are to become."""
+    places = sorted({str(path.parent.absolute()) for path in (*sources, *BENCH)})
+    macros = [f"-D{name}={value}" for name, value in chosen.items()]
+    return [*require_compiler(compiler), *options, *macros, *(f"-I{place}" for place in places)]
+
+
 class CBench:
     """The bench, compiled once for programs of one shape."""
 
@@ -113,31 +122,15 @@ class CBench:
         sources: Sequence[Path] | None = None,
         fill: int = 0,
         chosen: Mapping[str, int] | None = None,
-        objects: Path | None = None,
     ) -> None:
-        """``sources`` in place of the shipped runtime; what is ``chosen`` in place of what suits the shape.
-
-        Where there are ``objects``, a directory, the sources are compiled into it, or are there already: from a bench
-        with the same choices but ``fill``, which no source asks for.
-        """
-        command = require_compiler(compiler)
+        """``sources`` in place of the shipped runtime; what is ``chosen`` in place of what suits the shape."""
         runtime = list(c_runtime() if sources is None else sources)
         folder.mkdir(parents=True, exist_ok=True)
         self.shape, self.program = shape, folder / "stream_bench"
         self._constants = constants_written(chosen)
-        line = [
-            *command,
-            *options,
-            *(f"-D{name}={value}" for name, value in (defines(shape, fill) if chosen is None else chosen).items()),
-            *(f"-I{place}" for place in sorted({str(path.parent.absolute()) for path in (*runtime, *BENCH)})),
-        ]
-        parts = [path.absolute() for path in runtime if path.suffix == ".c"]
-        if objects is not None:
-            if not objects.is_dir():
-                objects.mkdir()
-                _compile([*line, "-c", *map(str, parts)], objects)
-            parts = sorted(objects.glob("*.o"))
-        _compile([*line, *map(str, (*parts, BENCH[0], HOST)), "-o", str(self.program)])
+        line = compiler_line(compiler, options, runtime, defines(shape, fill) if chosen is None else chosen)
+        parts = [str(path.absolute()) for path in runtime if path.suffix == ".c"]
+        compile_all([[*line, *parts, *map(str, OWN_SOURCES), "-o", str(self.program)]])
 
     def play(self, script: Script, fourier: bool = False) -> CPlayed:
         """Run a script; raises ``SimulationFailed`` where the bench ends before its script."""
@@ -145,21 +138,5 @@ class CBench:
 
     def run(self, words: str, timeout: float | None = None) -> CPlayed:
         """The same for a script as ``script_words`` makes it; a bench fails that takes longer, in seconds."""
-        try:
-            done = subprocess.run(
-                [str(self.program)], input=words.encode("ascii"), capture_output=True, check=False, timeout=timeout
-            )
-        except subprocess.TimeoutExpired:
-            raise SimulationFailed(f"the bench did not end in {timeout:.0f} s") from None
-        if done.returncode:
-            raise SimulationFailed(
-                done.stderr.decode("utf-8", "replace").strip() or f"the bench ended with status {done.returncode}"
-            )
-        return CPlayed.of(np.frombuffer(done.stdout, dtype="<u8"), words, self._constants)
-
-
-def _compile(line: list[str], place: Path | None = None) -> None:
-    """Run a compiler, in a directory if one is given; raises ``SimulationFailed`` with all that it says."""
-    done = subprocess.run(line, capture_output=True, text=True, check=False, cwd=place)
-    if done.returncode or done.stderr:
-        raise SimulationFailed(f"{' '.join(line)}\n{done.stdout}{done.stderr}".strip())
+        written = run(self.program, words.encode("ascii"), timeout)
+        return CPlayed.of(np.frombuffer(written, dtype="<u8"), words, self._constants)

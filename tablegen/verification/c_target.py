@@ -6,7 +6,6 @@ twice, a tick a call (``dac_sequencer_step``) and many ticks a call (``dac_seque
 
 import os
 import shlex
-import shutil
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -21,10 +20,18 @@ from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.program import Program
 from tablegen.manifest.read import NotABuild, StoredBuild
 from tablegen.reading import BUILD_FILE, read_bytes
-from tablegen.verification import worker
+from tablegen.verification import c_play, worker
 from tablegen.verification.bench import SCRIPT, SequencerShape
 from tablegen.verification.build import Outcome, PlayJob, differing_check
-from tablegen.verification.c_bench import CBench, CPlayed, require_compiler, script_words, storage_bits
+from tablegen.verification.c_bench import (
+    OWN_SOURCES,
+    CPlayed,
+    compiler_line,
+    constants_written,
+    require_compiler,
+    script_words,
+    storage_bits,
+)
 from tablegen.verification.capture import make_capture
 from tablegen.verification.checks import (
     Check,
@@ -37,14 +44,15 @@ from tablegen.verification.checks import (
     first_difference,
 )
 from tablegen.verification.directory import copies, some
+from tablegen.verification.failures import SimulationFailed
 from tablegen.verification.placement import Placement
 from tablegen.verification.session import make_session
-from tablegen.verification.simulate import SimulationFailed
 from tablegen.verification.stream import Script, Words, read_states
 
 _UNTOLD = ("armed", "running")  # what the status of the C sequencer does not tell
 _MAX_TABLE_WORDS = 1 << 17  # words of a direct table that dac_sequencer_load() accepts
 _MAX_FILL_TICKS = 600  # ticks per call
+_LINK = "dac_link"  # how the names of the link's sources begin
 _MIN_TICKS_PER_SECOND = 5000  # a slower program is taken for hanging
 
 
@@ -90,18 +98,17 @@ class CTarget:
         session = make_session(stored.program, None, job.most_ticks, job.seed, Placement())
         script = session.script
         shape = SequencerShape.of((stored.program.x, stored.program.y))
-        (work / SCRIPT).write_text(script_words(script, shape), "ascii")  # which ends the script
+        text = script_words(script, shape)  # which ends the script
+        (work / SCRIPT).write_text(text, "ascii")
         ticks = len(script.expected)
         wanted = {
-            "machine": self.machine,
             "shape": asdict(shape),
             "sources": [str(path) for path in sources],
             "defines": self._defines(stored),
-            "ticks": ticks,
         }
         try:
             progress(f"compiling and playing {ticks} ticks, one a call")
-            step = _played(work, {**wanted, "fill": 0})
+            step = _played(work, self.machine, text, ticks, {**wanted, "fill": 0})
         except (SimulationFailed, OSError, ValueError) as error:
             return Outcome([Check("program", player, f"{ticks} ticks", failure=f"program: {error}")])
         capture = make_capture(stored, script, _packed(step.capture, stored))
@@ -116,7 +123,7 @@ class CTarget:
         ]
         try:
             progress(f"compiling and playing {ticks} ticks, many a call")
-            fill = _played(work, {**wanted, "fill": _MAX_FILL_TICKS})
+            fill = _played(work, self.machine, text, ticks, {**wanted, "fill": _MAX_FILL_TICKS})
             filled = make_capture(stored, script, _packed(fill.capture, stored))
             checks.append(check_filled(filled, _states(script, fill), fill.counts, script.all_counts))
         except (SimulationFailed, OSError, ValueError) as error:
@@ -172,33 +179,55 @@ def _states(script: Script, played: CPlayed) -> Check:
 
 
 def play_job(folder: Path, job: dict[str, Any]) -> dict[str, Any]:
-    """Compile and play the script that stands in ``folder``; in a process that can be ended. Counts of faults."""
-    fill = job["fill"]
-    defines = {**job["defines"], **({"BENCH_FILL": fill} if fill else {})}
-    sources = [Path(source) for source in job["sources"]]
-    shape, place = SequencerShape(**job["shape"]), folder / ("fill" if fill else "step")
-    text = (folder / SCRIPT).read_text("ascii")
-    played: CPlayed
-    if job["machine"] == "cortex-m":
-        from tablegen.verification.emulate import CortexMBench
+    """Compile and play the script that stands in ``folder`` on a Cortex-M; in a process that can be ended."""
+    from tablegen.verification.emulate import CortexMBench
 
-        played = CortexMBench(shape, place, None, _options(), sources, fill, defines).run(text)
-    else:
-        objects = folder / "objects"
-        if not fill:  # the first; a directory that is kept may have those of another build
-            shutil.rmtree(objects, ignore_errors=True)
-        bench = CBench(
-            shape, place, _compiler(), _options(os.environ.get("CFLAGS", "")), sources, fill, defines, objects
-        )
-        played = bench.run(text, timeout=60.0 + job["ticks"] / _MIN_TICKS_PER_SECOND)
+    fill = job["fill"]
+    sources = [Path(source) for source in job["sources"]]
+    bench = CortexMBench(
+        SequencerShape(**job["shape"]), folder / _place_of(fill), None, _options(), sources, fill, job["defines"]
+    )
+    played = bench.run((folder / SCRIPT).read_text("ascii"))
     (folder / _record_of(fill)).write_bytes(played.capture.tobytes())
     return {"counts": played.counts, "states": played.states, "constants": played.constants}
 
 
-def _played(work: Path, job: dict[str, Any]) -> CPlayed:
+def _played(work: Path, machine: str, text: str, ticks: int, job: dict[str, Any]) -> CPlayed:
     """What the bench stored, two words a tick, counts of faults, states, and the constants of the header."""
-    status = worker.run(work, __name__, job)
-    return CPlayed(np.frombuffer(read_bytes(work / _record_of(job["fill"]), BUILD_FILE), dtype=np.uint64), **status)
+    fill = job["fill"]
+    job["defines"] = {**job["defines"], **({"BENCH_FILL": fill} if fill else {})}
+    if machine == "cortex-m":
+        status = worker.run(work, __name__, job)
+        return CPlayed(_record(work, fill), **status)
+    worker.run(work, c_play.__name__, _host_job(job, ticks))
+    return CPlayed.of(_record(work, fill), text, constants_written(job["defines"]))
+
+
+def _host_job(job: dict[str, Any], ticks: int) -> dict[str, Any]:
+    """How this machine compiles and runs it. The first job compiles the sources, which do not ask for ``fill``."""
+    fill, sources = job["fill"], [Path(source) for source in job["sources"]]
+    line = compiler_line(_compiler(), _options(os.environ.get("CFLAGS", "")), sources, job["defines"])
+    parts = [source for source in sources if source.suffix == ".c"]
+    # The link is compiled and linked too, but nothing plays it: it does not have to be fast.
+    links = [str(part) for part in parts if part.name.startswith(_LINK)]
+    played = [str(part) for part in parts if not part.name.startswith(_LINK)]
+    objects = [] if fill else [[*line, "-c", *played], *([[*line, "-O0", "-c", *links]] if links else [])]
+    return {
+        "objects": objects,
+        "line": [*line, *(f"objects/{part.stem}.o" for part in parts), *map(str, OWN_SOURCES)],
+        "program": f"{_place_of(fill)}/stream_bench",
+        "script": SCRIPT,
+        "record": _record_of(fill),
+        "timeout": 60.0 + ticks / _MIN_TICKS_PER_SECOND,
+    }
+
+
+def _record(work: Path, fill: int) -> Words:
+    return np.frombuffer(read_bytes(work / _record_of(fill), BUILD_FILE), dtype="<u8")
+
+
+def _place_of(fill: int) -> str:
+    return "fill" if fill else "step"
 
 
 def _sources(folder: Path, work: Path, stored: StoredBuild, fourier: bool) -> tuple[list[Path], list[str]]:

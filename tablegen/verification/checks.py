@@ -8,7 +8,7 @@ import numpy as np
 
 from tablegen.manifest.fields import ManifestAxis
 from tablegen.manifest.read import StoredBuild
-from tablegen.numerics.arrays import Floats, Ints
+from tablegen.numerics.arrays import Floats, Ints, distinct
 from tablegen.verification.capture import UNDEFINED, Capture, part, without_faults
 from tablegen.verification.shaped import shaped_codes
 from tablegen.verification.stream import FAULTS, FLAGS, STATES, Sample, StoredState
@@ -108,7 +108,7 @@ def _float(capture: Capture, axis: Literal["x", "y"], content: ManifestAxis, lim
     at = np.flatnonzero(capture.own & capture.steady & capture.known)
     period = content.line.ticks
     k = capture.place[at] % period
-    covered = len(np.unique(k)) / period
+    covered = len(distinct(k, period)) / period
     name = "line" if axis == "x" else "frame"
     # Rounded down: a frame of which a tick was not played is not whole.
     compared = f"{len(at)} codes, {int(covered * 1000) / 10:g} % of the {name}"
@@ -240,8 +240,7 @@ def _converter(capture: Capture, axis: str, content: ManifestAxis, words: Ints) 
 def coded(codes: Ints, content: ManifestAxis) -> Ints:
     """Converter words of codes, by the coding and the alignment that the manifest has."""
     output = content.program.output
-    values, which = np.unique(codes, return_inverse=True)
-    return np.array([output.word(code) for code in values.tolist()], dtype=np.int64)[which.reshape(-1)]
+    return output.word(codes)
 
 
 def check_wires(capture: Capture, stored: StoredBuild, sent: Mapping[int, int], least: int) -> Check:

@@ -19,7 +19,7 @@ from tablegen.resources import c_runtime
 from tablegen.verification.bench import SequencerShape
 from tablegen.verification.c_bench import BENCH, OPTIONS, CPlayed, constants_written, defines, script_words, sine_of
 from tablegen.verification.elf import Executable, read_executable
-from tablegen.verification.simulate import SimulationFailed, ToolMissing
+from tablegen.verification.failures import SimulationFailed, ToolMissing
 from tablegen.verification.stream import Script
 
 _HERE = Path(__file__).parent

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from tablegen.installation import install_advice
+from tablegen.verification.failures import SimulationFailed, ToolMissing
 from tablegen.verification.model_cache import keep_model, kept_model, model_key
 
 SIMULATORS = ("icarus", "verilator")
@@ -20,14 +21,6 @@ _BUILD_ARGUMENTS = {
     "verilator": ["--timing", "--no-assert", "-O3", "-Wno-fatal", "-Wno-lint", "-Wno-style"],
 }
 _MAX_LOG_LINES = 15
-
-
-class ToolMissing(Exception):
-    """A simulator, or the Python side of one, is not installed; says what to install."""
-
-
-class SimulationFailed(Exception):
-    """A design did not compile, or its simulation ended without results; carries the end of the log."""
 
 
 @dataclass(frozen=True)

@@ -39,10 +39,10 @@ def pack(tick: Tick) -> int:
     return tick.faults.value << 56 | flags << 48 | tick.y << 24 | tick.x
 
 
-def pack_line(ticks: LineTicks, faults: Fault) -> Words:
-    """The same for ticks of a line, all of which play, with the faults so far."""
+def pack_line(ticks: LineTicks, faults: Ints) -> Words:
+    """The same for ticks of a line, all of which play, with the faults so far, shape (ticks,)."""
     markers = {"line": ticks.line, "frame": ticks.frame, "pixel": ticks.pixel, "backward": ticks.backward}
-    words = faults.value << _FAULTS_AT | 1 << 48 + FLAGS.index("playing") | ticks.y << 24 | ticks.x
+    words = faults << _FAULTS_AT | 1 << 48 + FLAGS.index("playing") | ticks.y << 24 | ticks.x
     for name, marker in {**markers, "valid": ticks.valid}.items():
         words |= marker.astype(np.int64) << 48 + FLAGS.index(name)
     return words.astype(np.uint64)
@@ -264,9 +264,9 @@ class Script:
             self.clocks += self._until + 1
             self._until = self._period - 1
             self._ticked_at = self.clocks
-            at_once = self.model.undisturbed((end - self.clocks) // self._period + 1)
+            at_once = self.model.ahead((end - self.clocks) // self._period + 1)
             if at_once is not None:
-                words = pack_line(at_once, self.model.faults).tolist()
+                words = pack_line(*at_once).tolist()
                 self.expected.extend(map(self._with_reported, words) if any(self._reported.values()) else words)
                 self._ticked_at = self.clocks = self.clocks + (len(words) - 1) * self._period
                 continue

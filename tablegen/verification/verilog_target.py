@@ -31,10 +31,11 @@ from tablegen.verification.checks import (
     first_difference,
 )
 from tablegen.verification.directory import copies, memory_words, some
+from tablegen.verification.failures import SimulationFailed
 from tablegen.verification.loading import Memories
 from tablegen.verification.placement import Placement
 from tablegen.verification.session import BuildSession, make_session, needed_ticks
-from tablegen.verification.simulate import Design, SimulationFailed, compile_design, require
+from tablegen.verification.simulate import Design, compile_design, require
 from tablegen.verification.stream import read_capture, read_states
 from tablegen.verification.verilog_bench import (
     COUNT_BITS,

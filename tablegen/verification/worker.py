@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from tablegen.interruption import deliver, held
-from tablegen.verification.simulate import SimulationFailed, ToolMissing
+from tablegen.verification.failures import SimulationFailed, ToolMissing
 
 _JOB, _OUTCOME, _LOG = "job.json", "outcome.json", "worker.log"
 

@@ -80,12 +80,12 @@ def test_many_ticks_at_once_are_those_of_single_steps(program: DualProgram) -> N
     single = [(t.x, t.y) for t in run(one, ticks)]
     many: list[tuple[int, int]] = []
     while len(many) < ticks:
-        part = other.undisturbed(ticks - len(many))
+        part = other.ahead(ticks - len(many))
         if part is None:
             step = other.step()
             many.append((step.x, step.y))
         else:
-            many += zip(part.x.tolist(), part.y.tolist(), strict=True)
+            many += zip(part[0].x.tolist(), part[0].y.tolist(), strict=True)
     assert many == single
 
 

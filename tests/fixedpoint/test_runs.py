@@ -72,6 +72,43 @@ def test_held_and_direct_programs(program: Program, hold: int) -> None:
         assert np.array_equal(np.repeat(runs.codes, runs.lengths), one.codes(np.arange(one.ticks)))
 
 
+@settings(max_examples=150, deadline=None)
+@given(programs(), st.integers(0, 2), st.sampled_from((1, -1)))
+def test_codes_finer_than_samples(program: Program, doubled: int, sign: int) -> None:
+    """Where each sample is a code or more, or less, within the limits and beyond them: no run but of another code."""
+    output = program.output
+    wide = replace(
+        output,
+        gain_word=sign * ((doubled << 15) + abs(output.gain_word) % (1 << 15)),
+        gain_q=15,
+        offset_word=1 << 38,
+        code_min=(doubled // 2) << 23,
+        code_max=(1 << 24) - 1,
+        dac_bits=24,
+    )
+    program = replace(program, output=wide, words=program.words >> program.bits - 5)  # few enough levels for runs
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "_MIN_TICKS_PER_RUN", 0)
+        runs = runs_of(program)
+    codes = program.codes(np.arange(program.ticks))
+    assert int(runs.lengths.min()) >= 1
+    assert np.array_equal(np.repeat(runs.codes, runs.lengths), codes)
+    assert len(runs.starts) <= np.count_nonzero(np.diff(codes)) + len(program.words)
+
+
+@settings(max_examples=30, deadline=None)
+@given(programs(), st.integers(1, 40))
+def test_parts_do_not_show(program: Program, size: int) -> None:
+    """However many levels are worked out together, the runs are the same."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "_MIN_TICKS_PER_RUN", 0)
+        whole = runs_of(program)
+        patch.setattr(module, "_CHUNK_LEVELS", size * max(1, len(whole.starts) // 100))
+        parts = runs_of(program)
+    assert np.array_equal(parts.starts, whole.starts)
+    assert np.array_equal(parts.codes, whole.codes)
+
+
 def test_a_frame_of_minutes_takes_no_more_than_its_codes() -> None:
     """2^31 - 1 ticks: the ends of every run are checked against the arithmetic, without playing the rest."""
     words = np.rint(20000 * np.sin(2 * np.pi * np.arange(256) / 256)).astype(np.int64)

@@ -29,7 +29,7 @@ from mutants import Verdict
 from tablegen.resources import c_runtime
 from tablegen.verification.bench import SequencerShape
 from tablegen.verification.c_bench import CBench, defines
-from tablegen.verification.simulate import SimulationFailed
+from tablegen.verification.failures import SimulationFailed
 from tablegen.verification.stream import Script, compare
 
 HERE = Path(__file__).parent

@@ -20,7 +20,7 @@ from stream_scripts import sweep
 from tablegen.verification.bench import SequencerShape
 from tablegen.verification.c_bench import OPTIONS, CBench, CPlayed
 from tablegen.verification.emulate import CortexMBench, Processor, compile_bare
-from tablegen.verification.simulate import SimulationFailed
+from tablegen.verification.failures import SimulationFailed
 from tablegen.verification.stream import Script, compare
 
 pytestmark = pytest.mark.rest

@@ -45,9 +45,9 @@ from tablegen.verification.c_bench import CBench, script_words
 from tablegen.verification.c_target import CTarget, _codes, _packed, _sources
 from tablegen.verification.capture import make_capture
 from tablegen.verification.checks import check_states
+from tablegen.verification.failures import SimulationFailed
 from tablegen.verification.placement import Placement
 from tablegen.verification.session import make_session
-from tablegen.verification.simulate import SimulationFailed
 from tablegen.verification.stream import Script, read_states
 from tablegen.verification.variation import variation
 from tablegen.version import __version__

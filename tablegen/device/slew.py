@@ -1,0 +1,30 @@
+"""The slew guard over many ticks at once: what moving by at most a step a tick towards a moving target makes."""
+
+import numpy as np
+
+from tablegen.numerics.arrays import Ints
+
+_AHEAD = 256  # ticks of a ramp that are looked at together
+
+
+def guarded(targets: Ints, code: int, step: int) -> Ints:
+    """Codes of shape (ticks,) that follow ``targets`` from ``code`` on, by at most ``step`` >= 1 a tick."""
+    codes = targets.copy()
+    jumps = np.flatnonzero(np.abs(np.diff(targets)) > step) + 1  # ticks before which the output may be at the target
+    at = 0
+    while at < len(targets):
+        way = int(targets[at]) - code
+        if abs(way) <= step:  # from here on codes are the targets, up to the next jump
+            next_one = int(np.searchsorted(jumps, at, side="right"))
+            at = int(jumps[next_one]) if next_one < len(jumps) else len(targets)
+            code = int(targets[at - 1])
+            continue
+        # A ramp, for as long as its target is more than a step ahead.
+        stride = step if way > 0 else -step
+        ramp = code + stride * np.arange(len(targets[at : at + _AHEAD]), dtype=np.int64)
+        ahead = (targets[at : at + _AHEAD] - ramp) * (1 if way > 0 else -1) > step
+        ticks = len(ahead) if ahead.all() else int(np.argmin(ahead))
+        codes[at : at + ticks] = ramp[:ticks] + stride
+        code += stride * ticks
+        at += ticks
+    return codes
