@@ -1,6 +1,5 @@
 """Which table an axis gets: the one that is written, or the least memory that keeps an error."""
 
-from collections.abc import Iterable
 from typing import cast
 
 from msgspec import Struct
@@ -18,7 +17,6 @@ from tablegen.problems import Unphysical
 DEFAULT_ERROR_LSB = 1.0
 # Of shaped output the table's own error, before the rounding that is shaped: little beside what shaping leaves.
 DEFAULT_SHAPED_ERROR_LSB = 0.01
-_NOT_PLAYED: dict[str, tuple[Mode, ...]] = {"verilog": ("cubic",)}  # modes by formats whose sequencer has none of them
 
 
 class TableChoice(Struct, frozen=True):
@@ -60,17 +58,9 @@ def written_shape(table: Table, period: int) -> TableShape:
     return TableShape(mode, length, table.bits or DEFAULT_BITS)
 
 
-def played_modes(formats: Iterable[str]) -> tuple[Mode, ...]:
-    """The modes that the devices of all these formats play."""
-    missing = {mode for name in formats for mode in _NOT_PLAYED.get(name, ())}
-    return tuple(mode for mode in MODES if mode not in missing)
-
-
-def possible_shapes(
-    table: Table, period: int, harmonics: int, free_modes: tuple[Mode, ...] = MODES
-) -> list[TableShape]:
-    """Every shape that carries the harmonics, with what is given of a table; ``free_modes`` where no mode is."""
-    modes = free_modes if table.mode in (None, "auto") else (cast(Mode, table.mode),)
+def possible_shapes(table: Table, period: int, harmonics: int) -> list[TableShape]:
+    """Every shape that carries the harmonics, with what is given of a table."""
+    modes = MODES if table.mode in (None, "auto") else (cast(Mode, table.mode),)
     return [
         TableShape(mode, length, bits)
         for mode in modes

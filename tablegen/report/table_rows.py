@@ -27,7 +27,6 @@ class TableRow:
     """A table with its errors over all ticks, in LSB of the converter; of shaped output before the rounding.
 
     ``stored_bits`` is what it takes in C: in words of 16 or 32 bits, with the first ones once more behind the last.
-    ``played`` is whether all formats of the scan play it.
     """
 
     shape: TableShape
@@ -36,7 +35,6 @@ class TableRow:
     stored_bits: int
     chosen: bool
     planned: bool
-    played: bool
 
     @property
     def instructions(self) -> dict[str, float]:
@@ -44,8 +42,8 @@ class TableRow:
         return INSTRUCTIONS[self.shape.mode]
 
     @property
-    def cells(self) -> int | None:
-        """One axis in Verilog; None where that has no such mode."""
+    def cells(self) -> int:
+        """One axis in Verilog."""
         return CELLS[self.shape.mode]
 
 
@@ -95,7 +93,6 @@ class AxisTables:
                     "hx8k_cells": row.cells,
                     "chosen": row.chosen,
                     "planned": row.planned,
-                    "played": row.played,
                 }
                 for row in self.rows
             ],
@@ -124,7 +121,6 @@ def axis_tables(setup: Setup, line: LinePlan) -> AxisTables:
                 (shape.length + _behind(shape)) * storage_bits(shape.bits),
                 shape == front.chosen,
                 shape == front.planned,
-                shape.mode in front.modes,
             )
 
     return AxisTables(
