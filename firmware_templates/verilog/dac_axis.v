@@ -1,22 +1,24 @@
 // One axis, one sample per clock: phase, table, interpolation, gain and offset, limits, slew guard.
 //
 // A tick comes in with its flags on one clock; the code is there LATENCY clocks later. The next tick may come on the
-// next clock. A new program comes in with the tick that has `load`, and travels down the pipeline with that tick: its
-// phase, its bank of the table, its gain and its limits each change just before it, so that no sample mixes two
-// programs.
+// next clock, with a cubic table 11 clocks later. A new program comes in with the tick that has `load`, and travels
+// down the pipeline with that tick: its phase, its bank of the table, its gain and its limits each change just before
+// it, so that no sample mixes two programs.
 
 `default_nettype none
 
 module dac_axis #(
-    parameter INTERPOLATED = 1,     // 0: no interpolation, one table word per advance
+    parameter INTERPOLATED = 1,     // degree between words; 0: none, one table word per advance; 1: lines; 3: cubic
     parameter INDEX_BITS = 11,      // a bank of the table holds 2^INDEX_BITS words
     parameter WORD_BITS = 16,
     parameter DAC_BITS = 16,
     parameter PERIOD_BITS = 31,
     parameter PLAIN_MULTIPLIER = 0,  // 1: multiplier blocks; 0: look-up tables
     parameter SHAPING = 0,           // highest order of shaping; with 3, ticks are at least 6 clocks apart
+    parameter SPLINE = INTERPOLATED == 3 ? 1 : 0,  // 1: of both axes one at least has a cubic table
     parameter [63:0] POWER_UP_CODE = 0,
-    parameter LATENCY = (PLAIN_MULTIPLIER ? 22 : 34) + (SHAPING != 0 ? 1 : 0)  // derived: do not set it
+    parameter LATENCY =  // derived: do not set it
+        (SPLINE ? 43 : PLAIN_MULTIPLIER ? 10 : 15) + (PLAIN_MULTIPLIER ? 12 : 19) + (SHAPING != 0 ? 1 : 0)
 ) (
     input  wire                  clock,
     // writes to a register or a table word of the idle program
@@ -41,27 +43,35 @@ module dac_axis #(
 );
     localparam GUARD_BITS = WORD_BITS > 21 ? 25 - WORD_BITS : 4;
     localparam SAMPLE_BITS = WORD_BITS + GUARD_BITS;
-    localparam SAMPLE_AT = PLAIN_MULTIPLIER ? 10 : 15;  // clocks from the tick to its sample
+    localparam SAMPLE_AT = SPLINE ? 43 : PLAIN_MULTIPLIER ? 10 : 15;  // clocks from the tick to its sample
     localparam TARGET_AT = LATENCY - 4;                 // clocks from the tick to its target
 
     wire signed [SAMPLE_BITS-1:0] sample;
     wire unused_flags = &{loads, ticks, runnings, take};
 
+    // The flags wait for a slower axis beside, since a flag is narrower than a sample.
+    localparam WAIT = INTERPOLATED == 3 ? 0 : SAMPLE_AT - (INTERPOLATED == 0 ? 3 : PLAIN_MULTIPLIER ? 10 : 15);
+
     generate
-        if (INTERPOLATED) begin : interpolated
+        if (INTERPOLATED == 1) begin : interpolated
             localparam FRACTION_AT = 17 - INDEX_BITS;
 
             wire [31:0] phase;
-            wire read_bank;
+            wire restarts, advances, read_bank;
             wire signed [WORD_BITS-1:0] here, there;
             wire [14:0] fraction;
-            wire unused = &phase;  // the bits of phase below the fraction are unused
+            wire [WAIT+1:0] takes = {loads[WAIT:0], take};  // bit i: i - 1 clocks ago
+            wire unused = &{phase, takes};  // the bits of phase below the fraction are unused
 
+            dac_delay #(.BITS(2), .CLOCKS(WAIT)) flags (
+                .clock(clock), .in({restart, advance}), .out({restarts, advances})
+            );
             dac_phase #(.PERIOD_BITS(PERIOD_BITS)) position (
                 .clock(clock), .write(write), .write_address(write_address), .write_data(write_data),
-                .take(take), .load(loads[0]), .tick(ticks[0]), .restart(restart), .advance(advance), .phase(phase)
+                .take(takes[WAIT]), .load(loads[WAIT]), .tick(ticks[WAIT]), .restart(restarts), .advance(advances),
+                .phase(phase)
             );
-            dac_delay #(.BITS(1), .CLOCKS(2)) with_phase (.clock(clock), .in(bank), .out(read_bank));
+            dac_delay #(.BITS(1), .CLOCKS(WAIT + 2)) with_phase (.clock(clock), .in(bank), .out(read_bank));
             dac_table #(.WORD_BITS(WORD_BITS), .INDEX_BITS(INDEX_BITS)) words (
                 .clock(clock), .write(table_write), .write_bank(!bank), .write_index(table_address),
                 .write_data(table_data), .read_bank(read_bank), .index(phase[31 -: INDEX_BITS]),
@@ -73,9 +83,20 @@ module dac_axis #(
             dac_interpolator #(
                 .WORD_BITS(WORD_BITS), .GUARD_BITS(GUARD_BITS), .PLAIN_MULTIPLIER(PLAIN_MULTIPLIER)
             ) between (.clock(clock), .here(here), .there(there), .fraction(fraction), .sample(sample));
+        end else if (INTERPOLATED == 3) begin : cubic
+            wire [31:0] phase;
+            wire unused = &phase;
+
+            dac_phase #(.PERIOD_BITS(PERIOD_BITS)) position (
+                .clock(clock), .write(write), .write_address(write_address), .write_data(write_data),
+                .take(take), .load(loads[0]), .tick(ticks[0]), .restart(restart), .advance(advance), .phase(phase)
+            );
+            dac_spline #(.WORD_BITS(WORD_BITS), .INDEX_BITS(INDEX_BITS)) spline (
+                .clock(clock), .write(table_write), .write_bank(!bank), .write_index(table_address),
+                .write_data(table_data), .read_bank(bank), .phase(phase[31 -: INDEX_BITS+18]), .ticks(ticks[31:2]),
+                .sample(sample)
+            );
         end else begin : direct
-            // Only two clocks of work: the flags wait, since a flag is narrower than a sample.
-            localparam WAIT = SAMPLE_AT - 3;
             wire restarts, advances, read_bank;
             reg [INDEX_BITS-1:0] index;
             initial index = 0;

@@ -7,7 +7,8 @@
 //   tick    is one clock long, at the update rate of the converter. `strobe` comes with the codes and markers of a
 //           tick: 36 clocks after it, 24 with PLAIN_MULTIPLIER = 1, 41 with LOW_AREA = 1 (`busy` is high until then).
 //           With SHAPING it is a clock later, and two with LOW_AREA = 1. Where SHAPING is 3, ticks are at least 6
-//           clocks apart: `busy` is high on the five after a tick.
+//           clocks apart: `busy` is high on the five after a tick. Where a table is cubic, a strobe comes 64, 57 or 90
+//           clocks after its tick, and ticks are at least 11 clocks apart.
 //
 // docs/sequencer.md defines what happens on which tick, and every bit of every code. All inputs must be synchronous to
 // `clock`. The design relies on power-up values of its registers, as FPGAs have them: a reset must not move a code.
@@ -16,7 +17,7 @@
 
 module dac_sequencer #(
     parameter DAC_BITS = 16,
-    parameter X_INTERPOLATED = 1,    // 0: no interpolation, one table word per advance
+    parameter X_INTERPOLATED = 1,    // degree between words; 0: none, one word per advance; 1: lines; 3: cubic
     parameter X_INDEX_BITS = 11,     // a bank holds 2^X_INDEX_BITS words; an interpolated table has exactly this length
     parameter X_WORD_BITS = 16,
     parameter Y_INTERPOLATED = 1,
@@ -76,7 +77,10 @@ module dac_sequencer #(
     localparam [2:0] PROGRAM = 3'd0, X_TABLE = 3'd1, Y_TABLE = 3'd2, X_FOURIER = 3'd3, Y_FOURIER = 3'd4;
     localparam [3:0] AXIS_HARMONICS = 4'd10;
     localparam [11:0] SCAN_PAGE = 12'd0, X_PAGE = 12'd1, Y_PAGE = 12'd2;
-    localparam LATENCY = (PLAIN_MULTIPLIER ? 22 : 34) + (SHAPING != 0 ? 1 : 0);
+    localparam SPLINE = X_INTERPOLATED == 3 || Y_INTERPOLATED == 3 ? 1 : 0;
+    localparam LATENCY =
+        (SPLINE ? 43 : PLAIN_MULTIPLIER ? 10 : 15) + (PLAIN_MULTIPLIER ? 12 : 19) + (SHAPING != 0 ? 1 : 0);
+    localparam SPACING = SPLINE ? 11 : SHAPING == 3 ? 6 : 1;  // least clocks from tick to tick
     localparam MARKERS_AT = 3;
     localparam X_PERIOD_BITS = TICK_BITS + 1;  // the period of x is a line
 
@@ -86,8 +90,8 @@ module dac_sequencer #(
         if (DAC_BITS < 8 || DAC_BITS > 24) begin : guard_0
             dac_sequencer_DAC_BITS_is_not_8_to_24 stop ();
         end
-        if (X_INTERPOLATED < 0 || X_INTERPOLATED > 1) begin : guard_1
-            dac_sequencer_X_INTERPOLATED_is_not_0_to_1 stop ();
+        if (X_INTERPOLATED != 0 && X_INTERPOLATED != 1 && X_INTERPOLATED != 3) begin : guard_1
+            dac_sequencer_X_INTERPOLATED_is_not_0_1_or_3 stop ();
         end
         if (X_INDEX_BITS < 2 || X_INDEX_BITS > 16) begin : guard_2
             dac_sequencer_X_INDEX_BITS_is_not_2_to_16 stop ();
@@ -95,8 +99,8 @@ module dac_sequencer #(
         if (X_WORD_BITS < 8 || X_WORD_BITS > 24) begin : guard_3
             dac_sequencer_X_WORD_BITS_is_not_8_to_24 stop ();
         end
-        if (Y_INTERPOLATED < 0 || Y_INTERPOLATED > 1) begin : guard_4
-            dac_sequencer_Y_INTERPOLATED_is_not_0_to_1 stop ();
+        if (Y_INTERPOLATED != 0 && Y_INTERPOLATED != 1 && Y_INTERPOLATED != 3) begin : guard_4
+            dac_sequencer_Y_INTERPOLATED_is_not_0_1_or_3 stop ();
         end
         if (Y_INDEX_BITS < 2 || Y_INDEX_BITS > 16) begin : guard_5
             dac_sequencer_Y_INDEX_BITS_is_not_2_to_16 stop ();
@@ -136,6 +140,18 @@ module dac_sequencer #(
         end
         if (SHAPING < 0 || SHAPING > 3) begin : guard_17
             dac_sequencer_SHAPING_is_not_0_to_3 stop ();
+        end
+        if (X_INTERPOLATED == 3 && (X_INDEX_BITS < 3 || X_INDEX_BITS > 14)) begin : guard_18
+            dac_sequencer_X_INDEX_BITS_of_a_cubic_table_is_not_3_to_14 stop ();
+        end
+        if (X_INTERPOLATED == 3 && X_WORD_BITS > 21) begin : guard_19
+            dac_sequencer_X_WORD_BITS_of_a_cubic_table_is_not_8_to_21 stop ();
+        end
+        if (Y_INTERPOLATED == 3 && (Y_INDEX_BITS < 3 || Y_INDEX_BITS > 14)) begin : guard_20
+            dac_sequencer_Y_INDEX_BITS_of_a_cubic_table_is_not_3_to_14 stop ();
+        end
+        if (Y_INTERPOLATED == 3 && Y_WORD_BITS > 21) begin : guard_21
+            dac_sequencer_Y_WORD_BITS_of_a_cubic_table_is_not_8_to_21 stop ();
         end
     endgenerate
 
@@ -243,7 +259,7 @@ module dac_sequencer #(
             always @(posedge clock) works <= accepted_tick || (works && !done);
             assign busy = works;
             assign overrun = tick && busy;
-            assign done = x_done;  // y takes the same number of clocks
+            assign done = Y_INTERPOLATED == 3 ? y_done : x_done;  // a spline takes longer, the others take the same
             assign drained = done;
             // The flags hold until the next tick.
             reg runs, begins, swapped;
@@ -259,7 +275,7 @@ module dac_sequencer #(
             assign clears_done = clears_0;
             assign {line_done, frame_done, pixel_done, backward_done, images_done} =
                 {line_3, frame_3, pixel_3, backward_3, images_3};
-            wire unused = &{y_done};
+            wire unused = &{x_done, y_done};
 
             dac_axis_serial #(
                 .INTERPOLATED(X_INTERPOLATED), .INDEX_BITS(X_INDEX_BITS), .WORD_BITS(X_WORD_BITS), .DAC_BITS(DAC_BITS),
@@ -297,15 +313,15 @@ module dac_sequencer #(
                 loads <= loads_now[LATENCY-1:0];
                 runnings <= runnings_now[LATENCY-1:0];
             end
-            if (SHAPING == 3) begin : scanner_shaping
-                reg [3:0] recent;  // ticks; bit i: i + 1 clocks ago
+            if (SPACING != 1) begin : spaced
+                reg [SPACING-3:0] recent;  // ticks; bit i: i + 1 clocks ago
                 reg works;
                 initial begin
                     recent = 0;
                     works = 1'b0;
                 end
                 always @(posedge clock) begin
-                    recent <= {recent[2:0], accepted_tick};
+                    recent <= {recent[SPACING-4:0], accepted_tick};
                     works <= accepted_tick || recent != 0;
                 end
                 assign busy = works;
@@ -333,7 +349,7 @@ module dac_sequencer #(
             dac_axis #(
                 .INTERPOLATED(X_INTERPOLATED), .INDEX_BITS(X_INDEX_BITS), .WORD_BITS(X_WORD_BITS), .DAC_BITS(DAC_BITS),
                 .PERIOD_BITS(X_PERIOD_BITS), .PLAIN_MULTIPLIER(PLAIN_MULTIPLIER), .SHAPING(SHAPING),
-                .POWER_UP_CODE(X_POWER_UP_CODE)
+                .SPLINE(SPLINE), .POWER_UP_CODE(X_POWER_UP_CODE)
             ) x_axis (
                 .clock(clock), .write(x_write), .write_address(address[3:0]), .table_write(x_table_write),
                 .table_address(table_address[X_INDEX_BITS-1:0]), .write_data(data),
@@ -345,7 +361,7 @@ module dac_sequencer #(
             dac_axis #(
                 .INTERPOLATED(Y_INTERPOLATED), .INDEX_BITS(Y_INDEX_BITS), .WORD_BITS(Y_WORD_BITS), .DAC_BITS(DAC_BITS),
                 .PERIOD_BITS(PERIOD_BITS), .PLAIN_MULTIPLIER(PLAIN_MULTIPLIER), .SHAPING(SHAPING),
-                .POWER_UP_CODE(Y_POWER_UP_CODE)
+                .SPLINE(SPLINE), .POWER_UP_CODE(Y_POWER_UP_CODE)
             ) y_axis (
                 .clock(clock), .write(y_write), .write_address(address[3:0]), .table_write(y_table_write),
                 .table_address(table_address[Y_INDEX_BITS-1:0]), .write_data(data),
