@@ -24,12 +24,10 @@ from tablegen.device.widths import AxisWidths, Widths, misfits
 from tablegen.link.frames import FrameReader
 from tablegen.link.image import ProgramImage, take_apart
 from tablegen.link.messages import AxisLimits, DeviceInfo, DeviceStatus, ImageInfo, Reason, Refusal, Request, Upload
-from tablegen.verification.bench import SequencerShape
 
 MADE = GOLDEN["devices"]["open"]
 TOLD = DeviceInfo.unpack(bytes.fromhex(MADE["device"]))
 FRAMES = json.loads((HELPERS / "golden_frames.json").read_text("utf-8"))
-SHAPE = SequencerShape(16, 1, 4, 16, 1, 4, 12)
 TOP = (1 << 16) - 1
 CLOCKS_PER_BIT = 8
 _BYTES = bytes.fromhex(MADE["boot_image"])
@@ -74,7 +72,7 @@ def random_dialogue(loader: Loader, seed: int, steps: int, words: list[int]) -> 
     narrow = AxisLimits(3000, 60000, 9000, TOP)
     info, memory = limited(loader.info, wide if seed % 3 else narrow, wide)
     with Simulation(loader.compiled, words, memory) as simulation:
-        dialogue = Dialogue(LoaderDevice(simulation, info, seed), info, boot_program(MADE), SHAPE, seed)
+        dialogue = Dialogue(LoaderDevice(simulation, info, seed), info, loader.boot, loader.shape, seed)
         dialogue.play(steps)
     return dialogue
 
@@ -93,7 +91,7 @@ def checked_uploads(loader: Loader, seed: int, uploads: int, words: list[int]) -
     limits = [AxisLimits(int(rng.integers(0, most)), TOP - int(rng.integers(0, most)), TOP, TOP) for _ in range(2)]
     info, memory = limited(loader.info, limits[0], limits[1])
     with Simulation(loader.compiled, words, memory) as simulation:
-        dialogue = Dialogue(LoaderDevice(simulation, info, seed), info, boot_program(MADE), SHAPE, seed)
+        dialogue = Dialogue(LoaderDevice(simulation, info, seed), info, loader.boot, loader.shape, seed)
         dialogue.upload(uploads)
     return dialogue
 

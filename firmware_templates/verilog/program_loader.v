@@ -18,7 +18,7 @@ module program_loader #(
     parameter MEMORY_BYTES = 2048,       // 2^11..2^16
     parameter WINDOW = 8,                // frames that may be unacknowledged
     parameter DAC_BITS = 16,
-    parameter X_INTERPOLATED = 1,
+    parameter X_INTERPOLATED = 1,        // degree of a table: 0 direct, 1 lines, 3 cubic
     parameter X_INDEX_BITS = 11,
     parameter X_WORD_BITS = 16,
     parameter Y_INTERPOLATED = 1,
@@ -82,15 +82,20 @@ module program_loader #(
     localparam [31:0] X_REACH = 1 << (X_WORD_BITS + X_GUARD - 1), Y_REACH = 1 << (Y_WORD_BITS + Y_GUARD - 1);
     localparam [31:0] X_HALF = 1 << (X_WORD_BITS - 1), Y_HALF = 1 << (Y_WORD_BITS - 1);
     localparam [31:0] X_MOST_WORDS = 1 << X_INDEX_BITS, Y_MOST_WORDS = 1 << Y_INDEX_BITS;
-    localparam [31:0] X_WORDS = X_INTERPOLATED ? X_MOST_WORDS : 0, Y_WORDS = Y_INTERPOLATED ? Y_MOST_WORDS : 0;
+    localparam [31:0] X_WORDS = X_INTERPOLATED != 0 ? X_MOST_WORDS : 0;
+    localparam [31:0] Y_WORDS = Y_INTERPOLATED != 0 ? Y_MOST_WORDS : 0;
     localparam [31:0] MOST_HARMONICS = FOURIER ? HARMONICS : 0;
-    localparam [31:0] X_HARMONICS = X_INTERPOLATED ? MOST_HARMONICS : 0;
-    localparam [31:0] Y_HARMONICS = Y_INTERPOLATED ? MOST_HARMONICS : 0;
+    localparam [31:0] X_HARMONICS = X_INTERPOLATED != 0 ? MOST_HARMONICS : 0;
+    localparam [31:0] Y_HARMONICS = Y_INTERPOLATED != 0 ? MOST_HARMONICS : 0;
     localparam [31:0] TOP_CODE = (1 << DAC_BITS) - 1, MOST_TICKS = 1 << TICK_BITS, MOST_LINES = 1 << LINE_BITS;
     localparam [31:0] X_INDEX = X_INDEX_BITS, Y_INDEX = Y_INDEX_BITS, X_WORD = X_WORD_BITS, Y_WORD = Y_WORD_BITS;
     localparam [31:0] DAC = DAC_BITS, FRAMES = WINDOW, WORD = CONVERTER, HIGHEST_ORDER = SHAPING;
-    localparam [7:0] X_INDEX_WANTED = X_INTERPOLATED ? X_INDEX[7:0] : 8'd0;
-    localparam [7:0] Y_INDEX_WANTED = Y_INTERPOLATED ? Y_INDEX[7:0] : 8'd0;
+    localparam [7:0] CUBIC = 8'd128;  // in the index bits of a table
+    localparam [7:0] DEGREE = X_INTERPOLATED == 3 || Y_INTERPOLATED == 3 ? 8'd3 : 8'd0;
+    localparam [7:0] X_INDEX_WANTED =
+        X_INTERPOLATED == 3 ? CUBIC | X_INDEX[7:0] : X_INTERPOLATED != 0 ? X_INDEX[7:0] : 8'd0;
+    localparam [7:0] Y_INDEX_WANTED =
+        Y_INTERPOLATED == 3 ? CUBIC | Y_INDEX[7:0] : Y_INTERPOLATED != 0 ? Y_INDEX[7:0] : 8'd0;
     localparam [7:0] X_WORD_BYTES = X_WORD_BITS <= 16 ? 8'd2 : 8'd3, Y_WORD_BYTES = Y_WORD_BITS <= 16 ? 8'd2 : 8'd3;
     localparam [7:0] FEATURES = FOURIER ? 8'd27 : 8'd25;  // tables, Fourier words, read back, interlock
 
@@ -110,7 +115,7 @@ module program_loader #(
     localparam [56*8-1:0] HELLO = {
         UPDATE_RATE, TOP_CODE, Y_MAX_STEP, Y_CODE_MAX, Y_CODE_MIN, TOP_CODE, X_MAX_STEP, X_CODE_MAX, X_CODE_MIN,
         WORD[7:0], DAC[7:0], Y_WORD[7:0], Y_INDEX[7:0], WORD[7:0], DAC[7:0], X_WORD[7:0], X_INDEX[7:0],
-        IMAGE_BYTES, 8'd0, HIGHEST_ORDER[7:0], MOST_HARMONICS[15:0], 8'd240, FRAMES[7:0], FEATURES, 8'd1
+        IMAGE_BYTES, DEGREE, HIGHEST_ORDER[7:0], MOST_HARMONICS[15:0], 8'd240, FRAMES[7:0], FEATURES, 8'd1
     };
     function [255:0] reversed(input [255:0] bytes);
         integer i;
@@ -135,8 +140,8 @@ module program_loader #(
         if (DAC_BITS < 8 || DAC_BITS > 24) begin : guard_3
             program_loader_DAC_BITS_is_not_8_to_24 stop ();
         end
-        if (X_INTERPOLATED < 0 || X_INTERPOLATED > 1) begin : guard_4
-            program_loader_X_INTERPOLATED_is_not_0_to_1 stop ();
+        if (X_INTERPOLATED != 0 && X_INTERPOLATED != 1 && X_INTERPOLATED != 3) begin : guard_4
+            program_loader_X_INTERPOLATED_is_not_0_1_or_3 stop ();
         end
         if (X_INDEX_BITS < 2 || X_INDEX_BITS > 16) begin : guard_5
             program_loader_X_INDEX_BITS_is_not_2_to_16 stop ();
@@ -144,8 +149,8 @@ module program_loader #(
         if (X_WORD_BITS < 8 || X_WORD_BITS > 24) begin : guard_6
             program_loader_X_WORD_BITS_is_not_8_to_24 stop ();
         end
-        if (Y_INTERPOLATED < 0 || Y_INTERPOLATED > 1) begin : guard_7
-            program_loader_Y_INTERPOLATED_is_not_0_to_1 stop ();
+        if (Y_INTERPOLATED != 0 && Y_INTERPOLATED != 1 && Y_INTERPOLATED != 3) begin : guard_7
+            program_loader_Y_INTERPOLATED_is_not_0_1_or_3 stop ();
         end
         if (Y_INDEX_BITS < 2 || Y_INDEX_BITS > 16) begin : guard_8
             program_loader_Y_INDEX_BITS_is_not_2_to_16 stop ();
@@ -182,6 +187,18 @@ module program_loader #(
         end
         if (SHAPING < 0 || SHAPING > 3) begin : guard_19
             program_loader_SHAPING_is_not_0_to_3 stop ();
+        end
+        if (X_INTERPOLATED == 3 && (X_INDEX_BITS < 3 || X_INDEX_BITS > 14)) begin : guard_20
+            program_loader_X_INDEX_BITS_of_a_cubic_table_is_not_3_to_14 stop ();
+        end
+        if (X_INTERPOLATED == 3 && X_WORD_BITS > 21) begin : guard_21
+            program_loader_X_WORD_BITS_of_a_cubic_table_is_not_8_to_21 stop ();
+        end
+        if (Y_INTERPOLATED == 3 && (Y_INDEX_BITS < 3 || Y_INDEX_BITS > 14)) begin : guard_22
+            program_loader_Y_INDEX_BITS_of_a_cubic_table_is_not_3_to_14 stop ();
+        end
+        if (Y_INTERPOLATED == 3 && Y_WORD_BITS > 21) begin : guard_23
+            program_loader_Y_WORD_BITS_of_a_cubic_table_is_not_8_to_21 stop ();
         end
     endgenerate
 

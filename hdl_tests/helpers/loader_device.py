@@ -9,10 +9,12 @@ from loader_bridge import Simulation, compile_loader
 
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.registers import program_words
+from tablegen.emit.constants import DEGREES
 from tablegen.emit.memory import memory_file
 from tablegen.fixedpoint.synthesis import sine_quarter
 from tablegen.link.frames import Frame, FrameReader
-from tablegen.link.messages import ANSWER, AxisLimits, AxisShape, DeviceInfo, Feature, Request
+from tablegen.link.messages import ANSWER, SPLINE_DEGREE, AxisLimits, AxisShape, DeviceInfo, Feature, Request
+from tablegen.verification.bench import SequencerShape
 from tablegen.verification.simulate import Compiled
 
 _LINE_AT = 12  # in a status
@@ -22,7 +24,7 @@ _FIXED_BYTES = 768  # of the memory: no image
 
 
 class Loader:
-    """A compiled bench for programs of the shape of ``boot``, which it starts with.
+    """A compiled bench for programs of the ``shape`` of ``boot``, which it starts with.
 
     ``limits`` are code_min, code_max and max_step of x and of y.
     """
@@ -37,6 +39,7 @@ class Loader:
         **parameters: int | str,
     ) -> None:
         x, y = boot.x, boot.y
+        self.boot, self.shape = boot, SequencerShape.of((x, y))
         top = (1 << x.output.dac_bits) - 1
         self.info = DeviceInfo(
             version=1,
@@ -51,6 +54,7 @@ class Loader:
             y_limits=AxisLimits(*limits[1], top),
             update_rate_hz=update_rate_hz,
             shaping=int(parameters.get("SHAPING", 0)),
+            degree=SPLINE_DEGREE if "cubic" in (x.mode, y.mode) else 0,
         )
         folder.mkdir(parents=True, exist_ok=True)
         files = {
@@ -70,8 +74,10 @@ class Loader:
         self.compiled: Compiled = compile_loader(
             folder,
             {
+                "X_INTERPOLATED": DEGREES[x.mode],
                 "X_INDEX_BITS": x.index_bits,
                 "X_WORD_BITS": x.bits,
+                "Y_INTERPOLATED": DEGREES[y.mode],
                 "Y_INDEX_BITS": y.index_bits,
                 "Y_WORD_BITS": y.bits,
                 "DAC_BITS": x.output.dac_bits,

@@ -134,7 +134,8 @@ def _device(image: ProgramImage, info: DeviceInfo, scan: PreparedScan) -> list[s
         )
     if info.degree < SPLINE_DEGREE:
         found += [
-            f"{name}: a cubic table; the device plays none: compile it with DAC_SPLINE=1, or set table.mode"
+            f"{name}: a cubic table; the device plays none: build it with DAC_SPLINE=1 in C, "
+            f"{name.upper()}_INTERPOLATED=3 in Verilog, or set table.mode"
             for name, axis, _ in scan.axes
             if axis.mode == "cubic"
         ]

@@ -16,7 +16,8 @@ _ORDERS = {0: "no shaping", 1: "'first'", 2: "'first' and 'second'", 3: "all ord
 
 # For these, `detail` is an axis, plus 2 times the index of a word where there is one.
 _AXIS_REASONS = {
-    Reason.SHAPE: "its table is too long for the device, or its words have a different width; build for this device",
+    Reason.SHAPE: "its table is too long for the device, or of another mode or width of words than the device has; an "
+    "FPGA plays one mode and length; build for this device",
     Reason.PERIOD: "its period, phase step and remainder do not match; build it again",
     Reason.OUTPUT: "gain, offset, code limits or max_step are out of range or order; build it again",
     Reason.FOURIER: "its Fourier words sum to 4.0 or more, too much for the device; upload --as table",
