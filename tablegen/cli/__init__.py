@@ -15,6 +15,10 @@ from tablegen.cli.terminal import guard_streams
 from tablegen.interruption import endings_interrupt
 from tablegen.version import __version__
 
+# Python looks for cycles of objects whenever there are 700 more, which is nearly a tenth of a build, though almost all
+# are of modules and stay. What so many at most leave lying about between two searches is small.
+_OBJECTS_BETWEEN_SEARCHES = 50_000
+
 # Commands by name: the module in this folder, and the command in it.
 _COMMANDS = {
     "build": ("build", "build"),
@@ -98,6 +102,7 @@ def cli() -> None:
 
 def main() -> None:
     """Run the command line and exit with its status."""
+    gc.set_threshold(_OBJECTS_BETWEEN_SEARCHES)
     status = _run()
     gc.freeze()  # all goes with the process: to look for cycles in it first is a tenth of what a build takes
     sys.exit(status)

@@ -1,5 +1,6 @@
 """Fourier words, and the integer synthesis that renders them into table words on the host and on the device alike."""
 
+from collections.abc import Iterator
 from functools import lru_cache
 
 import numpy as np
@@ -14,6 +15,7 @@ FRACTION_BITS = 30  # Q2.30: |s| <= 1 bounds every coefficient by 4/pi
 SINE_FRACTION_BITS = 30
 ACCUMULATOR_BITS = 64
 _KEPT = 1 << 16  # words of the longest sine table that is kept
+_KEPT_WAVES = 1 << 17  # words of the cosines of all harmonics that are kept, and as many of the sines: 2 MB
 
 
 class FourierWords(Struct, frozen=True, eq=False):
@@ -92,6 +94,27 @@ def sine_periods(index_bits: int) -> Ints:
     return np.concatenate([sines, sines[: len(sines) // 4]])
 
 
+def _waves(length: int, harmonics: int) -> Iterator[tuple[Ints, Ints]]:
+    """C[n k mod length] and S[n k mod length] for k in [0, length / 2], for n = 1..harmonics."""
+    sines = sine_table(length)
+    if length % 4 == 0:
+        cosines = np.roll(sines, -(length // 4))
+    else:
+        value = sine(np.arange(length) / length + 0.25) * float(1 << SINE_FRACTION_BITS)
+        cosines = np.where(value < 0.0, -round_half_up(-value), round_half_up(value))
+    for at in multiples(np.arange(length // 2 + 1, dtype=np.int64), length, harmonics):
+        yield cosines.take(at, mode="clip"), sines.take(at, mode="clip")
+
+
+@lru_cache(maxsize=4)  # tables of one length and as many harmonics are made again and again
+def _kept_waves(length: int, harmonics: int) -> tuple[Ints, Ints]:
+    cosines, sines = (np.empty((harmonics, length // 2 + 1), dtype=np.int64) for _ in "cs")
+    for n, (cosine, sine_) in enumerate(_waves(length, harmonics)):
+        cosines[n], sines[n] = cosine, sine_
+    freeze(cosines, sines)
+    return cosines, sines
+
+
 def synthesize(words: FourierWords, length: int, bits: int) -> Ints:
     """Table words k = 0..length-1: saturate(round(2^(bits-1) s(k / length))), ties up, int64 of shape (length,).
 
@@ -99,19 +122,17 @@ def synthesize(words: FourierWords, length: int, bits: int) -> Ints:
     terms and any use of symmetry do not matter; C[j] is S[j + length/4], or the cosine rounded alike
     where the length is not divisible by 4. Then one rounding shift by 60 - (bits - 1).
     """
-    sines = sine_table(length)
-    if length % 4 == 0:
-        cosines = np.roll(sines, -(length // 4))
-    else:
-        value = sine(np.arange(length) / length + 0.25) * float(1 << SINE_FRACTION_BITS)
-        cosines = np.where(value < 0.0, -round_half_up(-value), round_half_up(value))
     accumulator = np.full(length, words.a0 << SINE_FRACTION_BITS, dtype=np.int64)
     # Word length - k has the cosines of word k, and its sines with the other sign.
     k = np.arange(length // 2 + 1, dtype=np.int64)
-    even, odd = np.zeros_like(k), np.zeros_like(k)
-    for n, at in enumerate(multiples(k, length, words.harmonics)):
-        even += words.a[n] * cosines.take(at, mode="clip")
-        odd += words.b[n] * sines.take(at, mode="clip")
+    if len(k) * words.harmonics <= _KEPT_WAVES:
+        cosines, sines = _kept_waves(length, words.harmonics)
+        even, odd = words.a @ cosines, words.b @ sines
+    else:
+        even, odd = np.zeros_like(k), np.zeros_like(k)
+        for n, (cosine, sine_) in enumerate(_waves(length, words.harmonics)):
+            even += words.a[n] * cosine
+            odd += words.b[n] * sine_
     accumulator[k] += even + odd
     accumulator[length - k[1 : (length + 1) // 2]] += (even - odd)[1 : (length + 1) // 2]
     return saturate(shift_round(accumulator, FRACTION_BITS + SINE_FRACTION_BITS - (bits - 1)), bits)

@@ -44,6 +44,22 @@ def _tree_sum(values: Floats) -> Floats:
     return sums[..., 0]
 
 
+def tree_sum_down(values: Floats) -> Floats:
+    """As ``tree_sum``, of which it has every bit, but along the first axis: several times as fast with many columns."""
+    count = len(values)
+    half = (1 << max(count - 1, 0).bit_length()) // 2
+    if not half:
+        return values[0].copy() if count else np.zeros(values.shape[1:])
+    sums = np.empty((half, *values.shape[1:]))
+    np.add(values[: count - half], values[half:], out=sums[: count - half])
+    np.add(values[count - half : half], 0.0, out=sums[count - half :])
+    while half > 1:
+        half //= 2
+        sums[:half] += sums[half : 2 * half]
+    total: Floats = sums[0]
+    return total
+
+
 def folded_sum(values: Floats) -> Floats:
     """As ``tree_sum``, in another order that every machine shares, and in place: ``values`` is written over."""
     count = values.shape[-1]

@@ -5,7 +5,7 @@ import numpy as np
 from tablegen.numerics.arrays import Floats
 
 _PANEL = 32  # columns that are worked out together
-_SMALL = 192  # up to this size all columns are one panel: the whole fits the cache
+_SMALL = 112  # up to this size all columns are one panel: the whole fits the cache
 _ROWS, _COLUMNS = 32, 256  # of a tile, which then has 64 KiB
 
 

@@ -27,7 +27,7 @@ from tablegen.planning.refinement_layer import learnt_layer
 from tablegen.planning.settling import settle_lines
 from tablegen.planning.shaping_choice import chosen_shaping
 from tablegen.planning.table_choice import TableChoice, asked_of, choose, possible_shapes, written_shape
-from tablegen.planning.table_maker import StoredWave, TableMaker
+from tablegen.planning.table_maker import TableMaker
 from tablegen.planning.table_search import TableSearch
 from tablegen.planning.timing import make_schedule
 from tablegen.problems import Problems
@@ -223,9 +223,8 @@ def _line_plan(setup: Setup, axis: Literal["x", "y"], schedule: Schedule, proble
         hold=hold,
         output=make_output(hardware.dac, converter, drive.driver, park_v, shaping),
     )
-    as_asked = StoredWave(series)
-    feasible.check_words(as_asked)
-    feasible.check_range(drive, converter, *as_asked.reach, shaping)
+    feasible.check_words(maker.as_asked)
+    feasible.check_range(drive, converter, *maker.as_asked.reach, shaping)
     shape, asked = written_shape(scan.table, period), asked_of(scan.table, setup.scan.limits, shaping.order > 0)
     if asked is not None and len(problems.found) == before:
         with problems.at(file, f"{axis}.table.{'mode' if scan.table.max_error_lsb is None else 'max_error_lsb'}"):

@@ -60,9 +60,16 @@ class TableMaker(Struct, frozen=True, eq=False):
     output: Output
     _stored: dict[int, StoredWave] = field(default_factory=dict)  # by the words of a spline, 0 for the waveform itself
 
+    @property
+    def as_asked(self) -> StoredWave:
+        """The waveform itself."""
+        return self._stored_by(0)
+
     def stored(self, shape: TableShape) -> StoredWave:
         """What the words of a shape are values of: the waveform, or the spline that is nearest to it."""
-        length = shape.length if shape.mode == "cubic" else 0
+        return self._stored_by(shape.length if shape.mode == "cubic" else 0)
+
+    def _stored_by(self, length: int) -> StoredWave:
         if length not in self._stored:
             factors = spline_factors(self.series.harmonics, length) if length else None
             self._stored[length] = StoredWave(self.series if factors is None else self.series.times(*factors))

@@ -52,12 +52,12 @@ class FourierSeries(Struct, frozen=True, eq=False, dict=True):
         total = np.full(count, self.a0 if derivative == 0 else 0.0)
         kept = count * self.harmonics <= _KEPT
         cosines, sines = np.empty(count), np.empty(count)
-        for n, (s, c) in enumerate((_kept_waves if kept else _waves)(count, self.harmonics), 1):
-            a, b = self._factors(n, derivative)
-            np.multiply(c, a, out=cosines)
-            np.multiply(s, b, out=sines)
-            cosines += sines
-            total += cosines
+        waves = (_kept_waves if kept else _waves)(count, self.harmonics)
+        for (a, b), (s, c) in zip(self._all_factors(derivative), waves, strict=True):
+            np.multiply(c, a, cosines)
+            np.multiply(s, b, sines)
+            np.add(cosines, sines, cosines)
+            np.add(total, cosines, total)
         return total
 
     def term(self, n: int, derivative: int, s: Floats, c: Floats) -> Floats:
@@ -67,11 +67,12 @@ class FourierSeries(Struct, frozen=True, eq=False, dict=True):
 
     def _factors(self, n: int, derivative: int) -> tuple[float, float]:
         """Of the cosine and of the sine of harmonic n in a derivative."""
-        a, b = float(self.a[n - 1]), float(self.b[n - 1])
-        for _ in range(derivative % 4):  # d/dt turns (a, b) into 2 pi n (b, -a)
-            a, b = b, -a
-        factor = (tau * n) ** derivative
-        return factor * a, factor * b
+        return _differentiated(n, float(self.a[n - 1]), float(self.b[n - 1]), derivative)
+
+    def _all_factors(self, derivative: int) -> list[tuple[float, float]]:
+        """Those of all harmonics in order."""
+        pairs = zip(self.a.tolist(), self.b.tolist(), strict=True)
+        return [_differentiated(n, a, b, derivative) for n, (a, b) in enumerate(pairs, 1)]
 
     def peak_slope(self) -> float:
         """max |w'| per period, on a grid of 32 points per period of the highest harmonic."""
@@ -101,6 +102,13 @@ class FourierSeries(Struct, frozen=True, eq=False, dict=True):
     def times(self, real: Floats, imaginary: Floats) -> "FourierSeries":
         """The series with harmonic n multiplied by real[n - 1] + i imaginary[n - 1]; the mean stays."""
         return FourierSeries(self.a0, self.a * real + self.b * imaginary, self.b * real - self.a * imaginary)
+
+
+def _differentiated(n: int, a: float, b: float, derivative: int) -> tuple[float, float]:
+    for _ in range(derivative % 4):  # d/dt turns (a, b) into 2 pi n (b, -a)
+        a, b = b, -a
+    factor = (tau * n) ** derivative
+    return factor * a, factor * b
 
 
 def values(t: FloatsLike, *asked: tuple[FourierSeries, int]) -> tuple[Floats, ...]:

@@ -17,7 +17,7 @@ from math import tau
 
 import numpy as np
 
-from tablegen.numerics.arrays import Floats, tree_sum
+from tablegen.numerics.arrays import Floats, tree_sum, tree_sum_down
 from tablegen.numerics.linear import Cholesky
 from tablegen.numerics.turns import cosine, sine_and_cosine
 from tablegen.problems import Unphysical
@@ -31,7 +31,7 @@ SMOOTHNESS = 1e-12
 # Where the fit would leave [0, 1] its extremes are held this far inside.
 _RANGE_MARGIN = 1e-3
 _MAX_RANGE_ROUNDS = 40
-_BLOCK = 1 << 16  # sines and cosines that are worked out together, and kept where they are all of a window: 1 MB
+_BLOCK = 1 << 17  # sines and cosines that are worked out together, and kept where they are all of a window: 2 MB
 
 
 def fit_window(shape: WaveformShape, harmonics: int, window: tuple[float, float], both: bool) -> FourierSeries:
@@ -117,16 +117,17 @@ def _sums(times: Floats, weights: Sequence[Floats], highest: int) -> list[tuple[
     for first in range(0, highest + 1, rows):
         block = slice(first, min(first + rows, highest + 1))
         s, c = waves(times.tobytes(), block.start, block.stop)
+        products = np.empty_like(s)
         for weight, (cosines, sines) in zip(weights, found, strict=True):
-            cosines[block] = tree_sum(c * weight) / count
-            sines[block] = tree_sum(s * weight) / count
+            cosines[block] = tree_sum_down(np.multiply(c, weight[:, None], out=products)) / count
+            sines[block] = tree_sum_down(np.multiply(s, weight[:, None], out=products)) / count
     return found
 
 
 def _waves(times: bytes, first: int, stop: int) -> tuple[Floats, Floats]:
-    """Sine and cosine of harmonics [first, stop) at times, each (harmonics, times)."""
+    """Sine and cosine of harmonics [first, stop) at times, each (times, harmonics)."""
     n = np.arange(first, stop, dtype=np.float64)
-    return sine_and_cosine(n[:, None] * np.frombuffer(times)[None, :])
+    return sine_and_cosine(np.frombuffer(times)[:, None] * n[None, :])
 
 
 _kept_waves = lru_cache(maxsize=4)(_waves)  # in a batch the windows of both axes are often the same

@@ -1,7 +1,5 @@
 """Fits that say nothing about the scanner are told from those that do, for each kind of calibration."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from calibrating import (
@@ -15,6 +13,7 @@ from calibrating import (
     actual,
     apparent,
 )
+from replacing import replace
 
 from tablegen.calibration.branch import MeasuredBranch
 from tablegen.calibration.doubts import doubts

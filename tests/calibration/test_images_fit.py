@@ -1,12 +1,11 @@
 """Images to branches: whatever the sample, its angle, drift, window and levelling; and what is refused."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from calibrating import AMPLITUDES, V_MAX, Sample, Scanner, grating, grown, lattice
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from replacing import replace
 
 from tablegen.calibration.estimate import Estimate
 from tablegen.calibration.image_fit import ImageFit, fit_pair

@@ -1,7 +1,6 @@
 """The slow axis on an operator: traces at the turn and the rates of frames, and what the emitted integers image."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -9,6 +8,7 @@ import numpy as np
 import pytest
 from editing import SCAN, SCANNER, edited
 from foreign_plants import BoucWen, ForeignPlant, ManyPlays, record
+from replacing import replace
 
 from tablegen.calibration.hysteresis import Trace
 from tablegen.calibration.operator.creep_fit import creep_of_fields

@@ -1,7 +1,6 @@
 """What messages and results claim of a device, against what it really has: nothing is claimed that was not answered."""
 
 import re
-from dataclasses import replace
 from random import Random
 
 import pytest
@@ -10,6 +9,7 @@ from client_rig import LARGE, LARGE_INFO, TABLE, LoseOnce, Watched, client, mode
 from link_faults import Chances
 from link_line import Line
 from link_programs import INFO
+from replacing import replace
 
 from tablegen.link.device import Device
 from tablegen.link.errors import LinkError, LinkLost, OutOfTime

@@ -1,7 +1,6 @@
 """Long ways, slow lines and lost frames: uploads and readbacks end well, and cost little more than their bytes."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from itertools import pairwise
 from random import Random
 from unittest.mock import patch
@@ -13,6 +12,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from link_faults import Chances
 from link_line import Line
+from replacing import replace
 
 from tablegen.link.device import Device
 from tablegen.link.errors import LinkError, OutOfTime

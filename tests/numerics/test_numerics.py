@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tablegen.numerics.arrays import tree_sum
+from tablegen.numerics.arrays import tree_sum, tree_sum_down
 from tablegen.numerics.elementary import exp, log10
 from tablegen.numerics.linear import Cholesky
 from tablegen.numerics.turns import cosine, sinc, sine, sine_and_cosine, spherical_bessel_1
@@ -69,6 +69,7 @@ def test_log10_is_correctly_rounded(x: float) -> None:
 def test_tree_sum_is_a_sum(size: int, seed: int) -> None:
     values = np.random.default_rng(seed).standard_normal((3, size))
     assert tree_sum(values) == pytest.approx([float(mp.fsum(row.tolist())) for row in values], abs=1e-12)
+    assert tree_sum_down(values.T).tobytes() == tree_sum(values).tobytes()
 
 
 @pytest.mark.parametrize("size", [1, 2, 7, 65])

@@ -3,7 +3,6 @@
 import os
 import re
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -13,6 +12,7 @@ import pytest
 from chart_rules import drawn_charts, faults, text_faults
 from editing import run
 from plotting_lab import PLOTTING, REPORTING, make_lab
+from replacing import replace
 from sets import quick
 
 from tablegen.cli import cli

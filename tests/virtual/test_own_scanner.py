@@ -1,11 +1,11 @@
 """The scanner file's own operator as the virtual scanner: it is that operator, and wrong by what it is uncertain."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from operator_files import REVERSIBLE, STROKES, THRESHOLDS, WEIGHTS, operator_file, write_operator_scan
+from replacing import replace
 
 from tablegen.compensation.dynamics import SecondOrder
 from tablegen.compensation.operator.file import read_operator
