@@ -32,7 +32,7 @@ from tablegen.verification.c_bench import (
     script_words,
     storage_bits,
 )
-from tablegen.verification.capture import make_capture
+from tablegen.verification.capture import make_capture, recaptured
 from tablegen.verification.checks import (
     Check,
     check_codes,
@@ -124,7 +124,8 @@ class CTarget:
         try:
             progress(f"compiling and playing {ticks} ticks, many a call")
             fill = _played(work, self.machine, text, ticks, {**wanted, "fill": _MAX_FILL_TICKS})
-            filled = make_capture(stored, script, _packed(fill.capture, stored))
+            codes = _packed(fill.capture, stored)
+            filled = recaptured(capture, codes) or make_capture(stored, script, codes)
             checks.append(check_filled(filled, _states(script, fill), fill.counts, script.all_counts))
         except (SimulationFailed, OSError, ValueError) as error:
             checks.append(Check("fill", "integer model", f"{ticks} ticks", failure=f"fill: {error}"))

@@ -1,7 +1,7 @@
 """What was stored against the integer model, the float waveform, and the limits of the programs that played."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -289,8 +289,6 @@ def check_filled(capture: Capture, states: Check, counted: list[int], counts: li
 
 
 def _with(capture: Capture, got: Any, wanted: Any) -> Capture:
-    from dataclasses import replace
-
     return replace(capture, got=got, wanted=wanted)
 
 
