@@ -52,6 +52,12 @@ def part(subject: str, words: Words) -> Ints:
     return (words >> np.uint64(shift) & np.uint64(mask)).view(np.int64)
 
 
+def differing(subject: str, capture: Capture) -> Ints:
+    """The ticks at which a field of what was stored is not that of the model."""
+    shift, mask = _MASK[subject]
+    return np.flatnonzero((capture.got ^ capture.wanted) & np.uint64(mask << shift))
+
+
 def without_faults(words: Words) -> Words:
     """Stored words whose faults are none."""
     kept: Words = words & ~np.uint64(_MASK["faults"][1] << _MASK["faults"][0])
