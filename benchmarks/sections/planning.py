@@ -109,5 +109,6 @@ def notes(firsts: dict[str, list[float]], many: list[float]) -> list[str]:
         f"The first files of a process take {files / many[2]:.0f} times those of a later one: Jinja compiles its "
         "templates.",
         "Many harmonics: sums of sines over the nodes, which make the normal equations of the window's fit, and their "
-        "Cholesky factorisation in a fixed order. Many ticks: the certificate finds each tick at which a code changes.",
+        "Cholesky factorisation in a fixed order. Many ticks: the certificate finds each tick at which a code changes, "
+        "and measures errors where runs of one code begin and end.",
     ]

@@ -1,6 +1,6 @@
 """What was stored of a session beside what the model has, and where in which program each tick was."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -49,13 +49,24 @@ class Capture:
 def part(subject: str, words: Words) -> Ints:
     """A field of stored words: x, y, markers, or faults."""
     shift, mask = _MASK[subject]
-    return (words >> np.uint64(shift) & np.uint64(mask)).astype(np.int64)
+    return (words >> np.uint64(shift) & np.uint64(mask)).view(np.int64)
+
+
+def differing(subject: str, capture: Capture) -> Ints:
+    """The ticks at which a field of what was stored is not that of the model."""
+    shift, mask = _MASK[subject]
+    return np.flatnonzero((capture.got ^ capture.wanted) & np.uint64(mask << shift))
 
 
 def without_faults(words: Words) -> Words:
     """Stored words whose faults are none."""
     kept: Words = words & ~np.uint64(_MASK["faults"][1] << _MASK["faults"][0])
     return kept
+
+
+def recaptured(capture: Capture, got: Words) -> Capture | None:
+    """The same session played once more, where as much came of it as before."""
+    return None if capture.lost or len(got) != len(capture.got) else replace(capture, got=got)
 
 
 def make_capture(stored: StoredBuild, script: Script, got: Words) -> Capture:

@@ -11,7 +11,7 @@ import numpy as np
 
 from tablegen.fixedpoint.runs import runs_of
 from tablegen.manifest.fields import ManifestAxis, ManifestSeries
-from tablegen.numerics.arrays import Floats, Ints
+from tablegen.numerics.arrays import Floats, Ints, merged
 from tablegen.verification.shaped import MOST_TICKS, ShapedPlay, code_excess, step_excess
 
 _MOST_ADVANCES = 1 << 22  # of a period whose every advance is looked at
@@ -80,7 +80,7 @@ class PlayedPeriod:
     @property
     def edges(self) -> Ints:
         """Ticks at which a run of one code begins or ends."""
-        return np.union1d(self.runs.starts, self.runs.lasts)
+        return merged(self.runs.starts, self.runs.lasts)
 
     def errors(self, k: Ints) -> Floats:
         """Code less the unrounded code of the waveform, at ticks k, of any period."""

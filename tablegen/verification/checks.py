@@ -1,7 +1,7 @@
 """What was stored against the integer model, the float waveform, and the limits of the programs that played."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -9,7 +9,7 @@ import numpy as np
 from tablegen.manifest.fields import ManifestAxis
 from tablegen.manifest.read import StoredBuild
 from tablegen.numerics.arrays import Floats, Ints, distinct
-from tablegen.verification.capture import UNDEFINED, Capture, part, without_faults
+from tablegen.verification.capture import UNDEFINED, Capture, differing, part, without_faults
 from tablegen.verification.shaped import shaped_codes
 from tablegen.verification.stream import FAULTS, FLAGS, STATES, Sample, StoredState
 
@@ -58,11 +58,11 @@ def check_codes(capture: Capture, stored: StoredBuild, sent: Mapping[str, Ints])
 
 
 def _model(capture: Capture, subject: str) -> Check:
-    got, wanted = part(subject, capture.got), part(subject, capture.wanted)
-    differs = np.flatnonzero(got != wanted)
+    differs = differing(subject, capture)
     failure = None
     worst = "0"
     if len(differs):
+        got, wanted = part(subject, capture.got), part(subject, capture.wanted)
         at = int(differs[0])
         undefined = capture.got[at] == UNDEFINED
         if subject == "markers":
@@ -72,13 +72,13 @@ def _model(capture: Capture, subject: str) -> Check:
             expected, found = str(wanted[at]), str(got[at])
             worst = str(int(np.max(np.abs(got - wanted)[capture.known], initial=0)))
         failure = (
-            f"{subject}: {len(differs)} of {len(got)} ticks differ from the model, the first at "
+            f"{subject}: {len(differs)} of {len(capture.got)} ticks differ from the model, the first at "
             f"{_where(capture, at)}: expected {expected}, got {'undefined' if undefined else found}"
         )
     elif capture.lost:
         failure = f"{subject}: {capture.lost} ticks are missing or too many at the end of the capture"
     unit = "ticks" if subject == "markers" else "codes"
-    return Check(subject, "integer model", f"{len(got)} {unit}", worst, "0", failure)
+    return Check(subject, "integer model", f"{len(capture.got)} {unit}", worst, "0", failure)
 
 
 def check_waveform(capture: Capture, stored: StoredBuild, limits: Mapping[str, float]) -> list[Check]:
@@ -179,20 +179,19 @@ def check_no_faults(capture: Capture) -> Check:
 
 def check_faults(capture: Capture, counted: list[int], counts: list[int]) -> Check:
     """Faults on purpose equal the model's, tick for tick, and so do their ``counted`` numbers at the end."""
-    got, wanted = part("faults", capture.got), part("faults", capture.wanted)
-    wrong = np.flatnonzero(got != wanted)
+    wanted, wrong = part("faults", capture.wanted), differing("faults", capture)
     failure = None
     if len(wrong):
-        at = int(wrong[0])
+        got, at = part("faults", capture.got), int(wrong[0])
         failure = (
-            f"faults: {len(wrong)} of {len(got)} ticks differ from the model, the first at "
+            f"faults: {len(wrong)} of {len(wanted)} ticks differ from the model, the first at "
             f"{_where(capture, at)}: expected {_raised(int(wanted[at]))}, got {_raised(int(got[at]))}"
         )
     elif counted != counts:
         failure = f"faults: expected are {_counts(counts)}; counted are {_counts(counted)}"
-    seen = [name for bit, name in enumerate(FAULTS) if np.any(wanted >> bit & 1)]
+    seen = [name for bit, name in enumerate(FAULTS) if np.any(wanted & 1 << bit)]
     return Check(
-        "faults", "integer model", f"{len(got)} ticks: {', '.join(seen)}", f"{len(wrong)} differ", "0", failure
+        "faults", "integer model", f"{len(wanted)} ticks: {', '.join(seen)}", f"{len(wrong)} differ", "0", failure
     )
 
 
@@ -289,8 +288,6 @@ def check_filled(capture: Capture, states: Check, counted: list[int], counts: li
 
 
 def _with(capture: Capture, got: Any, wanted: Any) -> Capture:
-    from dataclasses import replace
-
     return replace(capture, got=got, wanted=wanted)
 
 

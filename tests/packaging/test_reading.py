@@ -32,6 +32,7 @@ ALLOWED = {
     ("verification/simulate.py", "shutil.copy"): "a compiled model, whose bytes were held against its name",
     ("verification/model_cache.py", "shutil.copy"): "what it has compiled",
     ("verification/elf.py", "open"): "what it has compiled",
+    ("verification/c_play.py", "open"): "its own record, to write it",
     ("verification/c_play.py", "read_bytes"): "its own script",
     ("verification/c_target.py", "read_text"): "its own script",
     ("verification/verilog_bench.py", "read_text"): "its own record",

@@ -515,6 +515,30 @@ def test_a_runtime_that_crashes_is_a_failed_check(folder: Path) -> None:
     assert re.search(r"program: the bench ended with status -\d+", outcome.err)
 
 
+@pytest.mark.common
+def test_a_runtime_that_writes_without_end_is_ended(folder: Path) -> None:
+    """Before it has filled the disk."""
+    substitute(folder / "dac_sequencer.c", r"(void dac_sequencer_step\(.*\)\n{\n)", r"\1    for (;;) putchar(0);\n")
+    substitute(folder / "dac_sequencer.c", r"\A", "#include <stdio.h>\n")
+    outcome = verify(folder)
+    assert outcome.status == 5
+    assert re.search(r"program: the bench ended with status -\d+", outcome.err)
+
+
+@pytest.mark.common
+def test_a_record_too_many_is_found(folder: Path) -> None:
+    """The first tick is written twice, so that those after it come late."""
+    substitute(
+        folder / "dac_sequencer.c",
+        r"(void dac_sequencer_step\(.*\)\n{\n)",
+        r"\1    static int more = 16; for (; more > 0; more--) putchar(0);\n",
+    )
+    substitute(folder / "dac_sequencer.c", r"\A", "#include <stdio.h>\n")
+    outcome = verify(folder)
+    assert outcome.status == 5
+    assert {("x", "integer model"), ("y", "integer model")} <= failed(outcome)
+
+
 def endless(folder: Path) -> None:
     """Let no tick ever end."""
     substitute(
