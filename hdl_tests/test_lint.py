@@ -47,6 +47,19 @@ SEQUENCERS: dict[str, Mapping[str, int | str]] = {
         for order in (1, 2, 3)
         for kind in ("digits", "plain", "low_area")
     },
+    **{
+        f"cubic_words_{words}_converter_{converter}_{kind}": {
+            "X_INTERPOLATED": 3,
+            "Y_INTERPOLATED": other,
+            "DAC_BITS": converter,
+            "X_WORD_BITS": words,
+            "PLAIN_MULTIPLIER": kind == "plain",
+            "LOW_AREA": kind == "low_area",
+            "SHAPING": shaping,
+        }
+        for words, converter, other, shaping in ((14, 16, 3, 0), (8, 24, 1, 3), (21, 8, 0, 1), (21, 20, 1, 0))
+        for kind in ("digits", "plain", "low_area")
+    },
     "short": {"TICK_BITS": 6, "LINE_BITS": 4, "PERIOD_BITS": 9, "COUNT_BITS": 4, "X_INDEX_BITS": 4, "Y_INDEX_BITS": 3},
     "long": {"TICK_BITS": 30, "LINE_BITS": 16, "COUNT_BITS": 32, "X_INDEX_BITS": 14, "Y_INDEX_BITS": 5},
     "power_up_codes": {"X_POWER_UP_CODE": "64'hffff", "Y_POWER_UP_CODE": "64'h8000"},

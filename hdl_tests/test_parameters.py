@@ -19,14 +19,15 @@ PUBLIC = ("dac_sequencer", "program_loader", "dac_boot", "dac_fourier", "dac_cod
 Values = Mapping[str, int | str]
 
 FOURIER = {"FOURIER": 1, "X_WORD_BITS": 32, "Y_WORD_BITS": 32, "X_WORDS": 3, "Y_WORDS": 3, "X_HARMONICS": 1}
+CUBIC = {"X_INTERPOLATED": 3, "Y_INTERPOLATED": 3}
 BOOT = FOURIER | {"Y_HARMONICS": 1}
 # What is illegal, and the reason that a tool gives.
 ILLEGAL: dict[str, list[tuple[Values, str]]] = {
     "dac_sequencer": [
         ({"DAC_BITS": 7}, "DAC_BITS_is_not_8_to_24"),
         ({"DAC_BITS": 25}, "DAC_BITS_is_not_8_to_24"),
-        ({"X_INTERPOLATED": 2}, "X_INTERPOLATED_is_not_0_to_1"),
-        ({"Y_INTERPOLATED": 2}, "Y_INTERPOLATED_is_not_0_to_1"),
+        ({"X_INTERPOLATED": 2}, "X_INTERPOLATED_is_not_0_1_or_3"),
+        ({"Y_INTERPOLATED": 4}, "Y_INTERPOLATED_is_not_0_1_or_3"),
         ({"X_INDEX_BITS": 17}, "X_INDEX_BITS_is_not_2_to_16"),
         ({"Y_INDEX_BITS": 1}, "Y_INDEX_BITS_is_not_2_to_16"),
         ({"X_WORD_BITS": 25}, "X_WORD_BITS_is_not_8_to_24"),
@@ -46,6 +47,10 @@ ILLEGAL: dict[str, list[tuple[Values, str]]] = {
         ({"HARMONICS": 513, "FOURIER": 1}, "HARMONICS_is_not_1_to_512"),
         ({"X_INDEX_BITS": 2, "FOURIER": 1}, "X_INDEX_BITS_is_not_3_to_16"),
         ({"SHAPING": 4}, "SHAPING_is_not_0_to_3"),
+        ({**CUBIC, "X_INDEX_BITS": 2}, "X_INDEX_BITS_of_a_cubic_table_is_not_3_to_14"),
+        ({**CUBIC, "X_WORD_BITS": 22}, "X_WORD_BITS_of_a_cubic_table_is_not_8_to_21"),
+        ({**CUBIC, "Y_INDEX_BITS": 15}, "Y_INDEX_BITS_of_a_cubic_table_is_not_3_to_14"),
+        ({**CUBIC, "Y_WORD_BITS": 24}, "Y_WORD_BITS_of_a_cubic_table_is_not_8_to_21"),
         ({"X_POWER_UP_CODE": 65536}, "X_POWER_UP_CODE_has_more_than_DAC_BITS"),
         ({"Y_POWER_UP_CODE": 256, "DAC_BITS": 8}, "Y_POWER_UP_CODE_has_more_than_DAC_BITS"),
     ],
@@ -132,6 +137,7 @@ ILLEGAL: dict[str, list[tuple[Values, str]]] = {
 # Everything at the lower end of its range, and at the upper.
 SMALL = {"X_INDEX_BITS": 2, "Y_INDEX_BITS": 2, "X_WORD_BITS": 8, "Y_WORD_BITS": 8, "DAC_BITS": 8}
 LARGE = {"X_INDEX_BITS": 16, "Y_INDEX_BITS": 16, "X_WORD_BITS": 24, "Y_WORD_BITS": 24, "DAC_BITS": 24}
+LONG_SPLINE = {"X_INDEX_BITS": 14, "Y_INDEX_BITS": 14, "X_WORD_BITS": 21, "Y_WORD_BITS": 21}
 TOP = "64'hffffff"
 LEGAL: dict[str, list[Values]] = {
     "dac_sequencer": [
@@ -141,6 +147,10 @@ LEGAL: dict[str, list[Values]] = {
         {**LARGE, "TICK_BITS": 30, "LINE_BITS": 16, "PERIOD_BITS": 31, "COUNT_BITS": 32, "X_POWER_UP_CODE": TOP},
         {**SMALL, "SHAPING": 1},
         {**LARGE, "SHAPING": 3, "PLAIN_MULTIPLIER": 1},
+        {**SMALL, **CUBIC, "X_INDEX_BITS": 3, "Y_INDEX_BITS": 3, "TICK_BITS": 3, "PERIOD_BITS": 1},
+        {**SMALL, **CUBIC, "X_INDEX_BITS": 3, "Y_INDEX_BITS": 3, "LOW_AREA": 1},
+        {**LARGE, **CUBIC, **LONG_SPLINE, "TICK_BITS": 30, "SHAPING": 3, "FOURIER": 1},
+        {**LARGE, **CUBIC, **LONG_SPLINE, "TICK_BITS": 30, "LOW_AREA": 1, "SHAPING": 1},
         {**LARGE, "TICK_BITS": 30, "LOW_AREA": 1, "FOURIER": 1, "HARMONICS": 512, "Y_POWER_UP_CODE": TOP},
     ],
     "program_loader": [

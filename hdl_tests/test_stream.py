@@ -5,11 +5,12 @@ Icarus plays every case, Verilator the long ones. Programs of plans are in ``tes
 ``test_stream_swaps.py``.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from programs import random_dual, shaped
+from programs import extreme, random_dual, shaped
 from sets import common
 from stream_benches import HARMONICS, equal, with_sine
 from stream_configurations import (
@@ -21,6 +22,8 @@ from stream_configurations import (
     SCANNER,
     SCANNER_PACE,
     SMALL,
+    SPLINE_LOW_AREA_PACES,
+    SPLINE_PACE,
 )
 from stream_plans import PLANS, planned
 from stream_scripts import (
@@ -103,6 +106,27 @@ def test_remainders_begin_anew_with_every_program(order: int, pace: int, tmp_pat
     swaps_at_every_tick(script, (second, shaped(rng, first, order)))
     equal(SequencerBench("icarus", SMALL, tmp_path, {"SHAPING": order}), script)
     assert script.swaps > 16
+
+
+@pytest.mark.common
+@pytest.mark.parametrize("name", ["cubic_x", "cubic_y_lines_plain", "cubic_low_area"])
+def test_splines_of_extreme_words(name: str, tmp_path: Path) -> None:
+    """Only the least word and the greatest one, so that the sums are as large as they can be."""
+    configuration = CONFIGURATIONS[name]
+    rng, script = np.random.default_rng(7), Script(drain=configuration.placement.drain_clocks)
+    for _ in range(6):
+        program = random_dual(rng, configuration.shape, (16, 24), kind="tame", lines=(3, 5))
+        program = replace(program, x=extreme(rng, program.x), y=extreme(rng, program.y))
+        script.load(program)
+        script.pace(configuration.placement.tick_clocks, configuration.placement.tick_clocks)
+        script.request("commit", "arm", program=program)
+        script.wait_ticks(3)
+        script.request("trigger")
+        script.wait_ticks(80)
+        script.request("park")
+        script.wait_ticks(3)
+    equal(SequencerBench("icarus", configuration.shape, tmp_path, dict(configuration.parameters)), script)
+    assert script.swaps == 6
 
 
 # Long runs on Verilator.
@@ -198,11 +222,20 @@ def test_an_underrun_is_a_fault(tmp_path: Path) -> None:
 
 @pytest.mark.common
 @pytest.mark.parametrize(
-    ("least", "parameters"), [(LEAST_PACE, LOW_AREA), (SCANNER_PACE, SCANNER)], ids=["low_area", "scanner"]
+    ("least", "parameters", "name"),
+    [
+        (LEAST_PACE, LOW_AREA, "settle_0"),
+        (SCANNER_PACE, SCANNER, "settle_0"),
+        (SPLINE_PACE, {}, "cubic"),
+        (SPLINE_LOW_AREA_PACES[0], LOW_AREA, "cubic"),
+    ],
+    ids=["low_area", "scanner", "cubic", "cubic_low_area"],
 )
-def test_a_tick_that_comes_too_early_is_a_fault(least: int, parameters: dict[str, int], tmp_path: Path) -> None:
+def test_a_tick_that_comes_too_early_is_a_fault(
+    least: int, parameters: dict[str, int], name: str, tmp_path: Path
+) -> None:
     """With a tick a clock earlier than the least pace every second one is refused, and the others go on as if alone."""
-    plan = planned(tmp_path, PLANS["settle_0"])
+    plan = planned(tmp_path, PLANS[name])
     program = plan.program
     script = Script()
     script.tick_every(0)

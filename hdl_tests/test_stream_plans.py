@@ -25,11 +25,12 @@ from stream_scripts import (
 from tablegen.certificate.certificate import certify
 from tablegen.resources import verilog_runtime
 from tablegen.verification.bench import SequencerBench, SequencerShape
+from tablegen.verification.placement import Placement
 from tablegen.verification.stream import Script
 
 
 @pytest.mark.common
-@pytest.mark.parametrize("name", common(("bits_16", "turn_0.7", "direct_steps", "settle_5", "guarded"), PLANS))
+@pytest.mark.parametrize("name", common(("bits_16", "turn_0.7", "direct_steps", "settle_5", "cubic", "guarded"), PLANS))
 def test_whole_frames_of_a_plan(name: str, tmp_path: Path) -> None:
     plan = planned(tmp_path, PLANS[name])
     program = plan.program
@@ -42,7 +43,7 @@ def test_whole_frames_of_a_plan(name: str, tmp_path: Path) -> None:
     park = plan.x.program.output.park_code, plan.y.program.output.park_code
     script = Script()
     script.load(program)
-    script.tick_every(1)
+    script.tick_every(Placement().playing(program).tick_clocks)
     script.request("commit", program=program)
     script.wait_ticks(100)
     script.request("arm", "trigger", frames=2)

@@ -14,6 +14,7 @@ module dac_axis #(
     parameter PERIOD_BITS = 31,
     parameter PLAIN_MULTIPLIER = 0,
     parameter SHAPING = 0,
+    parameter SPLINE = 0,
     parameter [63:0] POWER_UP_CODE = 0,
     parameter LATENCY = (PLAIN_MULTIPLIER ? 22 : 34) + (SHAPING != 0 ? 1 : 0)
 ) (

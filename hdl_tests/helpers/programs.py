@@ -111,6 +111,13 @@ def random_program(rng: Generator, shape: SequencerShape, axis: str, schedule: S
     return replace(program, output=replace(output, max_step=max(largest if kind == "smooth" else largest // 2, 1)))
 
 
+def extreme(rng: Generator, program: Program) -> Program:
+    """The tame program with words at both ends of their range, and a gain that is as much less."""
+    half = 1 << (program.bits - 1)
+    words = rng.choice(np.array([-half, half - 1]), len(program.words))
+    return replace(program, words=words, output=replace(program.output, gain_word=program.output.gain_word // 4))
+
+
 def shaped(rng: Generator, program: DualProgram, highest: int) -> DualProgram:
     """The program with an order of its own for each axis, up to the highest; the guard stays as it is."""
     axes = {}

@@ -8,12 +8,21 @@ from programs import random_dual
 from stream_scripts import random_play
 
 from tablegen.device.dual_program import DualProgram
+from tablegen.emit.constants import DEGREES
 from tablegen.verification.bench import SequencerShape
 from tablegen.verification.placement import Placement
 from tablegen.verification.stream import Script
 
 SWAPS, SWAPS_SLOW = 10_000, 100_000
-FEW = ("bits_16", "bits_18_plain", "bits_24", "small_counters", "low_area", "power_up_codes")  # in every `make test`
+FEW = (
+    "bits_16",
+    "bits_18_plain",
+    "bits_24",
+    "small_counters",
+    "low_area",
+    "cubic",
+    "power_up_codes",
+)  # in every `make test`
 SMALL = SequencerShape(16, 1, 2, 16, 1, 2, 16)  # so that an upload takes few clocks
 
 
@@ -31,11 +40,19 @@ class Configuration:
     def script(self, seed: str) -> Script:
         """Random programs back to back; the same ones for the same seed."""
         rng = np.random.default_rng(sum(seed.encode()))
-        script = Script((self.parameters.get("X_POWER_UP_CODE", 0), self.parameters.get("Y_POWER_UP_CODE", 0)))
+        codes = (self.parameters.get("X_POWER_UP_CODE", 0), self.parameters.get("Y_POWER_UP_CODE", 0))
+        script = Script(codes, drain=self.placement.drain_clocks if self.placement.spline else Script.drain)
         script.tick_every(self.paces[0])
         script.wait_ticks(5)
         random_play(rng, script, self.shape, self.samples, self.paces, self.ticks, self.lines, self.shaping)
         return script
+
+    @property
+    def placement(self) -> Placement:
+        """As it is synthesised."""
+        axis = "serial" if self.parameters.get("LOW_AREA") else "pipelined"
+        spline = DEGREES["cubic"] in (self.shape.x_interpolated, self.shape.y_interpolated)
+        return Placement(axis, shaping=self.shaping, spline=spline)
 
     @property
     def shaping(self) -> int:
@@ -50,6 +67,10 @@ LEAST_PACES = (LEAST_PACE, 64)  # clocks from tick to tick, with LOW_AREA
 FIRST, SECOND, SCANNER = ({"SHAPING": order} for order in (1, 2, 3))
 SCANNER_PACE = Placement("pipelined", shaping=3).tick_clocks
 SHAPED_LEAST_PACES = (Placement("serial", shaping=1).tick_clocks, 64)
+SPLINE_PACE = Placement("pipelined", spline=True).tick_clocks
+SPLINE_PACES = (SPLINE_PACE, 12, 40)
+SPLINE_LOW_AREA_PACES = (Placement("serial", spline=True).tick_clocks, 99)
+SHAPED_SPLINE_LOW_AREA_PACES = (Placement("serial", shaping=3, spline=True).tick_clocks,)
 CONFIGURATIONS: dict[str, Configuration] = {
     "bits_16": Configuration(SequencerShape(16, 1, 5, 16, 1, 4, 16), samples=12000),
     "bits_16_plain": Configuration(SequencerShape(16, 1, 5, 16, 1, 4, 16), PLAIN_MULTIPLIER, samples=12000),
@@ -99,6 +120,26 @@ CONFIGURATIONS: dict[str, Configuration] = {
     ),
     "second_low_area_dac_8": Configuration(
         SequencerShape(8, 0, 5, 24, 1, 3, 12), SECOND | LOW_AREA, SHAPED_LEAST_PACES, samples=800
+    ),
+    "cubic": Configuration(SequencerShape(16, 3, 5, 14, 3, 4, 16), paces=SPLINE_PACES, samples=2500),
+    "cubic_x": Configuration(SequencerShape(18, 3, 3, 21, 1, 4, 18), paces=SPLINE_PACES, samples=1500),
+    "cubic_y_plain": Configuration(
+        SequencerShape(24, 0, 5, 24, 3, 3, 8), PLAIN_MULTIPLIER, paces=SPLINE_PACES, samples=1500
+    ),
+    "cubic_y_lines_plain": Configuration(
+        SequencerShape(12, 1, 4, 22, 3, 3, 21), PLAIN_MULTIPLIER, paces=(SPLINE_PACE,), samples=1500
+    ),
+    "cubic_scanner": Configuration(
+        SequencerShape(8, 3, 3, 21, 3, 4, 8), SCANNER, paces=(SPLINE_PACE, 13), samples=1500
+    ),
+    "cubic_low_area": Configuration(
+        SequencerShape(16, 3, 4, 14, 3, 3, 21), LOW_AREA, SPLINE_LOW_AREA_PACES, samples=700
+    ),
+    "cubic_y_low_area": Configuration(
+        SequencerShape(24, 1, 3, 8, 3, 3, 8), LOW_AREA, SPLINE_LOW_AREA_PACES, samples=500
+    ),
+    "cubic_x_scanner_low_area": Configuration(
+        SequencerShape(8, 3, 3, 21, 0, 5, 12), SCANNER | LOW_AREA, SHAPED_SPLINE_LOW_AREA_PACES, samples=500
     ),
     "power_up_codes": Configuration(
         SequencerShape(16, 1, 3, 16, 0, 3, 14), {"X_POWER_UP_CODE": 65535, "Y_POWER_UP_CODE": 12345}, paces=(3, 1)

@@ -45,11 +45,17 @@ SHAPES = {
     "second": SequencerShape(16, 1, 4, 16, 1, 3, 16),
     "scanner": SequencerShape(18, 1, 3, 16, 1, 3, 18),
     "low area scanner": SequencerShape(16, 1, 3, 16, 0, 4, 12),
+    "cubic": SequencerShape(20, 3, 3, 14, 1, 3, 16),
+    "cubic low area": SequencerShape(24, 3, 3, 12, 1, 3, 12),
 }
 SHAPED = {  # parameters, paces, samples
     "second": ({"SHAPING": 2}, (1, 3), 5000),
     "scanner": ({"SHAPING": 3, "PLAIN_MULTIPLIER": 1}, (Placement("blocks", shaping=3).tick_clocks,), 4000),
     "low area scanner": ({"SHAPING": 3, "LOW_AREA": 1}, (Placement("serial", shaping=3).tick_clocks,), 800),
+}
+SPLINES = {  # parameters, how it is placed, samples
+    "cubic": ({}, Placement(spline=True), 1500),
+    "cubic low area": ({"LOW_AREA": 1}, Placement("serial", spline=True), 300),
 }
 BENCHES = tuple(SHAPES)
 
@@ -75,6 +81,10 @@ def script_of(bench: str) -> Script:
     elif bench in SHAPED:
         parameters, paces, samples = SHAPED[bench]
         random_play(rng, script, shape, samples, paces, shaping=parameters["SHAPING"])
+    elif bench in SPLINES:
+        _, placement, samples = SPLINES[bench]
+        script = Script(drain=placement.drain_clocks)
+        random_play(rng, script, shape, samples, (placement.tick_clocks, placement.tick_clocks + 9), (8, 20))
     elif bench == "low area":
         script.tick_every(LEAST_PACE)
         tame, smooth = imaging_program(rng, shape, "tame"), imaging_program(rng, shape, "smooth")
@@ -114,6 +124,8 @@ def bench_of(bench: str, folder: Path, mutant: Mutant | None = None) -> Sequence
     parameters["LOW_AREA"] = int(bench == "low area")
     if bench in SHAPED:
         parameters |= SHAPED[bench][0]
+    if bench in SPLINES:
+        parameters |= SPLINES[bench][0]
     if bench == "fourier":
         parameters |= with_sine(folder, SHAPES[bench], HARMONICS)
     return SequencerBench("icarus", SHAPES[bench], folder / "bench", parameters, sources)
@@ -164,14 +176,14 @@ def _axis() -> Iterator[Mutant]:
     yield Mutant(
         "the bank is read a clock early",
         "dac_axis",
-        "dac_delay #(.BITS(1), .CLOCKS(2)) with_phase",
-        "dac_delay #(.BITS(1), .CLOCKS(1)) with_phase",
+        "dac_delay #(.BITS(1), .CLOCKS(WAIT + 2)) with_phase",
+        "dac_delay #(.BITS(1), .CLOCKS(WAIT + 1)) with_phase",
     )
     yield Mutant(
         "the bank is read a clock late",
         "dac_axis",
-        "dac_delay #(.BITS(1), .CLOCKS(2)) with_phase",
-        "dac_delay #(.BITS(1), .CLOCKS(3)) with_phase",
+        "dac_delay #(.BITS(1), .CLOCKS(WAIT + 2)) with_phase",
+        "dac_delay #(.BITS(1), .CLOCKS(WAIT + 3)) with_phase",
     )
     yield Mutant(
         "a direct table changes bank a clock early", "dac_axis", ".CLOCKS(WAIT + 1)", ".CLOCKS(WAIT)", "direct"
@@ -742,8 +754,93 @@ def _fourier() -> Iterator[Mutant]:
     )
 
 
+def _cubic() -> Iterator[Mutant]:
+    """Splines: their words, coefficients and products, what waits for them, and their steps in low area."""
+    thrice = "{{2{%s[%s]}}, %s} + {%s[%s], %s, 1'b0};"
+    for breaks, old, new in (
+        ("word 1 is not read again", "!(ticks[1] || ticks[3])", "ticks[0] || ticks[2]"),
+        ("word 3 is word 2", "!(ticks[1] || ticks[3])", "!(ticks[0] || ticks[1] || ticks[3])"),
+        ("there is no word 2", "{ticks[0] || ticks[1], ", "{ticks[0], "),
+        ("the slope is that of a rise", "span <= rise_before + rise;", "span <= rise;"),
+        ("b0 has no bend", "{bend[WORD_BITS+1], bend} + {thrice, 1'b0}", "{thrice, 1'b0}"),
+        ("b3 is the bend before", "bend_before} - {bend[WORD_BITS+1], bend}", "bend_before}"),
+        (
+            "b1 is that of the next tick",
+            "{2{b1_quarter_on[WORD_BITS+2]}}, b1_quarter_on,",
+            "{2{b1_quarter[WORD_BITS+2]}}, b1_quarter,",
+        ),
+        ("b0 is that of the tick before", "if (ticks[THIRD]) b0_half_at_last", "if (ticks[SECOND]) b0_half_at_last"),
+        ("b0 is that of the next tick", "b0_half_at_last <= b0_half_on;", "b0_half_at_last <= b0_half;"),
+        ("digits begin a clock early", "ticks[FIRST] ? recoded", "ticks[FIRST-1] ? recoded"),
+        ("digits come late to the second product", "CLOCKS(SPACING)) to_second", "CLOCKS(SPACING + 1)) to_second"),
+        ("digits come early to the third product", "CLOCKS(SPACING)) to_third", "CLOCKS(SPACING - 1)) to_third"),
+        ("the fraction has 17 bits", "{1'b0, phase[17:0], 1'b0}", "{2'b00, phase[16:0], 1'b0}"),
+        ("the first product is rounded down", "3'd0, first_half}", "3'd0, 1'b0}"),
+        ("the second product is rounded down", "2'd0, second_half}", "2'd0, 1'b0}"),
+        ("the third product is rounded down", "1'b0, third_half}", "1'b0, 1'b0}"),
+        ("b2 is taken once", thrice % (("bend", "WORD_BITS+1", "bend") * 2), "{{2{bend[WORD_BITS+1]}}, bend};"),
+        ("b1 is taken once", thrice % (("span", "WORD_BITS", "span") * 2), "{{2{span[WORD_BITS]}}, span};"),
+        ("word 1 is taken once", thrice % (("word", "WORD_BITS-1", "word") * 2), "{{2{word[WORD_BITS-1]}}, word};"),
+    ):
+        yield Mutant(breaks, "dac_spline", old, new, "cubic")
+    for breaks, old, new in (
+        ("a negative digit has no carry", "{term, minus}", "{term, 1'b0}"),
+        (
+            "the last product goes on",
+            "if (load)\n            product <= 0;\n        else\n            product",
+            "product",
+        ),
+        ("products are not negative", "{2{product[BITS-1]}}", "2'b00"),
+        ("rounds by the bit below", "half <= total[2]", "half <= total[1]"),
+        ("a digit of 2 is 1", "{factor[BITS-1], factor, 1'b0}", "{{2{factor[BITS-1]}}, factor}"),
+        ("the factor is the next one", "if (load) factor <= sum;", "factor <= sum;"),
+    ):
+        yield Mutant(breaks, "dac_spline_step", old, new, "cubic")
+    for breaks, old, new in (
+        ("a spline reads the idle bank", ".read_bank(bank), .phase(", ".read_bank(!bank), .phase("),
+        ("the step beside a spline comes early", ".load(loads[WAIT])", ".load(loads[0])"),
+        ("the phase beside a spline does not wait", ".tick(ticks[WAIT])", ".tick(ticks[0])"),
+        ("the bank beside a spline does not wait", "CLOCKS(WAIT + 2)) with_phase", "CLOCKS(2)) with_phase"),
+    ):
+        yield Mutant(breaks, "dac_axis", old, new, "cubic")
+    yield Mutant("a spline takes a tick in 12 clocks", "dac_sequencer", "SPLINE ? 11", "SPLINE ? 12", "cubic")
+    yield Mutant(
+        "a sample is over before its spline", "dac_sequencer", "Y_INTERPOLATED == 3 ? y_done : x_done", "y_done",
+        "cubic low area",
+    )  # fmt: skip
+    for breaks, old, new in (
+        ("b3 has no word 3", ", {2'd3, 3'd7}: {twice", ": {twice"),
+        ("b3 has word 1 once", "{2'd3, 3'd3}, {2'd3, 3'd6}: ", "{2'd3, 3'd6}: "),
+        ("b2 has word 1 four times", "{2'd2, 3'd4}, ", ""),
+        ("b1 has word 0 once", "{2'd1, 3'd1}, {2'd1, 3'd6}: ", "{2'd1, 3'd6}: "),
+        ("b0 has word 1 twice", "{2'd0, 3'd2}, {2'd0, 3'd3}: ", "{2'd0, 3'd2}: "),
+        ("b3 adds word 2", "of_c0 || of_c2 :", "of_c0 :"),
+        ("b2 adds word 1", "degree == 2'd2 ? of_c1", "degree == 2'd2 ? 1'b0"),
+        ("b1 adds word 0", "degree == 2'd1 && of_c0", "1'b0"),
+    ):
+        yield Mutant(breaks, "dac_spline_terms", old, new, "cubic low area")
+    for breaks, old, new in (
+        ("words are halved", "<< degree << 1;", "<< degree;"),
+        ("b0 is left out", "step == LAST_TERM && degree == 2'd0", "step == LAST_TERM && degree == 2'd1"),
+        ("the fraction of a spline is halved", "fraction, 2'b00};", "1'b0, fraction, 1'b0};"),
+        ("products of a spline are rounded down", "1'b1} << 19;", "1'b0} << 19;"),
+        ("the last sample goes on", "step == SPLINE ? {BITS{1'b0}} : sum", "sum"),
+        ("word 3 is word 2", "step == TERMS + 2 || step == LAST_TERM}", "step == TERMS + 2}"),
+        ("word 2 is word 0", "step == TERMS + 3 || step == TERMS + 4 || ", ""),
+        ("word 0 is not read", "        if (CUBIC != 0 && step == PRODUCT_END) m <= term_word;\n", ""),
+        ("a product has nine digits", "PRODUCT_END = 6'd50", "PRODUCT_END = 6'd49"),
+        (
+            "b0 goes on in the next step",
+            "next == FROM_HERE || (next >= TERMS && !next_once)",
+            "next >= TERMS && !next_once",
+        ),
+        ("the degree of the last sample goes on", "left <= 2'd3;", "left <= left;"),
+    ):
+        yield Mutant(breaks, "dac_axis_serial", old, new, "cubic low area")
+
+
 MUTANTS: tuple[Mutant, ...] = (
-    *_axis(), *_output(), *_scan(), *_markers(), *_verdict(), *_low_area(), *_fourier(), *_shaping(),
+    *_axis(), *_output(), *_scan(), *_markers(), *_verdict(), *_low_area(), *_fourier(), *_shaping(), *_cubic(),
 )  # fmt: skip
 
 

@@ -70,6 +70,9 @@ PLANS: dict[str, Variant] = {
     "inverting": short(amplifier__gain=-10.0),
     "settle_0": _settling(0),
     "settle_5": _settling(5),
+    "cubic": short(
+        x__table={"mode": "cubic", "length": 64, "bits": 14}, y__table={"mode": "cubic", "length": 32, "bits": 16}
+    ),
     "guarded": short(amplifier__max_slew_v_per_s=40e3),
 }
 PLAIN = {"bits_12", "bits_18", "bits_24", "wide_tables_narrow_dac", "steps", "direct"}  # multiplier blocks

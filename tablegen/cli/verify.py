@@ -51,15 +51,15 @@ _CLOCKS_A_SECOND = 20_000  # that Icarus simulates, more or less
     type=click.IntRange(min=1000, max=1 << 28),
     metavar="N",
     help="Play at most N ticks of the build's own program, after some 6000 for requests and faults.  [default: "
-    "icarus 300000, verilator 3000000, both divided by 41 with --axis serial; c "
-    "3000000, cortex-m 1000000]",
+    "icarus 300000, verilator 3000000, both divided by the clocks from tick to tick: 41 with --axis serial, 11 with a "
+    "cubic table, 90 with both; c 3000000, cortex-m 1000000]",
 )
 @click.option(
     "--axis",
     type=click.Choice(("pipelined", "blocks", "serial")),
     help="Verilog variant of dac_axis: pipelined, one sample per clock, multiplies in look-up tables; blocks "
-    "(PLAIN_MULTIPLIER = 1), the same with multiplier blocks; serial (LOW_AREA = 1), smaller, 41 clocks per sample.  "
-    "[default: pipelined]",
+    "(PLAIN_MULTIPLIER = 1), the same with multiplier blocks; serial (LOW_AREA = 1), smaller, 41 clocks per sample, 90 with a "
+    "cubic table.  [default: pipelined]",
 )
 @click.option(
     "--fourier",

@@ -79,10 +79,6 @@ def message(tmp_path, *changes: str) -> list[str]:  # type: ignore[no-untyped-de
 
 def test_what_is_refused(tmp_path_factory: pytest.TempPathFactory) -> None:
     cubic = "x.table.mode = 'cubic'"
-    (why,) = message(tmp_path_factory.mktemp("verilog"), cubic, "x.table.length = 128")
-    assert why.endswith(
-        "the Verilog sequencer plays no cubic tables: leave verilog out, or set x.table.mode to 'interpolated'"
-    )
     (why,) = message(tmp_path_factory.mktemp("few"), cubic, "x.table.length = 64")
     assert why.endswith("x.band_limit.harmonics: 32 harmonics are too many; a table of 64 words carries 31")
     (why,) = message(tmp_path_factory.mktemp("length"), cubic, "x.table.length = 100")

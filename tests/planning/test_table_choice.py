@@ -19,14 +19,12 @@ from tablegen.planning import emitted_error
 from tablegen.planning.emitted_error import AskedCodes
 from tablegen.planning.line_plan import LinePlan, Plan, make_plan
 from tablegen.planning.other_table import maker_of, shape_of, with_table
-from tablegen.planning.table_choice import played_modes
 from tablegen.planning.table_search import TableSearch
-from tablegen.problems import Rejected, Unphysical
+from tablegen.problems import Rejected
 
 AUTO = {"x.table.mode": '"auto"', "x.table.length": "", "x.table.bits": ""}
-C_ALONE = {"+ [emit]\nformats": '["c"]'}  # which plays all modes
 FEW = {"x.band_limit.harmonics": "3", "limits.max_scaling_error_percent": ""}
-COARSE = {**FEW, **C_ALONE, "dac.bits": "12"}
+COARSE = {**FEW, "dac.bits": "12"}
 
 
 def asking(error: float, **keys: str) -> dict[str, str]:
@@ -196,20 +194,13 @@ def test_auto_keeps_1_lsb_or_the_limit_of_the_scan(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["c", "verilog"])
-def test_a_mode_is_chosen_that_the_formats_play(tmp_path: Path, name: str) -> None:
-    """What a format refuses is not chosen for it, and what it takes is."""
-    setup = setup_of(tmp_path, {**AUTO, "+ [emit]\nformats": f'["{name}"]'})
-    plan = make_plan(setup)
-    played = played_modes([name])
-    assert shape_of(plan.x).mode == ("cubic" if "cubic" in played else "interpolated")
+def test_every_mode_is_emitted(tmp_path: Path, name: str) -> None:
+    plan = make_plan(setup_of(tmp_path, {**AUTO, "+ [emit]\nformats": f'["{name}"]'}))
+    assert shape_of(plan.x).mode == "cubic"
     for mode in MODES:
         length = plan.x.program.phase.ticks if mode == "direct" else 128
-        cubic = replace(plan, x=with_table(plan.x, TableShape(mode, length, 16)))
-        if mode in played:
-            assert render(cubic, certify(cubic), [name])
-        else:
-            with pytest.raises(Unphysical, match="plays no cubic tables"):
-                render(cubic, certify(cubic), [name])
+        other = replace(plan, x=with_table(plan.x, TableShape(mode, length, 16)))
+        assert render(other, certify(other), [name])
 
 
 def test_words_are_fine_enough_for_the_amplifier(tmp_path: Path) -> None:
