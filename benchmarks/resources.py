@@ -60,10 +60,13 @@ class Result:
 
 
 _AXIS = {"INDEX_BITS": 10, "PERIOD_BITS": 25}
+_CUBIC = {"INTERPOLATED": 3, "INDEX_BITS": 7, "WORD_BITS": 14, "PERIOD_BITS": 25}
 _TOP = {"X_INDEX_BITS": 10, "Y_INDEX_BITS": 10}
 CASES = {
     "axis": Case("one axis, a sample a clock", "dac_axis", "HX8K", _AXIS, most_cells=2500, least_mhz=120),
     "axis_serial": Case("one axis, low area", "dac_axis_serial", "HX8K", _AXIS, most_cells=900),
+    "axis_cubic": Case("one axis, a sample in 11 clocks", "dac_axis", "HX8K", _CUBIC, most_cells=3000, least_mhz=110),
+    "axis_serial_cubic": Case("one axis, low area", "dac_axis_serial", "HX8K", _CUBIC, most_cells=900),
     "axis_first": Case(
         "one axis, shaped: first", "dac_axis", "HX8K", {**_AXIS, "SHAPING": 1}, most_cells=2567, least_mhz=120
     ),
@@ -129,6 +132,7 @@ CASES = {
 # measured without its file, what does not shape without that of dac_shaper, and what has no cubic table without those
 # of dac_spline. Were one of them to have one, yosys would miss the module, and say so.
 WITH_FIT = ("dac_sequencer",)
+PINS = HERE / "axis_pins.v"  # around an axis with a cubic table, whose flags are more than a part has pins
 
 
 def measure(case: Case, seeds: Sequence[int] = SEEDS, modules: Path = MODULES) -> Result:
@@ -149,9 +153,13 @@ def measure(case: Case, seeds: Sequence[int] = SEEDS, modules: Path = MODULES) -
                 continue
             text = path.read_text("utf-8")
             Path(folder, path.name).write_text(text.replace('SINE_FILE = ""', 'SINE_FILE = "sine.mem"'), "utf-8")
+        top = case.top
+        if top == "dac_axis" and case.parameters.get("INTERPOLATED") == 3:
+            top = PINS.stem
+            Path(folder, PINS.name).write_text(PINS.read_text("utf-8"), "utf-8")
         script = (
-            f"read_verilog -defer *.v; hierarchy -check -top {case.top} {parameters}; "
-            f"{SYNTHESIS[case.family].format(top=case.top, netlist=netlist)}; tee -q -o {statistics} stat"
+            f"read_verilog -defer *.v; hierarchy -check -top {top} {parameters}; "
+            f"{SYNTHESIS[case.family].format(top=top, netlist=netlist)}; tee -q -o {statistics} stat"
         )
         _run("yosys", "-q", "-p", script, folder=folder)
         counts = _counts(statistics.read_text("utf-8"))

@@ -26,8 +26,6 @@ def tables_text(tables: AxisTables) -> Iterator[str]:
     yield from _keys(tables.axis, {"mode": f'"{chosen.mode}"', "length": f"{chosen.length}", "bits": f"{chosen.bits}"})
     if any(row.planned and not row.chosen for row in tables.rows):
         yield "= the table of the scan file"
-    if not all(row.played for row in tables.rows):
-        yield "- not played by all formats of the scan file, see [emit] formats: not chosen"
 
 
 def _keys(axis: str, keys: dict[str, str]) -> Iterator[str]:
@@ -37,9 +35,9 @@ def _keys(axis: str, keys: dict[str, str]) -> Iterator[str]:
 
 def _row(row: TableRow) -> str:
     shape, takes = row.shape, row.instructions
-    mark = "*" if row.chosen else "=" if row.planned else " " if row.played else "-"
+    mark = "*" if row.chosen else "=" if row.planned else " "
     return (
         f"  {mark}  {shape.mode:<13}{shape.length:>7}{shape.bits:>6}{shape.memory_bits:>11}{row.stored_bits:>11}"
         f"{row.max_error_lsb:>8.3f}{row.rms_error_lsb:>7.3f}"
-        f"{takes['cortex-m4']:>8.1f}{takes['cortex-m0plus']:>7.1f}{row.cells or '':>8}"
+        f"{takes['cortex-m4']:>8.1f}{takes['cortex-m0plus']:>7.1f}{row.cells:>8}"
     )

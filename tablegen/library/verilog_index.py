@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS
+from tablegen.emit.constants import DEGREES
 from tablegen.emit.formats.verilog import literal, value_range
 from tablegen.emit.templates import template_text
 from tablegen.library.entry import AxisEntry, Entry
@@ -55,7 +56,7 @@ def _constants(entries: Sequence[Entry]) -> dict[str, int]:
     found = {"PROGRAMS": len(entries), "DAC_BITS": entries[0].x.dac_bits}
     for letter, axes in (("X", [entry.x for entry in entries]), ("Y", [entry.y for entry in entries])):
         found |= {
-            f"{letter}_INTERPOLATED": int(axes[0].interpolated),
+            f"{letter}_INTERPOLATED": DEGREES["cubic"] if axes[0].cubic else int(axes[0].interpolated),
             f"{letter}_INDEX_BITS": max(_index_bits(axis) for axis in axes),
             f"{letter}_WORD_BITS": axes[0].table_bits,
         }

@@ -25,7 +25,7 @@ from tablegen.planning.feasibility import DEFAULT_HARMONICS, Feasibility
 from tablegen.planning.refinement_layer import learnt_layer
 from tablegen.planning.settling import settle_lines
 from tablegen.planning.shaping_choice import chosen_shaping
-from tablegen.planning.table_choice import TableChoice, asked_of, choose, played_modes, possible_shapes, written_shape
+from tablegen.planning.table_choice import TableChoice, asked_of, choose, possible_shapes, written_shape
 from tablegen.planning.table_maker import StoredWave, TableMaker
 from tablegen.planning.table_search import TableSearch
 from tablegen.planning.timing import make_schedule
@@ -230,8 +230,7 @@ def _line_plan(setup: Setup, axis: Literal["x", "y"], schedule: Schedule, proble
     shape, asked = written_shape(scan.table, period), asked_of(scan.table, setup.scan.limits)
     if asked is not None and len(problems.found) == before:
         with problems.at(file, f"{axis}.table.{'mode' if scan.table.max_error_lsb is None else 'max_error_lsb'}"):
-            modes = played_modes(setup.scan.emit.formats or DEFAULT_FORMATS)
-            possible = possible_shapes(scan.table, period, harmonics, modes)
+            possible = possible_shapes(scan.table, period, harmonics)
             shapes = feasible.fitting(possible, drive, converter, maker)
             shape = choose(TableSearch(maker), shapes, asked.max_error_lsb)
     stored = maker.stored(shape)

@@ -1,6 +1,5 @@
 """Which table an axis gets: the one that is written, or the least memory that keeps an error."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import cast
 
@@ -15,7 +14,6 @@ from tablegen.problems import Unphysical
 # A code is rounded by up to 1/2 LSB whatever the table is. With as much again for the table, what is played is one of
 # the two codes that what was asked for lies between.
 DEFAULT_ERROR_LSB = 1.0
-_NOT_PLAYED: dict[str, tuple[Mode, ...]] = {"verilog": ("cubic",)}  # modes by formats whose sequencer has none of them
 
 
 @dataclass(frozen=True)
@@ -51,17 +49,9 @@ def written_shape(table: Table, period: int) -> TableShape:
     return TableShape(mode, length, table.bits or DEFAULT_BITS)
 
 
-def played_modes(formats: Iterable[str]) -> tuple[Mode, ...]:
-    """The modes that the devices of all these formats play."""
-    missing = {mode for name in formats for mode in _NOT_PLAYED.get(name, ())}
-    return tuple(mode for mode in MODES if mode not in missing)
-
-
-def possible_shapes(
-    table: Table, period: int, harmonics: int, free_modes: tuple[Mode, ...] = MODES
-) -> list[TableShape]:
-    """Every shape that carries the harmonics, with what is given of a table; ``free_modes`` where no mode is."""
-    modes = free_modes if table.mode in (None, "auto") else (cast(Mode, table.mode),)
+def possible_shapes(table: Table, period: int, harmonics: int) -> list[TableShape]:
+    """Every shape that carries the harmonics, with what is given of a table."""
+    modes = MODES if table.mode in (None, "auto") else (cast(Mode, table.mode),)
     return [
         TableShape(mode, length, bits)
         for mode in modes

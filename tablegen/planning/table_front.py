@@ -3,13 +3,12 @@
 from dataclasses import dataclass
 
 from tablegen.config.load import Setup
-from tablegen.config.schema import DEFAULT_FORMATS, FastAxis, Table
-from tablegen.fixedpoint.program import Mode
+from tablegen.config.schema import FastAxis, Table
 from tablegen.fixedpoint.table_shape import TableShape
 from tablegen.planning.feasibility import Feasibility
 from tablegen.planning.line_plan import LinePlan
 from tablegen.planning.other_table import maker_of, shape_of
-from tablegen.planning.table_choice import allowed_lsb, choose, played_modes, possible_shapes
+from tablegen.planning.table_choice import allowed_lsb, choose, possible_shapes
 from tablegen.planning.table_search import TableSearch
 from tablegen.problems import Problems
 
@@ -20,10 +19,9 @@ _TIMES = 8.0  # an error that is so many times what is asked is of no use
 class TableFront:
     """Tables of an axis by their memory.
 
-    ``chosen`` is the least memory within ``max_error_lsb`` of the modes that all formats of the scan play, ``modes``;
-    ``planned`` the table that the axis has; both are among ``shapes``. Of the others none is larger than one that is as
-    simple to play and errs less than 5 % more. ``rendered`` is the least memory of those that a device renders from
-    Fourier words.
+    ``chosen`` is the least memory within ``max_error_lsb``, ``planned`` the table that the axis has; both are among
+    ``shapes``. Of the others none is larger than one that is as simple to play and errs less than 5 % more.
+    ``rendered`` is the least memory of those that a device renders from Fourier words.
     """
 
     max_error_lsb: float
@@ -31,7 +29,6 @@ class TableFront:
     chosen: TableShape
     rendered: TableShape | None
     planned: TableShape
-    modes: tuple[Mode, ...]
 
 
 def table_front(setup: Setup, line: LinePlan) -> TableFront:
@@ -42,9 +39,7 @@ def table_front(setup: Setup, line: LinePlan) -> TableFront:
     shapes = feasible.fitting(possible, line.drive, line.converter, maker)
     search, most = TableSearch(maker), allowed_lsb(scan.table, setup.scan.limits)
     found = {one.shape for one in search.front(shapes, _TIMES * most)}
-    modes = played_modes(setup.scan.emit.formats or DEFAULT_FORMATS)
-    played = [shape for shape in shapes if shape.mode in modes]
-    chosen = choose(search, played, most)
-    rendered = search.smallest((shape for shape in played if shape.mode != "direct"), most)
+    chosen = choose(search, shapes, most)
+    rendered = search.smallest((shape for shape in shapes if shape.mode != "direct"), most)
     found |= {chosen, shape_of(line)}
-    return TableFront(most, tuple(sorted(found, key=lambda one: one.order)), chosen, rendered, shape_of(line), modes)
+    return TableFront(most, tuple(sorted(found, key=lambda one: one.order)), chosen, rendered, shape_of(line))

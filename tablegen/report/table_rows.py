@@ -22,7 +22,6 @@ class TableRow:
     """A table with its errors over all ticks, in LSB of the converter.
 
     ``stored_bits`` is what it takes in C: in words of 16 or 32 bits, with the first ones once more behind the last.
-    ``played`` is whether all formats of the scan play it.
     """
 
     shape: TableShape
@@ -31,7 +30,6 @@ class TableRow:
     stored_bits: int
     chosen: bool
     planned: bool
-    played: bool
 
     @property
     def instructions(self) -> dict[str, float]:
@@ -39,8 +37,8 @@ class TableRow:
         return INSTRUCTIONS[self.shape.mode]
 
     @property
-    def cells(self) -> int | None:
-        """One axis in Verilog; None where that has no such mode."""
+    def cells(self) -> int:
+        """One axis in Verilog."""
         return CELLS[self.shape.mode]
 
 
@@ -88,7 +86,6 @@ class AxisTables:
                     "hx8k_cells": row.cells,
                     "chosen": row.chosen,
                     "planned": row.planned,
-                    "played": row.played,
                 }
                 for row in self.rows
             ],
@@ -120,7 +117,6 @@ def axis_tables(setup: Setup, line: LinePlan) -> AxisTables:
                 (shape.length + _behind(shape)) * storage_bits(shape.bits),
                 shape == front.chosen,
                 shape == front.planned,
-                shape.mode in front.modes,
             )
 
     return AxisTables(

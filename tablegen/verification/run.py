@@ -37,7 +37,7 @@ def verify(
     nothing can be written. A program of a library is played with the runtime of the library.
     """
     folder = Path(folder)
-    chosen, most_ticks = _target(target or default_target(folder), simulator, axis, fourier, ticks is None)
+    chosen, most_ticks = _target(folder, target or default_target(folder), simulator, axis, fourier, ticks is None)
     with _work_folder(None if keep is None else Path(keep)) as work, whole_build(folder) as whole:
         return verify_build(whole, work, chosen, most_ticks if ticks is None else ticks, seed, progress)
 
@@ -61,6 +61,7 @@ def rendering_clocks(folder: Path, axis: Literal["pipelined", "blocks", "serial"
 
 
 def _target(
+    folder: Path,
     name: TargetName,
     simulator: Literal["icarus", "verilator"],
     axis: Literal["pipelined", "blocks", "serial"],
@@ -79,7 +80,8 @@ def _target(
 
     placement = Placement(axis, fourier)
     apart = simulator == "icarus" and axis == "pipelined" and not fourier and as_usual
-    return VerilogTarget(simulator, placement, apart), DEFAULT_TICKS[simulator] // placement.tick_clocks
+    tick_clocks = placement.playing(read_build(folder).program).tick_clocks
+    return VerilogTarget(simulator, placement, apart), DEFAULT_TICKS[simulator] // tick_clocks
 
 
 @contextmanager

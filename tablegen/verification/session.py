@@ -113,7 +113,7 @@ def make_session(
     """
     pace, schedule = placement.tick_clocks, program.schedule
     codes = power_up_codes(program)
-    script = Script(power_up=codes, drain=48 + pace, commit_clocks=placement.commit_clocks())
+    script = Script(power_up=codes, drain=placement.drain_clocks, commit_clocks=placement.commit_clocks())
     loader = Loader(script, program, memories, placement)
     own = _Own(script, loader, most - WIRED_TICKS, seed, pace)
 

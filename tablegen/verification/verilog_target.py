@@ -5,7 +5,7 @@ time: that takes half as long.
 """
 
 import shutil
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -111,14 +111,13 @@ class VerilogTarget:
     def _runs(self, job: PlayJob, memories: Memories) -> "list[SimulatedRun]":
         """The session as it is placed, and a whole frame with multiplier blocks, which are simulated twice as fast."""
         program, seed = job.stored.program, job.seed
-        shaping = max(axis.output.shaping.order for axis in (program.x, program.y))
-        placement = replace(self.placement, shaping=shaping)
+        placement = self.placement.playing(program)
         apart = self.frame_apart and min(needed_ticks(program), job.most_ticks) > _SESSION_TICKS
         most = _SESSION_TICKS if apart else job.most_ticks
         runs = [SimulatedRun(job.work, make_session(program, memories, most, seed, placement), placement, memories)]
         if apart:
             (job.work / "frame").mkdir(exist_ok=True)
-            blocks = Placement("blocks", shaping=shaping)
+            blocks = Placement("blocks").playing(program)
             session = make_session(program, memories, job.most_ticks, seed, blocks, requests=False)
             runs.append(SimulatedRun(job.work / "frame", session, blocks, memories))
         return runs

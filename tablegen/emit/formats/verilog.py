@@ -10,7 +10,6 @@ from tablegen.emit.content import AxisContent, Content
 from tablegen.emit.format import Comparison, Format, differing
 from tablegen.emit.memory import memory_files
 from tablegen.emit.templates import comment_safe, template
-from tablegen.problems import Unphysical
 from tablegen.reading import BUILD_FILE, read_text
 from tablegen.resources import resource_folder, verilog_runtime
 
@@ -26,13 +25,7 @@ class Verilog(Format):
     file_names = "NAME.vh, NAME_*.mem, dac_*.v, program_loader.v"
 
     def files(self, content: Content) -> dict[str, bytes]:
-        """The header and the memory files. Raises ``Unphysical`` for a cubic table, which no Verilog plays."""
-        for axis in content.axes:
-            if axis.program.mode == "cubic":
-                raise Unphysical(
-                    f"the Verilog sequencer plays no cubic tables: leave verilog out, or set {axis.axis}.table.mode to "
-                    "'interpolated'"
-                )
+        """The header and the memory files."""
         header = template("verilog/tables.vh.j2", _context(content), literal, range=value_range)
         return {f"{content.name}.vh": header, **_memories(content)}
 
