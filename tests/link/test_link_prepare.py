@@ -204,8 +204,8 @@ def test_what_would_be_refused_is_said_with_a_remedy(scan: PreparedScan, info: D
 def test_a_device_without_splines_takes_no_cubic_table(tmp_path: Path) -> None:
     scan = PreparedScan.of_build(build(tmp_path, IN_C["cubic"]).folder)
     info = replace(info_for(scan), harmonics=512)
-    said = "{}: a cubic table; the device plays none: build it with DAC_SPLINE=1 in C, {}_INTERPOLATED=3 in Verilog, or "
-    assert objections(scan, info) == [f"{said.format(axis, axis.upper())}set table.mode" for axis in "xy"]
+    said = "{}: a cubic table; the device plays none: build it with DAC_SPLINE=1 in C, {}_INTERPOLATED=3 in Verilog, "
+    assert objections(scan, info) == [f"{said.format(axis, axis.upper())}or set table.mode" for axis in "xy"]
     for form in ("table", "fourier", "auto"):
         assert objections(scan, replace(info, degree=3), form) == []
 
