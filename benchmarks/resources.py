@@ -132,7 +132,7 @@ CASES = {
 # measured without its file, what does not shape without that of dac_shaper, and what has no cubic table without those
 # of dac_spline. Were one of them to have one, yosys would miss the module, and say so.
 WITH_FIT = ("dac_sequencer",)
-PINS = HERE / "axis_pins.v"  # around an axis with a cubic table, whose flags are more than a part has pins
+FLAGS = HERE / "axis_flags.v"  # around an axis with a cubic table, whose flags are more than a part has pins
 
 
 def measure(case: Case, seeds: Sequence[int] = SEEDS, modules: Path = MODULES) -> Result:
@@ -155,8 +155,8 @@ def measure(case: Case, seeds: Sequence[int] = SEEDS, modules: Path = MODULES) -
             Path(folder, path.name).write_text(text.replace('SINE_FILE = ""', 'SINE_FILE = "sine.mem"'), "utf-8")
         top = case.top
         if top == "dac_axis" and case.parameters.get("INTERPOLATED") == 3:
-            top = PINS.stem
-            Path(folder, PINS.name).write_text(PINS.read_text("utf-8"), "utf-8")
+            top = FLAGS.stem
+            Path(folder, FLAGS.name).write_text(FLAGS.read_text("utf-8"), "utf-8")
         script = (
             f"read_verilog -defer *.v; hierarchy -check -top {top} {parameters}; "
             f"{SYNTHESIS[case.family].format(top=top, netlist=netlist)}; tee -q -o {statistics} stat"

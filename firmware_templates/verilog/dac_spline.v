@@ -72,10 +72,11 @@ module dac_spline #(
     reg [19:0] recoded, digits;
     always @(posedge clock) begin
         recoded <= {1'b0, phase[17:0], 1'b0} + {10{2'b01}};
-        digits <= ticks[FIRST] ? recoded : {2'b01, digits[19:2]};
+        digits <= ticks[FIRST-1] ? recoded : {2'b01, digits[19:2]};
     end
-    wire [1:0] second_digit, third_digit;
-    dac_delay #(.BITS(2), .CLOCKS(SPACING)) to_second (.clock(clock), .in(digits[1:0]), .out(second_digit));
+    wire [1:0] first_digit, second_digit, third_digit;
+    dac_delay #(.BITS(2), .CLOCKS(1)) to_first (.clock(clock), .in(digits[1:0]), .out(first_digit));
+    dac_delay #(.BITS(2), .CLOCKS(SPACING)) to_second (.clock(clock), .in(first_digit), .out(second_digit));
     dac_delay #(.BITS(2), .CLOCKS(SPACING)) to_third (.clock(clock), .in(second_digit), .out(third_digit));
 
     // What is below a product adds to the bit that decides how it rounds.
@@ -87,7 +88,7 @@ module dac_spline #(
     wire [WORD_BITS+4:0] sum = {third_product[WORD_BITS+3:0], 1'b1} + {b0_half_at_last, 1'b0, third_half};
     wire unused = &{phase, second_sum[0], third_sum[0], sum[0], third_product[BITS-1:WORD_BITS+4]};
     dac_spline_step #(.BITS(BITS)) first (
-        .clock(clock), .load(ticks[FIRST]), .sum({b3_sixteenth, 4'd0}), .digit(digits[1:0]), .product(first_product),
+        .clock(clock), .load(ticks[FIRST]), .sum({b3_sixteenth, 4'd0}), .digit(first_digit), .product(first_product),
         .half(first_half)
     );
     dac_spline_step #(.BITS(BITS)) second (

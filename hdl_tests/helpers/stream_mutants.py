@@ -771,7 +771,7 @@ def _cubic() -> Iterator[Mutant]:
         ),
         ("b0 is that of the tick before", "if (ticks[THIRD]) b0_half_at_last", "if (ticks[SECOND]) b0_half_at_last"),
         ("b0 is that of the next tick", "b0_half_at_last <= b0_half_on;", "b0_half_at_last <= b0_half;"),
-        ("digits begin a clock early", "ticks[FIRST] ? recoded", "ticks[FIRST-1] ? recoded"),
+        ("digits begin a clock early", "ticks[FIRST-1] ? recoded", "ticks[FIRST-2] ? recoded"),
         ("digits come late to the second product", "CLOCKS(SPACING)) to_second", "CLOCKS(SPACING + 1)) to_second"),
         ("digits come early to the third product", "CLOCKS(SPACING)) to_third", "CLOCKS(SPACING - 1)) to_third"),
         ("the fraction has 17 bits", "{1'b0, phase[17:0], 1'b0}", "{2'b00, phase[16:0], 1'b0}"),

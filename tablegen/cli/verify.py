@@ -58,8 +58,8 @@ _CLOCKS_A_SECOND = 20_000  # that Icarus simulates, more or less
     "--axis",
     type=click.Choice(("pipelined", "blocks", "serial")),
     help="Verilog variant of dac_axis: pipelined, one sample per clock, multiplies in look-up tables; blocks "
-    "(PLAIN_MULTIPLIER = 1), the same with multiplier blocks; serial (LOW_AREA = 1), smaller, 41 clocks per sample, 90 with a "
-    "cubic table.  [default: pipelined]",
+    "(PLAIN_MULTIPLIER = 1), the same with multiplier blocks; serial (LOW_AREA = 1), smaller, 41 clocks per sample, "
+    "90 with a cubic table.  [default: pipelined]",
 )
 @click.option(
     "--fourier",

@@ -1,9 +1,8 @@
-// An axis with a cubic table by itself: of its flags, which are more than a part has pins, those that it uses. The
-// others, in the middle of each vector, are 0.
+// An axis with a cubic table and the delay of its flags: as inputs these would be more than a part has pins.
 
 `default_nettype none
 
-module axis_pins #(
+module axis_flags #(
     parameter INTERPOLATED = 3,
     parameter INDEX_BITS = 7,
     parameter WORD_BITS = 14,
@@ -18,11 +17,9 @@ module axis_pins #(
     input  wire [INDEX_BITS-1:0] table_address,
     input  wire [WORD_BITS-1:0]  table_data,
     input  wire                  take,
-    input  wire [31:0]           first_ticks,
-    input  wire [6:0]            last_ticks,
-    input  wire                  first_load,
-    input  wire [17:0]           last_loads,
-    input  wire [2:0]            last_runnings,
+    input  wire                  tick,
+    input  wire                  load,
+    input  wire                  running,
     input  wire                  begins,
     input  wire                  bank,
     input  wire                  restart,
@@ -31,7 +28,14 @@ module axis_pins #(
     output wire                  reached,
     output wire                  clamped
 );
-    localparam FLAGS = 59;  // of each kind: dac_axis has LATENCY - 3
+    localparam FLAGS = 59;  // LATENCY - 3 of dac_axis
+
+    reg [FLAGS-2:0] ticks, loads, runnings;
+    always @(posedge clock) begin
+        ticks <= {ticks[FLAGS-3:0], tick};
+        loads <= {loads[FLAGS-3:0], load};
+        runnings <= {runnings[FLAGS-3:0], running};
+    end
 
     dac_axis #(
         .INTERPOLATED(INTERPOLATED), .INDEX_BITS(INDEX_BITS), .WORD_BITS(WORD_BITS), .DAC_BITS(DAC_BITS),
@@ -39,9 +43,8 @@ module axis_pins #(
     ) axis (
         .clock(clock), .write(write), .write_address(write_address), .write_data(write_data),
         .table_write(table_write), .table_address(table_address), .table_data(table_data), .take(take),
-        .ticks({last_ticks, {FLAGS-39{1'b0}}, first_ticks}), .loads({last_loads, {FLAGS-19{1'b0}}, first_load}),
-        .runnings({last_runnings, {FLAGS-3{1'b0}}}), .begins(begins), .bank(bank), .restart(restart),
-        .advance(advance), .code(code), .reached(reached), .clamped(clamped)
+        .ticks({ticks, tick}), .loads({loads, load}), .runnings({runnings, running}), .begins(begins), .bank(bank),
+        .restart(restart), .advance(advance), .code(code), .reached(reached), .clamped(clamped)
     );
 endmodule
 
