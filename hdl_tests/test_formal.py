@@ -122,6 +122,7 @@ BY_SAT = {
     "windows": Proof("window_properties", 1, 16),
     # The product of a tick is made on the clocks after it.
     "scanner": Proof("scanner_properties", 7, 26, {"SHAPING": 3, "BITS": 3}),
+    "product": Proof("product_properties", 1, 14, {"BITS": 10}),
 }
 
 
@@ -270,6 +271,14 @@ MUTANTS = {
     "first_order_is_second": ("second", "dac_shaper", "begins || !order[1]", "begins"),
     "second_order_without_its_zero": ("scanner", "dac_shaper", "word[14] || word[1:0] == 2'd2", "word[14]"),
     "product_of_three_digits": ("scanner", "dac_shaper", "step != 3'd0 && step != 3'd5", "step != 3'd0 && step < 3'd4"),
+    # j. the products of a spline
+    "product_without_its_carry": ("product", "dac_spline_step", "{term, minus}", "{term, 1'b0}"),
+    "digit_of_two_is_one": (
+        "product", "dac_spline_step", "{factor[BITS-1], factor, 1'b0}", "{{2{factor[BITS-1]}}, factor}"
+    ),
+    "product_goes_on": ("product", "dac_spline_step", "product <= 0;", "product <= product;"),
+    "half_of_another_bit": ("product", "dac_spline_step", "half <= total[2];", "half <= total[1];"),
+    "sum_of_the_next_clock": ("product", "dac_spline_step", "if (load) factor <= sum;", "if (!load) factor <= sum;"),
     "a_line_settles_too_long": ("windows", "dac_markers", "settle_left <= 1;", "settle_left <= 0;"),
 }  # fmt: skip
 

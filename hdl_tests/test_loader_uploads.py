@@ -34,8 +34,23 @@ SHORT: dict[str, object] = {
     "dac.update_rate_hz": float(UPDATE_RATE_HZ),
     "x.band_limit.harmonics": HARMONICS,
     "y.band_limit.harmonics": 8,
-    "x.table.length": 256,
-    "y.table.length": 128,
+}
+CUBIC = {"mode": "cubic", "length": 64, "bits": 14}
+
+
+@dataclass(frozen=True)
+class Case:
+    """What the tables of a device are, and the kind of its axes."""
+
+    tables: dict[str, object]
+    low_area: int
+
+
+LINES_OF = {"x.table.length": 256, "y.table.length": 128}
+CASES = {
+    "low area": Case(LINES_OF, 1),
+    "a sample a clock": Case(LINES_OF, 0),
+    "cubic": Case({"x.table": CUBIC, "y.table": {**CUBIC, "length": 32}}, 0),
 }
 
 
@@ -53,23 +68,28 @@ class Scans:
         return {name: each.plan.program for name, each in zip(names, (self.boot, *self.others), strict=True)}
 
 
+@pytest.fixture(scope="module", params=CASES)
+def case(request: pytest.FixtureRequest) -> Case:
+    return CASES[request.param]
+
+
 @pytest.fixture(scope="module")
-def scans(tmp_path_factory: pytest.TempPathFactory) -> Scans:
+def scans(case: Case, tmp_path_factory: pytest.TempPathFactory) -> Scans:
     folder = tmp_path_factory.mktemp("scans")
     built = [
-        build(folder / str(size), Variant({**SHORT, "x.size_nm": size, "y.size_nm": size}))
+        build(folder / str(size), Variant({**SHORT, **case.tables, "x.size_nm": size, "y.size_nm": size}))
         for size in (200.0, 150.0, 90.0)
     ]
     return Scans(built[0], (built[1], built[2]))
 
 
-@pytest.fixture(scope="module", params=[1, 0], ids=["low area", "a sample a clock"])
-def loader(request: pytest.FixtureRequest, scans: Scans, tmp_path_factory: pytest.TempPathFactory) -> Loader:
+@pytest.fixture(scope="module")
+def loader(case: Case, scans: Scans, tmp_path_factory: pytest.TempPathFactory) -> Loader:
     boot = scans.boot.plan.program
     x, y = ((0, 65535, axis.output.max_step + 100) for axis in (boot.x, boot.y))
     folder = tmp_path_factory.mktemp("loader")
     return Loader(
-        folder, boot, (x, y), HARMONICS, UPDATE_RATE_HZ, LOW_AREA=request.param, CLOCKS_PER_BIT=CLOCKS_PER_BIT
+        folder, boot, (x, y), HARMONICS, UPDATE_RATE_HZ, LOW_AREA=case.low_area, CLOCKS_PER_BIT=CLOCKS_PER_BIT
     )
 
 

@@ -16,7 +16,7 @@ module dac_axis #(
     parameter SHAPING = 0,
     parameter SPLINE = 0,
     parameter [63:0] POWER_UP_CODE = 0,
-    parameter LATENCY = (PLAIN_MULTIPLIER ? 22 : 34) + (SHAPING != 0 ? 1 : 0)
+    parameter LATENCY = (SPLINE ? 43 : PLAIN_MULTIPLIER ? 10 : 15) + (PLAIN_MULTIPLIER ? 12 : 19) + (SHAPING != 0 ? 1 : 0)
 ) (
     input  wire                  clock,
     input  wire                  write,
