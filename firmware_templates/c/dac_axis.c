@@ -1,5 +1,6 @@
 /* One axis: the code of one tick, and the fast path for many ticks at once. */
 #include "dac_run.h"
+#include "dac_short.h"
 
 bool dac_axis_serves(const dac_converter *c)
 {
@@ -125,76 +126,22 @@ static uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uin
 
 #else
 
-/* The same where a product of 64 bits is dear. Codes that are in the window differ from `base` so little that 32 bits hold them with
- * all their fraction bits; what matters is that a code outside is not taken for one inside, since 32 bits wrap.
- *
- * Let s be a sample and s0 an earlier one whose code is in the window; rise = s - s0 + 2^spread, from 21 bits; and the exact
- * T(s) = gain s + offset - base 2^gain_q, so that the code is in the window if 0 <= T < 2^(gain_q + run_bits) <= 2^31. Samples have 20
- * bits, so that the 21 bits of `rise` are below 2^(spread + 1) only if |s - s0| <= 2^spread (spread <= 19). Then T(s) differs from
- * T(s0) by |gain| 2^spread <= 2^31 at most, and is within -2^31..2^32: its lower 32 bits are below 2^31 only if it is in 0..2^31. */
-
-/* From `rise` to the output, and on to the next tick. */
-#define PUT_CODE                                                                                                      \
-    last = gain * rise + rest;                                                                                        \
-    risen |= rise;                                                                                                    \
-    strayed |= last;                                                                                                  \
-    last = (last >> gain_q) + (uint32_t)base;                                                                         \
-    *out = (dac_output)last;                                                                                          \
-    at += advance;                                                                                                    \
-    out += DAC_STRIDE;                                                                                                \
-    DAC_OPAQUE(out)
+#if DAC_SPLINE
+DAC_APART uint32_t play_spline(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
+                               uint32_t ticks)
+{
+    return dac_play_short(axis, bank, at, step, out, ticks, false, 0, bank->gain_q, true, NULL);
+}
+#endif
 
 static uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
                      uint32_t ticks)
 {
-    const dac_word *const table = bank->table;
-    const DAC_READ_AGAIN uint64_t advance = step;
-    const uint32_t gain = (uint32_t)bank->gain, spread = UINT32_C(1) << bank->run_spread;
-    const unsigned gain_q = bank->gain_q;
-    const int32_t begin = dac_sample_at(bank, (uint32_t)(at >> 32));
-    uint32_t done = 0, sample = (uint32_t)begin, last;
-
-    if ((uint32_t)(code_of(bank, begin) - axis->code + bank->run_half) >> bank->run_bits != 0)
-        return 0;
-    while (done < ticks) {
-        const uint32_t length = dac_block_of(ticks - done);
-        int32_t base = axis->code - bank->run_half;
-        const uint32_t origin = sample - spread;
-        uint32_t low = (UINT32_C(1) << (DAC_ABOVE - 1)) - (origin << DAC_ABOVE);
-        uint32_t rest = gain * origin + (uint32_t)bank->offset - ((uint32_t)base << gain_q);
-        dac_output *stop = out + length * DAC_STRIDE;
-        uint32_t strayed = 0, risen = 0, rise;
-
-        if (!dac_has_room(bank, base))
-            break;
-#if !defined(__OPTIMIZE_SIZE__) /* what is small has the second loop only */
-        if ((at + (DAC_RUN - 1) * step) >> 47 == at >> 47) { /* all between the same two words */
-            DAC_NEIGHBOURS(table, (uint32_t)(at >> 47), here, there);
-            const uint32_t slope = (uint32_t)(there - here);
-            low += (uint32_t)here << 15;
-            do {
-                DAC_PUT_ASIDE(low, base, stop);
-                rise = (slope * ((uint32_t)(at >> 32) & 0x7fffu) + low) >> DAC_ABOVE;
-                PUT_CODE;
-            } while (out != stop);
-        } else
+#if DAC_SPLINE
+    if (bank->cubic)
+        return play_spline(axis, bank, at, step, out, ticks);
 #endif
-        {
-            do {
-                DAC_PUT_ASIDE(low, base, stop);
-                const uint32_t high = (uint32_t)(at >> 32);
-                DAC_NEIGHBOURS(table, high >> 15, here, there);
-                rise = ((uint32_t)(there - here) * (high & 0x7fffu) + ((uint32_t)here << 15) + low) >> DAC_ABOVE;
-                PUT_CODE;
-            } while (out != stop);
-        }
-        if (strayed >> gain_q >> bank->run_bits != 0 || risen > 2 * spread - 1)
-            break;
-        sample = origin + rise;
-        axis->code = (int32_t)last;
-        done += length;
-    }
-    return done;
+    return dac_play_short(axis, bank, at, step, out, ticks, false, 0, bank->gain_q, false, NULL);
 }
 
 #endif

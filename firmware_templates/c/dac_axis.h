@@ -64,8 +64,12 @@ static inline int32_t dac_between(int32_t here, int32_t there, uint32_t fraction
 }
 
 #if DAC_SPLINE
-/* lower + value * half / 2^32, to nearest, ties up; |value| <= 2^27. */
-static inline int32_t dac_horner(int32_t lower, int32_t value, int32_t half)
+/* Horner's rule: lower + value * fraction / 2^19, to nearest, ties up. The fraction has 18 bits; |value| <= 2^27, of words of 16 bits
+ * 2^22. What it is told of the fraction is what is the same for all three steps. */
+#if DAC_LONG_MULTIPLY || defined(__riscv_mul)
+typedef int32_t dac_factor; /* the fraction times 2^13, so that the upper word of a product is the sum's */
+#define DAC_FACTOR(fraction) (int32_t)((fraction) << 13)
+static inline int32_t dac_horner(int32_t lower, int32_t value, dac_factor half)
 {
     /* Instructions that compilers do not find here: they know too much of the factors. */
 #if defined(__GNUC__) && defined(__thumb2__) && defined(__ARM_FEATURE_DSP)
@@ -77,10 +81,26 @@ static inline int32_t dac_horner(int32_t lower, int32_t value, int32_t half)
     __asm__("smlal %0, %1, %2, %3" : "+r"(rest), "+r"(lower) : "r"(value), "r"(half));
     return lower;
 #else
-    const int64_t start = (int64_t)lower * (INT64_C(1) << 32) + INT64_C(0x80000000);
-    return (int32_t)((start + (int64_t)value * half) >> 32);
+    const int64_t product = (int64_t)value * half;
+    return lower + (int32_t)(product >> 32) + (int32_t)((uint32_t)product >> 31);
 #endif
 }
+#else
+typedef struct {
+    int32_t upper, lower; /* 9 bits each: products with a value, and their sum, stay below 2^31 */
+} dac_factor;
+#define DAC_FACTOR(fraction) {(int32_t)((fraction) >> 9), (int32_t)((fraction) & 0x1ffu)}
+static inline int32_t dac_horner(int32_t lower, int32_t value, dac_factor by)
+{
+    int32_t sum = value * by.upper + (value * by.lower >> 9);
+#if defined(__GNUC__) && defined(__thumb__) && !defined(__thumb2__)
+    __asm__(".syntax unified\n\tasrs %0, %0, #10\n\tadcs %0, %1" : "+l"(sum) : "l"(lower) : "cc"); /* the carry rounds */
+#else
+    sum = lower + ((sum + 512) >> 10);
+#endif
+    return sum;
+}
+#endif
 
 #define DAC_SPLINE_UNIT 12 /* units of a sample for the LSB of a word */
 
@@ -104,8 +124,8 @@ static inline dac_segment dac_segment_of(const dac_word *words)
 /* The sample at a fraction of 18 bits. */
 static inline int32_t dac_along(const dac_segment *s, uint32_t fraction)
 {
-    const int32_t half = (int32_t)(fraction << 13);
-    return dac_horner(s->b0, dac_horner(s->b1, dac_horner(s->b2, s->b3, half), half), half);
+    const dac_factor by = DAC_FACTOR(fraction);
+    return dac_horner(s->b0, dac_horner(s->b1, dac_horner(s->b2, s->b3, by), by), by);
 }
 #endif
 

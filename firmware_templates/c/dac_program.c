@@ -150,8 +150,8 @@ static void allow_runs(dac_bank_axis *b, const dac_axis_program *p)
     uint8_t bits = 0;
 
     b->run_most = 0;
-    /* Runs of a spline take products of 64 bits, and less than half a segment from tick to tick. */
-    if (CUBIC(p) && (!DAC_LONG_MULTIPLY || (p->hold_ticks == 1 && p->phase_period <= 2 * p->length)))
+    /* Runs of a spline take less than half a segment from tick to tick. */
+    if (CUBIC(p) && p->hold_ticks == 1 && p->phase_period <= 2 * p->length)
         return;
 #if DAC_SHAPING
     if (b->order != 0 && !scale_shaped(b, p))

@@ -84,22 +84,35 @@ static inline bool dac_has_room(const dac_bank_axis *bank, int32_t base)
     return (uint32_t)(base - bank->code_min) <= (uint32_t)bank->run_room;
 }
 
-#if !DAC_LONG_MULTIPLY
-
-#define DAC_SAMPLE_BITS 20 /* of 16 and 4 guard bits */
-#define DAC_ABOVE (32 - (DAC_SAMPLE_BITS + 1)) /* where the sum of an interpolation has the LSB of the sample */
-
-/* A Cortex-M0 adds and compares with all of its registers, and does everything else with eight: what is only added or compared is
- * put aside, and the step is read again for every sample. */
-#if defined(__GNUC__) && defined(__thumb__) && !defined(__thumb2__) && !defined(__OPTIMIZE_SIZE__)
-#define DAC_ASIDE(value) __asm__("" : "+h"(value))
-#define DAC_PUT_ASIDE(low, base, stop) DAC_ASIDE(low); DAC_ASIDE(base); DAC_ASIDE(stop)
-#define DAC_READ_AGAIN volatile
+/* Copied to where the order is known, and the bits of a remainder. */
+#if defined(__GNUC__)
+#define DAC_COPIED static inline __attribute__((always_inline))
+#define DAC_APART static __attribute__((noinline)) /* a loop that gets all of the registers */
 #else
-#define DAC_PUT_ASIDE(low, base, stop) (void)0
-#define DAC_READ_AGAIN
+#define DAC_COPIED static inline
+#define DAC_APART static
 #endif
 
-#endif
+/* The remainders here have half a code more, so that none is negative. What is fed back has half a code more then too, since all
+ * orders have a zero at DC: it is the half of the rounding, which need not be added. */
+
+#define DAC_WEIGHT(bank) ((bank)->zero + 64) /* of e1 - e2 in the third order, in 1/64: that of docs/sequencer.md and its zero */
+
+/* From a code with its remainder to what is fed back to the next one. */
+DAC_COPIED dac_shaper dac_followed(dac_shaper last, uint32_t fed, uint32_t mask, unsigned order, int32_t weight)
+{
+    dac_shaper next;
+
+    next.back = next.newest = next.older = fed & mask;
+    if (order == 1)
+        return next;
+    next.older = last.newest;
+    const uint32_t rise = next.newest - next.older;
+    if (order == 2)
+        next.back = next.newest + rise;
+    else
+        next.back = last.older + (uint32_t)((weight * (int32_t)rise) >> 6);
+    return next;
+}
 
 #endif

@@ -279,12 +279,10 @@ typedef struct {
     dac_bank_axis x, y;
 } dac_bank;
 
-#if DAC_SHAPING
 /* What is fed back to the next code, and the remainders of the last two ticks: all with half a code more than they are. */
 typedef struct {
     uint32_t back, newest, older;
 } dac_shaper;
-#endif
 
 typedef struct {
     int32_t code;

@@ -43,7 +43,7 @@ def test_rows_are_what_a_build_of_that_table_has(found: dict[str, Any], tmp_path
 
 
 def test_of_shaped_output_errors_are_those_before_the_rounding(tmp_path: Path) -> None:
-    path = write_pair(tmp_path, edited(f"{SCAN}{C_ALONE}", "dac.shaping = 'second'", "x.size_nm = 20"))
+    path = write_pair(tmp_path, edited(f"{SCAN}", "dac.shaping = 'second'", "x.size_nm = 20"))
     text, data = run("tables", path, "--axis", "x"), run("tables", path, "--axis", "x", "--json")
     assert (text.status, data.status) == (0, 0), text.err + data.err
     assert text.out.splitlines()[0].endswith("; shaped: errors are those before the rounding")

@@ -38,7 +38,19 @@ CHECKS = {"checks": (), "checks small": ("-DDAC_SMALL=1",), "checks short": ("-D
 PLAY_S, CHECK_S = 20, 120  # of CPU time: what does not hang takes a second of it, and two
 _PROGRAMS = 3000  # between two threads
 
-PLACES = ("fill", "step", "wide", "short", "cubic", "shaped", "shaped short", *CHECKS, "threads")
+PLACES = (
+    "fill",
+    "step",
+    "wide",
+    "short",
+    "cubic",
+    "cubic short",
+    "shaped",
+    "shaped short",
+    "shaped few",
+    *CHECKS,
+    "threads",
+)
 _FILES = c_mutants_axis, c_mutants_program, c_mutants_sequencer, c_mutants_fourier, c_mutants_shaping
 MUTANTS: tuple[Mutant, ...] = tuple(mutant for each in _FILES for mutant in each.MUTANTS)
 EQUIVALENT = {**c_mutants_axis.EQUIVALENT, **c_mutants_program.EQUIVALENT, **c_mutants_sequencer.EQUIVALENT}
@@ -61,6 +73,7 @@ def scripts(where: str) -> tuple[tuple[Script, SequencerShape], ...]:
         return (
             *((long_play(name, 12_000, 0, 3), LONG[name][0]) for name in names),
             (long_play("bits_16", 20_000, 1, 3), LONG["bits_16"][0]),
+            (long_play("bits_12", 60_000, 0, 3), LONG["bits_12"][0]),
             (refused_by_y(20_000), LONG["many_lines"][0]),
             (shaped_short_lines(SequencerShape(16, 1, 4, 16, 1, 3, 16), 6000), SequencerShape(16, 1, 4, 16, 1, 3, 16)),
         )
@@ -115,8 +128,10 @@ def _check(paths: tuple[Path, ...]) -> Verdict:
 def _play(where: str, folder: Path, runtime: list[Path]) -> Verdict:
     fill = 0 if where == "step" else FILL
     shaped = where.startswith("shaped")
-    playing = scripts("shaped" if shaped else where if where in ("wide", "cubic") else "fill")
-    chosen = defines(playing[0][1], fill) | ({"DAC_LONG_MULTIPLY": 0} if where.endswith("short") else {})
+    kind = where.split()[0]
+    playing = scripts(kind if kind in ("wide", "cubic", "shaped") else "fill")
+    chosen = defines(playing[0][1], fill) | ({"DAC_LONG_MULTIPLY": 0} if where.endswith(("short", "few")) else {})
+    chosen |= {"DAC_FEW_REGISTERS": 1} if where.endswith("few") else {}
     chosen |= {"DAC_SHAPING": 3} if shaped else {}
     bench = CBench(playing[0][1], folder, "gcc", OPTIONS, runtime, chosen=chosen)
     bench.program = program_within(PLAY_S, bench.program)

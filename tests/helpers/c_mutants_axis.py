@@ -66,7 +66,7 @@ MUTANTS: tuple[Mutant, ...] = (
         },
     ),
     *changed(
-        "dac_axis.c",
+        "dac_short.h",
         "short",
         {
             "short: the sample is rounded down": (
@@ -114,12 +114,54 @@ MUTANTS: tuple[Mutant, ...] = (
         "dac_axis.h",
         "cubic",
         {
-            "a spline's sums are rounded down": (" + INT64_C(0x80000000);", ";"),
-            "a spline's ties are rounded down": ("INT64_C(0x80000000);", "INT64_C(0x7fffffff);"),
+            "a spline's sums are rounded down": (" + (int32_t)((uint32_t)product >> 31);", ";"),
+            "a spline's ties are rounded down": (
+                "(int32_t)((uint32_t)product >> 31)",
+                "((uint32_t)product > UINT32_C(0x80000000) ? 1 : 0)",
+            ),
             "a spline's value has no middle": ("2 * ends + 8 * second", "2 * ends + 4 * second"),
             "a spline's slope is the way to the next word": ("12 * (third - first)", "12 * (third - second)"),
             "a spline has no curvature": ("24 * (ends - 2 * second)", "0"),
             "a spline is quadratic": ("16 * (fourth - first + 3 * (second - third))", "0"),
+        },
+    ),
+    *changed(
+        "dac_axis.h",
+        "cubic short",
+        {
+            "short: a spline's sums are rounded down": ("((sum + 512) >> 10)", "(sum >> 10)"),
+            "short: a spline's ties are rounded down": ("((sum + 512) >> 10)", "((sum + 511) >> 10)"),
+            "short: a spline has half of its fraction": (" + (value * by.lower >> 9)", ""),
+            "short: a spline's fraction loses a bit above": ("(fraction) >> 9)", "(fraction) >> 9 & 0xffu)"),
+            "short: a spline's fraction loses a bit in the middle": ("& 0x1ffu", "& 0xffu"),
+        },
+    ),
+    *changed(
+        "dac_axis.c",
+        "cubic short",
+        {
+            "short: runs of lines are those of splines": (
+                "    if (bank->cubic)\n        return play_spline",
+                "    return play_spline",
+            ),
+        },
+    ),
+    *changed(
+        "dac_short.h",
+        "cubic short",
+        {
+            "short: a run's spline begins a segment late": (
+                "track = dac_track_of(table, at, step)",
+                "track = dac_track_of(table + 1, at, step)",
+            ),
+            "short: a run's spline rises by a unit more": (
+                "dac_track_on(&track) - origin",
+                "dac_track_on(&track) - origin + 1u",
+            ),
+            "short: a run of a spline is not held in its window": (
+                "            if (strayed >> bits >> bank->run_bits != 0 || ",
+                "            if (",
+            ),
         },
     ),
     *changed(
@@ -186,26 +228,28 @@ MUTANTS: tuple[Mutant, ...] = (
         },
     ),
     *removed(
-        "dac_axis.c",
+        "dac_short.h",
         "short",
         {
-            "short: the slew guard is not heeded": "strayed >> gain_q >> bank->run_bits != 0 || ",
+            "short: the slew guard is not heeded": "strayed >> bits >> bank->run_bits != 0 || ",
             "short: the first of two words is lost": "            low += (uint32_t)here << 15;\n",
-            "short: codes follow no run": "        axis->code = (int32_t)last;\n",
+            "short: codes follow no run": (
+                "            axis->code = shaped ? (int32_t)out[-DAC_STRIDE] : (int32_t)last;\n"
+            ),
         },
     ),
     *changed(
-        "dac_axis.c",
+        "dac_short.h",
         "short",
         {
-            "short: only the last code counts": ("    strayed |= last; ", "    strayed = last; "),
+            "short: only the last code counts": ("    strayed |= value; ", "    strayed = value; "),
             "short: a window is twice as wide": (
-                "strayed >> gain_q >> bank->run_bits != 0",
-                "strayed >> gain_q >> bank->run_bits > 1",
+                "strayed >> bits >> bank->run_bits != 0",
+                "strayed >> bits >> bank->run_bits > 1",
             ),
             "short: two words for all ticks": ("(at + (DAC_RUN - 1) * step) >> 47 == at >> 47", "true"),
             "short: two words for too many ticks": ("(DAC_RUN - 1) * step", "DAC_RUN / 2 * step"),
-            "short: the offset is lost": ("+ (uint32_t)bank->offset - ", "- "),
+            "short: the offset is lost": ("+ (uint32_t)offset - ", "- "),
         },
     ),
     *removed(
@@ -241,20 +285,20 @@ MUTANTS: tuple[Mutant, ...] = (
         },
     ),
     *removed(
-        "dac_axis.c",
+        "dac_short.h",
         "checks short",
         {
             "short: a wide rise is not seen": " || risen > 2 * spread - 1",
         },
     ),
     *changed(
-        "dac_axis.c",
+        "dac_short.h",
         "checks short",
         {
             "short: only the last rise counts": ("    risen |= rise; ", "    risen = rise; "),
             "short: a run may begin anywhere": (
-                ("if ((uint32_t)(code_of(bank, begin) - axis->code + bank->run_half) >> bank->run_bits != 0)"),
-                "if (false)",
+                "(first + half) >> bank->run_bits != 0",
+                "false",
             ),
         },
     ),

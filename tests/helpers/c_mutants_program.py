@@ -38,7 +38,10 @@ MUTANTS: tuple[Mutant, ...] = (
         "step",
         {
             "the step is rounded down": ("        dac_advance(&quotient, &one);", "        (void)one;"),
-            "the fraction loses a bit": ("power_divided(79u + INDEX_BITS(p)", "power_divided(78u + INDEX_BITS(p)"),
+            "the fraction loses a bit": (
+                "power_divided(79u + (CUBIC(p) ? 3u : 0u) + INDEX_BITS(p)",
+                "power_divided(78u + INDEX_BITS(p)",
+            ),
         },
     ),
     *changed(
@@ -64,7 +67,7 @@ MUTANTS: tuple[Mutant, ...] = (
             "words of another storage": "p->storage_bits == DAC_TABLE_STORAGE_BITS && ",
             "words that their storage does not hold": " && p->bits <= DAC_TABLE_STORAGE_BITS",
             "a direct table that is too long": " && p->length <= UINT32_C(1) << 17",
-            "2^17 words": "INDEX_BITS(p) <= 16 && ",
+            "2^17 words": "INDEX_BITS(p) <= (CUBIC(p) ? 14 : 16) && ",
             "an interpolated table of any length": " && p->length == UINT32_C(1) << INDEX_BITS(p)",
             "x is held": "p->x.hold_ticks == 1 && ",
             "y is held for any time": "p->y.hold_ticks == ticks && ",

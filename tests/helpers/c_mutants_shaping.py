@@ -4,14 +4,21 @@ from c_faults import Mutant, changed
 
 MUTANTS: tuple[Mutant, ...] = (
     *changed(
-        "dac_shaping.c",
+        "dac_run.h",
         "shaped",
         {
             "the second order feeds back as the first": ("next.back = next.newest + rise;", "next.back = next.newest;"),
-            "the zero is rounded up": ("(zero * (int32_t)rise) >> 6", "(zero * (int32_t)rise + 63) >> 6"),
-            "the zero is another": ("(zero * (int32_t)rise) >> 6", "(zero * (int32_t)rise) >> 5"),
-            "the third remainder is the second": ("last.older - last.newest + next.newest", "next.newest"),
+            "the zero is rounded up": ("(weight * (int32_t)rise) >> 6", "(weight * (int32_t)rise + 63) >> 6"),
+            "the zero is another": ("((bank)->zero + 64)", "((bank)->zero / 2 + 64)"),
+            "the zero has no weight of its own": ("((bank)->zero + 64)", "((bank)->zero)"),
+            "the third remainder is the second": ("next.back = last.older +", "next.back = last.newest +"),
             "the second remainder is the third": ("next.older = last.newest;", "next.older = last.older;"),
+        },
+    ),
+    *changed(
+        "dac_shaping.c",
+        "shaped",
+        {
             "a tick has half a code less": (
                 " + bank->offset - ((int64_t)1 << (bank->gain_q - 1));",
                 " + bank->offset;",
@@ -21,14 +28,47 @@ MUTANTS: tuple[Mutant, ...] = (
                 "fed, (UINT32_C(2) << bits) - 1, bank",
             ),
             "the window of a shaped run is twice as wide": (
-                "if (strayed >> bits >> bank->run_bits != 0)",
-                "if (strayed >> bits >> bank->run_bits > 1)",
+                "if (strayed >> bits >> bank->run_bits != 0)\n            break;",
+                "if (strayed >> bits >> bank->run_bits > 1)\n            break;",
             ),
             "only the last code of a shaped run counts": ("            strayed |= fed;", "            strayed = fed;"),
         },
     ),
     *changed(
         "dac_shaping.c",
+        "shaped few",
+        {
+            "few: a block is not held in its window": (
+                "    if (strayed >> bits >> bank->run_bits != 0)\n        return false;\n",
+                "",
+            ),
+            "few: only the last code of a block counts": ("\n        strayed |= fed;", "\n        strayed = fed;"),
+            "few: a block forgets its remainders": ("    axis->shaper = shaper;\n    axis->code", "    axis->code"),
+            "few: a block's codes are not followed": (
+                "    axis->code = (int32_t)out[-DAC_STRIDE];\n    return",
+                "    return",
+            ),
+            "few: values have a bit more": ("(*values++ >> DAC_BELOW)", "(*values++ >> (DAC_BELOW - 1))"),
+            "few: all is fed back by the highest order": (
+                "remainder_bits == 12 && bank->order == 3)",
+                "remainder_bits == 12)",
+            ),
+            "few: other converters have another remainder": (
+                "FEEDER(feed_any, bank->order, bank->remainder_bits)",
+                "FEEDER(feed_any, bank->order, bank->remainder_bits + 1)",
+            ),
+        },
+    ),
+    *changed(
+        "dac_short.h",
+        "shaped few",
+        {
+            "few: blocks follow each other on the same place": ("            out = stop;\n", ""),
+            "few: a block that is refused is played": ("risen > 2 * spread - 1 || !feeder(axis", "feeder(axis"),
+        },
+    ),
+    *changed(
+        "dac_short.h",
         "shaped short",
         {
             "short: a shaped run is not held in its window": (
@@ -36,14 +76,14 @@ MUTANTS: tuple[Mutant, ...] = (
                 "risen",
             ),
             "short: a shaped run may begin anywhere": (
-                "if ((uint32_t)((int32_t)unrounded - axis->code + bank->run_half) >> bank->run_bits != 0)",
-                "if (false)",
+                "first + (half >> 1) >= half",
+                "false",
             ),
             "short: a shaped run's sample is rounded down": (
                 "(UINT32_C(1) << (DAC_ABOVE - 1)) - (origin << DAC_ABOVE)",
                 "0u - (origin << DAC_ABOVE)",
             ),
-            "short: a shaped run loses its offset": ("+ (uint32_t)bank->run_offset - ", "- "),
+            "short: a shaped run loses its offset": ("shaped ? bank->run_offset : bank->offset", "bank->offset"),
         },
     ),
     *changed(

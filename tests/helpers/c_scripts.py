@@ -44,6 +44,7 @@ SMALL_IN_C = shape_in_c(SMALL)
 LONG: dict[str, tuple[SequencerShape, tuple[int, int]]] = {
     "bits_16": (SequencerShape(16, 1, 8, 16, 1, 6, 16), (100, 3000)),
     "bits_8": (SequencerShape(8, 1, 5, 8, 1, 4, 8), (100, 700)),
+    "bits_12": (SequencerShape(12, 1, 6, 12, 1, 5, 14), (100, 2000)),
     "bits_20": (SequencerShape(20, 1, 10, 18, 1, 7, 20), (100, 2000)),
     "bits_24": (SequencerShape(24, 1, 9, 24, 1, 7, 24), (100, 2000)),
     "dac_24_words_8": (SequencerShape(24, 1, 6, 8, 1, 5, 8), (100, 700)),

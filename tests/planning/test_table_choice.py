@@ -76,7 +76,7 @@ def test_of_shaped_output_it_is_the_error_before_the_rounding(
     tmp_path: Path, asked: float | None, error: float
 ) -> None:
     """A table within 1 LSB would be the whole error of what shaping leaves."""
-    edits = {**FEW, **C_ALONE, "x.size_nm": "20.0", "dac.shaping": '"second"', **(asking(asked) if asked else AUTO)}
+    edits = {**FEW, "x.size_nm": "20.0", "dac.shaping": '"second"', **(asking(asked) if asked else AUTO)}
     plan = plan_of(tmp_path, edits)
     found, line = shape_of(plan.x), plan.x
     keeping = [shape for shape in every_shape(line, 1 << 12) if worst_of(line, shape) <= error]

@@ -93,7 +93,7 @@ def test_cortex_m_plays_long_lines(name: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("level", ["-O2", "-Os"])
 @pytest.mark.parametrize("core", [*CORTEX_M, *RISC_V])
 def test_shaped_output(core: str, level: str, tmp_path: Path) -> None:
-    for name in ("bits_16", "bits_8", "bits_20"):
+    for name in ("bits_16", "bits_8", "bits_12", "bits_20"):
         shape, script = LONG[name][0], long_play(name, 6000, 0, 3)
         words = words_of(script, shape)
         for fill in (200, 0):
