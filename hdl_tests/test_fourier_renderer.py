@@ -6,7 +6,7 @@ word that leaves. Mutants of the Verilog show that each check can fail.
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
 from math import floor
@@ -16,6 +16,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 from building import BENCHES, REPOSITORY
+from replacing import replace
 from variants import plan_of
 
 from tablegen.fixedpoint.rounding import signed_limits

@@ -6,7 +6,7 @@ The last ones are by the command line, over TCP, into a simulation that runs mea
 import json
 import subprocess
 import sys
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -16,6 +16,7 @@ from line_log import LineCheck, PlayedLine, WrongLine
 from link_talk import Talk
 from loader_bridge import Simulation
 from loader_device import Loader
+from replacing import replace
 
 from tablegen.device.dual_program import DualProgram
 from tablegen.link.image import ProgramImage, make_image

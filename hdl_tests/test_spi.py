@@ -1,11 +1,11 @@
 """dac_spi: converters receive every sample that is not missed, in all wirings, and mutants of it are found."""
 
 import random
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from replacing import replace
 from spi_bench import (
     AD5541A,
     AD5791,

@@ -1,10 +1,10 @@
 """The monitor of SPI against frames that were drawn by hand: the tests of dac_spi are no better than it."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 import pytest
+from replacing import replace
 from spi_monitor import Converter, ProtocolFault, Wires, receive, updates
 
 # A frame of four bits, 1011, in mode 0, by hand; and what a change in one wire is to be called.

@@ -5,12 +5,12 @@ Icarus plays every case, Verilator the long ones. Programs of plans are in ``tes
 ``test_stream_swaps.py``.
 """
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from programs import extreme, random_dual, shaped
+from replacing import replace
 from sets import common
 from stream_benches import HARMONICS, equal, with_sine
 from stream_configurations import (

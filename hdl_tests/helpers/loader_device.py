@@ -1,11 +1,11 @@
 """A simulated program_loader as the devices of ``tests/dialogues.py`` are: bytes in, bytes out, ticks."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from loader_bridge import Simulation, compile_loader
+from replacing import replace
 
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.registers import program_words

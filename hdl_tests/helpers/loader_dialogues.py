@@ -4,7 +4,6 @@ import struct
 from binascii import crc32
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 from unittest import mock
 
@@ -13,6 +12,7 @@ from link_images import damaged, random_image
 from link_talk import Talk
 from loader_bridge import BOOT_HASH
 from loader_device import LoaderDevice, without_lines
+from replacing import replace
 
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS

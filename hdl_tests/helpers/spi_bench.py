@@ -6,11 +6,12 @@ dac_spi.v, says which samples have to arrive and on which clock. Words come from
 
 import random
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from building import BENCHES, REPOSITORY
+from replacing import replace
 from spi_monitor import Converter, Wires, quiet, receive, two_channels, updates
 
 from tablegen.fixedpoint.output import Output

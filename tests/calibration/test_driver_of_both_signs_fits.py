@@ -1,7 +1,6 @@
 """Calibrations on a driver of v_min..v_max: moved voltages give the same parameters, messages say volts as they are."""
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +9,7 @@ from calibrating import AMPLITUDES, OFFSETS, V_MAX, Scanner, apparent
 from editing import run
 from msgspec import structs
 from operator_files import operator_file, write_operator_scan
+from replacing import replace
 
 from tablegen.calibration.hysteresis import fit_hysteresis
 from tablegen.calibration.offset import fit_offset

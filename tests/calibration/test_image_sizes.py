@@ -1,6 +1,5 @@
 """Images of a sample of known constant to the length of the line, however it lies; and what is refused."""
 
-from dataclasses import replace
 from math import sqrt
 
 import numpy as np
@@ -9,6 +8,7 @@ from calibrating import LATTICE_NM, PITCH_NM, V_MAX, Scanner, grating, lattice, 
 from calibrating import Sample as Seen
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from replacing import replace
 
 from tablegen.calibration.estimate import Estimate
 from tablegen.calibration.image_line import fit_line

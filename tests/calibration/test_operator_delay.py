@@ -1,12 +1,12 @@
 """The delay of a sensor, fitted from lines of foreign piezos: what was put in comes out, whatever the hysteresis."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 from foreign_plants import SIX, V_MAX, BoucWen, Core, ForeignPlant, ManyPlays, record
+from replacing import replace
 
 from tablegen.calibration.hysteresis import Trace
 from tablegen.calibration.operator.delay import fit_delay

@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from unittest.mock import patch
 
@@ -12,6 +11,7 @@ from client_line import VirtualLine
 from client_rig import BOOT, KEY, Bench, info_for, model
 from editing import run
 from link_programs import INFO
+from replacing import replace
 
 from tablegen.cli.bar import Bar
 from tablegen.link.frames import FrameReader

@@ -1,7 +1,6 @@
 """The order of notes and warnings where several come together: what spoils an image first, small print last."""
 
 import re
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from gwyfile.objects import GwyContainer, GwyDataField
 from hypothesis import given
 from hypothesis import strategies as st
 from plotting_lab import write_csv
+from replacing import replace
 
 from tablegen.calibration.hysteresis import Trace, fit_hysteresis
 from tablegen.findings import Finding, Remark, as_printed, of_remarks, worst_first

@@ -4,7 +4,6 @@ import copy
 import json
 import re
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ from html_page import Page, well_formed
 from hypothesis import given
 from hypothesis import strategies as st
 from operator_files import operator_file, write_operator_scan
+from replacing import replace
 
 from tablegen.comparison.charts import comparison_charts, differing_charts
 from tablegen.comparison.comparison import compared

@@ -1,6 +1,5 @@
 """Bouc and Wen's equation settled, against the equation stepped; and the families that are mixed of it and plays."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace as replace_table
 from operator_files import operator_file
+from replacing import replace
 
 from tablegen.compensation.operator.bouc_wen import POWER_BITS, BoucWen
 from tablegen.compensation.operator.family import Family

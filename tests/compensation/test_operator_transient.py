@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Callable
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -10,6 +9,7 @@ import numpy as np
 import pytest
 from editing import SCAN, SCANNER, edited, run
 from foreign_plants import SIX, BoucWen, ForeignPlant, ManyPlays, record
+from replacing import replace
 from stepped_plants import Followed, bouc_wen_played, followed, plays_played
 from test_operator_waveform import THRESHOLDS, WEIGHTS, operator
 

@@ -1,11 +1,10 @@
 """How far an operator may be off: against piezos that depart by a known process, and the laws that it has to obey."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from replacing import replace
 
 from tablegen.compensation.expectation import LEVEL_PERCENT
 from tablegen.compensation.operator.operator import MeasuredLine

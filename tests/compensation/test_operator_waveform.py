@@ -1,9 +1,8 @@
 """The waveform that an operator follows straight: what it leaves on its own operator, and where it is refused."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
+from replacing import replace
 
 from tablegen.compensation.dynamics import SecondOrder
 from tablegen.compensation.hysteresis import BranchShape

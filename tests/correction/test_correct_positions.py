@@ -1,11 +1,11 @@
 """Old frames of piezos that are known put straight: 0.3 % of the width, half a pixel, and no more noise."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from correcting import LATTICE, LAWS, OFFSET_V, PLANTS, RATE_HZ, V, off, old_frame, save_pair, scanner_file
+from replacing import replace
 from sets import common
 
 from tablegen.correction.distortion import Resampler

@@ -6,7 +6,6 @@ import socket
 import threading
 import time
 import tty
-from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from random import Random
@@ -17,6 +16,7 @@ from client_line import VirtualLine
 from editing import Outcome, run
 from limits import PATIENCE_S
 from link_programs import INFO, SmallScan, make_scan
+from replacing import replace
 
 from tablegen.link.device import Device
 from tablegen.link.frames import Frame, FrameReader

@@ -1,8 +1,10 @@
 """What serial lines do to bytes and frames, from a seed: for lines in virtual time and for a proxy in real time."""
 
 from collections import Counter
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from random import Random
+
+from replacing import replace
 
 
 @dataclass(frozen=True, slots=True)

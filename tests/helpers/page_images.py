@@ -2,13 +2,13 @@
 
 import re
 import shlex
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from building import REPOSITORY
 from editing import Outcome, run
 from refining import IMAGED, scanner
+from replacing import replace
 
 from tablegen.config.load import load
 from tablegen.planning.line_plan import make_plan

@@ -2,13 +2,13 @@
 
 import struct
 import zlib
-from dataclasses import replace
 
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from line_log import LineCheck, PlayedLine, WrongLine
 from link_programs import make_scan
+from replacing import replace
 
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.sequencer import Tick

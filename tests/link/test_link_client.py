@@ -1,7 +1,6 @@
 """The client in virtual time, against the model of a device: what it asks, how fast it is, and what it survives."""
 
 import time
-from dataclasses import replace
 from random import Random
 from unittest.mock import patch
 
@@ -9,6 +8,7 @@ import pytest
 from client_line import VirtualLine
 from client_rig import BOOT, FOURIER, KEY, LARGE, LARGE_INFO, NEW, TABLE, Watched, client, model
 from link_programs import INFO, LIMITS, make_scan
+from replacing import replace
 
 from tablegen.link.device import Device
 from tablegen.link.errors import (

@@ -1,6 +1,5 @@
 """What the client does when frames are lost, ports go and devices are reset; and a control that must fail."""
 
-from dataclasses import replace
 from random import Random
 from unittest.mock import patch
 
@@ -8,6 +7,7 @@ import pytest
 from client_line import Noise, VirtualLine
 from client_rig import KEY, LARGE, LARGE_INFO, LoseOnce, Watched, client, model
 from link_programs import INFO, make_scan
+from replacing import replace
 
 from tablegen.link.device import Device
 from tablegen.link.errors import (

@@ -1,7 +1,6 @@
 """Each exit status of the commands that talk to a device, and what is said with it."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from unittest.mock import patch
 
@@ -9,6 +8,7 @@ import pytest
 from building import Variant, build
 from client_rig import BOOT, Bench, info_for, model
 from editing import run
+from replacing import replace
 
 from tablegen.link.frames import FrameReader
 from tablegen.link.messages import AxisShape, DeviceInfo, Request

@@ -4,7 +4,6 @@ import ctypes
 import hashlib
 import struct
 import zlib
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +13,7 @@ from link_device import HostDevice, device_library
 from link_images import random_image
 from link_programs import make_scan
 from link_talk import Talk, derived_nonce, is_answer
+from replacing import replace
 
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS
 from tablegen.link.frames import Frame

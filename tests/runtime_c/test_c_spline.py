@@ -1,6 +1,5 @@
 """Cubic tables in the C runtime: what it loads, and what a device that was compiled without them refuses."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +10,7 @@ from c_scripts import LONG, long_dual, long_play
 from link_device import HostDevice, device_library
 from link_images import random_image
 from link_talk import Talk
+from replacing import replace
 
 from tablegen.link.messages import CUBIC, DeviceInfo, Reason
 from tablegen.verification.bench import SequencerShape

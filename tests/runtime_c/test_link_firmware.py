@@ -7,7 +7,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from random import Random
 
@@ -21,6 +21,7 @@ from link_faults import MIXED, Chances
 from link_line import Line
 from link_proxy import FaultProxy
 from link_qemu import LinkMachine
+from replacing import replace
 
 from tablegen.config.load import load
 from tablegen.link.device import Device

@@ -1,11 +1,11 @@
 """Sizes and lines from images of plants that obey no law of ours, held against where the plant was."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from foreign_plants import BoucWen, ForeignPlant, ManyPlays
+from replacing import replace
 
 from tablegen.calibration.image_line import fit_line
 from tablegen.calibration.image_scale import Cell, Grating, size_of_line
