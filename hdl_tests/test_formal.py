@@ -123,6 +123,7 @@ BY_SAT = {
     # The product of a tick is made on the clocks after it.
     "scanner": Proof("scanner_properties", 7, 26, {"SHAPING": 3, "BITS": 3}),
     "product": Proof("product_properties", 1, 14, {"BITS": 10}),
+    "product_of_words_of_21_bits": Proof("product_properties", 1, 14, {"BITS": 28}),
 }
 
 
