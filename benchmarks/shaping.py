@@ -57,7 +57,6 @@ def planned(shaping: str, table: tuple[str, int, int], scanner: int) -> LinePlan
     _, hz, quality, scan, changes = SCANNERS[scanner]
     wanted = {"x.size_nm": 20.0, "timing.lines": 40} | scan
     wanted |= dict(zip(("x.table.mode", "x.table.length", "x.table.bits"), table, strict=True))
-    wanted["emit.formats"] = ["json"]
     resonance = {"frequency_hz": hz, "quality": quality, "max_boost_db": 6.0}
     variant = Variant(wanted, {"x.resonance": resonance, "x.dac": {"shaping": shaping}} | changes)
     with tempfile.TemporaryDirectory() as folder:
