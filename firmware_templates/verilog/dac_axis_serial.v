@@ -178,7 +178,7 @@ module dac_axis_serial #(
     endgenerate
 
     // The terms of a cubic table, a clock ahead as the other flags.
-    wire not_once, term_twice, next_minus; 
+    wire not_once, term_twice, next_minus;
     wire [BITS-1:0] term_word;
     generate
         if (INTERPOLATED == 3) begin : terms
