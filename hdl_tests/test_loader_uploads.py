@@ -25,7 +25,6 @@ from tablegen.link.messages import ANSWER, DeviceState, DeviceStatus, Request, U
 pytestmark = pytest.mark.rest
 
 UPDATE_RATE_HZ = 50_000
-TICK_EVERY = 50  # clocks
 LINE = 331  # ticks
 HARMONICS = 16
 CLOCKS_PER_BIT = 16  # the least at which the loader keeps up with the line
@@ -41,17 +40,20 @@ CUBIC = {"mode": "cubic", "length": 64, "bits": 14}
 
 @dataclass(frozen=True)
 class Case:
-    """What the tables of a device are, and the kind of its axes."""
+    """What the tables of a device are, the kind of its axes, and clocks from tick to tick."""
 
     tables: dict[str, object]
     low_area: int
+    tick_every: int = 50
 
 
 LINES_OF = {"x.table.length": 256, "y.table.length": 128}
+CUBIC_TABLES = {"x.table": CUBIC, "y.table": {**CUBIC, "length": 32}}
 CASES = {
     "low area": Case(LINES_OF, 1),
     "a sample a clock": Case(LINES_OF, 0),
-    "cubic": Case({"x.table": CUBIC, "y.table": {**CUBIC, "length": 32}}, 0),
+    "cubic": Case(CUBIC_TABLES, 0),
+    "cubic in low area": Case(CUBIC_TABLES, 1, tick_every=100),
 }
 
 
@@ -120,15 +122,15 @@ def status(simulation: Simulation, talk: Talk) -> DeviceStatus:
     return DeviceStatus.unpack(answer.payload)
 
 
-def test_uploads_while_a_scan_plays(loader: Loader, scans: Scans) -> None:
+def test_uploads_while_a_scan_plays(case: Case, loader: Loader, scans: Scans) -> None:
     talk = Talk()
     with Simulation(loader.compiled) as simulation:
-        simulation.set(tick_every=TICK_EVERY)
+        simulation.set(tick_every=case.tick_every)
         simulation.ticks(None)
-        simulation.run(TICK_EVERY * 200)
+        simulation.run(case.tick_every * 200)
         simulation.talk(talk.hello())
         simulation.talk(talk.acting(Request.ARM, bytes(4)) + talk.acting(Request.TRIGGER))
-        simulation.run(TICK_EVERY * LINE * 3)
+        simulation.run(case.tick_every * LINE * 3)
         for count, (built, fourier) in enumerate(
             [(scans.others[0], False), (scans.others[1], True), (scans.boot, True), (scans.others[1], False)], 2
         ):
@@ -138,7 +140,7 @@ def test_uploads_while_a_scan_plays(loader: Loader, scans: Scans) -> None:
             simulation.talk(talk.commit(image))
             now = status(simulation, talk)
             assert now.upload == Upload.WAITING or now.generation == count
-            simulation.run(TICK_EVERY * LINE * 3)
+            simulation.run(case.tick_every * LINE * 3)
             now = status(simulation, talk)
             assert (now.state, now.generation, now.hash) == (DeviceState.PLAYING, count, image.info.hash)
             assert (now.faults, now.bad_frames) == (0, 0)
@@ -153,15 +155,15 @@ def test_uploads_while_a_scan_plays(loader: Loader, scans: Scans) -> None:
             LineCheck(scans.all["boot"]).follow(log)
 
 
-def test_it_keeps_up_with_the_line(loader: Loader, scans: Scans) -> None:
+def test_it_keeps_up_with_the_line(case: Case, loader: Loader, scans: Scans) -> None:
     """A whole upload without a pause between two bytes."""
     talk, image = Talk(), image_of(scans.others[0], fourier=False)
     with Simulation(loader.compiled) as simulation:
         simulation.ticks(None)
-        simulation.run(TICK_EVERY * 200)
+        simulation.run(case.tick_every * 200)
         simulation.talk(talk.hello())
         wire = b"".join(talk.upload(image)) + talk.commit(image)
-        answers = talk.answers(simulation.talk(wire) + simulation.run(TICK_EVERY * 10))
+        answers = talk.answers(simulation.talk(wire) + simulation.run(case.tick_every * 10))
         assert [frame.type for frame in answers][-1] == Request.COMMIT | ANSWER
         assert status(simulation, talk).bad_frames == 0
 
@@ -177,9 +179,9 @@ def command(*arguments: str | Path | int) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_the_command_line(loader: Loader, scans: Scans) -> None:
+def test_the_command_line(case: Case, loader: Loader, scans: Scans) -> None:
     with Simulation(loader.compiled) as simulation:
-        simulation.set(tick_every=TICK_EVERY)
+        simulation.set(tick_every=case.tick_every)
         simulation.ticks(None)
         with simulation.bridged() as port:
             where = ("--port", port, "--baud", BAUD)
