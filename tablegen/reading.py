@@ -11,15 +11,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from hashlib import sha256
 from pathlib import Path
-
-from msgspec import Struct
+from typing import NamedTuple
 
 from tablegen.user_cache import is_private
 
 _CHUNK_BYTES = 1 << 20
 
 
-class Kind(Struct, frozen=True):
+class Kind(NamedTuple):
     """A kind of file: what messages call it, and the most bytes that are read of one."""
 
     what: str

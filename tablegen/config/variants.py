@@ -15,10 +15,11 @@ from tablegen.config.words import IMAGES, OFFSETS, RATES, SIZES
 from tablegen.problems import Document, Problem, Rejected
 
 
-class VariedDocument(Document, frozen=True):
+@dataclass(frozen=True)
+class VariedDocument(Document):
     """A scan file of which some keys were set elsewhere: ``set_by`` says where, by key."""
 
-    set_by: Mapping[str, str] = {}
+    set_by: Mapping[str, str] = field(default_factory=dict)
 
     def problem(self, key: str, why: str) -> Problem:
         """A problem of a key, at the option that set it or in the file."""
