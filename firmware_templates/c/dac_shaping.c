@@ -157,7 +157,7 @@ FEEDER(feed_second, 2, 12)
 FEEDER(feed_scanner, 3, 12)
 #endif
 
-static dac_feeder *feeder_of(const dac_bank_axis *bank)
+static dac_feeder feeder_of(const dac_bank_axis *bank)
 {
     (void)bank;
 #if DAC_SHAPING > 2

@@ -44,8 +44,8 @@
 
 /* Feeds back the remainders of a block of values, up to `end`, and puts out its codes; false, and the axis unchanged, if one is
  * outside the window. */
-typedef bool dac_feeder(dac_axis *axis, const dac_bank_axis *bank, const uint32_t *values, const uint32_t *end,
-                        dac_output *out);
+typedef bool (*dac_feeder)(dac_axis *axis, const dac_bank_axis *bank, const uint32_t *values, const uint32_t *end,
+                           dac_output *out);
 
 /* From `rise` to the output, or to the values for the feeder. */
 #define DAC_PUT_CODE                                                                                                  \
@@ -76,7 +76,7 @@ typedef bool dac_feeder(dac_axis *axis, const dac_bank_axis *bank, const uint32_
  * shaped one its remainder's, else gain_q. With a feeder, that feeds back, and `order` is not used. */
 DAC_COPIED uint32_t dac_play_short(dac_axis *axis, const dac_bank_axis *bank, uint64_t at, uint64_t step, dac_output *out,
                                    uint32_t ticks, const bool shaped, const unsigned order, const unsigned bits,
-                                   const bool cubic, dac_feeder *const feeder)
+                                   const bool cubic, const dac_feeder feeder)
 {
     const dac_word *const table = bank->table;
     const DAC_READ_AGAIN uint64_t advance = step;

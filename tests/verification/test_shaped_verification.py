@@ -160,8 +160,8 @@ def test_the_verilog_plays_shaped_codes(played: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "pattern", "new", "target"),
     [
-        ("dac_shaping.c", r"next.older = last.newest;", "next.older = last.older;", ("--target", "c")),
-        ("dac_shaping.c", r"\) >> 6\)", ") >> 5)", ("--target", "c")),
+        ("dac_run.h", r"next.older = last.newest;", "next.older = last.older;", ("--target", "c")),
+        ("dac_run.h", r"\) >> 6\)", ") >> 5)", ("--target", "c")),
         pytest.param("dac_shaper.v", "product - ", "product + ", ("--sim", "icarus"), marks=pytest.mark.common),
     ],
 )
