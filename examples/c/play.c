@@ -22,7 +22,7 @@
 #error "this example plays no shaped output: the C sequencer dac_*.c does"
 #endif
 
-enum { PHASE_BITS = 32, FRACTION_BITS = 15 };
+enum { PHASE_BITS = 32, FRACTION_BITS = 15, SPLINE_FRACTION_BITS = 18 };
 
 /* The constants of an axis. Words are fetched by a function, since tables have 8, 16 or 32 bits. */
 struct axis {
@@ -66,19 +66,20 @@ static int64_t shift_round(int64_t value, int bits)
 /* The table value at a position: 2^guard_bits, or of a spline 12, for the LSB of a word. */
 static int64_t sample_at(const struct axis *axis, const struct position *at)
 {
+    const int fraction_bits = axis->interpolated == 3 ? SPLINE_FRACTION_BITS : FRACTION_BITS;
     uint32_t index = at->count, fraction = 0;
     if (axis->interpolated) {
         index = at->phase >> (PHASE_BITS - axis->index_bits);
-        fraction = (at->phase >> (PHASE_BITS - axis->index_bits - FRACTION_BITS)) & ((1u << FRACTION_BITS) - 1u);
+        fraction = (at->phase >> (PHASE_BITS - axis->index_bits - fraction_bits)) & ((1u << fraction_bits) - 1u);
     }
     if (axis->interpolated == 3) { /* a cubic spline */
         int64_t c[4];
         for (uint32_t i = 0; i < 4; i++)
             c[i] = axis->word((index + i) % axis->length);
         int64_t sample = 16 * (c[3] - c[0] + 3 * (c[1] - c[2]));
-        sample = 24 * (c[0] - 2 * c[1] + c[2]) + shift_round(sample * fraction, 16);
-        sample = 12 * (c[2] - c[0]) + shift_round(sample * fraction, 16);
-        return 2 * (c[0] + 4 * c[1] + c[2]) + shift_round(sample * fraction, 16);
+        sample = 24 * (c[0] - 2 * c[1] + c[2]) + shift_round(sample * fraction, SPLINE_FRACTION_BITS + 1);
+        sample = 12 * (c[2] - c[0]) + shift_round(sample * fraction, SPLINE_FRACTION_BITS + 1);
+        return 2 * (c[0] + 4 * c[1] + c[2]) + shift_round(sample * fraction, SPLINE_FRACTION_BITS + 1);
     }
     const int64_t here = axis->word(index);
     const int64_t there = axis->word(index + 1 < axis->length ? index + 1 : 0);
