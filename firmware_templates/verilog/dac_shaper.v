@@ -79,7 +79,7 @@ module dac_shaper #(
                 wire [1:0] digit = step == 3'd1 ? digits[1:0] : step == 3'd2 ? digits[3:2] :
                                    step == 3'd3 ? digits[5:4] : digits[7:6];
                 wire minus = digit == 2'd0;
-                wire [BITS+2:0] term = digit == 2'd0 ? ~{{2{difference[BITS]}}, difference} :
+                wire [BITS+2:0] term = minus ? ~{{2{difference[BITS]}}, difference} :
                                        digit == 2'd1 ? {BITS+3{1'b0}} :
                                        digit == 2'd2 ? {{2{difference[BITS]}}, difference} :
                                                        {difference[BITS], difference, 1'b0};
