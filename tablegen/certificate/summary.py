@@ -44,6 +44,7 @@ def drive_lines(line: LinePlan) -> list[tuple[str, str]]:
             f"{line.series.harmonics}, up to {_hz(line.series.harmonics * float(line.rate))}, {_method(line)}",
         ),
         ("table", f"{len(line.program.words)} words of {line.program.bits} bits, {line.program.mode}{_chosen(line)}"),
+        *_needs_of_table(line),
         ("gain, offset", f"{output.gain_word} / 2^{output.gain_q}, code {output.offset_code}"),
     ]
     if line.layer is not None:
@@ -70,6 +71,13 @@ def _method(line: LinePlan) -> str:
     low, high = line.band_limit.window
     kept = "" if line.kept_percent is None else f", gentlest at {line.kept_percent:.3g} %"
     return f"{line.band_limit.method} {low:g}..{high:g} {line.band_limit.directions}{kept}"
+
+
+def _needs_of_table(line: LinePlan) -> list[tuple[str, str]]:
+    """What a device has to have for it: a build knows neither its options nor its clock, and cannot refuse."""
+    if line.program.mode != "cubic":
+        return []
+    return [("", "needs DAC_SPLINE=1 in C; in Verilog 11 clocks a tick, 90 in low area")]
 
 
 def _chosen(line: LinePlan) -> str:

@@ -9,6 +9,8 @@ from editing import SCAN, SCANNER, edited, run, write_pair
 from manifest_integers import played_codes
 
 from tablegen.certificate.certificate import certify
+from tablegen.certificate.summary import summary
+from tablegen.verification.placement import Placement
 
 CUBIC = {
     "x.table": {"mode": "cubic", "length": 128, "bits": 14},
@@ -28,6 +30,14 @@ def test_less_than_an_lsb_in_few_bits(built: Build, axis: str, bits: int, most: 
     line = getattr(built.plan, axis)
     assert len(line.program.words) * line.program.bits == bits
     assert most - 0.01 < certify(built.plan)[axis].max_error_lsb < most
+
+
+def test_a_build_says_what_a_device_needs_for_it(built: Build) -> None:
+    """Where nothing can refuse: options of a compiler, and the clocks that `verify` gives to such a tick."""
+    fast, low_area = (Placement(axis, spline=True).tick_clocks for axis in ("pipelined", "serial"))  # type: ignore[arg-type]
+    needs = f"needs DAC_SPLINE=1 in C; in Verilog {fast} clocks a tick, {low_area} in low area"
+    assert "\n".join(summary(built.plan, certify(built.plan))).count(needs) == 2, "of x and y"
+    assert "_SPLINE 1" in built.files["annexin_200nm.h"].decode()
 
 
 @pytest.mark.parametrize("axis", ["x", "y"])
