@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from datetime import date, time
+from functools import cache
 from typing import Any, TypeAlias, TypeVar
 
 import msgspec.inspect as types
@@ -27,7 +28,7 @@ def decode(kind: type[T], values: dict[str, Any], document: Document, problems: 
 
     ``check`` adds what keys of the same table say about each other.
     """
-    built = _Decoder(document, problems, check).struct(types.type_info(kind), values, "")
+    built = _Decoder(document, problems, check).struct(_described(kind), values, "")
     return built if isinstance(built, kind) else None
 
 
@@ -113,7 +114,7 @@ class _Decoder:
         try:
             if not isinstance(name, str):
                 raise models.UnknownModel(f"{_shown(name)} is not one of {', '.join(map(repr, models.names()))}")
-            kind = types.type_info(models.get(name))
+            kind = _described(models.get(name))
         except models.UnknownModel as why:
             self._wrong(join_key(key, "model"), str(why))
             return None
@@ -178,6 +179,12 @@ class _Decoder:
         if kind.max_length is not None and len(value) > kind.max_length:
             return self._wrong(key, f"{len(value)} characters are too many, at most {kind.max_length} are taken")
         return value
+
+
+@cache
+def _described(kind: type[Struct]) -> types.Type:
+    """The fields of a type with their ranges; a scan has several tables of one type."""
+    return types.type_info(kind)
 
 
 def _bare(kind: types.Type) -> types.Type:

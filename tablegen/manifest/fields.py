@@ -125,9 +125,6 @@ class ManifestTable(Struct):
     asked: ManifestAskedTable | None = None
 
 
-CONVERTER_KEYS = ("v_zero", "v_per_code", "coding", "align", "word_bits")  # of an output: its converter and amplifier
-
-
 class ManifestShaping(Struct, forbid_unknown_fields=True):
     """How remainders of the rounding are fed back; without it they are not."""
 

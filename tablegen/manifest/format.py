@@ -5,6 +5,7 @@ import json
 from typing import Any
 
 MANIFEST = "manifest.json"
+CONVERTER_KEYS = ("v_zero", "v_per_code", "coding", "align", "word_bits")  # of an output: its converter and amplifier
 
 
 def read_json(content: bytes) -> Any:

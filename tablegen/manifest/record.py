@@ -15,7 +15,7 @@ from tablegen.compensation.dynamics import capped_inverse
 from tablegen.compensation.expectation import Expectation, Figure
 from tablegen.device.schedule import Schedule, Window
 from tablegen.fixedpoint.shaping import Shaping
-from tablegen.manifest.fields import CONVERTER_KEYS
+from tablegen.manifest.format import CONVERTER_KEYS
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, Plan
 

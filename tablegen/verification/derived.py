@@ -11,7 +11,8 @@ from tablegen.fixedpoint.program import sample_gain
 from tablegen.fixedpoint.rounding import round_number
 from tablegen.fixedpoint.spline_words import spline_factors
 from tablegen.fixedpoint.synthesis import FourierWords, encode, synthesize
-from tablegen.manifest.fields import CONVERTER_KEYS, Manifest, ManifestAxis
+from tablegen.manifest.fields import Manifest, ManifestAxis
+from tablegen.manifest.format import CONVERTER_KEYS
 from tablegen.manifest.read import StoredBuild
 
 _RELATIVE = 1e-9  # of floats that went through JSON and a handful of operations

@@ -9,7 +9,7 @@ import pytest
 from editing import SCAN, edited, write_pair
 
 from tablegen.fixedpoint.runs import Runs
-from tablegen.numerics import arrays, turns
+from tablegen.numerics import arrays, linear, turns
 from tablegen.numerics.arrays import Floats, tree_sum
 from tablegen.numerics.linear import Cholesky
 from tablegen.numerics.turns import sine_and_cosine
@@ -27,12 +27,14 @@ def by_columns(matrix: Floats) -> Floats:
     return np.tril(work)
 
 
+@pytest.mark.parametrize("block", [linear._BLOCK, 300, 1])
 @pytest.mark.parametrize("size", [1, 2, 31, 32, 33, 64, 65, 288, 289, 330])
-def test_a_factor_has_the_bits_of_column_by_column(size: int) -> None:
+def test_a_factor_has_the_bits_of_column_by_column(monkeypatch: pytest.MonkeyPatch, size: int, block: int) -> None:
+    monkeypatch.setattr(linear, "_BLOCK", block)
     random = np.random.default_rng(size)
     half = random.normal(size=(size, size))
     matrix = half @ half.T + size * np.eye(size)
-    assert np.array_equal(np.tril(Cholesky(matrix)._factor), by_columns(matrix))
+    assert np.array_equal(np.triu(Cholesky(matrix)._columns).T, by_columns(matrix))
 
 
 def test_a_pivot_that_is_not_positive_is_named_in_any_block() -> None:
