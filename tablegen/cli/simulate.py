@@ -29,9 +29,9 @@ OWN, DEFAULT = "own", "default"
     metavar="own|default|duhem|FILE",
     help="Scanner to play on. own: the operator of the scanner file, wrong by its own uncertainty, several times at "
     "random. default: built in, with a Preisach operator. duhem: built in, with another kind of hysteresis, two "
-    "resonances and a memory of the offset. Both were identified on numbers of the paper, and are scaled to the drive "
-    "range and the nm per V of the scanner file. FILE: parameters as in docs/virtual.md.  [default: own if the scanner "
-    "file has an operator, else default]",
+    "resonances and a memory of the offset. Both were identified on numbers of the paper, and are scaled to the "
+    "drive range, the nm per V and the resonances of the scanner file. FILE: parameters as in docs/virtual.md.  "
+    "[default: own if the scanner file has an operator, else default]",
 )
 @click.option(
     "--csv",

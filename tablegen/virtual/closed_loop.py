@@ -51,7 +51,10 @@ def uncorrected(setup: Setup) -> Setup:
     """The same scan on a scanner file that knows k of x alone, as controllers without correction do."""
     x: ScannerAxis = setup.scanner.x
     size = msgspec.structs.replace(x.size, beta=0.0)
-    return replace(setup, scanner=msgspec.structs.replace(setup.scanner, x=ScannerAxis(size=size)))
+    return replace(
+        setup,
+        scanner=msgspec.structs.replace(setup.scanner, x=ScannerAxis(size=size, dac=x.dac, amplifier=x.amplifier)),
+    )
 
 
 def play_x(setup: Setup, scanner: VirtualScanner) -> AxisRun:

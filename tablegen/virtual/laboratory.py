@@ -154,6 +154,8 @@ class _Day:
             hysteresis=_as(models.get(changes["hysteresis"].values["model"]), {"branches": branches}),
             frequency=_as(Frequency, changes["frequency"].values),
             resonance=resonance,
+            dac=self._before.dac,
+            amplifier=self._before.amplifier,
         )
 
     def _offset(self, size: SizeFit, sizes: Sequence[float]) -> Fit:

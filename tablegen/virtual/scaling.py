@@ -1,6 +1,7 @@
 """A built-in virtual scanner in the range and the size of another one: a shape, in its volts and nanometres."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
+from math import tau
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from tablegen.virtual.line_error import ideal_triangle
 from tablegen.virtual.scanner import VirtualAxis, VirtualScanner
 
 _SAME = 0.05  # sizes that differ by less are those of the scanner as it is
+_NEAR = 2.0  # a resonance that is no farther away than by this factor stays where it is
 _TICKS = 2000
 
 
@@ -33,15 +35,21 @@ class ScaledAxis(VirtualAxis):
 def scaled_to(scanner: VirtualScanner, file: Scanner) -> tuple[VirtualScanner, str]:
     """The scanner in the drive range of a scanner file, and with its nm per V at ``base_nm``; and what was done.
 
-    Frequencies stay. A scanner that goes as far as the file says within 5 % in both axes, over the same range, is
+    Its resonance goes to that of the file if that is more than a factor of 2 away; other frequencies stay. A scanner
+    that goes as far as the file says within 5 % in both axes, over the same range, and whose resonances stay, is
     returned as it is, with an empty text.
     """
     axes = {name: _scaled(getattr(scanner, name), getattr(file, name), file.driver) for name in ("x", "y")}
+    faster = {name: _faster(axis, getattr(file, name)) for name, axis in axes.items()}
     same_range = all(axis.driver == file.driver for axis in (scanner.x, scanner.y))
-    if same_range and all(abs(axis.times - 1.0) <= _SAME for axis in axes.values()):
+    if same_range and not any(faster.values()) and all(abs(axis.times - 1.0) <= _SAME for axis in axes.values()):
         return scanner, ""
-    k = " and ".join(f"{getattr(file, name).size.k_nm_per_v:g} nm/V in {name}" for name in axes)
-    return VirtualScanner(scanner.name, **axes), f"scaled to {file.driver}, {k}"
+    done = [" and ".join(f"{getattr(file, name).size.k_nm_per_v:g} nm/V in {name}" for name in axes)]
+    for name, times in faster.items():
+        if times is not None:
+            axes[name] = replace(axes[name], resonance=axes[name].resonance.faster(times))
+            done.append(f"a resonance of {getattr(file, name).resonance.frequency_hz:g} Hz in {name}")
+    return VirtualScanner(scanner.name, **axes), f"scaled to {file.driver}, {', '.join(done)}"
 
 
 def _scaled(axis: VirtualAxis, file: ScannerAxis, driver: Driver) -> ScaledAxis:
@@ -51,3 +59,11 @@ def _scaled(axis: VirtualAxis, file: ScannerAxis, driver: Driver) -> ScaledAxis:
     moved = float(np.ptp(axis.hysteresis.settled(drive)))
     kept: dict[str, Any] = {field.name: getattr(axis, field.name) for field in fields(axis)}
     return ScaledAxis(**{**kept, "driver": driver}, times=file.size.k_nm_per_v * share * driver.span / moved)
+
+
+def _faster(axis: VirtualAxis, file: ScannerAxis) -> float | None:
+    """How many times as high the resonance of the file is; None where that of the axis stays."""
+    if file.resonance is None or file.resonance.frequency_hz is None or not axis.resonance.poles:
+        return None
+    times = tau * file.resonance.frequency_hz / abs(axis.resonance.poles[0])
+    return None if 1.0 / _NEAR <= times <= _NEAR else times

@@ -7,11 +7,13 @@ import pytest
 from editing import SCAN, SCANNER, edited, write_pair
 
 from tablegen.config.load import Setup, load
+from tablegen.virtual.laboratory import calibrate
 from tablegen.virtual.parameters import BUILT_IN, load_truth
 from tablegen.virtual.scaling import scaled_to
-from tablegen.virtual.scanner import VirtualScanner
+from tablegen.virtual.scanner import VirtualAxis, VirtualScanner
 from tablegen.virtual.simulation import simulate
 
+EXAMPLES = Path(__file__).parents[2] / "examples"
 # v_max, nm/V, and the converter's range with the amplifier's gain and bias.
 SCANNERS = (
     (150.0, 67.0, (0.0, 10.0, 15.0, 0.0)),
@@ -90,3 +92,45 @@ def test_a_scaled_axis_is_the_same_in_normalised_volts(tmp_path: Path, built_in:
         after[0] / before[0]
     )
     assert np.array_equal(axis.response([10.0, 5e4]), built_in.x.response([10.0, 5e4]))
+
+
+def peak_hz(axis: VirtualAxis) -> float:
+    """Where its response is largest, to 1 %."""
+    f = np.geomspace(100.0, 1e6, 2000)
+    return float(f[np.argmax(np.abs(axis.response(f)))])
+
+
+def test_a_low_resonance_is_that_of_the_file(tmp_path: Path, built_in: VirtualScanner) -> None:
+    slow = edited(SCANNER, "x.resonance.frequency_hz = 1800.0", "x.resonance.quality = 25.0")
+    scanner, how = scaled_to(built_in, load(write_pair(tmp_path, scanner=slow)).scanner)
+    assert how.endswith(", a resonance of 1800 Hz in x")
+    assert peak_hz(scanner.x) == pytest.approx(1800.0, rel=0.02)
+    assert peak_hz(scanner.y) == pytest.approx(peak_hz(built_in.y))
+    assert scanner.x.response(0.0) == pytest.approx(built_in.x.response(0.0), rel=1e-6)
+    # The same form: as far above its resonance as the built-in one is above its own.
+    asked = np.array([0.3, 0.7, 1.1, 3.0])
+    moved, before = scanner.x.resonance.response(1800.0 * asked), built_in.x.resonance.response(5e4 * asked)
+    assert moved == pytest.approx(before, rel=1e-9)
+
+
+@pytest.mark.parametrize(("frequency_hz", "stays"), [(26e3, True), (99e3, True), (24e3, False), (101e3, False)])
+def test_a_resonance_that_is_near_stays(
+    tmp_path: Path, built_in: VirtualScanner, frequency_hz: float, stays: bool
+) -> None:
+    near = edited(SCANNER, f"x.resonance.frequency_hz = {frequency_hz}")
+    scanner, how = scaled_to(built_in, load(write_pair(tmp_path, scanner=near)).scanner)
+    assert (scanner is built_in, how == "") == (stays, stays)
+
+
+def test_the_tube_of_the_examples_is_calibrated_through_its_resonance() -> None:
+    """Its converter and its amplifiers stand in the scanner file, and go with the axes."""
+    setup = load(EXAMPLES / "tube_5um.toml")
+    scanner, _ = scaled_to(VirtualScanner.of(load_truth("default")), setup.scanner)
+    calibrated = calibrate(setup, scanner).setup
+    for name in ("x", "y"):
+        before, after = getattr(setup.scanner, name), getattr(calibrated.scanner, name)
+        assert (after.dac, after.amplifier) == (before.dac, before.amplifier)
+    assert calibrated.scanner.x.resonance is not None
+    assert calibrated.scanner.x.resonance.frequency_hz == pytest.approx(1800.0, rel=0.01)
+    run = simulate(calibrated, scanner, "harmonic")
+    assert max(abs(run.x.size_error_percent), abs(run.y.size_error_percent)) < 1.0
