@@ -1,10 +1,13 @@
 """A whole period as runs of one code: every tick accounted for, however many millions there are."""
 
+from collections.abc import Iterator
+
 import numpy as np
 from msgspec import Struct
 
-from tablegen.fixedpoint.interpolation import FRACTION_BITS, between, index_bits_of
+from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.phase import PHASE_BITS
+from tablegen.fixedpoint.pieces import Pieces, most_levels, pieces_of
 from tablegen.fixedpoint.program import Program
 from tablegen.numerics.arrays import Ints
 
@@ -61,84 +64,81 @@ class Runs(Struct, frozen=True, eq=False):
 
 def runs_of(program: Program) -> Runs:
     """The period of a program as runs. Raises ``ValueError`` for one that is shaped, which has no period."""
-    program.require_period()
-    ticks = program.ticks
-    if program.hold == 1 and program.mode == "interpolated":
-        runs = _between_words(program)
-        if runs is not None:
-            return runs
+    runs = long_runs(program)
+    if runs is not None:
+        return runs
     starts = np.arange(program.phase.ticks, dtype=np.int64) * program.hold
-    return Runs(starts, program.codes(starts), ticks)
+    return Runs(starts, program.codes(starts), program.ticks)
 
 
-def _between_words(program: Program) -> Runs | None:
-    """Runs between the words of a table, where codes rise or fall one by one; None where ticks are fewer.
+def long_runs(program: Program) -> Runs | None:
+    """The same of a table, on whose pieces codes rise or fall one by one; None where ticks are fewer.
 
-    Along a segment the sample is monotonic in the fraction, so that there is one at which each sample, and each code,
-    is first reached.
+    Along a piece the sample is monotonic in the fraction, so that there is one at which each sample, and each code,
+    is first reached. A run begins with each segment. Raises ``ValueError`` as ``runs_of``.
     """
-    words, guard, output = program.words, program.guard, program.output
-    ends_of = np.array([[0], [(1 << FRACTION_BITS) - 1]])
-    samples = between(words, np.roll(words, -1), ends_of, guard)
-    codes = output.code(samples)
-    if (int(np.abs(codes[1] - codes[0]).sum()) + len(words)) * _MIN_TICKS_PER_RUN > program.ticks:
+    program.require_period()
+    if program.hold != 1 or program.mode == "direct":
         return None
+    if most_levels(program) * _MIN_TICKS_PER_RUN > program.ticks:
+        return None
+    starts, played = [], []
+    for pieces in pieces_of(program):
+        for start, code in _levels(program, pieces):
+            starts.append(start)
+            played.append(code)
+    return Runs(np.concatenate(starts), np.concatenate(played), program.ticks)
 
+
+def _levels(program: Program, pieces: Pieces) -> Iterator[tuple[Ints, Ints]]:
+    """The first ticks and the codes of the runs of some pieces, some at a time."""
+    output, samples = program.output, pieces.ends_of_samples()
+    codes = output.code(samples)
     # Where a sample is a code or more each is another code, so that samples are all there is to look at.
     by_sample = abs(output.gain_word) >= 1 << output.gain_q and bool((codes == output.unclamped(samples)).all())
     first, last = samples if by_sample else codes
     changes = np.abs(last - first)
     ends, direction = np.cumsum(changes + 1), np.sign(last - first)
     begins, levels = ends - changes - 1, int(ends[-1])
-    segments, index_bits = _Segments(program, direction), index_bits_of(len(words))
-    starts, played = [], []
+    behind = -(-pieces.phase_behind * program.ticks >> PHASE_BITS)
+    inverse, played = _Inverse(output, np.sign(codes[1] - codes[0]), pieces), (-1, -1)
     for at in range(0, levels, _CHUNK_LEVELS):
         number = np.arange(at, min(at + _CHUNK_LEVELS + 1, levels))  # and the first of the next part
-        segment = np.searchsorted(ends, number, side="right")
-        order = number - begins[segment]
-        level = first[segment] + direction[segment] * order
-        sample, code = (level, output.code(level)) if by_sample else (segments.sample(segment, level), level)
-        reached = np.clip(segments.first_fraction(segment, sample), 0, (1 << FRACTION_BITS) - 1)
-        reached[order == 0] = 0
+        piece = np.searchsorted(ends, number, side="right")
+        order = number - begins[piece]
+        level = first[piece] + direction[piece] * order
+        sample, code = (level, output.code(level)) if by_sample else (inverse.sample(piece, level), level)
+        reached = np.clip(pieces.first_fraction(piece, sample), pieces.begins[piece], pieces.ends[piece] - 1)
+        reached = np.where(order == 0, pieces.begins[piece], reached)
         # The first tick whose phase reaches that fraction: ceil(phase ticks / 2^32), below 2^63.
-        phase = ((segment << FRACTION_BITS) | reached) << (PHASE_BITS - FRACTION_BITS - index_bits)
-        start = (phase * program.ticks + ((1 << PHASE_BITS) - 1)) >> PHASE_BITS
+        start = (pieces.phase(piece, reached) * program.ticks + ((1 << PHASE_BITS) - 1)) >> PHASE_BITS
         if at + _CHUNK_LEVELS >= levels:
-            start = np.append(start, program.ticks)
-        taken = start[1:] > start[:-1]  # of codes that are reached at one tick the last is played
-        starts.append(start[:-1][taken])
-        played.append(code[: len(taken)][taken])
-    return Runs(np.concatenate(starts), np.concatenate(played), program.ticks)
+            start = np.append(start, behind)
+        taken = np.flatnonzero(start[1:] > start[:-1])  # of codes that are reached at one tick the last is played
+        start, code, segment = start[taken], code[taken], pieces.segment[piece[taken]]
+        others = (np.diff(code, prepend=played[0]) != 0) | (np.diff(segment, prepend=played[1]) != 0)
+        if len(code):
+            played = int(code[-1]), int(segment[-1])
+        yield start[others], code[others]
 
 
-class _Segments:
-    """The segments of a table, each from a word to the one after it: where codes and samples are first reached.
+class _Inverse:
+    """The samples at which codes are first reached: ``Output.unclamped`` solved for the sample, in whole numbers.
 
-    ``between`` and ``Output.unclamped`` solved for the fraction, in whole numbers: a code rises to c where
-    gain sample + offset + 1/2 >= c, falls to it where that is < c + 1; the sample rises to S, or falls to it, alike.
+    A code rises to c where gain sample + offset + 1/2 >= c, and falls to it where that is < c + 1.
     """
 
-    def __init__(self, program: Program, direction: Ints) -> None:
-        """``direction`` is that of the codes along each segment, 1 where they rise, shape (words,)."""
-        output, words = program.output, program.words
+    def __init__(self, output: Output, direction: Ints, pieces: Pieces) -> None:
+        """``direction`` is that of the codes along each piece, 1 where they rise, shape (n,)."""
         self._gain_q = output.gain_q
         self._gain = abs(output.gain_word) or 1  # without gain no code changes, and nothing of this is used
         self._sign = -1 if output.gain_word < 0 else 1
         self._code_falls = np.where(direction > 0, 0, 1)
         self._bound = output.offset_word + (1 << (output.gain_q - 1)) + self._code_falls
-        rise = np.roll(words, -1) - words
-        self._falls = np.where(rise > 0, 0, 1)
-        self._rise = np.where(rise == 0, 1, rise)
-        self._shift = FRACTION_BITS - program.guard
-        self._level = (words << FRACTION_BITS) + (1 << (self._shift - 1)) + self._falls
+        self._sample_falls = pieces.slope <= 0
 
-    def sample(self, segment: Ints, code: Ints) -> Ints:
-        """The samples at which these segments first play these codes, both of shape (n,)."""
-        product = (((code + self._code_falls[segment]) << self._gain_q) - self._bound[segment]) * self._sign
-        least = product + np.where(self._falls[segment], 0, self._gain - 1)
+    def sample(self, piece: Ints, code: Ints) -> Ints:
+        """The samples at which these pieces first play these codes, both of shape (n,)."""
+        product = (((code + self._code_falls[piece]) << self._gain_q) - self._bound[piece]) * self._sign
+        least = product + np.where(self._sample_falls[piece], 0, self._gain - 1)
         return np.asarray(least // self._gain)
-
-    def first_fraction(self, segment: Ints, sample: Ints) -> Ints:
-        """The least fractions at which these segments reach these samples, both of shape (n,)."""
-        distance = ((sample + self._falls[segment]) << self._shift) - self._level[segment]
-        return np.asarray(-(-distance // self._rise[segment]))

@@ -39,13 +39,20 @@ def along(words: Sequence[Ints], fraction: Ints) -> Ints:
     way are no larger than b3, hence each product stays below 2^(B+24). The roundings add up to less than 1, so that a
     sample never leaves the 12-fold words.
     """
-    first, second, third, fourth = words
-    outer, inner = fourth - first, second - third
-    b0 = 2 * (first + 4 * second + third)
-    b1 = 12 * (third - first)
-    b2 = 24 * (first - 2 * second + third)
-    b3 = 16 * (outer + 3 * inner)
+    b0, b1, b2, b3 = coefficients(words)
     sample = b3
     for lower in (b2, b1, b0):
         sample = lower + shift_round(sample * fraction, SPLINE_FRACTION_BITS + 1)
     return sample
+
+
+def coefficients(words: Sequence[Ints]) -> tuple[Ints, Ints, Ints, Ints]:
+    """b0 to b3 of the segments of four words."""
+    first, second, third, fourth = words
+    outer, inner = fourth - first, second - third
+    return (
+        2 * (first + 4 * second + third),
+        12 * (third - first),
+        24 * (first - 2 * second + third),
+        16 * (outer + 3 * inner),
+    )

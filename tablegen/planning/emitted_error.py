@@ -10,7 +10,7 @@ import numpy as np
 
 from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.rounding import round_half_up, shift_round
-from tablegen.fixedpoint.runs import runs_of
+from tablegen.fixedpoint.runs import long_runs
 from tablegen.fixedpoint.shaping import remainder_bits
 from tablegen.numerics.arrays import Floats, Ints
 from tablegen.planning.table_maker import TableMaker
@@ -52,12 +52,11 @@ class AskedCodes:
 
     def worst_error(self, program: Program) -> int:
         """The worst of all ticks."""
-        in_order = program.mode == "interpolated" and program.hold == 1  # the codes along a line
-        if in_order and not program.output.shaping.order:
-            runs = runs_of(program).split_at(self._extremes)
+        runs = None if program.output.shaping.order else long_runs(program)
+        if runs is not None:
+            runs = runs.split_at(self._extremes)
             codes = runs.codes << FRACTION_BITS
-            worst = _largest(codes, self._at(runs.starts))
-            return worst if runs.by_tick else max(worst, _largest(codes, self._at(runs.lasts)))
+            return max(_largest(codes, self._at(runs.starts)), _largest(codes, self._at(runs.lasts)))
         advances, worst = program.phase.ticks, 0
         for first in range(0, advances, _CHUNK_TICKS):
             k = np.arange(first, min(first + _CHUNK_TICKS, advances), dtype=np.int64) * program.hold

@@ -142,13 +142,18 @@ def test_coarse_converter_shows_in_quantisation(tmp_path: Path) -> None:
     assert coarse == pytest.approx(16 * fine, rel=0.4)
 
 
-def test_runs_and_ticks_measure_the_same(example: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("mode", ["interpolated", "cubic"])
+def test_runs_and_ticks_measure_the_same(
+    example: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, mode: str
+) -> None:
     """Long frames are measured by runs of one code. Forced to single ticks, every figure has to come out again."""
-    by_runs = certify(example)["y"]
-    assert len(runs_of(example.y.program).starts) < 0.2 * example.y.program.ticks
+    cubic = {"timing.line_rate_hz": "20.0", "y.table.mode": '"cubic"', "y.table.length": "256", "y.table.bits": "14"}
+    plan = example if mode == "interpolated" else plan_of(tmp_path, {**FREE, **cubic})
+    by_runs = certify(plan)["y"]
+    assert len(runs_of(plan.y.program).starts) < 0.2 * plan.y.program.ticks
     monkeypatch.setattr(runs_module, "_MIN_TICKS_PER_RUN", 10**9)
-    assert len(runs_of(example.y.program).starts) == example.y.program.ticks
-    by_ticks = certify(example)["y"]
+    assert len(runs_of(plan.y.program).starts) == plan.y.program.ticks
+    by_ticks = certify(plan)["y"]
     exact = ("max_error_lsb", "lowest_code", "highest_code", "largest_step", "headroom_low")
     for name in exact:
         assert getattr(by_runs, name) == pytest.approx(getattr(by_ticks, name), rel=1e-9), name

@@ -8,13 +8,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from replacing import replace
 
+from tablegen.fixedpoint import pieces as pieces_module
 from tablegen.fixedpoint import runs as module
 from tablegen.fixedpoint.interpolation import guard_bits
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.phase import RationalPhase
-from tablegen.fixedpoint.program import Program
-from tablegen.fixedpoint.rounding import signed_limits
+from tablegen.fixedpoint.pieces import most_levels, pieces_of
+from tablegen.fixedpoint.program import Mode, Program
+from tablegen.fixedpoint.rounding import shift_round, signed_limits
 from tablegen.fixedpoint.runs import runs_of
+from tablegen.fixedpoint.spline import SPLINE_FRACTION_BITS, cubic
 
 
 @st.composite
@@ -42,8 +45,21 @@ def programs(draw: st.DrawFn) -> Program:
     return Program(RationalPhase(draw(st.integers(3, 20000))), 1, "interpolated", bits, words, output)
 
 
+@st.composite
+def splines(draw: st.DrawFn) -> Program:
+    """Cubic programs, of smooth words and of words that jump; their pieces are few enough to try."""
+    program = draw(programs())
+    bits, length = draw(st.integers(8, 21)), 1 << draw(st.integers(3, 6))
+    swing = draw(st.floats(0.0, 0.98)) * (1 << (bits - 1))
+    jump = draw(st.integers(0, min(60, (1 << (bits - 1)) // 50)))
+    turns = draw(st.floats(0.0, 1.0)) + np.arange(length) * draw(st.integers(0, 3)) / length
+    jumps = np.array(draw(st.lists(st.integers(-jump, jump), min_size=length, max_size=length)))
+    words = np.rint(swing * np.sin(2 * np.pi * turns)).astype(np.int64) + jumps
+    return replace(program, mode="cubic", bits=bits, words=words)
+
+
 @settings(max_examples=150, deadline=None)
-@given(programs())
+@given(st.one_of(programs(), splines()))
 def test_every_tick_is_in_its_run(program: Program) -> None:
     ticks = np.arange(program.ticks)
     codes = program.codes(ticks)
@@ -96,25 +112,59 @@ def test_codes_finer_than_samples(program: Program, doubled: int, sign: int) -> 
     assert len(runs.starts) <= np.count_nonzero(np.diff(codes)) + len(program.words)
 
 
+@settings(max_examples=100, deadline=None)
+@given(splines())
+def test_pieces_of_splines(program: Program) -> None:
+    """They cover every fraction of every segment once, their samples are those of the spline, and they rise or fall."""
+    count = 0
+    for pieces in pieces_of(program):
+        assert np.array_equal(pieces.begins == 0, np.diff(pieces.segment, prepend=pieces.segment[0] - 1) > 0)
+        inside = np.diff(pieces.segment) == 0
+        assert np.array_equal(pieces.begins[1:][inside], pieces.ends[:-1][inside])
+        assert (pieces.ends > pieces.begins).all()
+        assert (np.append(pieces.ends[:-1][~inside], pieces.ends[-1]) == 1 << SPLINE_FRACTION_BITS).all()
+        count += len(pieces.begins)
+        some = np.arange(0, len(pieces.begins), max(1, len(pieces.begins) // 500))
+        for fraction in (pieces.begins[some], (pieces.begins[some] + pieces.ends[some]) // 2, pieces.ends[some] - 1):
+            sample = pieces.base[some] + shift_round(pieces.slope[some] * fraction, pieces.shift)
+            assert np.array_equal(cubic(program.words, pieces.phase(some, fraction)), sample)
+    assert len(program.words) <= count <= most_levels(program)
+
+
+@settings(max_examples=100, deadline=None)
+@given(splines())
+def test_runs_of_splines_are_no_more_than_their_bound(program: Program) -> None:
+    """So that pieces are given up for ticks before they take memory; and pieces do not show in the runs."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "_MIN_TICKS_PER_RUN", 0)
+        runs = runs_of(program)
+    assert len(runs.starts) <= most_levels(program)
+    changes = np.count_nonzero(np.diff(program.codes(np.arange(program.ticks))))
+    assert len(runs.starts) <= changes + len(program.words)
+
+
 @settings(max_examples=30, deadline=None)
-@given(programs(), st.integers(1, 40))
+@given(st.one_of(programs(), splines()), st.integers(1, 40))
 def test_parts_do_not_show(program: Program, size: int) -> None:
-    """However many levels are worked out together, the runs are the same."""
+    """However many levels, and pieces, are worked out together, the runs are the same."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "_MIN_TICKS_PER_RUN", 0)
         whole = runs_of(program)
+        patch.setattr(pieces_module, "_PIECES", 50 * size)
         patch.setattr(module, "_CHUNK_LEVELS", size * max(1, len(whole.starts) // 100))
         parts = runs_of(program)
     assert np.array_equal(parts.starts, whole.starts)
     assert np.array_equal(parts.codes, whole.codes)
 
 
-def test_a_frame_of_minutes_takes_no_more_than_its_codes() -> None:
+@pytest.mark.parametrize(("mode", "bits"), [("interpolated", 16), ("cubic", 16), ("cubic", 14)])
+def test_a_frame_of_minutes_takes_no_more_than_its_codes(mode: Mode, bits: int) -> None:
     """2^31 - 1 ticks: the ends of every run are checked against the arithmetic, without playing the rest."""
-    words = np.rint(20000 * np.sin(2 * np.pi * np.arange(256) / 256)).astype(np.int64)
-    output = Output(50000, 20, 32768 << 20, 0, 65535, 1, 0, 16, "offset-binary", "right", 16)
-    program = Program(RationalPhase(2**31 - 1), 1, "interpolated", 16, words, output)
+    words = np.rint(20000 / 2 ** (16 - bits) * np.sin(2 * np.pi * np.arange(256) / 256)).astype(np.int64)
+    output = Output(50000, bits + 4, 32768 << (bits + 4), 0, 65535, 1, 0, 16, "offset-binary", "right", 16)
+    program = Program(RationalPhase(2**31 - 1), 1, mode, bits, words, output)
     runs = runs_of(program)
+    assert not runs.by_tick
     assert len(runs.starts) < 70000
     assert int(runs.lengths.sum()) == 2**31 - 1
     assert np.array_equal(program.codes(runs.starts), runs.codes)
