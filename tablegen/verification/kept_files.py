@@ -12,10 +12,11 @@ from contextlib import suppress
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
-from tempfile import NamedTemporaryFile
 
 from tablegen.reading import BUILD_FILE, chunks_of
 from tablegen.user_cache import is_private, keep_newest, private_folder
+
+_BY_OTHERS = stat.S_IRWXG | stat.S_IRWXO
 
 
 @dataclass(frozen=True)
@@ -42,11 +43,14 @@ class KeptFiles:
         folder = private_folder(self.folder)
         if folder is None:
             return
+        from tempfile import NamedTemporaryFile  # here: mostly nothing new is kept
+
         with suppress(OSError):
             with NamedTemporaryFile(dir=folder, prefix="part-", delete=False) as part:
                 path = Path(part.name)
             try:
                 shutil.copy(made, path)
+                path.chmod(stat.S_IMODE(path.stat().st_mode) & ~_BY_OTHERS)  # a compiler leaves it to the umask
                 path.rename(folder / _name(key, path))
             finally:
                 path.unlink(missing_ok=True)

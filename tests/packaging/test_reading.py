@@ -33,7 +33,7 @@ ALLOWED = {
     ("verification/elf.py", "open"): "what it has compiled",
     ("verification/c_play.py", "open"): "its own record, to write it",
     ("verification/c_play.py", "read_bytes"): "its own script",
-    ("verification/c_target.py", "read_text"): "its own script",
+    ("verification/c_emulated.py", "read_text"): "its own script",
     ("verification/verilog_bench.py", "read_text"): "its own record",
     ("verification/listing.py", "read_bytes"): "the runtime, which ships with the package",
     ("verification/directory.py", "shutil.copyfile"): "files of a build, which read_build has found to be files",

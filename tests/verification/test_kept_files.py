@@ -34,6 +34,7 @@ def copy(tmp_path: Path) -> Path:
 
 def test_what_was_kept_is_taken_and_can_be_run(model: Path, cache: Path, copy: Path) -> None:
     assert not MODELS.take(KEY, copy)
+    model.chmod(0o775)  # as the umask of some has it
     MODELS.keep(KEY, model)
     assert MODELS.take(KEY, copy)
     assert copy.read_bytes() == model.read_bytes()
@@ -43,9 +44,7 @@ def test_what_was_kept_is_taken_and_can_be_run(model: Path, cache: Path, copy: P
 
 
 @pytest.mark.parametrize("content", [b"", b"\x7fELF a mode", b"\x7fELF b model"])
-def test_a_file_that_is_not_what_was_written_is_taken_out(
-    model: Path, cache: Path, copy: Path, content: bytes
-) -> None:
+def test_a_file_that_is_not_what_was_written_is_taken_out(model: Path, cache: Path, copy: Path, content: bytes) -> None:
     MODELS.keep(KEY, model)
     (path,) = cache.iterdir()
     path.write_bytes(content)
