@@ -12,7 +12,6 @@ from typing import Any
 
 from tablegen.installation import install_advice
 from tablegen.verification.failures import SimulationFailed, ToolMissing
-from tablegen.verification.model_cache import MODELS, model_key
 
 SIMULATORS = ("icarus", "verilator")
 # What Icarus 11 is known to accept; Verilator needs the timing mode for the clock that the benches make in Verilog.
@@ -85,6 +84,8 @@ def compile_design(simulator: str, design: Design, folder: Path, *, kept: bool =
     """
     require(simulator)
     from cocotb_tools.runner import get_runner
+
+    from tablegen.verification.model_cache import MODELS, model_key  # here: what plays C needs neither
 
     folder.mkdir(parents=True, exist_ok=True)
     runner, log, model, key = get_runner(simulator), folder / "build.log", folder / design.top, ""
