@@ -134,5 +134,5 @@ def notes() -> list[str]:
         "What plays alone has no changes of programs, ramps and faults, and Icarus plays a part of `verify` with "
         "multipliers of look-up tables. The rest is ours: the integer model in Python, records of every tick, the "
         "certificate again from the words, SHA-256 of all files, starting Python twice, and compiling what the build "
-        "has of its own. Where nothing is kept the C compiler takes about as long as all that.",
+        "has of its own. Where nothing is kept the C compiler takes longer than all that.",
     ]
