@@ -25,7 +25,7 @@ from building import (
 )
 from sets import quick
 
-from tablegen.device.sequencer import play_line
+from tablegen.device.played_lines import play_line
 from tablegen.numerics.arrays import Ints
 
 PLAYER = REPOSITORY / "examples" / "verilog" / "play.v"

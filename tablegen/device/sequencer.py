@@ -1,6 +1,6 @@
 """The integer model of the sequencer: the specification that C and Verilog equal on every tick.
 
-``Sequencer`` is a device: two banks, a state, and a tick. ``play_line`` is the undisturbed line of a program.
+``Sequencer`` is a device: two banks, a state, and a tick.
 What happens on which tick is stated in ``docs/sequencer.md``; the arithmetic stands in ``tablegen.fixedpoint``.
 """
 
@@ -10,9 +10,12 @@ from enum import Enum, IntFlag
 import numpy as np
 
 from tablegen.device.dual_program import DualProgram
-from tablegen.device.schedule import Schedule, pixel_starts
+from tablegen.device.played_lines import LineTicks, PlayedLines
+from tablegen.device.schedule import Schedule
 from tablegen.device.slew import guarded
 from tablegen.numerics.arrays import Bools, Ints
+
+_MOST_TICKS = 1 << 14  # of lines that are worked out together, in the cache
 
 
 class SequencerState(Enum):
@@ -48,71 +51,6 @@ class Tick:
     faults: Fault = Fault.NONE
 
 
-@dataclass(frozen=True, eq=False)
-class LineTicks:
-    """One line as arrays of shape (ticks,): codes of both axes and the markers of every tick."""
-
-    x: Ints
-    y: Ints
-    line: Bools
-    frame: Bools
-    pixel: Bools
-    backward: Bools
-    valid: Bools
-
-
-class PlayedLines:
-    """The lines of a program one after another, from its beginning on: remainders of shaped axes run on."""
-
-    def __init__(self, program: DualProgram) -> None:
-        self._program = program
-        self._remainders = program.x.output.begin(), program.y.output.begin()
-
-    def unclamped(self, line: int) -> tuple[Ints, Ints]:
-        """Codes of x and y on the next line, ``line`` of a frame, before clamp and slew guard; shapes (ticks,)."""
-        ticks = self._program.schedule.ticks
-        x, y = self._remainders
-        return (
-            self._program.x.unclamped(0, ticks, x),
-            self._program.y.unclamped(line * ticks, (line + 1) * ticks, y),
-        )
-
-    def play(self, line: int, settled: bool = True) -> LineTicks:
-        """The next line, which is ``line`` of a frame, as ``play_line`` has it."""
-        return _line_of(self._program, line, settled, self.unclamped(line))
-
-
-def play_line(program: DualProgram, line: int, settled: bool = True) -> LineTicks:
-    """Line ``line`` of a frame in steady state: the slew guard untouched, ``valid`` as after settling.
-
-    Raises ``ValueError`` where an axis is shaped: the lines before belong to it, and ``PlayedLines`` plays them.
-    """
-    program.x.require_period()
-    program.y.require_period()
-    return PlayedLines(program).play(line, settled)
-
-
-def _line_of(program: DualProgram, line: int, settled: bool, unclamped: tuple[Ints, Ints]) -> LineTicks:
-    schedule = program.schedule
-    k = np.arange(schedule.ticks, dtype=np.int64)
-    pixel = np.zeros(schedule.ticks, dtype=np.bool_)
-    inside = np.zeros(schedule.ticks, dtype=np.bool_)
-    for window in (schedule.forward, schedule.backward):
-        if window.count:
-            pixel[pixel_starts(window, schedule.pixels)] = True
-            inside[window.first : window.stop] = True
-    images = line in schedule.up or line in schedule.down
-    return LineTicks(
-        x=program.x.output.clamp(unclamped[0]),
-        y=program.y.output.clamp(unclamped[1]),
-        line=k == 0,
-        frame=(k == 0) & (line == 0),
-        pixel=pixel,
-        backward=k >= schedule.turn_tick,
-        valid=inside & images & settled,
-    )
-
-
 @dataclass
 class Sequencer:
     """A device, tick by tick.
@@ -144,8 +82,10 @@ class Sequencer:
             self.codes = self.playing.x.output.park_code, self.playing.y.output.park_code
             self.parked = True
         self._lines: PlayedLines | None = None
-        self._line_ticks: LineTicks | None = None
+        # Lines that are worked out together, where their codes are clamped, and which tick of them is the next one.
+        self._ticks: LineTicks | None = None
         self._clamped: Bools = np.zeros(0, dtype=np.bool_)
+        self._at = 0
 
     @property
     def state(self) -> SequencerState:
@@ -208,14 +148,7 @@ class Sequencer:
         if not self.running or self.playing is None:
             return self._rest(swapped)
 
-        if self.tick == 0:
-            assert self._lines is not None
-            unclamped = self._lines.unclamped(self.line)
-            self._line_ticks = _line_of(self.playing, self.line, True, unclamped)
-            self._clamped = (self._line_ticks.x != unclamped[0]) | (self._line_ticks.y != unclamped[1])
-        line = self._line_ticks
-        assert line is not None
-        k = self.tick
+        line, k = self._next_lines(self.playing.schedule), self._at
         reached = self._approach(self.playing, int(line.x[k]), int(line.y[k]))
         if self._clamped[k]:
             self._fault(Fault.CLAMP)
@@ -238,46 +171,60 @@ class Sequencer:
         return out
 
     def ahead(self, most: int) -> tuple[LineTicks, Ints] | None:
-        """Play the next ticks of a line at once, at most so many: what ``step`` would make of each of them.
+        """Play the next ticks of a frame at once, at most so many: what ``step`` would make of each of them.
 
-        With their faults so far, shape (ticks,). None where a line begins, or none plays.
+        With their faults so far, shape (ticks,). None where nothing plays, or another program begins.
         """
-        line, program = self._line_ticks, self.playing
-        if not self.running or program is None or line is None or self.tick == 0:
+        program = self.playing
+        if not self.running or program is None or (self.tick == 0 and self.idle is not None):
             return None
-        part = slice(self.tick, min(self.tick + most, program.schedule.ticks))
-        x = guarded(line.x[part], self.codes[0], program.x.output.max_step)
-        y = guarded(line.y[part], self.codes[1], program.y.output.max_step)
-        reached = (x == line.x[part]) & (y == line.y[part])
+        lines, period = self._next_lines(program.schedule), program.schedule.ticks
+        if self.idle is not None:  # to be taken where the next line begins
+            most = min(most, period - self.tick)
+        part = slice(self._at, min(self._at + most, len(lines.x)))
+        x = guarded(lines.x[part], self.codes[0], program.x.output.max_step)
+        y = guarded(lines.y[part], self.codes[1], program.y.output.max_step)
+        reached = (x == lines.x[part]) & (y == lines.y[part])
         slewed = ~reached
         if self.catching_up:  # no fault until the output has reached the waveform
             slewed &= np.logical_or.accumulate(reached)
             self.catching_up = not reached.any()
         faults = np.full(len(x), int(self.faults), dtype=np.int64)
         for fault, occurs in ((Fault.SLEW, slewed), (Fault.CLAMP, self._clamped[part])):
-            faults |= np.logical_or.accumulate(occurs) * int(fault)
-            self.fault_counts[fault] += int(np.count_nonzero(occurs))
-        valid = line.valid[part] & reached & (faults == 0) & (self.settle_left == 0)
-        played = LineTicks(x, y, line.line[part], line.frame[part], line.pixel[part], line.backward[part], valid)
+            if count := int(np.count_nonzero(occurs)):
+                faults |= np.logical_or.accumulate(occurs) * int(fault)
+                self.fault_counts[fault] += count
+        valid = lines.valid[part] & reached & (faults == 0)
+        valid[: max(self.settle_left * period - self.tick, 0)] = False
+        markers = lines.line[part], lines.frame[part], lines.pixel[part], lines.backward[part]
         self.codes, self.faults = (int(x[-1]), int(y[-1])), Fault(int(faults[-1]))
-        self.tick = part.stop - 1
-        self._advance(program.schedule)
-        return played, faults
+        self._advance(program.schedule, len(x))
+        return LineTicks(x, y, *markers, valid), faults
+
+    def _next_lines(self, schedule: Schedule) -> LineTicks:
+        """The lines that are played now; where they are over the next ones, at first one, then ever more of a frame."""
+        assert self._lines is not None
+        if self._ticks is None or self._at == len(self._ticks.x):
+            before = 0 if self._ticks is None else len(self._ticks.x) // schedule.ticks
+            count = max(min(2 * before, _MOST_TICKS // schedule.ticks, schedule.lines - self.line), 1)
+            unclamped = self._lines.unclamped(self.line, count)
+            self._ticks, self._at = self._lines.ticks(self.line, unclamped), 0
+            self._clamped = (self._ticks.x != unclamped[0]) | (self._ticks.y != unclamped[1])
+        return self._ticks
 
     def _begin(self, program: DualProgram) -> None:
         """A program starts at its own line 0, unsettled, and away from where the output is."""
         self.tick = self.line = 0
         self.settle_left = program.schedule.settle_lines
         self.catching_up = True
-        self._lines = PlayedLines(program)
+        self._lines, self._ticks = PlayedLines(program), None
 
-    def _advance(self, schedule: Schedule) -> None:
-        self.tick += 1
-        if self.tick < schedule.ticks:
-            return
-        self.tick = 0
-        self.settle_left = max(self.settle_left - 1, 0)
-        self.line += 1
+    def _advance(self, schedule: Schedule, ticks: int = 1) -> None:
+        """So many ticks of a frame are over."""
+        self._at += ticks
+        lines, self.tick = divmod(self.tick + ticks, schedule.ticks)
+        self.settle_left = max(self.settle_left - lines, 0)
+        self.line += lines
         if self.line < schedule.lines:
             return
         self.line = 0

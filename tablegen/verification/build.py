@@ -15,7 +15,7 @@ from tablegen.verification.certificate_checks import check_certificates
 from tablegen.verification.checks import Check
 from tablegen.verification.derived import wrong_derived
 from tablegen.verification.directory import some, wrong_files
-from tablegen.verification.listing import known_formats, listed_files, unlike_installed
+from tablegen.verification.listing import Written, known_formats, listed_files, unlike_installed, written_files
 from tablegen.verification.session import BuildSession, needed_ticks
 from tablegen.version import __version__
 
@@ -156,13 +156,18 @@ def _manifest_checks(folder: Path, stored: StoredBuild) -> list[Check]:
 def _file_checks(folder: Path, stored: StoredBuild, content: Content, formats: list[Format], same: bool) -> list[Check]:
     """The files that a build has, their digests, and those that are the same in every build of a version."""
     files = stored.manifest.files
-    count, unlisted = listed_files(folder, stored, content, formats, same, len(formats) == len(stored.formats))
+    written: Written = []
+    try:
+        written = written_files(content, formats)
+        count, unlisted = listed_files(folder, stored, written, same, len(formats) == len(stored.formats))
+    except Unphysical as error:
+        count, unlisted = 0, [str(error)]
     checks = [
         differing_check("files", "its formats", f"{count} files", unlisted),
         differing_check("files", "SHA-256 in the manifest", f"{len(files)} files", wrong_files(folder, stored)),
     ]
     if same:
-        compared, unlike = unlike_installed(folder, content, formats)
+        compared, unlike = unlike_installed(folder, written)
         if compared:
             checks.append(differing_check("files", f"tablegen {__version__}", f"{compared} files", unlike))
     return checks

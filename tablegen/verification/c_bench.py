@@ -14,7 +14,7 @@ from tablegen.fixedpoint.synthesis import sine_periods
 from tablegen.numerics.arrays import Ints
 from tablegen.resources import c_runtime
 from tablegen.verification.bench import SequencerShape
-from tablegen.verification.c_play import compile_all, run
+from tablegen.verification.c_play import compile_line, run
 from tablegen.verification.failures import ToolMissing
 from tablegen.verification.stream import FAULTS, STATE_WORDS, Script, Words
 
@@ -101,13 +101,9 @@ def require_compiler(compiler: str) -> list[str]:
     return command
 
 
-def compiler_line(
-    compiler: str, options: Sequence[str], sources: Sequence[Path], chosen: Mapping[str, int]
-) -> list[str]:
-    """The command that compiles a bench but for its files, which find their headers, and what they are to become."""
-    places = sorted({str(path.parent.absolute()) for path in (*sources, *BENCH)})
-    macros = [f"-D{name}={value}" for name, value in chosen.items()]
-    return [*require_compiler(compiler), *options, *macros, *(f"-I{place}" for place in places)]
+def macros(chosen: Mapping[str, int]) -> list[str]:
+    """What is chosen, as words of a compiler's command."""
+    return [f"-D{name}={value}" for name, value in chosen.items()]
 
 
 class CBench:
@@ -128,9 +124,11 @@ class CBench:
         folder.mkdir(parents=True, exist_ok=True)
         self.shape, self.program = shape, folder / "stream_bench"
         self._constants = constants_written(chosen)
-        line = compiler_line(compiler, options, runtime, defines(shape, fill) if chosen is None else chosen)
+        choices = macros(defines(shape, fill) if chosen is None else chosen)
+        places = [f"-I{place}" for place in sorted({str(path.parent.absolute()) for path in (*runtime, *BENCH)})]
         parts = [str(path.absolute()) for path in runtime if path.suffix == ".c"]
-        compile_all([[*line, *parts, *map(str, OWN_SOURCES), "-o", str(self.program)]])
+        line = [*require_compiler(compiler), *options, *choices, *places, *parts, *map(str, OWN_SOURCES)]
+        compile_line([*line, "-o", str(self.program)])
 
     def play(self, script: Script, fourier: bool = False) -> CPlayed:
         """Run a script; raises ``SimulationFailed`` where the bench ends before its script."""

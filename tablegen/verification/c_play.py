@@ -7,15 +7,17 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from tablegen.verification.c_objects import Objects, maker
 from tablegen.verification.failures import SimulationFailed
 
+OBJECTS = "objects"
 
-def compile_all(lines: Sequence[Sequence[str]], place: Path | None = None) -> None:
-    """Run compilers, in a directory if one is given; raises ``SimulationFailed`` with all that one says."""
-    for line in lines:
-        done = subprocess.run(line, capture_output=True, text=True, check=False, cwd=place)
-        if done.returncode or done.stderr:
-            raise SimulationFailed(f"{' '.join(line)}\n{done.stdout}{done.stderr}".strip())
+
+def compile_line(line: Sequence[str], place: Path | None = None) -> None:
+    """Run a compiler, in a directory if one is given; raises ``SimulationFailed`` with all that it says."""
+    done = subprocess.run(line, capture_output=True, text=True, check=False, cwd=place)
+    if done.returncode or done.stderr:
+        raise SimulationFailed(f"{' '.join(line)}\n{done.stdout}{done.stderr}".strip())
 
 
 def run(program: Path, script: bytes, timeout: float | None = None) -> bytes:
@@ -23,17 +25,17 @@ def run(program: Path, script: bytes, timeout: float | None = None) -> bytes:
     return _ended(script, timeout, [str(program)], stdout=subprocess.PIPE)
 
 
-def record(program: Path, script: bytes, place: Path, most: int, timeout: float | None = None) -> None:
+def record(command: Sequence[str], script: bytes, place: Path, most: int, timeout: float | None = None) -> None:
     """The same into a file; the system ends a bench that writes more than ``most`` bytes."""
 
     def limited() -> None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))
 
     with place.open("wb") as stored:
-        _ended(script, timeout, [str(program)], stdout=stored, preexec_fn=limited)
+        _ended(script, timeout, command, stdout=stored, preexec_fn=limited)
 
 
-def _ended(script: bytes, timeout: float | None, command: list[str], **options: Any) -> bytes:
+def _ended(script: bytes, timeout: float | None, command: Sequence[str], **options: Any) -> bytes:
     try:
         done = subprocess.run(command, input=script, stderr=subprocess.PIPE, check=False, timeout=timeout, **options)
     except subprocess.TimeoutExpired:
@@ -46,18 +48,32 @@ def _ended(script: bytes, timeout: float | None, command: list[str], **options: 
 
 
 def play_job(folder: Path, job: dict[str, Any]) -> dict[str, Any]:
-    """Compile the ``objects`` of a job and its ``program``, and play the script that stands in ``folder``.
+    """Compile the ``objects`` of a job and its program, and play the script of ``folder`` in each of its ways.
 
-    Places and files are named within ``folder``; what the bench writes stands in ``record``, of ``most_bytes``.
+    Places and files are named within ``folder``; a way of playing is a record, of ``most_bytes``, and arguments.
+    Returns what went wrong, by the record; nothing is played after that.
     """
-    if job["objects"]:
-        place = folder / "objects"
-        shutil.rmtree(place, ignore_errors=True)  # a directory that is kept may have those of another build
-        place.mkdir()
-        compile_all(job["objects"], place)
+    _compile(folder, job["compiler"], [Objects(**one) for one in job["objects"]])
     program = folder / job["program"]
     program.parent.mkdir(parents=True, exist_ok=True)
-    compile_all([[*job["line"], "-o", str(program)]], folder)
+    compile_line(job["line"], folder)
     script = (folder / job["script"]).read_bytes()
-    record(program, script, folder / job["record"], job["most_bytes"], job["timeout"])
+    for stored, arguments in job["plays"]:
+        try:
+            record([str(program), *arguments], script, folder / stored, job["most_bytes"], job["timeout"])
+        except SimulationFailed as error:
+            return {stored: str(error)}
     return {}
+
+
+def _compile(folder: Path, compiler: list[str], objects: list[Objects]) -> None:
+    """Put objects into their place in ``folder``: those that were kept, others from the compiler, to be kept."""
+    place = folder / OBJECTS
+    shutil.rmtree(place, ignore_errors=True)  # a directory that is kept may have those of another build
+    place.mkdir()
+    made_by = maker(compiler)
+    for one in objects:
+        if made_by is None or not one.take(made_by, place):
+            compile_line(one.line(compiler), place)
+            if made_by is not None:
+                one.keep(made_by, place)

@@ -72,9 +72,9 @@ def recaptured(capture: Capture, got: Words) -> Capture | None:
 def make_capture(stored: StoredBuild, script: Script, got: Words) -> Capture:
     """Line capture and model up."""
     wanted = np.array(script.expected, dtype=np.uint64)
-    flags = {name: (wanted >> np.uint64(48 + i) & np.uint64(1)).astype(np.bool_) for i, name in enumerate(FLAGS)}
+    playing, frame = (wanted & np.uint64(1 << 48 + FLAGS.index(name)) != 0 for name in ("playing", "frame"))
     index = np.arange(len(wanted))
-    place = np.where(flags["playing"], index - np.maximum.accumulate(np.where(flags["frame"], index, -1)), -1)
+    place = np.where(playing, index - np.maximum.accumulate(np.where(frame, index, -1)), -1)
     firsts = [first for first, _ in script.programs]
     programs = tuple(program for _, program in script.programs)
     which = np.searchsorted(firsts, index, side="right") - 1
@@ -123,5 +123,7 @@ def _caught_up(program: DualProgram, place: Ints, since: Ints, wanted: Words) ->
 def _codes(program: Program, place: Ints, since: Ints) -> Ints:
     """The codes at ticks of a frame, and since the program began."""
     if not program.output.shaping.order:
+        if len(place) > program.ticks:  # every code of a period once
+            return program.codes(np.arange(program.ticks, dtype=np.int64))[place % program.ticks]
         return program.codes(place % program.ticks)
     return shaped_codes(program, int(np.max(since, initial=-1)) + 1)[since]

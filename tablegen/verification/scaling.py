@@ -12,7 +12,7 @@ from math import ceil, cos, floor, pi, sin
 import numpy as np
 
 from tablegen.manifest.fields import ManifestAxis, ManifestBranch, ManifestSeries
-from tablegen.numerics.arrays import Floats, Ints
+from tablegen.numerics.arrays import Floats, Ints, merged
 from tablegen.problems import shortened
 from tablegen.verification.certified import PlayedPeriod, at, on_grid, played_series
 from tablegen.verification.shaped import ShapedPlay
@@ -291,7 +291,7 @@ def _chords(
     length = max(1, min(round(CHORD * share * ticks), stop - first - 1))
     if stop - first < 2:
         return np.zeros(1), np.zeros(1)
-    begins = np.union1d(period.edges, period.edges - length)
+    begins = merged(period.edges, period.edges - length)
     begins = begins[(begins >= first) & (begins + length < stop)]
     if not len(begins):
         begins = np.array([first], dtype=np.int64)

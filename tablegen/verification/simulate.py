@@ -12,7 +12,6 @@ from typing import Any
 
 from tablegen.installation import install_advice
 from tablegen.verification.failures import SimulationFailed, ToolMissing
-from tablegen.verification.model_cache import keep_model, kept_model, model_key
 
 SIMULATORS = ("icarus", "verilator")
 # What Icarus 11 is known to accept; Verilator needs the timing mode for the clock that the benches make in Verilog.
@@ -86,14 +85,15 @@ def compile_design(simulator: str, design: Design, folder: Path, *, kept: bool =
     require(simulator)
     from cocotb_tools.runner import get_runner
 
+    from tablegen.verification.model_cache import MODELS, model_key  # here: what plays C needs neither
+
     folder.mkdir(parents=True, exist_ok=True)
     runner, log, model, key = get_runner(simulator), folder / "build.log", folder / design.top, ""
     with _environment(simulator, folder):
         if kept and simulator == "verilator":
             arguments = _BUILD_ARGUMENTS[simulator]
             key = model_key(design.sources, design.includes, design.parameters, design.top, *arguments)
-            if found := kept_model(key):
-                shutil.copy(found, model)
+            if MODELS.take(key, model):
                 return Compiled(simulator, design.top, folder, runner)
         try:
             runner.build(
@@ -109,7 +109,7 @@ def compile_design(simulator: str, design: Design, folder: Path, *, kept: bool =
         except (RuntimeError, SystemExit):
             raise SimulationFailed(_tail(log)) from None
     if key:
-        keep_model(key, model)
+        MODELS.keep(key, model)
     return Compiled(simulator, design.top, folder, runner)
 
 

@@ -5,6 +5,8 @@ description of what it does. ``stream_bench.v`` plays it and captures; ``compare
 """
 
 import re
+from array import array
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from operator import attrgetter
 from pathlib import Path
@@ -13,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tablegen.device.dual_program import DualProgram
+from tablegen.device.played_lines import LineTicks
 from tablegen.device.registers import program_words
-from tablegen.device.sequencer import Fault, LineTicks, Sequencer, Tick
+from tablegen.device.sequencer import Fault, Sequencer, Tick
 from tablegen.fixedpoint.synthesis import FourierWords
 from tablegen.numerics.arrays import Ints
 
@@ -96,7 +99,7 @@ class Script:
     drain: int = 48
     commit_clocks: int = 1
     commands: list[int] = field(default_factory=list)
-    expected: list[int] = field(default_factory=list)
+    expected: "array[int]" = field(default_factory=lambda: array("Q"))  # as wide as Words
     taken: list[DualProgram] = field(default_factory=list)  # programs, one a swap
     refused: bool = False  # a write was to be refused, and nobody has cleared that
     states: list[tuple[str, StoredState]] = field(default_factory=list)  # when each was asked for, and what it is
@@ -139,7 +142,9 @@ class Script:
     def write(self, region: int, words: list[int] | Ints, first: int = 0) -> None:
         """Write words to a region of the idle bank, from address ``first`` on, one a clock."""
         base = _WRITE | region << 48
-        self.commands.extend(base | at << 32 | int(word) & 0xFFFFFFFF for at, word in enumerate(words, first))
+        values = np.asarray(words, dtype=np.int64) & 0xFFFFFFFF
+        at = np.arange(first, first + len(values), dtype=np.int64) << 32
+        self.commands.extend((values | at | base).tolist())
         self._pass(len(words))
 
     def write_refused(self, region: int, words: list[int] | Ints, first: int = 0) -> None:
@@ -266,8 +271,11 @@ class Script:
             self._ticked_at = self.clocks
             at_once = self.model.ahead((end - self.clocks) // self._period + 1)
             if at_once is not None:
-                words = pack_line(*at_once).tolist()
-                self.expected.extend(map(self._with_reported, words) if any(self._reported.values()) else words)
+                words = pack_line(*at_once)
+                for name, count in self._reported.items():
+                    if count:
+                        words = words & ~np.uint64(_VALID) | np.uint64(1 << _FAULTS_AT + FAULTS.index(name))
+                self.expected.frombytes(words.tobytes())
                 self._ticked_at = self.clocks = self.clocks + (len(words) - 1) * self._period
                 continue
             tick = self.model.step()
@@ -318,7 +326,7 @@ class Mismatch:
     got: Sample | None
 
 
-def compare(expected: list[int], capture: Words) -> Mismatch | None:
+def compare(expected: Sequence[int], capture: Words) -> Mismatch | None:
     """Every tick of a capture against the model, codes, markers and faults; None where all are equal."""
     wanted = np.array(expected, dtype=np.uint64)
     length = min(len(wanted), len(capture))

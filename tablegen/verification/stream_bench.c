@@ -2,7 +2,7 @@
  *
  * The words of the script are those of tablegen.verification.stream, 64 bits each: what to do in the upper four bits. The bench is
  * both sides of the sequencer. Where it runs is the business of whoever gives it words and takes its captures: bench_read(),
- * bench_write() are theirs. With BENCH_FILL ticks are played by dac_sequencer_fill() as far as a command lets them; a
+ * bench_write() are theirs. With BENCH_FILL it can play ticks by dac_sequencer_fill() as far as a command lets them; a
  * capture then has no faults, since a fill tells them only at its end. With BENCH_EMITTED the program is that of an emitted
  * header, unless a commit says that it is another, which the script wrote; and a tick is two captures: converter words
  * of up to 32 bits, then markers and faults. After the ticks come the counts of faults, then the states that the script
@@ -33,6 +33,8 @@ static void capture(const dac_tick *tick)
 }
 
 #ifdef BENCH_FILL
+static bool fills;
+
 /* Lengths of all kinds, the same in every run. */
 static uint32_t some(uint32_t most)
 {
@@ -50,7 +52,7 @@ static void play(void)
 #ifdef BENCH_FILL
     static dac_output codes[2 * BENCH_FILL];
     static uint8_t markers[BENCH_FILL];
-    while (ticks_due != 0) {
+    while (fills && ticks_due != 0) {
         const uint32_t n = some(ticks_due);
         dac_sequencer_fill(&sequencer, codes, codes + 1, markers, n);
         for (uint32_t i = 0; i < n; i++) {
@@ -62,12 +64,11 @@ static void play(void)
         }
         ticks_due -= n;
     }
-#else
+#endif
     for (; ticks_due != 0; ticks_due--) {
         dac_sequencer_step(&sequencer, &tick);
         capture(&tick);
     }
-#endif
 }
 
 static void pass(uint32_t clocks)
@@ -341,10 +342,15 @@ static void request(unsigned mask, uint32_t frames)
 
 /* The first two words are the shape and the codes at power-up; then commands. After them come four captures, the counts of faults, and
  * those of states. */
-void bench_play(void)
+void bench_play(bool fill)
 {
     uint64_t word;
 
+#ifdef BENCH_FILL
+    fills = fill;
+#else
+    (void)fill;
+#endif
     shape(bench_read());
     power_up(bench_read());
     while ((word = bench_read()) != END) {

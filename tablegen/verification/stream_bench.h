@@ -20,7 +20,7 @@ uint64_t bench_read(void);            /* the next word of the script; 0 at its e
 void bench_write(uint64_t capture);    /* a tick */
 void bench_check(bool done, const char *what); /* the script asked for something that the sequencer has to do */
 
-void bench_play(void);
+void bench_play(bool fill); /* by fills, if it was compiled with BENCH_FILL, or a tick a call */
 
 #ifdef BENCH_EMITTED
 #include "dac_sequencer.h"

@@ -52,7 +52,7 @@ void bench_check(bool done, const char *what)
 
 void bench_main(void)
 {
-    bench_play();
+    bench_play(true);
     bench_done = 1;
     for (;;)
         bench_exchange();

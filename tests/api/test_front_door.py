@@ -12,7 +12,7 @@ from building import EXAMPLE, changed
 from editing import run
 
 import tablegen
-from tablegen.device.sequencer import play_line
+from tablegen.device.played_lines import play_line
 
 SCANNER = EXAMPLE.parent / "scanner.toml"
 

@@ -10,7 +10,8 @@ from programs import Kind, random_dual
 from stream_scripts import clamped, occurrences
 
 from tablegen.device import sequencer as sequencer_module
-from tablegen.device.sequencer import LineTicks, Sequencer
+from tablegen.device.played_lines import LineTicks
+from tablegen.device.sequencer import Sequencer
 from tablegen.device.slew import guarded
 from tablegen.numerics.arrays import Ints
 from tablegen.verification.bench import SequencerShape

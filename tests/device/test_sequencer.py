@@ -7,8 +7,9 @@ from hypothesis import strategies as st
 from variants import plan_of
 
 from tablegen.device.dual_program import DualProgram
+from tablegen.device.played_lines import play_line
 from tablegen.device.schedule import Window, pixel_starts
-from tablegen.device.sequencer import Fault, Sequencer, SequencerState, Tick, play_line
+from tablegen.device.sequencer import Fault, Sequencer, SequencerState, Tick
 
 SMALL = {
     "timing.lines": "6",

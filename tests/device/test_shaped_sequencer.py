@@ -7,7 +7,8 @@ from test_sequencer import SMALL, run, started
 from variants import plan_of
 
 from tablegen.device.dual_program import DualProgram
-from tablegen.device.sequencer import Fault, PlayedLines, Sequencer, play_line
+from tablegen.device.played_lines import PlayedLines, play_line
+from tablegen.device.sequencer import Fault, Sequencer
 from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.runs import runs_of
 from tablegen.fixedpoint.shaping import Shaping

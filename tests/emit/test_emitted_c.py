@@ -14,7 +14,7 @@ import pytest
 from building import IN_C, NAME, REPOSITORY, VARIANTS, Build, Variant, build, build_stressed, constants, run, run_clean
 from sets import by_tool, common
 
-from tablegen.device.sequencer import play_line
+from tablegen.device.played_lines import play_line
 from tablegen.numerics.arrays import Ints
 
 PLAYER = REPOSITORY / "examples" / "c" / "play.c"

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tablegen.device.dual_program import DualProgram
-from tablegen.device.sequencer import LineTicks, Sequencer, Tick, play_line
+from tablegen.device.played_lines import LineTicks, play_line
+from tablegen.device.sequencer import Sequencer, Tick
 from tablegen.numerics.arrays import Ints
 from tablegen.verification.stream import FLAGS
 

@@ -42,9 +42,10 @@ from tablegen.fixedpoint.shaping import Shaping
 from tablegen.manifest.read import StoredBuild, read_build
 from tablegen.verification.bench import SequencerShape
 from tablegen.verification.c_bench import CBench, script_words
-from tablegen.verification.c_target import CTarget, _codes, _packed, _sources
+from tablegen.verification.c_program import c_program
 from tablegen.verification.capture import make_capture
 from tablegen.verification.checks import check_states
+from tablegen.verification.converter_words import codes_of, packed
 from tablegen.verification.failures import SimulationFailed
 from tablegen.verification.placement import Placement
 from tablegen.verification.session import make_session
@@ -164,9 +165,9 @@ class Benches:
 def benches(short: Build, tmp_path_factory: pytest.TempPathFactory) -> Benches:
     """Those of the short build."""
     folder, stored = tmp_path_factory.mktemp("benches"), read_build(short.folder)
-    sources, absent = _sources(short.folder, folder, stored, fourier=False)
+    program, absent = c_program(short.folder, folder, stored, fourier=False)
     assert not absent
-    chosen = CTarget("c")._defines(stored)
+    sources, chosen = program.sources, program.defines
     shape = SequencerShape.of((stored.program.x, stored.program.y))
     step = CBench(shape, folder / "step", options=["-std=c99", "-O2"], sources=sources, chosen=chosen)
     chosen["BENCH_FILL"] = 600
@@ -187,7 +188,7 @@ def test_sessions_of_any_seed_and_length_equal_the_model(benches: Benches, seed:
     assert not np.any(wanted[own] >> np.uint64(56)), "the program of the build raises no fault"
     for bench, mask in ((benches.step, (1 << 64) - 1), (benches.fill, (1 << 56) - 1)):  # fills do not record faults
         played = bench.run(text)
-        assert np.array_equal(_packed(played.capture, stored), wanted & np.uint64(mask))
+        assert np.array_equal(packed(played.capture, stored), wanted & np.uint64(mask))
         assert played.counts == session.script.all_counts
         told = check_states(session.script.states, read_states(played.states), (1 << 32) - 1, ("armed", "running"))
         assert told.failure is None
@@ -240,7 +241,7 @@ def test_codes_come_back_from_converter_words(bits: tuple[int, int], coding: str
     dac_bits, word_bits = bits
     code &= (1 << dac_bits) - 1
     output = Output(1, 20, 0, 0, (1 << dac_bits) - 1, 1, 0, dac_bits, coding, align, word_bits)
-    assert _codes(np.array([output.word(code)], dtype=np.uint64), output).tolist() == [code]
+    assert codes_of(np.array([output.word(code)], dtype=np.uint64), output).tolist() == [code]
 
 
 @pytest.mark.parametrize("name", common(["short_frame"], VARIANTS))
@@ -617,7 +618,7 @@ def test_junit_has_a_case_a_check(folder: Path, tmp_path: Path) -> None:
 def test_what_is_played_is_kept_on_request(short: Build, tmp_path: Path) -> None:
     assert verify(short.folder, "--keep", tmp_path / "kept").status == 0
     kept = {path.name for path in (tmp_path / "kept").iterdir()}
-    assert {"script.hex", "step_capture.bin", "fill_capture.bin", "c", "bench", "step", "fill"} <= kept
+    assert {"script.hex", "step_capture.bin", "fill_capture.bin", "c", "runtime", "bench", "objects", "step"} <= kept
 
 
 @pytest.mark.parametrize("target", ["c", "cortex-m"])

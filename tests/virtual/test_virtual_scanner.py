@@ -9,7 +9,7 @@ from variants import plan_of, setup_of
 
 from tablegen.compensation.hysteresis import BranchShape, beta_at
 from tablegen.compensation.line import LineShape
-from tablegen.device.sequencer import play_line
+from tablegen.device.played_lines import play_line
 from tablegen.numerics.arrays import Floats
 from tablegen.virtual.experiments import actual_sizes, apparent_sizes, frequency_response, sensor_trace, triangle_size
 from tablegen.virtual.identify import X_TARGETS, Y_TARGETS, Targets, identify

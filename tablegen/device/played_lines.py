@@ -1,0 +1,102 @@
+"""Lines of a program as they are played undisturbed: codes of both axes and the markers of every tick."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tablegen.device.dual_program import DualProgram
+from tablegen.device.schedule import pixel_starts
+from tablegen.numerics.arrays import Bools, Ints
+
+Part = TypeVar("Part", np.int64, np.bool_)
+
+
+@dataclass(frozen=True, eq=False)
+class LineTicks:
+    """One line, or several, as arrays of shape (ticks,): codes of both axes and the markers of every tick."""
+
+    x: Ints
+    y: Ints
+    line: Bools
+    frame: Bools
+    pixel: Bools
+    backward: Bools
+    valid: Bools
+
+
+class PlayedLines:
+    """The lines of a program one after another, from its beginning on: remainders of shaped axes run on."""
+
+    def __init__(self, program: DualProgram) -> None:
+        self._program = program
+        self._remainders = program.x.output.begin(), program.y.output.begin()
+
+    def unclamped(self, line: int, count: int = 1) -> tuple[Ints, Ints]:
+        """Codes of x and y on the next lines, from ``line`` of a frame on, before clamp and slew guard.
+
+        There are ``count`` of them, shapes (ticks,); all belong to one frame.
+        """
+        program, ticks = self._program, self._program.schedule.ticks
+        y = program.y.unclamped(line * ticks, (line + count) * ticks, self._remainders[1])
+        if not program.x.output.shaping.order:
+            return _repeated(self._x_line, count), y
+        x = [program.x.unclamped(0, ticks, self._remainders[0]) for _ in range(count)]
+        return np.concatenate(x), y
+
+    def play(self, line: int, settled: bool = True) -> LineTicks:
+        """The next line, which is ``line`` of a frame, as ``play_line`` has it."""
+        return self.ticks(line, self.unclamped(line), settled)
+
+    def ticks(self, line: int, unclamped: tuple[Ints, Ints], settled: bool = True) -> LineTicks:
+        """Lines from ``line`` of a frame on, of which codes before the clamp are there, as they leave the device."""
+        schedule = self._program.schedule
+        count = len(unclamped[0]) // schedule.ticks
+        first, pixel, backward, inside = (_repeated(marker, count) for marker in self._markers)
+        images = [settled and (at in schedule.up or at in schedule.down) for at in range(line, line + count)]
+        frame = np.zeros(len(first), dtype=np.bool_)
+        frame[0] = line == 0
+        return LineTicks(
+            x=self._program.x.output.clamp(unclamped[0]),
+            y=self._program.y.output.clamp(unclamped[1]),
+            line=first,
+            frame=frame,
+            pixel=pixel,
+            backward=backward,
+            valid=inside & np.repeat(images, schedule.ticks),
+        )
+
+    @cached_property
+    def _x_line(self) -> Ints:
+        """Codes of x on every line, where it is not shaped."""
+        return self._program.x.unclamped(0, self._program.schedule.ticks, self._remainders[0])
+
+    @cached_property
+    def _markers(self) -> tuple[Bools, Bools, Bools, Bools]:
+        """Of every line: where it begins, pixels, what is backward, and what is within the windows."""
+        schedule = self._program.schedule
+        k = np.arange(schedule.ticks, dtype=np.int64)
+        pixel = np.zeros(schedule.ticks, dtype=np.bool_)
+        inside = np.zeros(schedule.ticks, dtype=np.bool_)
+        for window in (schedule.forward, schedule.backward):
+            if window.count:
+                pixel[pixel_starts(window, schedule.pixels)] = True
+                inside[window.first : window.stop] = True
+        return k == 0, pixel, k >= schedule.turn_tick, inside
+
+
+def play_line(program: DualProgram, line: int, settled: bool = True) -> LineTicks:
+    """Line ``line`` of a frame in steady state: the slew guard untouched, ``valid`` as after settling.
+
+    Raises ``ValueError`` where an axis is shaped: the lines before belong to it, and ``PlayedLines`` plays them.
+    """
+    program.x.require_period()
+    program.y.require_period()
+    return PlayedLines(program).play(line, settled)
+
+
+def _repeated(line: NDArray[Part], count: int) -> NDArray[Part]:
+    """What every line has, so many times; of one line no copy, since lines may be long."""
+    return line if count == 1 else np.tile(line, count)
