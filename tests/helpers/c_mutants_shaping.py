@@ -42,21 +42,24 @@ MUTANTS: tuple[Mutant, ...] = (
                 "    if (strayed >> bits >> bank->run_bits != 0)\n        return false;\n",
                 "",
             ),
-            "few: only the last code of a block counts": ("\n        strayed |= fed;", "\n        strayed = fed;"),
+            "few: only the last code of a block counts": ("    strayed |= fed;  ", "    strayed = fed;  "),
             "few: a block forgets its remainders": ("    axis->shaper = shaper;\n    axis->code", "    axis->code"),
             "few: a block's codes are not followed": (
                 "    axis->code = (int32_t)out[-DAC_STRIDE];\n    return",
                 "    return",
             ),
-            "few: values have a bit more": ("(*values++ >> DAC_BELOW)", "(*values++ >> (DAC_BELOW - 1))"),
+            "few: values have a bit more": ("(values[k] >> DAC_BELOW)", "(values[k] >> (DAC_BELOW - 1))"),
             "few: all is fed back by the highest order": (
                 "remainder_bits == 12 && bank->order == 3)",
                 "remainder_bits == 12)",
             ),
             "few: other converters have another remainder": (
-                "FEEDER(feed_any, bank->order, bank->remainder_bits)",
-                "FEEDER(feed_any, bank->order, bank->remainder_bits + 1)",
+                "FEEDER(feed_any, bank->order, bank->remainder_bits, false)",
+                "FEEDER(feed_any, bank->order, bank->remainder_bits + 1, false)",
             ),
+            "few: what is left of a block goes by fours": ("fours && end - values == DAC_RUN", "fours"),
+            "few: one of four ticks is played twice": ("            FEED(2)\n", "            FEED(1)\n"),
+            "few: the codes of four ticks lie closer": ("out[(k) * DAC_STRIDE]", "out[k]"),
         },
     ),
     *changed(
