@@ -119,23 +119,43 @@ DAC_COPIED uint32_t play(dac_axis *axis, const dac_bank_axis *bank, uint64_t at,
 
 /* A Cortex-M0 has not enough registers to feed back two remainders or three in the loop that computes the values. It feeds back
  * those of a block in a loop of its own, so that there is one loop of values for all orders and converters. */
+
+/* From value k of this turn of the loop to its code. The hint keeps gcc from or-ing later, for which it has no registers. */
+#define FEED(k)                                                                                                       \
+    fed = (values[k] >> DAC_BELOW) + shaper.back;                                                                     \
+    strayed |= fed;                                                                                                   \
+    DAC_AT_HAND(strayed);                                                                                             \
+    shaper = dac_followed(shaper, fed, mask, order, weight);                                                          \
+    out[(k) * DAC_STRIDE] = (dac_output)((fed >> bits) + base);
+#define TURN(ticks)                                                                                                   \
+    values += (ticks);                                                                                                \
+    out += (ticks) * DAC_STRIDE;                                                                                      \
+    DAC_OPAQUE(out);
+
+/* With `fours` a whole block goes by four ticks a turn: remainders then need not move from register to register. */
 DAC_COPIED bool feed(dac_axis *axis, const dac_bank_axis *bank, const uint32_t *values, const uint32_t *end, dac_output *out,
-                     const unsigned order, const unsigned bits)
+                     const unsigned order, const unsigned bits, const bool fours)
 {
     const uint32_t base = (uint32_t)(axis->code - bank->run_half), mask = (UINT32_C(1) << bits) - 1;
-    uint32_t strayed = 0;
+    uint32_t strayed = 0, fed;
     int32_t weight = DAC_WEIGHT(bank);
     dac_shaper shaper = axis->shaper;
 
-    do {
-        DAC_AT_HAND(weight);
-        const uint32_t fed = (*values++ >> DAC_BELOW) + shaper.back;
-        shaper = dac_followed(shaper, fed, mask, order, weight);
-        strayed |= fed;
-        *out = (dac_output)((fed >> bits) + base);
-        out += DAC_STRIDE;
-        DAC_OPAQUE(out);
-    } while (values != end);
+    if (fours && end - values == DAC_RUN) {
+        do {
+            FEED(0)
+            FEED(1)
+            FEED(2)
+            FEED(3)
+            TURN(4)
+        } while (values != end);
+    } else {
+        do {
+            DAC_AT_HAND(weight);
+            FEED(0)
+            TURN(1)
+        } while (values != end);
+    }
     if (strayed >> bits >> bank->run_bits != 0)
         return false;
     axis->shaper = shaper;
@@ -143,18 +163,18 @@ DAC_COPIED bool feed(dac_axis *axis, const dac_bank_axis *bank, const uint32_t *
     return true;
 }
 
-#define FEEDER(name, order, bits)                                                                                     \
+#define FEEDER(name, order, bits, fours)                                                                              \
     static bool name(dac_axis *axis, const dac_bank_axis *bank, const uint32_t *values, const uint32_t *end,          \
                      dac_output *out)                                                                                 \
     {                                                                                                                 \
-        return feed(axis, bank, values, end, out, order, bits);                                                       \
+        return feed(axis, bank, values, end, out, order, bits, fours);                                                \
     }
-FEEDER(feed_any, bank->order, bank->remainder_bits)
+FEEDER(feed_any, bank->order, bank->remainder_bits, false)
 #if DAC_SHAPING > 1
-FEEDER(feed_second, 2, 12)
+FEEDER(feed_second, 2, 12, true)
 #endif
 #if DAC_SHAPING > 2
-FEEDER(feed_scanner, 3, 12)
+FEEDER(feed_scanner, 3, 12, true)
 #endif
 
 static dac_feeder feeder_of(const dac_bank_axis *bank)

@@ -133,13 +133,18 @@ DAC_COPIED uint32_t dac_play_short(dac_axis *axis, const dac_bank_axis *bank, ui
 #if !defined(__OPTIMIZE_SIZE__) /* what is small has the other loop only */
         if ((at + (DAC_RUN - 1) * step) >> 47 == at >> 47) { /* all between the same two words */
             DAC_NEIGHBOURS(table, (uint32_t)(at >> 47), here, there);
-            const uint32_t slope = (uint32_t)(there - here);
+            uint32_t slope = (uint32_t)(there - here);
             low += (uint32_t)here << 15;
             do {
-                if (!shaped) {
+                if (!shaped || later)
                     DAC_ASIDE(low);
+                if (!shaped) {
                     DAC_ASIDE(base);
                     DAC_ASIDE(stop);
+                }
+                if (later) {
+                    DAC_AT_HAND(slope);
+                    DAC_AT_HAND(risen);
                 }
                 rise = (slope * ((uint32_t)(at >> 32) & 0x7fffu) + low) >> DAC_ABOVE;
                 at += advance;
@@ -149,8 +154,9 @@ DAC_COPIED uint32_t dac_play_short(dac_axis *axis, const dac_bank_axis *bank, ui
 #endif
         {
             do {
-                if (!shaped) {
+                if (!shaped || later)
                     DAC_ASIDE(low);
+                if (!shaped) {
                     DAC_ASIDE(base);
                     DAC_ASIDE(stop);
                 }

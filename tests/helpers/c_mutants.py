@@ -21,6 +21,7 @@ from c_faults import Mutant
 from c_library import compile_both
 from c_scripts import IN_C, LONG, everything, long_periods, long_play, refused_by_y, shaped_short_lines
 from c_scripts import LONG_PERIODS as PERIODS
+from c_shaped_waves import WAVES, shaped_waves
 from c_threads import compile_threads
 from c_threads import play as play_threads
 from limits import ENDED, program_within, within
@@ -48,6 +49,9 @@ PLACES = (
     "shaped",
     "shaped short",
     "shaped few",
+    "shaped wide",
+    "shaped wide short",
+    "shaped wide few",
     *CHECKS,
     "threads",
 )
@@ -68,12 +72,15 @@ def scripts(where: str) -> tuple[tuple[Script, SequencerShape], ...]:
         wild = SequencerShape(16, 3, 4, 14, 3, 3, 16)
         long = [(long_play(name, 60_000), LONG[name][0]) for name in names]
         return (*long, (everything(wild, 1, 500), wild))
+    if where == "shaped wide":
+        return tuple((shaped_waves(WAVES[name]), WAVES[name]) for name in ("bits_18", "bits_20", "bits_24"))
     if where == "shaped":
         names = ("bits_16", "bits_8", "direct", "many_lines")
         return (
             *((long_play(name, 12_000, 0, 3), LONG[name][0]) for name in names),
             (long_play("bits_16", 20_000, 1, 3), LONG["bits_16"][0]),
             (long_play("bits_12", 60_000, 0, 3), LONG["bits_12"][0]),
+            (shaped_waves(WAVES["bits_12"]), WAVES["bits_12"]),
             (refused_by_y(20_000), LONG["many_lines"][0]),
             (shaped_short_lines(SequencerShape(16, 1, 4, 16, 1, 3, 16), 6000), SequencerShape(16, 1, 4, 16, 1, 3, 16)),
         )
@@ -128,8 +135,8 @@ def _check(paths: tuple[Path, ...]) -> Verdict:
 def _play(where: str, folder: Path, runtime: list[Path]) -> Verdict:
     fill = 0 if where == "step" else FILL
     shaped = where.startswith("shaped")
-    kind = where.split()[0]
-    playing = scripts(kind if kind in ("wide", "cubic", "shaped") else "fill")
+    kinds = ("wide", "cubic", "shaped wide", "shaped")
+    playing = scripts(next((kind for kind in kinds if where.startswith(kind)), "fill"))
     chosen = defines(playing[0][1], fill) | ({"DAC_LONG_MULTIPLY": 0} if where.endswith(("short", "few")) else {})
     chosen |= {"DAC_FEW_REGISTERS": 1} if where.endswith("few") else {}
     chosen |= {"DAC_SHAPING": 3} if shaped else {}

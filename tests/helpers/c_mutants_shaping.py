@@ -2,7 +2,34 @@
 
 from c_faults import Mutant, changed
 
+# The copies of the fast path for all converters, by place.
+_FOR_ALL = {
+    "shaped wide": ("return PLAY(bank->order,", "return PLAY({},"),
+    "shaped wide short": ("return PLAY(bank->order,", "return PLAY({},"),
+    "shaped wide few": ("FEEDER(feed_any, bank->order,", "FEEDER(feed_any, {},"),
+}
+_ORDERS = {
+    "other converters feed back by the first order": "1",
+    "other converters have no second order": "bank->order == 2 ? 3u : bank->order",
+    "other converters have no third order": "bank->order == 3 ? 2u : bank->order",
+}
+
 MUTANTS: tuple[Mutant, ...] = (
+    *(
+        Mutant(breaks, "dac_shaping.c", old, new.format(order), where)
+        for where, (old, new) in _FOR_ALL.items()
+        for breaks, order in _ORDERS.items()
+    ),
+    *changed(
+        "dac_shaping.c",
+        "shaped wide few",
+        {
+            "other converters have another remainder": (
+                "FEEDER(feed_any, bank->order, bank->remainder_bits,",
+                "FEEDER(feed_any, bank->order, bank->remainder_bits + 1,",
+            ),
+        },
+    ),
     *changed(
         "dac_run.h",
         "shaped",
@@ -42,21 +69,20 @@ MUTANTS: tuple[Mutant, ...] = (
                 "    if (strayed >> bits >> bank->run_bits != 0)\n        return false;\n",
                 "",
             ),
-            "few: only the last code of a block counts": ("\n        strayed |= fed;", "\n        strayed = fed;"),
+            "few: only the last code of a block counts": ("    strayed |= fed;  ", "    strayed = fed;  "),
             "few: a block forgets its remainders": ("    axis->shaper = shaper;\n    axis->code", "    axis->code"),
             "few: a block's codes are not followed": (
                 "    axis->code = (int32_t)out[-DAC_STRIDE];\n    return",
                 "    return",
             ),
-            "few: values have a bit more": ("(*values++ >> DAC_BELOW)", "(*values++ >> (DAC_BELOW - 1))"),
+            "few: values have a bit more": ("(values[k] >> DAC_BELOW)", "(values[k] >> (DAC_BELOW - 1))"),
             "few: all is fed back by the highest order": (
                 "remainder_bits == 12 && bank->order == 3)",
                 "remainder_bits == 12)",
             ),
-            "few: other converters have another remainder": (
-                "FEEDER(feed_any, bank->order, bank->remainder_bits)",
-                "FEEDER(feed_any, bank->order, bank->remainder_bits + 1)",
-            ),
+            "few: what is left of a block goes by fours": ("fours && end - values == DAC_RUN", "fours"),
+            "few: one of four ticks is played twice": ("            FEED(2)\n", "            FEED(1)\n"),
+            "few: the codes of four ticks lie closer": ("out[(k) * DAC_STRIDE]", "out[k]"),
         },
     ),
     *changed(

@@ -13,6 +13,7 @@ from c_coverage import COVERAGE, Coverage, coverage
 from c_library import compile_both
 from c_mutants import scripts
 from c_scripts import IN_C, LONG, LONG_PERIODS, everything, long_periods, long_play, renderings
+from c_shaped_waves import WAVES, shaped_waves
 
 from tablegen.resources import c_runtime
 from tablegen.verification.bench import SequencerShape
@@ -20,8 +21,10 @@ from tablegen.verification.bench import SequencerShape
 pytestmark = pytest.mark.common
 
 AXIS = next(path for path in c_runtime() if path.name == "dac_axis.c")
+SHAPING = next(path for path in c_runtime() if path.name == "dac_shaping.c")
 SEQUENCER = next(path for path in c_runtime() if path.name == "dac_sequencer.c")
 RUN = 16  # ticks with one check
+SHAPED_WAYS = ((), ("-DDAC_LONG_MULTIPLY=0",), ("-DDAC_LONG_MULTIPLY=0", "-DDAC_FEW_REGISTERS=1"))
 
 
 @dataclass(frozen=True)
@@ -80,3 +83,13 @@ def test_every_line_of_shaping_was_run(tmp_path: Path) -> None:
     found = coverage([tmp_path], ["dac_shaping.c"])
     assert found.lines
     assert found.missed() == []
+
+
+@pytest.mark.parametrize("more", SHAPED_WAYS, ids=" ".join)
+@pytest.mark.parametrize("name", WAVES)
+def test_the_fast_path_plays_the_second_and_the_third_order(name: str, more: tuple[str, ...], tmp_path: Path) -> None:
+    """On converters of other than 16 bits too: ticks that are played one by one are few."""
+    script = shaped_waves(WAVES[name])
+    Benches(tmp_path, (*COVERAGE, "-DDAC_SHAPING=3", *more)).play(script, WAVES[name], fill=FILL)
+    one_by_one = coverage([tmp_path], ["dac_shaping.c"]).of(SHAPING, "return (int32_t)fed >> bits;")
+    assert one_by_one < 2 * len(script.expected) // 100

@@ -10,6 +10,7 @@ from c_benches import COMPILERS, FILL, SANITIZED, Benches
 from c_devices import device_for, flat
 from c_library import BAD_SHAPING, LOADED, Library, compile_library
 from c_scripts import LONG, every_tick, long_play, refused_by_y, shaped, shaped_short_lines
+from c_shaped_waves import WAVES, shaped_waves
 from replacing import replace
 from sets import common
 
@@ -63,6 +64,12 @@ def test_short_lines_that_clamp_are_held_back_and_take_each_other_s_place(
     script = shaped_short_lines(SHORT[name], 8000)
     everywhere(benches[3], script, SHORT[name])
     assert script.swaps > 10
+
+
+@pytest.mark.common
+@pytest.mark.parametrize("name", WAVES)
+def test_slow_waves_of_other_converters(name: str, benches: dict[int, Benches]) -> None:
+    everywhere(benches[3], shaped_waves(WAVES[name]), WAVES[name])
 
 
 @pytest.mark.common
