@@ -165,6 +165,32 @@ def test_is_not_vacuous(name: str, tmp_path: Path) -> None:
     assert "Reached cover statement" in answer, answer
 
 
+BOUNDS = FORMAL / "spline_bounds.smt2"
+BOUNDS_MUTANTS = {  # what stands there, and instead
+    "rounding_down": ("(<= (- half) third half)", "(<= (- 1) third 1)"),
+    "another_bend": ("(* 24 (+ c0", "(* 23 (+ c0"),
+    "fraction_of_two_segments": ("(< v half)", "(< v 1)"),
+}
+
+
+def _bounds(text: str) -> str:
+    command = [tool("z3"), "-in"]
+    return subprocess.run(command, input=text, capture_output=True, text=True, timeout=PATIENCE_S).stdout.strip()
+
+
+def test_no_sample_of_a_spline_leaves_its_words() -> None:
+    """Of words of any width: the rule and the error of its roundings, as the header of the file has them."""
+    assert _bounds(BOUNDS.read_text("utf-8")) == "unsat"
+
+
+@pytest.mark.parametrize("name", BOUNDS_MUTANTS)
+def test_a_sample_of_another_rule_leaves_them(name: str) -> None:
+    text = BOUNDS.read_text("utf-8")
+    old, new = BOUNDS_MUTANTS[name]
+    assert text.count(old) == 1
+    assert _bounds(text.replace(old, new)) == "sat"
+
+
 AT_Y = """[LATENCY-4:0]),
                 .runnings(runnings_now[LATENCY-4:0]),
                 .bank(bank), .restart(frame_0)"""
