@@ -12,6 +12,7 @@ import pytest
 from building import (
     BENCHES,
     FEW,
+    IN_C,
     NAME,
     REPOSITORY,
     VARIANTS,
@@ -147,6 +148,16 @@ def test_player_equals_the_model(built: Build) -> None:
     schedule = built.plan.schedule
     lines = schedule.lines + 1 if schedule.lines <= 8 else LINES
     assert np.array_equal(simulated_codes(built, lines * schedule.ticks), model_codes(built, lines))
+
+
+@pytest.mark.parametrize("name", ["cubic", "cubic_wide"])
+@pytest.mark.parametrize("gap", [0, 2])
+def test_player_of_a_cubic_table_equals_the_model(tmp_path: Path, name: str, gap: int) -> None:
+    """Words of 14 bits on both axes; of 21 bits on x, with lines on y."""
+    cubic = IN_C[name]
+    built = build(tmp_path, Variant({**cubic.scan, "emit.formats": ["verilog"]}, cubic.scanner))
+    expected = model_codes(built, LINES)
+    assert np.array_equal(simulated_codes(built, len(expected), gap), expected)
 
 
 @pytest.mark.parametrize("gap", [1, 6])

@@ -46,6 +46,8 @@ PROOFS = {
     "scan": Proof("scan_properties", 2, 20, covers=20),
     "play_pipelined": Proof("play_properties", 26, 34, {}, ALL_STUBS, 40, asserts_in_stubs=False),
     "play_low_area": Proof("play_properties", 18, 26, {"LOW_AREA": 1}, ALL_STUBS, 30),
+    "play_cubic": Proof("play_properties", 59, 67, {"CUBIC": 1}, ALL_STUBS, 90, asserts_in_stubs=False),
+    "play_cubic_low_area": Proof("play_properties", 18, 26, {"CUBIC": 1, "LOW_AREA": 1}, ALL_STUBS, 30),
     "valid": Proof("valid_properties", 4, 20, covers=12),
     "sequencer": Proof("sequencer_properties", 26, 34, stubs=("dac_axis", "dac_fit"), covers=40),
     "sequencer_of_look_up_tables": Proof(
@@ -163,6 +165,32 @@ def test_is_not_vacuous(name: str, tmp_path: Path) -> None:
     assert "Reached cover statement" in answer, answer
 
 
+BOUNDS = FORMAL / "spline_bounds.smt2"
+BOUNDS_MUTANTS = {  # what stands there, and instead
+    "rounding_down": ("(<= (- half) third half)", "(<= (- 1) third 1)"),
+    "another_bend": ("(* 24 (+ c0", "(* 23 (+ c0"),
+    "fraction_of_two_segments": ("(< v half)", "(< v 1)"),
+}
+
+
+def _bounds(text: str) -> str:
+    command = [tool("z3"), "-in"]
+    return subprocess.run(command, input=text, capture_output=True, text=True, timeout=PATIENCE_S).stdout.strip()
+
+
+def test_no_sample_of_a_spline_leaves_its_words() -> None:
+    """Of words of any width: the rule and the error of its roundings, as the header of the file has them."""
+    assert _bounds(BOUNDS.read_text("utf-8")) == "unsat"
+
+
+@pytest.mark.parametrize("name", BOUNDS_MUTANTS)
+def test_a_sample_of_another_rule_leaves_them(name: str) -> None:
+    text = BOUNDS.read_text("utf-8")
+    old, new = BOUNDS_MUTANTS[name]
+    assert text.count(old) == 1
+    assert _bounds(text.replace(old, new)) == "sat"
+
+
 AT_Y = """[LATENCY-4:0]),
                 .runnings(runnings_now[LATENCY-4:0]),
                 .bank(bank), .restart(frame_0)"""
@@ -253,6 +281,11 @@ MUTANTS = {
     ),
     "plays_what_did_not_run": ("play_pipelined", "dac_sequencer", "= runnings_now[LATENCY]", "= runnings[LATENCY-2]"),
     "low_area_plays_what_ran_before": ("play_low_area", "dac_sequencer", "runs <= runs_0;", "runs <= runs_0 || runs;"),
+    "ticks_closer_than_a_product": ("play_cubic", "dac_sequencer", "SPACING = SPLINE ? 11", "SPACING = SPLINE ? 10"),
+    "lost_tick_is_no_fault": ("play_cubic", "dac_sequencer", ".overrun(overrun),", ".overrun(overrun && !running),"),
+    "lost_tick_is_no_fault_in_low_area": (
+        "play_cubic_low_area", "dac_sequencer", ".overrun(overrun),", ".overrun(overrun && !running),"
+    ),
     # h. the imaging window
     "window_a_tick_longer": ("windows", "dac_window", "idle_first + idle_count;", "idle_first + idle_count + 1;"),
     "window_a_tick_shorter": ("windows", "dac_window", "idle_first + idle_count;", "idle_first + idle_count - 1;"),

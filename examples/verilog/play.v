@@ -36,8 +36,8 @@ module play (
 endmodule
 
 
-// One axis. The code of a tick is valid four clocks after it. Both multipliers fit a 25 x 18 DSP block; the table,
-// read at two places, a dual-port block RAM.
+// One axis. The code of a tick is valid four clocks after it, with a cubic table seven. Both multipliers of lines fit a
+// 25 x 18 DSP block; the table, read at two places, a dual-port block RAM. A cubic table is play_spline's.
 // Codes are straight binary; a converter in two's complement takes them with the top bit inverted.
 module play_axis #(
     parameter TABLE_FILE = "",
@@ -110,13 +110,75 @@ module play_axis #(
     always @(posedge clock)
         sample <= (here <<< GUARD_BITS) + ((between + HALF_SAMPLE) >>> DROPPED_BITS);
 
-    // Clock 3: gain and offset. Clock 4: rounded, ties up, and held inside the limits: never a wrap.
+    // A cubic table has its sample on clock 5, and needs nothing of clocks 1 and 2.
+    wire signed [SAMPLE_BITS-1:0] spline;
+    generate
+        if (INTERPOLATED == 3) begin : cubic
+            play_spline #(.TABLE_FILE(TABLE_FILE), .INDEX_BITS(INDEX_BITS), .BITS(BITS)) words (
+                .clock(clock), .phase(phase), .sample(spline)
+            );
+        end else begin : lines
+            assign spline = 0;
+        end
+    endgenerate
+
+    // Clock 3: gain and offset. Clock 4: rounded, ties up, and held inside the limits: never a wrap. Cubic: 6 and 7.
     reg signed [43:0] scaled;
     wire signed [43:0] unclamped = (scaled + HALF_CODE) >>> GAIN_Q;
 
     always @(posedge clock) begin
-        scaled <= sample * GAIN_WORD + OFFSET_WORD;
+        scaled <= (INTERPOLATED == 3 ? spline : sample) * GAIN_WORD + OFFSET_WORD;
         code <= unclamped < CODE_MIN ? CODE_MIN : unclamped > CODE_MAX ? CODE_MAX : unclamped;
+    end
+endmodule
+
+// The cubic B-spline of four neighbouring words, five clocks after its phase: 12 units are the LSB of a word. Horner's
+// rule, with three products that are rounded, ties up; a phase may come on every clock.
+module play_spline #(
+    parameter TABLE_FILE = "",
+    parameter INDEX_BITS = 3,
+    parameter BITS = 14
+) (
+    input  wire                   clock,
+    input  wire [31:0]            phase,
+    output reg  signed [BITS+3:0] sample
+);
+    localparam FRACTION_BITS = 18;
+    localparam signed [63:0] HALF = 64'sd1 <<< FRACTION_BITS;  // of 2^19, since a coefficient b has 2^k already
+
+    reg signed [BITS-1:0] table_words [0:(1<<INDEX_BITS)-1];
+    initial $readmemh(TABLE_FILE, table_words);
+
+    // Clock 1: the words. The index of each wraps at the end of the table.
+    wire [INDEX_BITS-1:0] index_0 = phase[31 -: INDEX_BITS];
+    wire [INDEX_BITS-1:0] index_1 = index_0 + 1, index_2 = index_0 + 2, index_3 = index_0 + 3;
+    reg signed [BITS-1:0] word_0, word_1, word_2, word_3;
+    reg signed [FRACTION_BITS:0] fraction_1, fraction_2, fraction_3, fraction_4;
+
+    // Clock 2: the coefficients. Clocks 3 to 5: a product each; the others wait for theirs.
+    wire signed [63:0] c0 = word_0, c1 = word_1, c2 = word_2, c3 = word_3;
+    reg signed [BITS+6:0] b0_2, b1_2, b2_2, b3_2, b0_3, b1_3, sum_3, b0_4, sum_4;
+    wire signed [63:0] product_3 = b3_2 * fraction_2, product_4 = sum_3 * fraction_3, product_5 = sum_4 * fraction_4;
+
+    always @(posedge clock) begin
+        word_0 <= table_words[index_0];
+        word_1 <= table_words[index_1];
+        word_2 <= table_words[index_2];
+        word_3 <= table_words[index_3];
+        fraction_1 <= {1'b0, phase[31-INDEX_BITS -: FRACTION_BITS]};
+        b0_2 <= 2 * (c0 + 4 * c1 + c2);
+        b1_2 <= 12 * (c2 - c0);
+        b2_2 <= 24 * (c0 - 2 * c1 + c2);
+        b3_2 <= 16 * (c3 - c0 + 3 * (c1 - c2));
+        fraction_2 <= fraction_1;
+        sum_3 <= b2_2 + ((product_3 + HALF) >>> (FRACTION_BITS + 1));
+        b1_3 <= b1_2;
+        b0_3 <= b0_2;
+        fraction_3 <= fraction_2;
+        sum_4 <= b1_3 + ((product_4 + HALF) >>> (FRACTION_BITS + 1));
+        b0_4 <= b0_3;
+        fraction_4 <= fraction_3;
+        sample <= b0_4 + ((product_5 + HALF) >>> (FRACTION_BITS + 1));
     end
 endmodule
 

@@ -3,13 +3,22 @@
 module play_bench;
     `include "annexin_200nm.vh"
 
-    localparam LATENCY = 4;
+    // Clocks from a tick to its code; the code of an axis of lines waits for that of a cubic one.
+    localparam CUBIC_X = ANNEXIN_200NM_X_INTERPOLATED == 3, CUBIC_Y = ANNEXIN_200NM_Y_INTERPOLATED == 3;
+    localparam LATENCY = CUBIC_X || CUBIC_Y ? 7 : 4;
 
     reg clock = 0, reset = 1;
     integer ticks, gap, clocks, printed;
     wire tick = !reset && clocks % (gap + 1) == 0;
     reg [LATENCY-1:0] leaving = 0;
     wire [23:0] x_code, y_code;
+    reg [3*24-1:0] x_waits, y_waits;
+    wire [23:0] x_together = LATENCY == 7 && !CUBIC_X ? x_waits[3*24-1 -: 24] : x_code;
+    wire [23:0] y_together = LATENCY == 7 && !CUBIC_Y ? y_waits[3*24-1 -: 24] : y_code;
+    always @(posedge clock) begin
+        x_waits <= {x_waits[2*24-1:0], x_code};
+        y_waits <= {y_waits[2*24-1:0], y_code};
+    end
 
     play x (.clock(clock), .reset(reset), .tick(tick), .code(x_code));
 
@@ -44,7 +53,7 @@ module play_bench;
             @(negedge clock);
             clocks = clocks + 1;
             if (leaving[LATENCY-1]) begin
-                $display("%0d %0d", x_code, y_code);
+                $display("%0d %0d", x_together, y_together);
                 printed = printed + 1;
             end
         end

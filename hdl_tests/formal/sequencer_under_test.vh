@@ -5,7 +5,8 @@
     parameter PLAIN_MULTIPLIER = 1,
     parameter LOW_AREA = 0,
     parameter FOURIER = 0,
-    parameter SHAPING = 0
+    parameter SHAPING = 0,
+    parameter CUBIC = 0  // 1: both tables
 ) (
     input wire        clock,
     input wire        reset,
@@ -32,7 +33,7 @@
     dac_sequencer #(
         .DAC_BITS(8), .X_INDEX_BITS(3), .X_WORD_BITS(8), .Y_INDEX_BITS(3), .Y_WORD_BITS(8), .TICK_BITS(4),
         .LINE_BITS(2), .PERIOD_BITS(8), .COUNT_BITS(2), .PLAIN_MULTIPLIER(PLAIN_MULTIPLIER), .LOW_AREA(LOW_AREA),
-        .FOURIER(FOURIER), .SHAPING(SHAPING)
+        .FOURIER(FOURIER), .SHAPING(SHAPING), .X_INTERPOLATED(CUBIC ? 3 : 1), .Y_INTERPOLATED(CUBIC ? 3 : 1)
     ) uut (
         .clock(clock), .reset(reset), .write(write), .write_region(write_region), .write_address(write_address),
         .write_data(write_data), .writable(writable), .refused(refused), .commit(commit), .withdraw(withdraw),
