@@ -45,7 +45,7 @@ def test_every_command_of_a_row_exists() -> None:
     rows = [row for name in results.SECTIONS for row in tables(name) if "run" in row]
     assert len(rows) >= 20
     for row in rows:
-        program, *words = row["run"].strip("`").split()
+        program, *words = (word for word in row["run"].strip("`").split() if "=" not in word)  # no variables
         if program == "python" and words[0] != "-m":
             assert (REPOSITORY / words[0]).is_file(), row
         elif program in ("python", "tablegen"):
