@@ -20,17 +20,19 @@ ROUNDS = 3
 TITLE = "Planning"
 TEXT = """CPU time over that of `python -c "import numpy"`, the least of three processes, with one BLAS thread: the
 first plan, certificate and files of a process, without start-up and imports; SCAN is the example with that change.
-`batch.py` has those of a build among many in one process, where templates are compiled and sines kept; it has
+`batch.py` has those of a build among many in one process, where Jinja is imported and sines kept; it has
 medians. Memory is the most that the process had. The last two rows are the same linear programme, by our own method
 and by HiGHS of scipy."""
 HEAD = ("scan", "plan", "certificate", "files", "memory [MB]", "run")
 WIDE = ("dac.bits = 24", "dac.update_rate_hz = 10e6", "timing.line_rate_hz = 10", "- [limits]")
+SLOW = ("timing.line_rate_hz = 1", "x.table.mode = 'auto'", "y.table.mode = 'auto'", "- [limits]")
 SCANS = {
     "the example, 32 and 64 harmonics": (),
     "256 harmonics of x": ("x.band_limit.harmonics = 256", "- [limits]"),
     "512 harmonics of x": ("x.band_limit.harmonics = 512", "- [limits]"),
     "least acceleration at 0.3 %, 32 harmonics": ("x.band_limit.max_scaling_error_percent = 0.3",),
     "24 bits, 10 MHz, lines of 10 Hz": WIDE,
+    "500 kHz, lines of 1 Hz, the tables chosen (cubic)": SLOW,
 }
 PROGRAMME = "both, 0.5, 0.1..0.9", 32, 0.3  # of benchmarks/gentle.py
 
@@ -106,8 +108,7 @@ def notes(firsts: dict[str, list[float]], many: list[float]) -> list[str]:
     """Where the time goes."""
     files = firsts["the example, 32 and 64 harmonics"][2]
     return [
-        f"The first files of a process take {files / many[2]:.0f} times those of a later one: Jinja compiles its "
-        "templates.",
+        f"The first files of a process take {files / many[2]:.0f} times those of a later one: Jinja is imported.",
         "Many harmonics: sums of sines over the nodes, which make the normal equations of the window's fit, and their "
         "Cholesky factorisation in a fixed order. Many ticks: the certificate finds each tick at which a code changes, "
         "and measures errors where runs of one code begin and end.",
