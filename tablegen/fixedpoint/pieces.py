@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 from msgspec import Struct
 
-from tablegen.fixedpoint.interpolation import FRACTION_BITS, index_bits_of
+from tablegen.fixedpoint.interpolation import FRACTION_BITS
 from tablegen.fixedpoint.phase import PHASE_BITS
 from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.rounding import shift_round
@@ -61,13 +61,16 @@ def pieces_of(program: Program) -> Iterator[Pieces]:
 
 
 def most_levels(program: Program) -> int:
-    """How many codes the pieces of a period begin, at the most."""
+    """How many codes the pieces of a period begin, at the most.
+
+    Of a spline by the sizes of its coefficients; where one piece ends and the next begins a sample may be one beside.
+    """
     output, words = program.output, program.words
     if program.mode == "cubic":
         _, b1, b2, b3 = map(np.abs, coefficients(_segments(words)))
         pieces, rise = _most_pieces(b2, b3), (4 * b1 + 2 * b2 + b3) // 8 + 1
-        codes = rise * abs(output.gain_word) >> output.gain_q
-        return int(np.sum(2 * pieces + np.minimum(codes, output.code_max - output.code_min)))
+        codes = (rise + pieces) * abs(output.gain_word) >> output.gain_q
+        return int(np.sum(2 * pieces + codes))
     codes = output.code(_lines(program).ends_of_samples())
     return int(np.abs(codes[1] - codes[0]).sum()) + len(words)
 
@@ -103,7 +106,7 @@ def _splines(program: Program) -> Iterator[Pieces]:
             slope=b1[segment] + second,
             shift=_SPLINE_SHIFT,
             fraction_bits=SPLINE_FRACTION_BITS,
-            index_bits=index_bits_of(len(b0)),
+            index_bits=program.index_bits,
         )
 
 

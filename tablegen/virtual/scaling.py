@@ -65,5 +65,5 @@ def _faster(axis: VirtualAxis, file: ScannerAxis) -> float | None:
     """How many times as high the resonance of the file is; None where that of the axis stays."""
     if file.resonance is None or file.resonance.frequency_hz is None or not axis.resonance.poles:
         return None
-    times = tau * file.resonance.frequency_hz / abs(axis.resonance.poles[0])
+    times = tau * file.resonance.frequency_hz / abs(axis.resonance.poles[0])  # the first pole is the first resonance's
     return None if 1.0 / _NEAR <= times <= _NEAR else times

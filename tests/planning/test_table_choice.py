@@ -13,8 +13,11 @@ from tablegen.certificate.certificate import certify
 from tablegen.certificate.line_errors import EmittedPeriod
 from tablegen.config.load import load
 from tablegen.emit.render import render
+from tablegen.fixedpoint import runs as runs_module
+from tablegen.fixedpoint.runs import long_runs
 from tablegen.fixedpoint.table_shape import MODES, TableShape
 from tablegen.manifest.record import plan_record
+from tablegen.numerics.arrays import Ints
 from tablegen.planning import emitted_error
 from tablegen.planning.emitted_error import AskedCodes
 from tablegen.planning.line_plan import LinePlan, Plan, make_plan
@@ -133,9 +136,29 @@ def test_the_error_that_decides_is_that_of_the_certificate(tmp_path: Path, edits
 def test_a_long_period_is_measured_piece_by_piece(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     line = plan_of(tmp_path, {"y.table.mode": '"cubic"', "y.table.length": "256"}).y
     asked = AskedCodes(maker_of(line))
+    assert long_runs(line.program) is None  # every tick is looked at
     whole = asked.worst_error(line.program)
     monkeypatch.setattr(emitted_error, "_CHUNK_TICKS", 9973)
     assert asked.worst_error(line.program) == whole
+
+
+def test_of_a_slow_frame_few_ticks_are_looked_at(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The worst error of a cubic table is found where runs begin and end, and is that of all ticks."""
+    slow = {"timing.line_rate_hz": "20", "y.table.mode": '"cubic"', "y.table.length": "256", "y.table.bits": "14"}
+    line = plan_of(tmp_path, slow).y
+    asked, looked = AskedCodes(maker_of(line)), []
+
+    def counting(k: Ints) -> Ints:
+        looked.append(len(k))
+        return AskedCodes._at(asked, k)
+
+    monkeypatch.setattr(asked, "_at", counting)
+    by_runs = asked.worst_error(line.program)
+    assert sum(looked) < line.program.ticks / 4
+    monkeypatch.setattr(runs_module, "_MIN_TICKS_PER_RUN", 10**9)
+    looked.clear()
+    assert asked.worst_error(line.program) == by_runs
+    assert sum(looked) == line.program.ticks
 
 
 def test_what_is_given_is_kept(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from building import NAME, VARIANTS, Build, build
+from building import NAME, Build
 from editing import run
 
 from tablegen.verification import c_objects, c_play
@@ -20,19 +20,6 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setenv("CC", "gcc")
     return tmp_path / "cache" / "tablegen" / "objects"
-
-
-@pytest.fixture(scope="module")
-def short(tmp_path_factory: pytest.TempPathFactory) -> Build:
-    """A build of 8 lines of 331 ticks."""
-    return build(tmp_path_factory.mktemp("short"), VARIANTS["short_frame"])
-
-
-@pytest.fixture
-def folder(short: Build, tmp_path: Path) -> Path:
-    """A copy of it, to be damaged."""
-    shutil.copytree(short.folder, tmp_path / "out")
-    return tmp_path / "out"
 
 
 @pytest.fixture

@@ -7,13 +7,12 @@ finds them is the session. That comparison has tests of its own.
 import copy
 import json
 import re
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from building import NAME, VARIANTS, Build, Variant, build
+from building import NAME, Variant, build
 from editing import Outcome, run
 from verifying import edit_manifest, failed, make_right
 
@@ -26,19 +25,6 @@ CAPITAL = NAME.upper()
 REQUESTS, MARKERS, FAULTS = (("requests", "integer model"), ("markers", "integer model"), ("faults", "integer model"))
 X, Y = ("x", "integer model"), ("y", "integer model")
 WORDS = ("x", "converter word")
-
-
-@pytest.fixture(scope="module")
-def short(tmp_path_factory: pytest.TempPathFactory) -> Build:
-    """A build of 8 lines of 331 ticks."""
-    return build(tmp_path_factory.mktemp("short"), VARIANTS["short_frame"])
-
-
-@pytest.fixture
-def folder(short: Build, tmp_path: Path) -> Path:
-    """A copy of it, to be tampered with."""
-    shutil.copytree(short.folder, tmp_path / "out")
-    return tmp_path / "out"
 
 
 def substitute(path: Path, pattern: str, new: str) -> None:

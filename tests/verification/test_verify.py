@@ -6,7 +6,6 @@ the tests of the sequencer in ``hdl_tests/``.
 
 import json
 import re
-import shutil
 import signal
 from hashlib import sha256
 from pathlib import Path
@@ -57,19 +56,6 @@ MODES = (
     "prime_line",
     "inverting",
 )
-
-
-@pytest.fixture(scope="module")
-def short(tmp_path_factory: pytest.TempPathFactory) -> Build:
-    """A build of 8 lines of 331 ticks."""
-    return build(tmp_path_factory.mktemp("short"), VARIANTS["short_frame"])
-
-
-@pytest.fixture
-def folder(short: Build, tmp_path: Path) -> Path:
-    """A copy of it, to be damaged."""
-    shutil.copytree(short.folder, tmp_path / "out")
-    return tmp_path / "out"
 
 
 def verify(folder: Path, *arguments: str | Path | int, ticks: int = TICKS) -> Outcome:

@@ -67,19 +67,6 @@ TWOS = Variant({**VARIANTS["short_frame"].scan, "dac.coding": "twos-complement",
 MIXED = Variant({**VARIANTS["short_frame"].scan, "x.table": {"mode": "direct", "bits": 12}})
 
 
-@pytest.fixture(scope="module")
-def short(tmp_path_factory: pytest.TempPathFactory) -> Build:
-    """A build of 8 lines of 331 ticks."""
-    return build(tmp_path_factory.mktemp("short"), VARIANTS["short_frame"])
-
-
-@pytest.fixture
-def folder(short: Build, tmp_path: Path) -> Path:
-    """A copy of it, to be damaged."""
-    shutil.copytree(short.folder, tmp_path / "out")
-    return tmp_path / "out"
-
-
 def verify(folder: Path, *arguments: str | Path | int, target: str = "c") -> Outcome:
     return run("verify", folder, "--target", target, *map(str, arguments))
 
