@@ -312,6 +312,19 @@ def test_a_backlog_of_requests_is_answered(loader: Loader) -> None:
 
 
 @pytest.mark.rest
+def test_the_bench_loses_no_byte_between_two_commands(loader: Loader) -> None:
+    """An answer is whole where commands of 7 clocks cut it at every place of a bit."""
+    talk = Talk()
+    with Simulation(loader.compiled) as simulation:
+        whole = simulation.talk(talk.hello())
+        byte = 10 * CLOCKS_PER_BIT
+        received = simulation.run(len(talk.hello()) * byte + 1, talk.hello())
+        for _ in range(2 * len(whole) * byte // 7):
+            received += simulation.run(7)
+        assert received == whole
+
+
+@pytest.mark.rest
 def test_a_reset_forgets_session_and_upload_but_not_what_plays(loader: Loader) -> None:
     talk = Talk()
     with Simulation(loader.compiled) as simulation:

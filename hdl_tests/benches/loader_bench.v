@@ -91,6 +91,9 @@ module loader_bench #(
         end
     endtask
 
+    wire device_line;
+    reg [7:0] coming = 0;
+
     // What is written belongs to the clock that follows.
     always @(posedge clock) begin
         if (go != done && clocks_left == 0) begin
@@ -122,12 +125,8 @@ module loader_bench #(
             if (sending == 0 && until_idle && idle > 200) clocks_left = 0;
             if (clocks_left == 0) done <= go;
         end
-    end
 
-    // Its receiver.
-    wire device_line;
-    reg [7:0] coming = 0;
-    always @(posedge clock) begin
+        // Its receiver, after the command that emptied `device_data`: a byte that ends on that clock belongs to it.
         if (receiving == 0)
             receiving = device_line ? 0 : 1;
         else begin

@@ -106,9 +106,9 @@ class Simulation:
             received += bytes.fromhex(self._ask(command)["received"])
         return received
 
-    def run(self, clocks: int) -> bytes:
-        """Let so many clocks go by; what came back."""
-        return bytes.fromhex(self._ask({"send": [], "clocks": clocks, "until_idle": False})["received"])
+    def run(self, clocks: int, data: Sequence[int] = b"") -> bytes:
+        """Let so many clocks go by, and send bytes meanwhile; what came back."""
+        return bytes.fromhex(self._ask({"send": list(data), "clocks": clocks, "until_idle": False})["received"])
 
     def lines(self) -> list[str]:
         """The log of lines so far."""
