@@ -33,8 +33,9 @@ FIRMWARE_TOOLS := gcc-arm-none-eabi qemu-system-arm gcc-avr avr-libc simavr gcc-
     arduino-builder arduino-core-avr libsimavr-dev libelf-dev nodejs npm
 TOOLS := $(COMMON_TOOLS) $(HDL_TOOLS) $(FIRMWARE_TOOLS) cppcheck
 # A process that has nothing more to do takes tests from the end of the other's: neighbours stay together, so that what
-# they share is made once. OpenBLAS threads only spin beside the other processes.
-PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist worksteal
+# they share is made once. OpenBLAS threads only spin beside the other processes. Half of what is compiled of each model
+# of Verilator is its library, the same for all.
+PYTEST := OPENBLAS_NUM_THREADS=1 OBJCACHE=ccache CCACHE_DIR=$(CURDIR)/build/ccache $(BIN)/python -m pytest --numprocesses auto --dist worksteal
 
 .PHONY: demo lint check test test-rest test-all test-hdl test-long resources instructions link fuzz bench cost figures notebooks site man reference paper clean
 .DELETE_ON_ERROR:

@@ -153,8 +153,6 @@ def _environment(simulator: str, folder: Path) -> Iterator[None]:
         os.environ["VERILATOR_ROOT"] = root
         os.environ["PATH"] = str(_tools(root, folder)) + os.pathsep + before.get("PATH", "")
         os.environ["MAKEFLAGS"] = _VERILATOR_MAKE
-        if shutil.which("ccache"):
-            os.environ["OBJCACHE"] = "ccache"
     try:
         yield
     finally:
