@@ -12,9 +12,12 @@ from installing import install, make_wheel, told_pythons
 settings.register_profile("tablegen", settings(), deadline=None)
 settings.load_profile("tablegen")
 
-# A shell that starts the tests in the background has SIGINT ignored, and whatever they start would ignore it too.
+# A shell that starts the tests in the background has SIGINT ignored, and nohup SIGHUP. Whatever the tests start would
+# ignore it too, but for a handler, which is not handed on.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
+    signal.signal(signal.SIGHUP, lambda *_: None)
 
 
 @pytest.fixture(scope="session", autouse=True)
