@@ -1,5 +1,6 @@
 """Folders of files that ship inside the package."""
 
+import os
 from importlib import import_module
 from pathlib import Path
 from typing import Literal
@@ -14,14 +15,25 @@ def resource_folder(name: Literal["examples", "firmware_templates"]) -> Path:
 
 def verilog_runtime() -> list[Path]:
     """The Verilog sequencer and its link, one module a file, in order of name; every build copies them."""
-    return sorted((resource_folder("firmware_templates") / "verilog").glob("*.v"))
+    return _runtime("verilog", "", (".v",))
 
 
 def c_runtime() -> list[Path]:
     """The C sequencer, headers and sources, in order of name; every build copies it."""
-    return sorted(set((resource_folder("firmware_templates") / "c").glob("dac_*.[ch]")) - set(c_link()))
+    link = c_link()
+    return [path for path in _runtime("c", "dac_", (".c", ".h")) if path not in link]
 
 
 def c_link() -> list[Path]:
     """The device's end of the serial link in C, which needs the sequencer; every build copies it too."""
-    return sorted((resource_folder("firmware_templates") / "c").glob("dac_link*.[ch]"))
+    return _runtime("c", "dac_link", (".c", ".h"))
+
+
+def own_runtime_folders() -> tuple[Path, ...]:
+    """Where all of these files stand."""
+    return tuple(resource_folder("firmware_templates") / language for language in ("c", "verilog"))
+
+
+def _runtime(language: str, beginning: str, endings: tuple[str, ...]) -> list[Path]:
+    folder = resource_folder("firmware_templates") / language
+    return [folder / name for name in sorted(os.listdir(folder)) if name.startswith(beginning) and name.endswith(endings)]
