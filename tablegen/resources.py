@@ -36,4 +36,5 @@ def own_runtime_folders() -> tuple[Path, ...]:
 
 def _runtime(language: str, beginning: str, endings: tuple[str, ...]) -> list[Path]:
     folder = resource_folder("firmware_templates") / language
-    return [folder / name for name in sorted(os.listdir(folder)) if name.startswith(beginning) and name.endswith(endings)]
+    names = sorted(os.listdir(folder))
+    return [folder / name for name in names if name.startswith(beginning) and name.endswith(endings)]
