@@ -14,7 +14,6 @@ from tablegen.compensation.line import AppliedBranch, LineShape, WantedLine
 from tablegen.compensation.model import Hysteresis
 from tablegen.compensation.offset import OffsetLaw
 from tablegen.compensation.offset_sizes import OffsetSurface, surface_of
-from tablegen.compensation.response_file import read_response
 from tablegen.compensation.size import SizeLaw
 from tablegen.config.load import Setup
 from tablegen.config.scanner import Offset, Resonance, ScannerAxis, Size
@@ -282,4 +281,6 @@ def dynamics_of(resonance: Resonance, folder: Path) -> Response:
         assert resonance.frequency_hz is not None
         assert resonance.quality is not None
         return SecondOrder(resonance.frequency_hz, resonance.quality, resonance.delay_s)
+    from tablegen.compensation.response_file import read_response  # here: few scanners have one
+
     return read_response(folder / resonance.response)
