@@ -1,11 +1,13 @@
 """Folders of files that ship inside the package."""
 
 import os
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import Literal
 
 PACKAGE = Path(__file__).parent
+_C_LINK = "dac_link"
 
 
 def resource_folder(name: Literal["examples", "firmware_templates"]) -> Path:
@@ -15,18 +17,17 @@ def resource_folder(name: Literal["examples", "firmware_templates"]) -> Path:
 
 def verilog_runtime() -> list[Path]:
     """The Verilog sequencer and its link, one module a file, in order of name; every build copies them."""
-    return _runtime("verilog", "", (".v",))
+    return list(_runtime("verilog", ".v"))
 
 
 def c_runtime() -> list[Path]:
     """The C sequencer, headers and sources, in order of name; every build copies it."""
-    link = c_link()
-    return [path for path in _runtime("c", "dac_", (".c", ".h")) if path not in link]
+    return [path for path in _runtime("c", ".c", ".h") if not path.name.startswith(_C_LINK)]
 
 
 def c_link() -> list[Path]:
     """The device's end of the serial link in C, which needs the sequencer; every build copies it too."""
-    return _runtime("c", "dac_link", (".c", ".h"))
+    return [path for path in _runtime("c", ".c", ".h") if path.name.startswith(_C_LINK)]
 
 
 def own_runtime_folders() -> tuple[Path, ...]:
@@ -34,7 +35,7 @@ def own_runtime_folders() -> tuple[Path, ...]:
     return tuple(resource_folder("firmware_templates") / language for language in ("c", "verilog"))
 
 
-def _runtime(language: str, beginning: str, endings: tuple[str, ...]) -> list[Path]:
+@cache
+def _runtime(language: str, *endings: str) -> tuple[Path, ...]:
     folder = resource_folder("firmware_templates") / language
-    names = sorted(os.listdir(folder))
-    return [folder / name for name in names if name.startswith(beginning) and name.endswith(endings)]
+    return tuple(folder / name for name in sorted(os.listdir(folder)) if name.endswith(endings))
