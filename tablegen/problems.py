@@ -2,8 +2,9 @@
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from typing import NamedTuple
+
+from msgspec import Struct, field
 
 MOST_PROBLEMS = 50  # of one run; more are no help, and a file may have a million
 _MOST_KEY, _MOST_WHY = 200, 1000  # characters
@@ -52,8 +53,7 @@ class Rejected(Exception):
         return type(self), (self.problems,)  # what was raised in another process arrives with its problems
 
 
-@dataclass(frozen=True)  # and no struct: `--version` loads this file, and no msgspec
-class Document:
+class Document(Struct, frozen=True):
     """A TOML file as the user named it, and the line on which each of its keys stands.
 
     ``lines`` is None for values that stand in no file. ``said`` has the keys that follow from others: the key that was

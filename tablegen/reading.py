@@ -16,6 +16,7 @@ from typing import NamedTuple
 from tablegen.user_cache import is_private
 
 _CHUNK_BYTES = 1 << 20
+_OPENING = os.O_RDONLY | sum(getattr(os, flag, 0) for flag in ("O_NONBLOCK", "O_NOCTTY", "O_CLOEXEC", "O_BINARY"))
 
 
 class Kind(NamedTuple):
@@ -80,8 +81,6 @@ def file_sha256(path: str | os.PathLike[str], kind: Kind = BUILD_FILE) -> str:
 def holds(path: Path, content: bytes) -> bool:
     """Whether a regular file has just this content; False for everything else, and for what cannot be read."""
     try:
-        if os.stat(path).st_size != len(content):
-            return False
         return read_bytes(path, Kind("", len(content))) == content
     except (OSError, ValueError):
         return False
@@ -95,8 +94,7 @@ def size_shown(count: int) -> str:
 def chunks_of(path: str | os.PathLike[str], kind: Kind, private: bool = False) -> Iterator[bytes]:
     """The bytes of a file, a part at a time; what ``read_bytes`` refuses is refused before the first part of it."""
     count = 0
-    with _opened(path) as handle:
-        status = os.fstat(handle)
+    with _opened(path) as (handle, status):
         if private and not is_private(status):
             raise PermissionError(errno.EPERM, "others can write it, or it is another user's")
         size = status.st_size
@@ -110,16 +108,16 @@ def chunks_of(path: str | os.PathLike[str], kind: Kind, private: bool = False) -
 
 
 @contextmanager
-def _opened(path: str | os.PathLike[str]) -> Iterator[int]:
+def _opened(path: str | os.PathLike[str]) -> Iterator[tuple[int, os.stat_result]]:
     try:
         _require_file(os.stat(path).st_mode)  # first of all: to open some devices is to do something
-        flags = ("O_NONBLOCK", "O_NOCTTY", "O_CLOEXEC", "O_BINARY")
-        handle = os.open(os.fspath(path), sum((getattr(os, flag, 0) for flag in flags), os.O_RDONLY))
+        handle = os.open(os.fspath(path), _OPENING)
     except ValueError:
         raise OSError(errno.EINVAL, "no file can have such a name") from None
     try:
-        _require_file(os.fstat(handle).st_mode)
-        yield handle
+        status = os.fstat(handle)
+        _require_file(status.st_mode)
+        yield handle, status
     finally:
         os.close(handle)
 

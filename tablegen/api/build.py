@@ -191,10 +191,11 @@ class Build:
 
         The input is never among them, whatever a manifest of somebody else lists.
         """
+        found = outdated_files(Path(folder), self.files)
+        if not found:
+            return []
         read = {path.resolve() for path in self.setup.files}
-        return [
-            name for name in outdated_files(Path(folder), self.files) if (Path(folder) / name).resolve() not in read
-        ]
+        return [name for name in found if (Path(folder) / name).resolve() not in read]
 
     def leftovers(self, folder: str | Path) -> list[str]:
         """Files of a directory that look like a build's and are not of this one: ``write`` leaves them there."""

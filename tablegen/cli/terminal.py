@@ -6,14 +6,20 @@ control characters there, for a line that is drawn again and for bold text.
 """
 
 import os
-import re
 import sys
 from collections.abc import Iterable
 from io import TextIOWrapper
 from typing import IO, Any
 
 # All controls but tab and line end; marks that reorder or hide text; separators that some take for ends of lines.
-_STEERING = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200b-\u200f\u2028-\u202e\u2060-\u2069\ufeff]")
+_STEERING = {
+    code: f"\\u{code:04x}"
+    for first, last in (
+        *((0x00, 0x08), (0x0B, 0x1F), (0x7F, 0x9F), (0x61C, 0x61C)),
+        *((0x200B, 0x200F), (0x2028, 0x202E), (0x2060, 0x2069), (0xFEFF, 0xFEFF)),
+    )
+    for code in range(first, last + 1)
+}
 _BOLD, _PLAIN = "\x1b[1m", "\x1b[0m"
 _STYLES = {  # colours of the table of 256 that are seen on black and on white, and by all eyes
     "title": _BOLD,
@@ -28,7 +34,7 @@ _STYLES = {  # colours of the table of 256 that are seen on black and on white, 
 
 def visible(text: str) -> str:
     r"""The text with ``\u001b`` in place of an escape, and so on; as JSON writes it, so that JSON stays JSON."""
-    return _STEERING.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+    return text.translate(_STEERING)
 
 
 class GuardedStream:

@@ -1,6 +1,5 @@
 """One harmonic of hysteresis, equations (13)-(22): the shape of a branch, and how it grows with the scan size."""
 
-from dataclasses import dataclass
 from math import atan, pi, sqrt
 from typing import ClassVar
 
@@ -18,7 +17,6 @@ LOWEST_PEAK = atan(0.5 * (pi - sqrt(pi * pi - 4.0))) * 2.0 / pi
 HIGHEST_PEAK = 1.0 - LOWEST_PEAK
 
 
-@dataclass(frozen=True, slots=True)
 class BranchShape(Sweep):
     """u(tau) = lambda tau + xi sin(pi tau) + xi_gamma (cos(pi tau) - 1) with lambda = 1 + 2 xi_gamma, (17), (18).
 
@@ -28,8 +26,10 @@ class BranchShape(Sweep):
 
     COORDINATES: ClassVar[tuple[str, ...]] = ("xi", "xi_gamma")
 
-    xi: float = 0.0
-    xi_gamma: float = 0.0
+    __slots__ = ("xi", "xi_gamma")
+
+    def __init__(self, xi: float = 0.0, xi_gamma: float = 0.0) -> None:
+        self.xi, self.xi_gamma = xi, xi_gamma
 
     @property
     def linear(self) -> float:

@@ -7,7 +7,6 @@ whole periodic waveform itself gives a ``WholeLine``.
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
@@ -156,13 +155,13 @@ class LineShape(Struct, frozen=True):
         return going, np.where(going, t / self.turn, (t - self.turn) / (1.0 - self.turn))
 
 
-@dataclass(frozen=True, slots=True)
 class SweptSeries(Sweep):
     """One sweep of a waveform that rises once and falls once; only where it does can it be inverted."""
 
-    series: FourierSeries
-    turn: float
-    forward: bool
+    __slots__ = ("forward", "series", "turn")
+
+    def __init__(self, series: FourierSeries, turn: float, forward: bool) -> None:
+        self.series, self.turn, self.forward = series, turn, forward
 
     def value(self, tau: FloatsLike) -> Floats:
         """u(tau)."""

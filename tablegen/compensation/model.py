@@ -6,15 +6,17 @@ Schema, the page of keys, the build, the certificate, ``tablegen show`` and ``si
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 from msgspec import Struct
 
 from tablegen.compensation.line import LineShape, WantedLine
-from tablegen.compensation.operator.creep import NO_CREEP, LogarithmicCreep
-from tablegen.compensation.operator.loop import POINTS, Loop
 from tablegen.reading import file_sha256
+
+if TYPE_CHECKING:
+    from tablegen.compensation.operator.creep import LogarithmicCreep
+    from tablegen.compensation.operator.loop import Loop
 
 
 class Parameters(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -67,12 +69,15 @@ class Hysteresis(Parameters, frozen=True, tag_field="model"):
         """The line of one axis; None where ``wanted.problems`` grew."""
         raise NotImplementedError(type(self))
 
-    def loop(self, wanted: WantedLine, low: float, high: float) -> tuple[Loop, LogarithmicCreep] | None:
+    def loop(self, wanted: WantedLine, low: float, high: float) -> "tuple[Loop, LogarithmicCreep] | None":
         """What a settled drive between two shares of v_max does, and the creep behind it; its mean is the offset.
 
         The loop is ``wanted.size_nm`` long. None where ``wanted.problems`` grew. By default it is that of the line's
         sweeps, without creep.
         """
+        from tablegen.compensation.operator.creep import NO_CREEP  # here: a build of a law asks for none
+        from tablegen.compensation.operator.loop import POINTS, Loop
+
         line = self.line(wanted)
         if line is None:
             return None

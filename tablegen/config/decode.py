@@ -8,6 +8,7 @@ from typing import Any, TypeAlias, TypeVar
 
 import msgspec.inspect as types
 from msgspec import Struct
+from msgspec.structs import FieldInfo, fields
 
 from tablegen.compensation import models
 from tablegen.compensation.model import Hysteresis
@@ -28,7 +29,7 @@ def decode(kind: type[T], values: dict[str, Any], document: Document, problems: 
 
     ``check`` adds what keys of the same table say about each other.
     """
-    built = _Decoder(document, problems, check).struct(_described(kind), values, "")
+    built = _Decoder(document, problems, check).struct(kind, values, "")
     return built if isinstance(built, kind) else None
 
 
@@ -59,7 +60,7 @@ class _Decoder:
                     next(t for t in some if len(some) == 1 or not isinstance(t, types.LiteralType)), value, key
                 )
             case types.StructType():
-                return self.struct(kind, value, key)
+                return self.struct(kind.cls, value, key)
             case types.ListType():
                 return self._list(kind, value, key)
             case types.TupleType():
@@ -79,47 +80,49 @@ class _Decoder:
                 return value if isinstance(value, bool) else self._wrong(key, f"{_shown(value)} is not true or false")
         raise NotImplementedError(kind)  # pragma: no cover - a type that the schema does not use
 
-    def struct(self, kind: types.Type, value: Any, key: str) -> Any:
-        assert isinstance(kind, types.StructType)
+    def struct(self, kind: type[Struct], value: Any, key: str) -> Any:
         if not isinstance(value, dict):
             return self._wrong(key, f"{_shown(value)} is not a table")
         good, built = True, {}
-        if kind.cls is Hysteresis:
+        if kind is Hysteresis:
             known_model = self._model(value, key)
             if known_model is None:  # nobody knows its keys
                 return _ALREADY_REPORTED
             kind = known_model
-        known = {field.encode_name: field for field in kind.fields}
-        tag = () if kind.tag_field is None else (kind.tag_field,)
+        known = _fields(kind)
+        tag_field = kind.__struct_config__.tag_field
+        tag = () if tag_field is None else (tag_field,)
         unknown = [name for name in value if name not in known and name not in tag]
         for name in unknown:
             good = False
             self._wrong(join_key(key, name), f"unknown key; {_suggestion(name, [*tag, *known], value)}")
         for name, field in known.items():
             if name in value:
-                built[name] = self._any(field.type, value[name], join_key(key, name))
+                inner = join_key(key, name)
+                if types.is_struct_type(field.type):
+                    built[name] = self.struct(field.type, value[name], inner)
+                else:
+                    built[name] = self._any(_described(kind, name), value[name], inner)
                 good = good and built[name] is not _ALREADY_REPORTED
             elif field.required:
                 good = False
                 if not any(name in meant(other, known) for other in unknown):
-                    kind_of = "table" if isinstance(field.type, types.StructType) else "key"
+                    kind_of = "table" if types.is_struct_type(field.type) else "key"
                     self._wrong(join_key(key, name), f"missing; this {kind_of} is required")
-        made = kind.cls(**built) if good else None
-        self._check(kind.cls, key, value, made)
+        made = kind(**built) if good else None
+        self._check(kind, key, value, made)
         return made if good else _ALREADY_REPORTED
 
-    def _model(self, value: dict[str, Any], key: str) -> types.StructType | None:
+    def _model(self, value: dict[str, Any], key: str) -> type[Struct] | None:
         """The type of a hysteresis table by the name in it; None where there is no such model."""
         name = value.get("model", models.DEFAULT)
         try:
             if not isinstance(name, str):
                 raise models.UnknownModel(f"{_shown(name)} is not one of {', '.join(map(repr, models.names()))}")
-            kind = _described(models.get(name))
+            return models.get(name)
         except models.UnknownModel as why:
             self._wrong(join_key(key, "model"), str(why))
             return None
-        assert isinstance(kind, types.StructType)
-        return kind
 
     def _list(self, kind: types.ListType, value: Any, key: str) -> Any:
         if not isinstance(value, list):
@@ -182,9 +185,15 @@ class _Decoder:
 
 
 @cache
-def _described(kind: type[Struct]) -> types.Type:
-    """The fields of a type with their ranges; a scan has several tables of one type."""
-    return types.type_info(kind)
+def _fields(kind: type[Struct]) -> dict[str, FieldInfo]:
+    """The fields of a type by their keys; a scan has several tables of one type."""
+    return {field.encode_name: field for field in fields(kind)}
+
+
+@cache
+def _described(kind: type[Struct], name: str) -> types.Type:
+    """A field of a type with its range. Of each one that is written, since of all it takes some percent of a build."""
+    return types.type_info(_fields(kind)[name].type)
 
 
 def _bare(kind: types.Type) -> types.Type:

@@ -1,8 +1,9 @@
 """``[y] like = "x"``: y takes what x has, and its own keys go before that; on the values as they were written."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
+
+from msgspec.structs import replace
 
 from tablegen.problems import Document, Problems
 from tablegen.toml import join_key

@@ -7,6 +7,8 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from tablegen.config.load import Scanners, Setup, assembled, read_scan_file
 from tablegen.config.names import why_not_a_name
 from tablegen.config.schema import MAXIMUM_NAME
@@ -15,11 +17,10 @@ from tablegen.config.words import IMAGES, OFFSETS, RATES, SIZES
 from tablegen.problems import Document, Problem, Rejected
 
 
-@dataclass(frozen=True)
-class VariedDocument(Document):
+class VariedDocument(Document, frozen=True):
     """A scan file of which some keys were set elsewhere: ``set_by`` says where, by key."""
 
-    set_by: Mapping[str, str] = field(default_factory=dict)
+    set_by: Mapping[str, str] = msgspec.field(default_factory=dict)
 
     def problem(self, key: str, why: str) -> Problem:
         """A problem of a key, at the option that set it or in the file."""

@@ -14,7 +14,7 @@ from tablegen.manifest.format import MANIFEST, content_hash
 from tablegen.manifest.record import plan_record
 from tablegen.manifest.write import manifest_file
 from tablegen.planning.line_plan import LinePlan, Plan
-from tablegen.resources import resource_folder
+from tablegen.resources import own_runtime_folders, resource_folder
 from tablegen.version import __version__
 
 _FILE_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]*(\.[A-Za-z0-9]+)+")  # of plain files, which manifests can list
@@ -77,5 +77,6 @@ def runtime_files(of: Format) -> dict[str, bytes]:
 @cache
 def own_runtime(of: Format) -> set[str]:
     """The names of those files among ``runtime_files`` that are tablegen's own, whoever's format this is."""
-    own = resource_folder("firmware_templates").resolve()
-    return {path.name for path in of.runtime() if own in path.resolve().parents}
+    known, own = own_runtime_folders(), resource_folder("firmware_templates").resolve()
+    # Links are followed only where the path does not say it: to follow that of every file is some percent of a build.
+    return {path.name for path in of.runtime() if path.parent in known or own in path.resolve().parents}

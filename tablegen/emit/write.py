@@ -130,7 +130,7 @@ def outdated_files(folder: Path, files: Iterable[str]) -> list[str]:
     """
     files = set(files)
     try:
-        if {path.name for path in folder.iterdir()} <= files:
+        if files.issuperset(os.listdir(folder)):
             return []
     except OSError:
         return []
@@ -143,17 +143,17 @@ def leftover_files(folder: Path, files: Iterable[str]) -> list[str]:
     They begin with ``dac_`` and have the suffix of a file of the build, or an earlier manifest lists them.
     """
     files = set(files)
-    suffixes = {Path(name).suffix for name in files if name.startswith("dac_")}
     try:
-        present = {path.name for path in folder.iterdir() if path.is_file()}
+        present = {name for name in os.listdir(folder) if name not in files and os.path.isfile(folder / name)}
     except OSError:
         return []
-    if present <= files:
+    if not present:
         return []
+    suffixes = {Path(name).suffix for name in files if name.startswith("dac_")}
     listed = _listed(folder, files)
     alike = {name for name in present if name.startswith("dac_") and Path(name).suffix in suffixes}
     outdated = {name for name, digest in listed.items() if name in present and _digest(folder / name) == digest}
-    return sorted((alike | (listed.keys() & present)) - files - outdated)
+    return sorted((alike | (listed.keys() & present)) - outdated)
 
 
 def _listed(folder: Path, files: Iterable[str]) -> dict[str, str]:
@@ -179,9 +179,9 @@ def _remove(folder: Path, names: Iterable[str]) -> None:
 
 def _remove_litter(folder: Path) -> None:
     """Remove what a writer that was killed has left; the directory is locked, so that none of it is somebody's."""
-    for path in folder.iterdir():
-        if _LITTER.fullmatch(path.name) and stat.S_ISREG(path.lstat().st_mode):
-            path.unlink(missing_ok=True)
+    for name in os.listdir(folder):
+        if _LITTER.fullmatch(name) and stat.S_ISREG(os.lstat(folder / name).st_mode):
+            (folder / name).unlink(missing_ok=True)
 
 
 def _digest(path: Path) -> str | None:

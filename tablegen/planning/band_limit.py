@@ -7,7 +7,6 @@ from tablegen.config.schema import BandLimit
 from tablegen.numerics.turns import sinc
 from tablegen.problems import Unphysical
 from tablegen.waveform.allowed_error import AllowedError
-from tablegen.waveform.closed_form import fourier_series
 from tablegen.waveform.refined import RefinedShape
 from tablegen.waveform.series import FourierSeries
 from tablegen.waveform.window_fit import fit_window
@@ -29,6 +28,8 @@ def band_limited(
     if limit.method == "window":
         asked = shape if layer is None else RefinedShape(shape, layer)
         return fit_window(asked, harmonics, limit.window, limit.directions == "both")
+    from tablegen.waveform.closed_form import fourier_series  # here: most scans have a window
+
     series = fourier_series(shape, harmonics)
     if limit.method == "lanczos":
         sigma = sinc(np.arange(1, harmonics + 1) / (harmonics + 1))

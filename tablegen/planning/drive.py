@@ -1,10 +1,10 @@
 """What is applied to one axis, factor by factor: V(t) = V_offset + m g V_scan (w(t) - 1/2)."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
+from msgspec import Struct
 from msgspec.structs import replace
 
 from tablegen.compensation import models
@@ -14,7 +14,6 @@ from tablegen.compensation.line import AppliedBranch, LineShape, WantedLine
 from tablegen.compensation.model import Hysteresis
 from tablegen.compensation.offset import OffsetLaw
 from tablegen.compensation.offset_sizes import OffsetSurface, surface_of
-from tablegen.compensation.response_file import read_response
 from tablegen.compensation.size import SizeLaw
 from tablegen.config.load import Setup
 from tablegen.config.scanner import Offset, Resonance, ScannerAxis, Size
@@ -30,8 +29,7 @@ from tablegen.waveform.allowed_error import AllowedError
 RESTING_SHARE = 2.0**-24
 
 
-@dataclass(frozen=True)
-class Drive:
+class Drive(Struct, frozen=True, eq=False):
     """The voltages at the piezo, and every factor that went into them.
 
     ``v_scan`` is from (9)/(12), before ``m`` of (1) and ``g`` of (23). The amplitude played is m g v_scan, peak to
@@ -58,7 +56,7 @@ class Drive:
     shape: LineShape
     response: Response | None
     max_boost_db: float
-    line_at: Callable[[float], LineShape | None] = field(compare=False, repr=False)
+    line_at: Callable[[float], LineShape | None]
     harmonics: int
     allowed: AllowedError | None
     model_files: tuple[tuple[str, str], ...] = ()
@@ -283,4 +281,6 @@ def dynamics_of(resonance: Resonance, folder: Path) -> Response:
         assert resonance.frequency_hz is not None
         assert resonance.quality is not None
         return SecondOrder(resonance.frequency_hz, resonance.quality, resonance.delay_s)
+    from tablegen.compensation.response_file import read_response  # here: few scanners have one
+
     return read_response(folder / resonance.response)

@@ -28,7 +28,6 @@ from tablegen.planning.settling import settle_lines
 from tablegen.planning.shaping_choice import chosen_shaping
 from tablegen.planning.table_choice import TableChoice, asked_of, choose, possible_shapes, written_shape
 from tablegen.planning.table_maker import TableMaker
-from tablegen.planning.table_search import TableSearch
 from tablegen.planning.timing import make_schedule
 from tablegen.problems import Problems
 from tablegen.waveform.allowed_error import AllowedError
@@ -227,6 +226,8 @@ def _line_plan(setup: Setup, axis: Literal["x", "y"], schedule: Schedule, proble
     feasible.check_range(drive, converter, *maker.as_asked.reach, shaping)
     shape, asked = written_shape(scan.table, period), asked_of(scan.table, setup.scan.limits, shaping.order > 0)
     if asked is not None and len(problems.found) == before:
+        from tablegen.planning.table_search import TableSearch  # here: most tables are written
+
         with problems.at(file, f"{axis}.table.{'mode' if scan.table.max_error_lsb is None else 'max_error_lsb'}"):
             possible = possible_shapes(scan.table, period, harmonics)
             shapes = feasible.fitting(possible, drive, converter, maker)

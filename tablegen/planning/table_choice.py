@@ -1,6 +1,6 @@
 """Which table an axis gets: the one that is written, or the least memory that keeps an error."""
 
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 from msgspec import Struct
 
@@ -9,8 +9,10 @@ from tablegen.figures import at_least
 from tablegen.fixedpoint.program import Mode
 from tablegen.fixedpoint.table_shape import LEAST_BITS, LEAST_LENGTH, MODES, MOST_BITS, MOST_LENGTH, TableShape
 from tablegen.planning.feasibility import DEFAULT_LENGTH
-from tablegen.planning.table_search import TableSearch
 from tablegen.problems import Unphysical
+
+if TYPE_CHECKING:
+    from tablegen.planning.table_search import TableSearch
 
 # A code is rounded by up to 1/2 LSB whatever the table is. With as much again for the table, what is played is one of
 # the two codes that what was asked for lies between.
@@ -83,7 +85,7 @@ def _lengths(table: Table, mode: Mode, period: int, harmonics: int, asked: bool)
     return [length for length in lengths if length >= LEAST_LENGTH and harmonics <= length // 2 - 1]
 
 
-def choose(search: TableSearch, shapes: list[TableShape], max_error_lsb: float) -> TableShape:
+def choose(search: "TableSearch", shapes: list[TableShape], max_error_lsb: float) -> TableShape:
     """The least memory that keeps an error. Raises ``Unphysical`` with the least error of any table."""
     found = search.smallest(shapes, max_error_lsb)
     if found is None:

@@ -8,12 +8,10 @@ from collections.abc import Callable
 from math import factorial, tau
 
 import numpy as np
-import numpy.typing as npt
 
-from tablegen.numerics.arrays import Floats, Ints
+from tablegen.numerics.arrays import Complexes, Floats, Ints
 from tablegen.waveform.series import FourierSeries
 
-Complexes = npt.NDArray[np.complex128]
 _TAYLOR_ORDER = 6
 # Half a block of the highest harmonic is then pi/64 of angle, and its seventh power over 7! is 1e-13.
 _BLOCKS_PER_HARMONIC = 64

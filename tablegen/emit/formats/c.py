@@ -26,8 +26,9 @@ from tablegen.numerics.arrays import Ints
 from tablegen.reading import BUILD_FILE, read_text
 from tablegen.resources import c_link, c_runtime, resource_folder
 
-_NUMBER = re.compile(r"(?:U?INT(?:32|64)_C)?\(?(-?\d{1,40})\)?")
-_ARRAY = re.compile(r"\b(\w+)\[\w*\] = \{(.*?)\};", re.DOTALL)
+# Patterns of what is checked are compiled when it is: a build needs none.
+_NUMBER = r"(?:U?INT(?:32|64)_C)?\(?(-?\d{1,40})\)?"
+_ARRAY = r"(?s)\b(\w+)\[\w*\] = \{(.*?)\};"
 
 
 class C(Format):
@@ -100,7 +101,7 @@ def wrong_arrays(folder: Path, content: Content) -> tuple[int, list[str]]:
         text = read_text(folder / name, BUILD_FILE, errors="replace")
     except OSError as error:
         return count, [f"{name}: cannot be read: {error.strerror or error}"]
-    found = {array: values.split(",") for array, values in _ARRAY.findall(text)}
+    found = {array: values.split(",") for array, values in re.findall(_ARRAY, text)}
     wrong = []
     for array, words in wanted.items():
         if array not in found:
@@ -213,5 +214,5 @@ def _value(text: str) -> int | str:
     """A number, the content of a string, or what is neither as it stands."""
     if len(text) > 1 and text[0] == text[-1] == '"':
         return text[1:-1]
-    number = _NUMBER.fullmatch(text)
+    number = re.fullmatch(_NUMBER, text)
     return int(number[1]) if number else text

@@ -13,8 +13,9 @@ from tablegen.emit.templates import comment_safe, template
 from tablegen.reading import BUILD_FILE, read_text
 from tablegen.resources import resource_folder, verilog_runtime
 
-_LOCALPARAM = re.compile(r"^localparam\s[^=]*?(\w+)\s*=\s*(.*?)\s*;", re.MULTILINE)
-_NUMBER = re.compile(r"(-?)(?:\d+'s?([dh]))?([0-9a-fA-F]+)")
+# Patterns of what is checked are compiled when it is: a build needs none.
+_LOCALPARAM = r"(?m)^localparam\s[^=]*?(\w+)\s*=\s*(.*?)\s*;"
+_NUMBER = r"(-?)(?:\d+'s?([dh]))?([0-9a-fA-F]+)"
 
 
 class Verilog(Format):
@@ -72,7 +73,7 @@ def wrong_constants(folder: Path, content: Content) -> tuple[int, list[str]]:
         text = read_text(folder / name, BUILD_FILE, errors="replace")
     except OSError as error:
         return len(wanted), [f"{name}: cannot be read: {error.strerror or error}"]
-    found: dict[str, int | str] = {key: _value(value) for key, value in _LOCALPARAM.findall(text)}
+    found: dict[str, int | str] = {key: _value(value) for key, value in re.findall(_LOCALPARAM, text)}
     return len(wanted), differing(name, found, wanted)
 
 
@@ -146,7 +147,7 @@ def _value(text: str) -> int | str:
     """A number, the content of a string, or what is neither as it stands."""
     if len(text) > 1 and text[0] == text[-1] == '"':
         return text[1:-1]
-    number = _NUMBER.fullmatch(text)
+    number = re.fullmatch(_NUMBER, text)
     if number is None:
         return text
     sign, base, digits = number.groups()
