@@ -7,6 +7,7 @@ import numpy as np
 from tablegen.numerics.arrays import Floats
 
 _BLOCK = 1 << 16  # products that are worked out together, in the cache
+_TOGETHER = 8  # columns from which those before them are taken at once: fewer and longer steps, each sum in its order
 
 
 class Cholesky:
@@ -20,30 +21,48 @@ class Cholesky:
     def __init__(self, matrix: Floats) -> None:
         columns = np.array(matrix, dtype=np.float64).T.copy()  # a row is a column of L, from its diagonal on
         size = len(columns)
-        terms = np.empty(max(_BLOCK, size + 1))
-        for j, column in enumerate(columns):
-            width = len(terms) // (j + 1)
-            for begin in range(j, size, width):
-                end = min(begin + width, size)
-                block = terms[: (j + 1) * (end - begin)].reshape(j + 1, end - begin)
-                block[0] = column[begin:end]
-                np.multiply(columns[:j, begin:end], columns[:j, j, None], out=block[1:])
-                np.subtract.reduce(block, axis=0, out=column[begin:end])
-            pivot = float(column[j])
-            if not pivot > 0.0:
-                raise ArithmeticError(f"pivot {j} of {size} is {pivot:g}")
-            column[j:] /= sqrt(pivot)
+        terms = np.empty(max(_BLOCK, 2 * _TOGETHER * size))
+        for begin in range(0, size, _TOGETHER):
+            panel = columns[begin : begin + _TOGETHER, begin:]
+            most = len(terms) // panel.size - 1
+            for first in range(0, begin, most):
+                before = columns[first : min(first + most, begin), begin:]
+                block = terms[: (len(before) + 1) * panel.size].reshape(-1, *panel.shape)
+                block[0] = panel
+                np.multiply(before[:, : len(panel), None], before[:, None, :], out=block[1:])
+                np.subtract.reduce(block, axis=0, out=panel)
+            for j in range(len(panel)):
+                column, later = panel[j, j:], panel[j + 1 :, j:]
+                pivot = float(column[0])
+                if not pivot > 0.0:
+                    raise ArithmeticError(f"pivot {begin + j} of {size} is {pivot:g}")
+                column /= sqrt(pivot)
+                later -= column[1 : len(later) + 1, None] * column
         self._columns = columns
-        self._diagonal: list[float] = columns.diagonal().tolist()
 
     def solve(self, right: Floats) -> Floats:
         """x with A x = right; right has shape (n,)."""
         x = np.array(right, dtype=np.float64)
-        columns = self._columns
-        for j, pivot in enumerate(self._diagonal):
-            x[j] = value = float(x[j]) / pivot
-            x[j + 1 :] -= value * columns[j, j + 1 :]
-        for j, pivot in reversed(list(enumerate(self._diagonal))):
-            x[j] = value = float(x[j]) / pivot
-            x[:j] -= value * columns[:j, j]
+        begins = range(0, len(x), _TOGETHER)
+        for begin in begins:
+            rows = self._columns[begin : begin + _TOGETHER, begin:]
+            _eliminate(x[begin:], rows)
+        for begin in reversed(begins):
+            end = min(begin + _TOGETHER, len(x))
+            _eliminate(x[:end][::-1], self._columns[:end, begin:end].T[::-1, ::-1])
         return x
+
+
+def _eliminate(x: Floats, columns: Floats) -> None:
+    """Solve for the first of x, one after the other, and take their columns from the rest; columns (some, all of x)."""
+    count = len(columns)
+    near, found = columns[:, :count].tolist(), x[:count].tolist()
+    for j, column in enumerate(near):
+        found[j] = value = found[j] / column[j]
+        for i in range(j + 1, count):
+            found[i] -= value * column[i]
+    x[:count] = found
+    terms = np.empty((count + 1, len(x) - count))
+    terms[0] = x[count:]
+    np.multiply(columns[:, count:], x[:count, None], out=terms[1:])
+    np.subtract.reduce(terms, axis=0, out=x[count:])

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from functools import cached_property, lru_cache
 from math import tau
+from typing import TypeVar
 
 import numpy as np
 from msgspec import Struct
@@ -10,22 +11,56 @@ from msgspec import Struct
 from tablegen.numerics.arrays import Floats, FloatsLike, freeze, multiples
 from tablegen.numerics.turns import sine_and_cosine
 
+_Real = TypeVar("_Real", float, Floats)
+
 _BLOCK = 1 << 12  # times that are worked out together
 _TURNED = 16  # harmonics from one whose sine is worked out to the next
 
-_KEPT = 1 << 18  # sines and cosines of one grid that are kept for the next series on it: 4 MB
+_KEPT = 1 << 17  # cosines of one grid that are kept for the next series on it, and as many sines: 2 MB
 
 
 def _waves(count: int, harmonics: int) -> Iterator[tuple[Floats, Floats]]:
-    """Sine and cosine of 2 pi n k / count for k in [0, count), for n = 1..harmonics."""
+    """Cosine and sine of 2 pi n k / count for k in [0, count / 4], for n = 1..harmonics; ``count`` is even."""
     s, c = sine_and_cosine(np.arange(count) / count)
-    for at in multiples(np.arange(count), count, harmonics):
-        yield s.take(at, mode="clip"), c.take(at, mode="clip")
+    for at in multiples(np.arange(count // 4 + 1), count, harmonics):
+        yield c.take(at, mode="clip"), s.take(at, mode="clip")
 
 
 @lru_cache(maxsize=4)  # both axes, in a plan and in its certificate
-def _kept_waves(count: int, harmonics: int) -> list[tuple[Floats, Floats]]:
-    return list(_waves(count, harmonics))
+def _kept_waves(count: int, harmonics: int) -> tuple[Floats, Floats]:
+    cosines, sines = (np.empty((harmonics, count // 4 + 1)) for _ in "cs")
+    for n, (c, s) in enumerate(_waves(count, harmonics)):
+        cosines[n], sines[n] = c, s
+    return cosines, sines
+
+
+def _sums(a0: float, a: Floats, b: Floats, count: int) -> tuple[Floats, Floats, Floats, Floats]:
+    """Values on a quarter of a grid, k in [0, count / 4]: at k, count - k, count / 2 + k and count / 2 - k.
+
+    Each is the sum of its harmonics in order. At count - k the sines have the other sign, half a period on all odd
+    harmonics, so that all four have the same products.
+    """
+    points = count // 4 + 1
+    if len(a) * points <= _KEPT:
+        cosines, sines = _kept_waves(count, len(a))
+        cosine_terms, sine_terms = cosines * a[:, None], sines * b[:, None]
+        terms = cosine_terms + sine_terms, np.subtract(cosine_terms, sine_terms, out=cosine_terms)
+        near = [np.add.reduce(part, axis=0, initial=a0) for part in terms]
+        for part in terms:
+            np.negative(part[::2], out=part[::2])
+        far = [np.add.reduce(part, axis=0, initial=a0) for part in terms]
+        return near[0], near[1], far[0], far[1]
+    sums = np.full((4, points), a0)
+    for n, (c, s) in enumerate(_waves(count, len(a)), 1):
+        cosine_term, sine_term = a[n - 1] * c, b[n - 1] * s
+        here, mirrored = cosine_term + sine_term, cosine_term - sine_term
+        sums[0] += here
+        sums[1] += mirrored
+        if n % 2:
+            here, mirrored = -here, -mirrored
+        sums[2] += here
+        sums[3] += mirrored
+    return sums[0], sums[1], sums[2], sums[3]
 
 
 class FourierSeries(Struct, frozen=True, eq=False, dict=True):
@@ -49,15 +84,16 @@ class FourierSeries(Struct, frozen=True, eq=False, dict=True):
 
     def on_grid(self, count: int, derivative: int = 0) -> Floats:
         """As ``value`` at k / count for k in [0, count), by one table of sines for all harmonics."""
-        total = np.full(count, self.a0 if derivative == 0 else 0.0)
-        kept = count * self.harmonics <= _KEPT
-        cosines, sines = np.empty(count), np.empty(count)
-        waves = (_kept_waves if kept else _waves)(count, self.harmonics)
-        for (a, b), (s, c) in zip(self._all_factors(derivative), waves, strict=True):
-            np.multiply(c, a, cosines)
-            np.multiply(s, b, sines)
-            np.add(cosines, sines, cosines)
-            np.add(total, cosines, total)
+        if count % 2:
+            return self.on_grid(2 * count, derivative)[::2].copy()
+        a, b = _differentiated(np.arange(1.0, self.harmonics + 1.0), self.a, self.b, derivative)
+        first, last, third, second = _sums(self.a0 if derivative == 0 else 0.0, a, b, count)
+        half, quarter = count // 2, count // 4
+        total = np.empty(count)
+        total[: quarter + 1] = first
+        total[half - quarter : half + 1] = second[::-1]
+        total[half : half + quarter + 1] = third
+        total[count - quarter :] = last[:0:-1]
         return total
 
     def term(self, n: int, derivative: int, s: Floats, c: Floats) -> Floats:
@@ -68,11 +104,6 @@ class FourierSeries(Struct, frozen=True, eq=False, dict=True):
     def _factors(self, n: int, derivative: int) -> tuple[float, float]:
         """Of the cosine and of the sine of harmonic n in a derivative."""
         return _differentiated(n, float(self.a[n - 1]), float(self.b[n - 1]), derivative)
-
-    def _all_factors(self, derivative: int) -> list[tuple[float, float]]:
-        """Those of all harmonics in order."""
-        pairs = zip(self.a.tolist(), self.b.tolist(), strict=True)
-        return [_differentiated(n, a, b, derivative) for n, (a, b) in enumerate(pairs, 1)]
 
     def peak_slope(self) -> float:
         """max |w'| per period, on a grid of 32 points per period of the highest harmonic."""
@@ -104,11 +135,13 @@ class FourierSeries(Struct, frozen=True, eq=False, dict=True):
         return FourierSeries(self.a0, self.a * real + self.b * imaginary, self.b * real - self.a * imaginary)
 
 
-def _differentiated(n: int, a: float, b: float, derivative: int) -> tuple[float, float]:
+def _differentiated(n: _Real, a: _Real, b: _Real, derivative: int) -> tuple[_Real, _Real]:
     for _ in range(derivative % 4):  # d/dt turns (a, b) into 2 pi n (b, -a)
         a, b = b, -a
-    factor = (tau * n) ** derivative
-    return factor * a, factor * b
+    rate = factor = tau * n
+    for _ in range(derivative - 1):  # not a power, whose last bit is the processor's
+        factor = factor * rate
+    return (factor * a, factor * b) if derivative else (a, b)
 
 
 def values(t: FloatsLike, *asked: tuple[FourierSeries, int]) -> tuple[Floats, ...]:

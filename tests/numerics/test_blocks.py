@@ -37,6 +37,26 @@ def test_a_factor_has_the_bits_of_column_by_column(monkeypatch: pytest.MonkeyPat
     assert np.array_equal(np.triu(Cholesky(matrix)._columns).T, by_columns(matrix))
 
 
+def solved_by_columns(factor: Floats, right: Floats) -> Floats:
+    """By the textbook: each unknown in turn, taken from all the others at once."""
+    x = np.array(right)
+    for j in range(len(x)):
+        x[j] /= factor[j, j]
+        x[j + 1 :] -= x[j] * factor[j + 1 :, j]
+    for j in reversed(range(len(x))):
+        x[j] /= factor[j, j]
+        x[:j] -= x[j] * factor[j, :j]
+    return x
+
+
+@pytest.mark.parametrize("size", [1, 2, 7, 8, 9, 31, 65, 128, 129])
+def test_a_solution_has_the_bits_of_column_by_column(size: int) -> None:
+    random = np.random.default_rng(size)
+    half, right = random.normal(size=(size, size)), random.normal(size=size)
+    matrix = half @ half.T + size * np.eye(size)
+    assert Cholesky(matrix).solve(right).tobytes() == solved_by_columns(by_columns(matrix), right).tobytes()
+
+
 def test_a_pivot_that_is_not_positive_is_named_in_any_block() -> None:
     matrix = np.eye(100)
     matrix[70, 70] = 0.0
