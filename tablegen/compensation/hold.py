@@ -4,10 +4,12 @@ A code holds from its tick to the next. What the piezo sees of samples w(k / N) 
 ``exp(-i pi n / N) sinc(n / N)``: half a tick late, and a little smaller. Docs/waveform.md has the convention of time.
 """
 
+from math import pi
+
 import numpy as np
 
 from tablegen.numerics.arrays import Floats
-from tablegen.numerics.turns import sinc, sine_and_cosine
+from tablegen.numerics.turns import sine_and_cosine
 
 
 def hold_inverse(harmonics: int, advances: int, steps: bool) -> tuple[Floats, Floats]:
@@ -20,5 +22,5 @@ def hold_inverse(harmonics: int, advances: int, steps: bool) -> tuple[Floats, Fl
     s, c = sine_and_cosine(0.5 * share)
     if steps:
         return c, s
-    size = sinc(share)
+    size = s / (pi * share)  # sinc of it, which is not 0
     return c / size, s / size

@@ -9,7 +9,7 @@ from tablegen.compensation.line import Sweep
 from tablegen.numerics.arrays import Floats, FloatsLike
 from tablegen.numerics.elementary import exp
 from tablegen.numerics.moments import plain_moment, ramp_moment
-from tablegen.numerics.turns import cosine, sine, sine_and_cosine
+from tablegen.numerics.turns import sine_and_cosine, sine_and_cosine_of
 from tablegen.problems import Unphysical
 
 # Where 1 - (pi/2) sin(pi u) = 0: the poles of (20), beyond which the residual peaks with the opposite sign.
@@ -61,7 +61,7 @@ class BranchShape(Sweep):
             raise Unphysical(
                 f"with beta = {beta:.4g} equation (20) needs {low:.4f} < u_peak < {high:.4f}; {u_peak:g} is outside"
             )
-        s, c = float(sine(0.5 * u0)), float(cosine(0.5 * u0))
+        s, c = sine_and_cosine_of(0.5 * u0)
         numerator, denominator = -0.5 * pi * c, 1.0 - 0.5 * pi * s  # gamma = numerator / denominator
         scale = beta / (numerator * (c + 2.0 * u0 - 1.0) + denominator * s)
         shape = cls(xi=scale * denominator, xi_gamma=scale * numerator)
@@ -137,7 +137,8 @@ class BranchShape(Sweep):
         if self.xi or self.xi_gamma:
             turning = (atan(-self.xi_gamma / self.xi) / pi) % 1.0 if self.xi else 0.5
             candidates.append(turning)
-        return float(np.min(self.slope(candidates)))
+        waves = [sine_and_cosine_of(0.5 * tau) for tau in candidates]
+        return min(self.linear + pi * (self.xi * c - self.xi_gamma * s) for s, c in waves)
 
 
 def beta_at(v_scan_normalised: float, beta_max: float, rho: float) -> float:

@@ -17,7 +17,7 @@ from tablegen.compensation.dynamics import Response
 from tablegen.compensation.expectation import Expectation
 from tablegen.compensation.transient import Transient
 from tablegen.driver import Driver
-from tablegen.numerics.arrays import Bools, Floats, FloatsLike
+from tablegen.numerics.arrays import Floats, FloatsLike
 from tablegen.problems import Document, Problems, Unphysical
 from tablegen.waveform.allowed_error import AllowedError
 from tablegen.waveform.series import FourierSeries
@@ -121,14 +121,15 @@ class LineShape(Struct, frozen=True):
 
     def value(self, t: FloatsLike) -> Floats:
         """w(t) with t in periods."""
-        going, tau = self._split(t)
-        return np.where(going, self.forward.value(tau), 1.0 - self.backward.value(tau))
+        return self._by_sweep(t, self.forward.value, lambda tau: 1.0 - self.backward.value(tau))
 
     def slope(self, t: FloatsLike) -> Floats:
         """dw/dt per period."""
-        going, tau = self._split(t)
-        rise = self.forward.slope(tau) / self.turn
-        return np.where(going, rise, -self.backward.slope(tau) / (1.0 - self.turn))
+        return self._by_sweep(
+            t,
+            lambda tau: self.forward.slope(tau) / self.turn,
+            lambda tau: -self.backward.slope(tau) / (1.0 - self.turn),
+        )
 
     def followed(
         self, side: str, position: Floats, drive: FourierSeries, value: Floats, slope: Floats
@@ -148,11 +149,20 @@ class LineShape(Struct, frozen=True):
         """When the sweep of one direction passes a normalised position, in periods."""
         return self.turn * position if side == "forward" else self.turn + (1.0 - self.turn) * (1.0 - position)
 
-    def _split(self, t: FloatsLike) -> tuple[Bools, Floats]:
+    def _by_sweep(
+        self, t: FloatsLike, forward: Callable[[Floats], Floats], backward: Callable[[Floats], Floats]
+    ) -> Floats:
+        """What either sweep gives at its own times, of the shape of ``t``."""
         t = np.asarray(t, dtype=np.float64)
         t = t - np.floor(t)
         going = t <= self.turn
-        return going, np.where(going, t / self.turn, (t - self.turn) / (1.0 - self.turn))
+        returning = ~going
+        found = np.empty(t.shape)
+        if going.any():
+            found[going] = forward(t[going] / self.turn)
+        if returning.any():
+            found[returning] = backward((t[returning] - self.turn) / (1.0 - self.turn))
+        return found
 
 
 class SweptSeries(Sweep):

@@ -122,17 +122,16 @@ def synthesize(words: FourierWords, length: int, bits: int) -> Ints:
     terms and any use of symmetry do not matter; C[j] is S[j + length/4], or the cosine rounded alike
     where the length is not divisible by 4. Then one rounding shift by 60 - (bits - 1).
     """
-    accumulator = np.full(length, words.a0 << SINE_FRACTION_BITS, dtype=np.int64)
     # Word length - k has the cosines of word k, and its sines with the other sign.
-    k = np.arange(length // 2 + 1, dtype=np.int64)
-    if len(k) * words.harmonics <= _KEPT_WAVES:
+    half = length // 2 + 1
+    if half * words.harmonics <= _KEPT_WAVES:
         cosines, sines = _kept_waves(length, words.harmonics)
-        even, odd = words.a @ cosines, words.b @ sines
+        even, odd = (np.einsum("n,nk->k", *both) for both in ((words.a, cosines), (words.b, sines)))
     else:
-        even, odd = np.zeros_like(k), np.zeros_like(k)
+        even, odd = np.zeros(half, dtype=np.int64), np.zeros(half, dtype=np.int64)
         for n, (cosine, sine_) in enumerate(_waves(length, words.harmonics)):
             even += words.a[n] * cosine
             odd += words.b[n] * sine_
-    accumulator[k] += even + odd
-    accumulator[length - k[1 : (length + 1) // 2]] += (even - odd)[1 : (length + 1) // 2]
+    even += words.a0 << SINE_FRACTION_BITS
+    accumulator = np.concatenate([even + odd, (even - odd)[length - half : 0 : -1]])
     return saturate(shift_round(accumulator, FRACTION_BITS + SINE_FRACTION_BITS - (bits - 1)), bits)

@@ -5,10 +5,13 @@ singularities of the closed forms need no special cases. The error is below 2.5 
 """
 
 from math import pi, tau
+from typing import TypeVar
 
 import numpy as np
 
 from tablegen.numerics.arrays import Floats, FloatsLike
+
+_Real = TypeVar("_Real", float, Floats)
 
 # Taylor series about 0: at pi/4 the first omitted terms are 4e-20 (sine) and 8e-21 (cosine).
 _SINE_TERMS = 9
@@ -30,7 +33,7 @@ _SINE = _reciprocal_factorials(1, _SINE_TERMS)
 _COSINE = _reciprocal_factorials(0, _COSINE_TERMS)
 
 
-def _horner(coefficients: list[float], square: Floats) -> Floats:
+def _horner(coefficients: list[float], square: _Real) -> _Real:
     value = coefficients[-1] * square
     for coefficient in reversed(coefficients[1:-1]):
         value += coefficient
@@ -64,6 +67,18 @@ def _sine_and_cosine(x: Floats) -> tuple[Floats, Floats]:
     sines *= 1 - (number & 2)  # quadrants 2 and 3 change the sign of the sine, 1 and 2 that of the cosine
     cosines *= 1 - (number + 1 & 2)
     return sines, cosines
+
+
+def sine_and_cosine_of(turns: float) -> tuple[float, float]:
+    """As ``sine_and_cosine``, of which it has every bit, for one finite number: some times as fast."""
+    x = turns - round(turns) + 0.0  # no -0, as an array has none
+    quadrant = round(4.0 * x)
+    angle = (x - 0.25 * quadrant) * tau
+    square = angle * angle
+    sine, cosine = angle * _horner(_SINE, square), _horner(_COSINE, square)
+    if quadrant & 1:
+        sine, cosine = cosine, sine
+    return sine * (1 - (quadrant & 2)), cosine * (1 - (quadrant + 1 & 2))
 
 
 def sine(turns: FloatsLike) -> Floats:

@@ -17,7 +17,7 @@ from math import tau
 
 import numpy as np
 
-from tablegen.numerics.arrays import Floats, tree_sum, tree_sum_down
+from tablegen.numerics.arrays import Floats, freeze, tree_sum, tree_sum_down
 from tablegen.numerics.linear import Cholesky
 from tablegen.numerics.turns import cosine, sine_and_cosine
 from tablegen.problems import Unphysical
@@ -40,12 +40,16 @@ def fit_window(shape: WaveformShape, harmonics: int, window: tuple[float, float]
     Raises ``Unphysical`` where the range [0, 1] and the harmonics do not go together.
     """
     times = _nodes(shape.turn, harmonics, window, both)
-    slope = shape.slope(times)
+    return _fitted(times.tobytes(), shape.value(times).tobytes(), shape.slope(times).tobytes(), harmonics)
+
+
+@lru_cache(maxsize=4)  # a sweep and the remedies of a warning change one axis, or what no waveform depends on
+def _fitted(at: bytes, values: bytes, slopes: bytes, harmonics: int) -> FourierSeries:
+    """The fit to values and slopes at times, which are all that it depends on; each is the bytes of float64."""
+    times, value, slope = (np.frombuffer(each) for each in (at, values, slopes))
     slope_weight = 1.0 / (slope * slope)
     value_weight = np.full_like(times, VALUE_WEIGHT)
-    normal, right = normal_equations(
-        times, shape.value(times), slope, value_weight, slope_weight, harmonics, SMOOTHNESS
-    )
+    normal, right = normal_equations(times, value, slope, value_weight, slope_weight, harmonics, SMOOTHNESS)
     try:
         factor = Cholesky(normal)
     except ArithmeticError:  # pragma: no cover - the smoothness term keeps every pivot positive
@@ -55,13 +59,19 @@ def fit_window(shape: WaveformShape, harmonics: int, window: tuple[float, float]
 
 
 def _nodes(turn: float, harmonics: int, window: tuple[float, float], both: bool) -> Floats:
-    count = 4 * harmonics + 32
-    x = 0.5 - 0.5 * cosine((np.arange(count) + 0.5) / (2 * count))
-    position = window[0] + (window[1] - window[0]) * x
+    position = window[0] + (window[1] - window[0]) * _chebyshev(4 * harmonics + 32)
     forward = turn * position
     if not both:
         return forward
     return np.concatenate([forward, turn + (1.0 - turn) * (1.0 - position)])
+
+
+@lru_cache(maxsize=4)  # for the harmonics of both axes
+def _chebyshev(count: int) -> Floats:
+    """The nodes of (0, 1)."""
+    x = 0.5 - 0.5 * cosine((np.arange(count) + 0.5) / (2 * count))
+    freeze(x)
+    return x
 
 
 def normal_equations(

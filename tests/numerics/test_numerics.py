@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from tablegen.numerics.arrays import tree_sum, tree_sum_down
 from tablegen.numerics.elementary import exp, log10
 from tablegen.numerics.linear import Cholesky
-from tablegen.numerics.turns import cosine, sinc, sine, sine_and_cosine, spherical_bessel_1
+from tablegen.numerics.turns import cosine, sinc, sine, sine_and_cosine, sine_and_cosine_of, spherical_bessel_1
 
 mp.mp.dps = 40
 turns = st.floats(-1e4, 1e4, allow_nan=False)
@@ -22,6 +22,11 @@ def test_sine_and_cosine_are_within_two_and_a_half_ulp(x: float) -> None:
         ulp = np.spacing(max(abs(float(reference)), 1e-300))
         # Near a zero the argument's own reduction is exact, so the bound holds there as well.
         assert abs(mp.mpf(float(value)) - reference) <= 2.5 * ulp
+
+
+@given(turns | st.integers(-64, 64).map(lambda eighths: eighths / 16.0))
+def test_one_angle_has_the_bits_of_many(x: float) -> None:
+    assert np.array(sine_and_cosine_of(x)).tobytes() == np.array(sine_and_cosine([x, 0.1])).T[0].tobytes()
 
 
 @given(st.integers(-(10**6), 10**6))

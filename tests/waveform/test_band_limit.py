@@ -13,6 +13,7 @@ from tablegen.problems import Unphysical
 from tablegen.waveform import window_fit
 from tablegen.waveform.closed_form import fourier_series
 from tablegen.waveform.sampler import Sampler
+from tablegen.waveform.series import FourierSeries
 
 
 @pytest.mark.parametrize(("harmonics", "percent"), [(32, 0.02), (21, 0.3), (16, 1.2)])
@@ -55,6 +56,27 @@ def test_chebyshev_nodes_are_what_levels_the_error(
     monkeypatch.setattr(window_fit, "_nodes", even)
     piled_up = worst(SECTION_8, band_limited(SECTION_8, BandLimit(), harmonics))
     assert piled_up > times * levelled
+
+
+def test_a_fit_that_is_kept_is_the_one_of_these_values_and_slopes() -> None:
+    """Any last bit of a value or of a slope is another fit; the control is what is asked for again."""
+    times = window_fit._nodes(0.5, 16, (0.1, 0.9), True)
+    value, slope = SECTION_8.value(times), SECTION_8.slope(times)
+
+    def fitted(harmonics: int, *arrays: np.ndarray) -> FourierSeries:
+        return window_fit._fitted(*(each.tobytes() for each in arrays), harmonics)
+
+    first = fitted(16, times, value, slope)
+    assert fitted(16, times, value.copy(), slope) is first
+    for which in (value, slope):
+        which[3] = np.nextafter(which[3], 2.0)
+        other = fitted(16, times, value, slope)
+        assert other is not first
+        assert other.a.tobytes() != first.a.tobytes()
+        first = other
+    assert fitted(17, times, value, slope).harmonics == 17
+    again = window_fit._fitted.__wrapped__(times.tobytes(), value.tobytes(), slope.tobytes(), 16)
+    assert (again.a0, again.a.tobytes(), again.b.tobytes()) == (first.a0, first.a.tobytes(), first.b.tobytes())
 
 
 def test_forward_only_leaves_the_way_back_free() -> None:
