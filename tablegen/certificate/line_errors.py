@@ -115,7 +115,8 @@ class EmittedPeriod:
         codes = np.empty(len(k))
         for at in range(0, len(k), _CHUNK_RUNS):
             chunk = slice(at, at + _CHUNK_RUNS)
-            codes[chunk] = self._line.float_codes(self._reference.at(k[chunk] // self._hold))
+            advances = k[chunk] if self._hold == 1 else k[chunk] // self._hold
+            codes[chunk] = self._line.float_codes(self._reference.at(advances))
         return codes
 
     def errors(self, k: Ints) -> Floats:
@@ -217,16 +218,15 @@ def scaling_error(line: LinePlan, played: EmittedPeriod, side: str, branch: Swee
     sweep = position if side == "forward" else 1.0 - position
     steepness = branch.slope(sweep)
     chords = [_chords(line, one, side, position, deviation, steepness) for one in played.arriving()]
-    # A triangle leaves the piezo at the inverse of the branch, whose slope is 1 / u'.
-    triangle = 1.0 / branch.slope(branch.inverse(sweep))
-    middle = float(1.0 / branch.slope(branch.inverse(0.5)))
+    # A triangle leaves the piezo at the inverse of the branch, whose slope is 1 / u'; the last one is of its middle.
+    triangle = 1.0 / branch.slope(branch.inverse(np.append(sweep, 0.5)))
     return ScalingError(
         total=max(_peak_to_peak(total) for total, _ in chords),
         band_limit=_peak_to_peak(wanted_speed),
         quantisation=max(_peak_to_peak(noise) for _, noise in chords),
         model=_peak_to_peak(speed - wanted_speed),
         size=100.0 * float(deviation[-1] - deviation[0]) / (high - low),
-        uncompensated=_peak_to_peak(triangle / middle),
+        uncompensated=_peak_to_peak(triangle[:-1] / triangle[-1]),
     )
 
 

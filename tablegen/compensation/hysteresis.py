@@ -110,14 +110,18 @@ class BranchShape(Sweep):
 
     def value(self, tau: FloatsLike) -> Floats:
         """u(tau), equation (17)."""
-        tau = np.asarray(tau, dtype=np.float64)
-        s, c = sine_and_cosine(0.5 * tau)
-        return self.linear * tau + self.xi * s + self.xi_gamma * (c - 1.0)
+        return self.value_and_slope(tau)[0]
 
     def slope(self, tau: FloatsLike) -> Floats:
         """du/dtau."""
-        s, c = sine_and_cosine(0.5 * np.asarray(tau, dtype=np.float64))
-        return self.linear + pi * (self.xi * c - self.xi_gamma * s)
+        return self.value_and_slope(tau)[1]
+
+    def value_and_slope(self, tau: FloatsLike) -> tuple[Floats, Floats]:
+        """u(tau) and du/dtau, of the same sines."""
+        tau = np.asarray(tau, dtype=np.float64)
+        s, c = sine_and_cosine(0.5 * tau)
+        value = self.linear * tau + self.xi * s + self.xi_gamma * (c - 1.0)
+        return value, self.linear + pi * (self.xi * c - self.xi_gamma * s)
 
     def moments(self, y: Floats) -> tuple[Floats, Floats]:
         """int_0^1 u(s) exp(-2 pi i y s) ds, real and imaginary part, in closed form."""

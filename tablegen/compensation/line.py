@@ -41,13 +41,18 @@ class Sweep(ABC):
     def slope(self, tau: FloatsLike) -> Floats:
         """du/dtau, above 0."""
 
+    def value_and_slope(self, tau: FloatsLike) -> tuple[Floats, Floats]:
+        """Both at the same places; a subclass may have a way that is shorter than the two."""
+        return self.value(tau), self.slope(tau)
+
     def inverse(self, u: FloatsLike) -> Floats:
         """tau(u): where the modelled piezo is when the normalised drive is u. Clipped to u in [0, 1]."""
         u = np.clip(np.asarray(u, dtype=np.float64), 0.0, 1.0)
         grid = np.linspace(0.0, 1.0, _GRID)
         tau = np.interp(u, self.value(grid), grid)
         for _ in range(2):  # the grid is within 1e-6; each Newton step squares that
-            tau = tau - (self.value(tau) - u) / self.slope(tau)
+            value, slope = self.value_and_slope(tau)
+            tau = tau - (value - u) / slope
         return tau
 
     def moments(self, y: Floats) -> tuple[Floats, Floats]:

@@ -12,6 +12,8 @@ from tablegen.fixedpoint.program import Program
 from tablegen.numerics.arrays import Ints
 
 _MIN_TICKS_PER_RUN = 4  # average ticks per run from which runs are cheaper than ticks
+_MOST_TICKS_PER_CODE = 8  # up to which all ticks from the first to the last are gone through for some codes
+_CHUNK_TICKS = 1 << 13  # ticks whose codes are looked for together, in the cache
 _CHUNK_LEVELS = 1 << 13  # codes or samples that are worked out together, in the cache
 
 
@@ -48,7 +50,19 @@ class Runs(Struct, frozen=True, eq=False):
         """The codes at ticks k."""
         if self.by_tick:
             return self.codes[k]
-        return self.codes[np.searchsorted(self.starts, k, side="right") - 1]
+        if len(k) <= _CHUNK_TICKS:
+            return self._codes(k)
+        return np.concatenate([self._codes(k[at : at + _CHUNK_TICKS]) for at in range(0, len(k), _CHUNK_TICKS)])
+
+    def _codes(self, k: Ints) -> Ints:
+        low, high = (int(k.min()), int(k.max())) if len(k) else (0, -1)
+        if high - low >= _MOST_TICKS_PER_CODE * len(k):
+            return self.codes[np.searchsorted(self.starts, k, side="right") - 1]
+        # To count the runs that begin takes less than to look for each tick.
+        first, last = np.searchsorted(self.starts, (low, high), side="right")
+        begins = np.zeros(high - low + 1, dtype=np.bool_)
+        begins[self.starts[first:last] - low] = True
+        return self.codes[first - 1 :].take(np.cumsum(begins, dtype=np.int32)[k - low])
 
     def split_at(self, k: Ints) -> "Runs":
         """The same playback with runs that begin at ticks k as well, ascending and each once."""
@@ -103,8 +117,11 @@ def _levels(program: Program, pieces: Pieces) -> Iterator[tuple[Ints, Ints]]:
     behind = -(-pieces.phase_behind * program.ticks >> PHASE_BITS)
     inverse, played = _Inverse(output, np.sign(codes[1] - codes[0]), pieces), (-1, -1)
     for at in range(0, levels, _CHUNK_LEVELS):
-        number = np.arange(at, min(at + _CHUNK_LEVELS + 1, levels))  # and the first of the next part
-        piece = np.searchsorted(ends, number, side="right")
+        behind_number = min(at + _CHUNK_LEVELS + 1, levels)  # and the first of the next part
+        number = np.arange(at, behind_number)
+        first_piece, last_piece = np.searchsorted(ends, (at, behind_number - 1), side="right")
+        counts = np.diff(ends[first_piece:last_piece], prepend=at, append=behind_number)
+        piece = np.repeat(np.arange(first_piece, last_piece + 1), counts)
         order = number - begins[piece]
         level = first[piece] + direction[piece] * order
         sample, code = (level, output.code(level)) if by_sample else (inverse.sample(piece, level), level)

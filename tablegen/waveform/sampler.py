@@ -55,17 +55,19 @@ class Expansion:
     def __init__(self, series: FourierSeries) -> None:
         self._blocks = blocks = 1 << (_LONG_BLOCKS_PER_HARMONIC * series.harmonics - 1).bit_length()
         spectrum, rate = _spectrum(series), 1j * tau * np.arange(series.harmonics + 1)
-        self._terms: list[Floats] = []
-        for m in range(_LONG_ORDER + _MOST_DERIVATIVES + 1):
-            self._terms.append(np.fft.irfft(spectrum, blocks) * (blocks / factorial(m)))
+        orders = range(_LONG_ORDER + _MOST_DERIVATIVES + 1)
+        spectra = np.empty((len(orders), len(rate)), dtype=np.complex128)
+        for m in orders:
+            np.multiply(spectrum, blocks / factorial(m), out=spectra[m])
             spectrum = spectrum * rate
+        self._terms: list[Floats] = list(np.fft.irfft(spectra, blocks))
 
     def at(self, t: Floats, *derivatives: int) -> list[Floats]:
         """w, or these derivatives of it, at times in periods."""
         nearest = np.rint(t * self._blocks)
         h = t - nearest / self._blocks
         block = nearest.astype(np.int64) & (self._blocks - 1)
-        near = [term[block] for term in self._terms[: _LONG_ORDER + max(derivatives) + 1]]
+        near = [term.take(block, mode="clip") for term in self._terms[: _LONG_ORDER + max(derivatives) + 1]]
         return [_derivative(near, h, order) for order in derivatives]
 
 
@@ -108,8 +110,8 @@ class Sampler:
         block = (k * self._blocks + self._count // 2) // self._count
         h = (k * self._blocks - block * self._count) * (1.0 / (self._count * float(self._blocks)))
         block = block & (self._blocks - 1)
-        total: Floats = self._terms[-1][block]
+        total: Floats = self._terms[-1].take(block, mode="clip")  # clip looks for no index that is outside
         for term in reversed(self._terms[:-1]):
             total *= h
-            total += term[block]
+            total += term.take(block, mode="clip")
         return total

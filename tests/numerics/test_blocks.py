@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from editing import SCAN, edited, write_pair
 
+from tablegen.fixedpoint import runs
 from tablegen.fixedpoint.runs import Runs
 from tablegen.numerics import arrays, linear, turns
 from tablegen.numerics.arrays import Floats, tree_sum
@@ -101,12 +102,35 @@ def test_quadrants_at_their_ends() -> None:
 
 
 def test_lengths_of_some_runs() -> None:
-    runs = Runs(np.array([0, 3, 4, 9]), np.array([5, 6, 5, 7]), 12)
-    assert runs.lengths.tolist() == [3, 1, 5, 3]
-    assert [runs.lengths_of(slice(a, a + 2)).tolist() for a in range(4)] == [[3, 1], [1, 5], [5, 3], [3]]
+    some = Runs(np.array([0, 3, 4, 9]), np.array([5, 6, 5, 7]), 12)
+    assert some.lengths.tolist() == [3, 1, 5, 3]
+    assert [some.lengths_of(slice(a, a + 2)).tolist() for a in range(4)] == [[3, 1], [1, 5], [5, 3], [3]]
     single = Runs(np.arange(6), np.arange(6), 6)
     assert single.by_tick
     assert single.lengths.tolist() == single.lengths_of(slice(0, 99)).tolist() == [1] * 6
+
+
+@pytest.mark.parametrize("most", [runs._MOST_TICKS_PER_CODE, 0, 10**9], ids=["chosen", "searched", "counted"])
+@pytest.mark.parametrize("chunk", [runs._CHUNK_TICKS, 7])
+def test_codes_of_runs_are_those_of_their_ticks(monkeypatch: pytest.MonkeyPatch, chunk: int, most: int) -> None:
+    """In any order, twice, at the first and the last tick; all ticks and few of them; none."""
+    monkeypatch.setattr(runs, "_CHUNK_TICKS", chunk)
+    monkeypatch.setattr(runs, "_MOST_TICKS_PER_CODE", most)
+    random = np.random.default_rng(5)
+    lengths = random.integers(1, 40, 300)
+    codes = random.integers(-99, 99, 300)
+    played, by_tick = Runs(np.cumsum(lengths) - lengths, codes, int(lengths.sum())), np.repeat(codes, lengths)
+    ticks = played.ticks
+    for k in (
+        np.arange(ticks),
+        random.integers(0, ticks, 500),
+        np.array([ticks - 1, 0]),
+        np.array([ticks // 2] * 3),
+        np.array([ticks - 1]),
+        played.lasts,
+        np.zeros(0, dtype=np.int64),
+    ):
+        assert np.array_equal(played.at(k), by_tick[k])
 
 
 @pytest.mark.common
