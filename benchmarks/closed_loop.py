@@ -10,9 +10,10 @@ from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+from tablegen.base.input_errors import Unphysical
 from tablegen.config.load import Setup, load
 from tablegen.config.schema import BandLimit
-from tablegen.problems import Unphysical
+from tablegen.virtual.calibration_day import OFFSETS, calibrate
 from tablegen.virtual.closed_loop import (
     MAP_SIZES,
     SHARP,
@@ -22,7 +23,6 @@ from tablegen.virtual.closed_loop import (
     uncorrected,
     with_scan,
 )
-from tablegen.virtual.laboratory import OFFSETS, calibrate
 from tablegen.virtual.other_plants import same_numbers, uniform_density
 from tablegen.virtual.parameters import BUILT_IN, load_truth
 from tablegen.virtual.scanner import VirtualScanner

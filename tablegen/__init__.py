@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from tablegen.api.many import BuildOutcome, build_many, variants
     from tablegen.api.refine import RefinedScan, refine
     from tablegen.api.samples import Samples
+    from tablegen.base.input_errors import Problem, Rejected, Unphysical
     from tablegen.certificate.certificate import Certificate
     from tablegen.config.load import Setup
     from tablegen.config.variants import Variant
@@ -35,8 +36,7 @@ if TYPE_CHECKING:
     from tablegen.link.prepare import PreparedScan
     from tablegen.manifest.read import NotABuild, StoredBuild, read_build
     from tablegen.planning.line_plan import Plan
-    from tablegen.problems import Problem, Rejected, Unphysical
-    from tablegen.verification.build import Report
+    from tablegen.verification.build_report import Report
     from tablegen.verification.failures import ToolMissing
     from tablegen.verification.run import verify
 
@@ -65,16 +65,16 @@ _HOMES = {
     "BuildOutcome": "tablegen.api.many",
     "Variant": "tablegen.config.variants",
     "StoredBuild": "tablegen.manifest.read",
-    "Report": "tablegen.verification.build",
+    "Report": "tablegen.verification.build_report",
     "Format": "tablegen.emit.format",
     "Content": "tablegen.emit.content",
-    "Rejected": "tablegen.problems",
-    "Problem": "tablegen.problems",
-    "Unphysical": "tablegen.problems",
+    "Rejected": "tablegen.base.input_errors",
+    "Problem": "tablegen.base.input_errors",
+    "Unphysical": "tablegen.base.input_errors",
     "BrokenLimit": "tablegen.api.build",
     "CannotWrite": "tablegen.emit.write",
     "NotABuild": "tablegen.manifest.read",
-    "ToolMissing": "tablegen.verification.simulate",
+    "ToolMissing": "tablegen.verification.verilog.simulate",
     "LinkError": "tablegen.link.errors",
     "PreparedScan": "tablegen.link.prepare",
 }

@@ -9,10 +9,10 @@ import msgspec
 import numpy as np
 from msgspec.structs import replace
 
-from tablegen.calibration.hysteresis import HysteresisFit, Trace, fit_hysteresis
+from tablegen.calibration.laws.hysteresis import HysteresisFit, Trace, fit_hysteresis
+from tablegen.calibration.operator.file_of_fit import operator_file
 from tablegen.calibration.operator.fit import OperatorFit, fit_operator
 from tablegen.calibration.operator.periodic_line import periodic_line
-from tablegen.calibration.operator.record import operator_file
 from tablegen.compensation.branch import Branch
 from tablegen.compensation.branches import Branches
 from tablegen.compensation.hysteresis import BranchShape

@@ -24,10 +24,11 @@ from stream_scripts import (
     sweep,
 )
 
-from tablegen.resources import verilog_runtime
-from tablegen.verification.bench import SequencerBench, SequencerShape
-from tablegen.verification.placement import Placement
-from tablegen.verification.stream import Script
+from tablegen.base.resources import verilog_runtime
+from tablegen.verification.play.placement import Placement
+from tablegen.verification.play.sequencer_shape import SequencerShape
+from tablegen.verification.play.stream import Script
+from tablegen.verification.verilog.sequencer_bench import SequencerBench
 
 HARMONICS = 4
 LEAST_PACE = Placement("serial").tick_clocks

@@ -5,9 +5,11 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from tablegen.base.input_errors import Problem, Rejected, Unphysical
+from tablegen.base.warnings import Finding
 from tablegen.certificate.certificate import Certificate, broken_limits
 from tablegen.certificate.certificate import certify as certify_plan
-from tablegen.certificate.scan_findings import scan_findings
+from tablegen.certificate.scan_notes import scan_findings
 from tablegen.certificate.scan_warnings import brief_warnings, limit_advice, scan_warnings
 from tablegen.certificate.summary import summary
 from tablegen.config.load import Setup, from_values
@@ -16,9 +18,7 @@ from tablegen.emit.format import Format
 from tablegen.emit.formats import UnknownFormat, chosen
 from tablegen.emit.render import render, runtime_files
 from tablegen.emit.write import leftover_files, outdated_files, write_files
-from tablegen.findings import Finding
 from tablegen.planning.line_plan import Plan, make_plan
-from tablegen.problems import Problem, Rejected, Unphysical
 
 if TYPE_CHECKING:
     from tablegen.api.samples import Samples

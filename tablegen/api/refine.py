@@ -7,12 +7,12 @@ from typing import Any, Literal
 import msgspec
 
 from tablegen.api.measured import Measured, table_of
-from tablegen.calibration.columns import DISPLACEMENT, DRIVE, TIME
-from tablegen.calibration.table import Source
+from tablegen.base.data_files import Source
+from tablegen.base.input_errors import Problem, Rejected
+from tablegen.base.reading import CONFIGURATION, read_text
+from tablegen.calibration.tables.columns import DISPLACEMENT, DRIVE, TIME
 from tablegen.config.load import Setup, load
 from tablegen.emit.write import write_files
-from tablegen.problems import Problem, Rejected
-from tablegen.reading import CONFIGURATION, read_text
 from tablegen.refinement.comment import provenance
 from tablegen.refinement.round import Options, Round
 from tablegen.refinement.round import refine as learn_from

@@ -10,13 +10,13 @@ from typing import Any
 import tomlkit
 from tomlkit.items import AoT, InlineTable, Table
 
-from tablegen.calibration.hysteresis import TURN_TOLERANCE
+from tablegen.base.input_errors import Problem, Problems, Rejected
+from tablegen.base.toml import parse_toml
+from tablegen.calibration.laws.hysteresis import TURN_TOLERANCE
 from tablegen.compensation.branch import LAW, MEASURED
 from tablegen.config.decode import decode
 from tablegen.config.scanner import Scanner
-from tablegen.driver import Driver
-from tablegen.problems import Problem, Problems, Rejected
-from tablegen.toml import parse_toml
+from tablegen.numerics.driver import Driver
 
 _PROVENANCE_MARK = "# calibrate "
 _FIRST_MARK = re.compile(r"# calibrate (\w+)(?:, turn ([\d.]+))?: ")

@@ -1,4 +1,4 @@
-"""The command line. Results go to stdout, messages to stderr; see ``tablegen.cli.exit_status`` for the exit statuses.
+"""The command line. Results go to stdout, messages to stderr; ``shared/exit_status.py`` has the exit statuses.
 
 Commands import what they need when they run, so that ``--version`` and ``--help`` answer at once.
 """
@@ -9,10 +9,10 @@ from importlib import import_module
 
 import click
 
-from tablegen.cli.common import Failure
-from tablegen.cli.exit_status import ExitStatus
-from tablegen.cli.terminal import guard_streams
-from tablegen.interruption import endings_interrupt
+from tablegen.base.interruption import endings_interrupt
+from tablegen.cli.shared.common import Failure
+from tablegen.cli.shared.exit_status import ExitStatus
+from tablegen.cli.shared.terminal import guard_streams
 from tablegen.version import __version__
 
 # Python looks for cycles of objects whenever there are 700 more, which is nearly a tenth of a build, though almost all
@@ -28,19 +28,19 @@ _COMMANDS = {
     "tables": ("table_choice", "tables"),
     "report": ("report", "report"),
     "compare": ("compare", "compare"),
-    "calibrate": ("calibrate", "calibrate"),
-    "channels": ("channels", "channels"),
+    "calibrate": ("calibrate.group", "calibrate"),
+    "channels": ("images.channels", "channels"),
     "simulate": ("simulate", "simulate"),
-    "refine": ("refine", "refine"),
-    "correct": ("correct", "correct"),
+    "refine": ("images.refine", "refine"),
+    "correct": ("images.correct", "correct"),
     "verify": ("verify", "verify"),
-    "upload": ("upload", "upload"),
-    "status": ("device_status", "device_status"),
-    "readback": ("readback", "readback"),
-    "park": ("control", "park"),
-    "trigger": ("control", "trigger"),
-    "clear": ("control", "clear"),
-    "ports": ("ports", "ports"),
+    "upload": ("device.upload", "upload"),
+    "status": ("device.status", "device_status"),
+    "readback": ("device.readback", "readback"),
+    "park": ("device.control", "park"),
+    "trigger": ("device.control", "trigger"),
+    "clear": ("device.control", "clear"),
+    "ports": ("device.ports", "ports"),
     "init": ("init", "init"),
     "formats": ("formats", "formats"),
     "paths": ("paths", "paths"),

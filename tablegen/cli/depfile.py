@@ -6,8 +6,8 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from tablegen.cli.common import fail, written
-from tablegen.cli.exit_status import ExitStatus
+from tablegen.cli.shared.common import fail, written
+from tablegen.cli.shared.exit_status import ExitStatus
 
 
 class Depfile:

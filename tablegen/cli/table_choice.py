@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
-from tablegen.cli.common import fail, quiet_blas, scan_argument
-from tablegen.cli.exit_status import ExitStatus
-from tablegen.cli.plot import PlottingCommand, check_plot, plot_option, put_plot
-from tablegen.cli.progress import Progress
-from tablegen.cli.terminal import tell
+from tablegen.cli.shared.common import fail, quiet_blas, scan_argument
+from tablegen.cli.shared.exit_status import ExitStatus
+from tablegen.cli.shared.plot import PlottingCommand, check_plot, plot_option, put_plot
+from tablegen.cli.shared.progress import Progress
+from tablegen.cli.shared.terminal import tell
 
 if TYPE_CHECKING:
     from tablegen.report.table_rows import AxisTables
@@ -64,9 +64,9 @@ def tables(scan: Path, axis: Literal["x", "y"] | None, plot: Path | None, as_jso
 
 def _found(scan: Path, axis: str | None) -> "tuple[str, list[AxisTables]]":
     quiet_blas()
+    from tablegen.base.input_errors import Problems, Rejected
     from tablegen.config.load import load
     from tablegen.planning.line_plan import make_plan
-    from tablegen.problems import Problems, Rejected
     from tablegen.report.table_rows import axis_tables
 
     try:

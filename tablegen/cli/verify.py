@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
-from tablegen.cli.common import OutputFile, OutputFolder, fail
-from tablegen.cli.exit_status import ExitStatus
-from tablegen.cli.progress import Progress
-from tablegen.cli.terminal import tell
+from tablegen.cli.shared.common import OutputFile, OutputFolder, fail
+from tablegen.cli.shared.exit_status import ExitStatus
+from tablegen.cli.shared.progress import Progress
+from tablegen.cli.shared.terminal import tell
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from tablegen.verification.build import Report
-    from tablegen.verification.checks import Check
+    from tablegen.verification.build_report import Report
+    from tablegen.verification.checks.played_checks import Check
 
 _FAILED = "FAILED"
 
@@ -217,8 +217,8 @@ def _terminated_as_interrupted() -> Iterator[None]:
 
 def _digest(folder: Path) -> str:
     """The SHA-256 of the manifest; empty where it cannot be read, which is reported elsewhere."""
+    from tablegen.base.reading import file_sha256
     from tablegen.manifest.format import MANIFEST
-    from tablegen.reading import file_sha256
 
     try:
         return file_sha256(folder / MANIFEST)

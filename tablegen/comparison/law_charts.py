@@ -5,6 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
+from tablegen.base.input_errors import Document, Problems, Unphysical
+from tablegen.charts.chart import POSITION, Chart, Mark
 from tablegen.comparison.operators import SIDES
 from tablegen.comparison.overlay import overlaid
 from tablegen.compensation.branches import WithBranches
@@ -12,11 +14,9 @@ from tablegen.compensation.frequency import frequency_gain
 from tablegen.compensation.line import LineShape, WantedLine
 from tablegen.compensation.offset import OffsetLaw
 from tablegen.config.scanner import Scanner, ScannerAxis
-from tablegen.driver import Driver
 from tablegen.numerics.arrays import Floats
+from tablegen.numerics.driver import Driver
 from tablegen.planning.drive import offset_surface, size_law_of
-from tablegen.problems import Document, Problems, Unphysical
-from tablegen.report.chart import POSITION, Chart, Mark
 
 _POINTS = 201
 _DECADES = (0.1, 10.0)  # about the rates at which the scanners were calibrated

@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
+from tablegen.base.input_errors import Problem, Rejected, Unphysical
+from tablegen.base.toml import read_toml
 from tablegen.certificate.certificate import broken_limits, certify
 from tablegen.comparison.operators import ComparedOperator
 from tablegen.comparison.quantity import ComparedQuantity
@@ -17,10 +19,8 @@ from tablegen.emit.formats import UnknownFormat
 from tablegen.emit.render import render
 from tablegen.manifest.format import MANIFEST
 from tablegen.planning.line_plan import make_plan
-from tablegen.problems import Problem, Rejected, Unphysical
 from tablegen.report.ranking import placed
 from tablegen.report.subject import PlannedScan, Subject, of_directory, of_scan
-from tablegen.toml import read_toml
 
 Kind = Literal["scan", "build", "scanner", "operator"]
 WORDS: dict[Kind, str] = {

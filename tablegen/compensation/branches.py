@@ -6,13 +6,13 @@ from typing import Annotated, Self
 
 from msgspec import Meta, field
 
+from tablegen.base.figures import at_least, at_most
+from tablegen.base.input_errors import Unphysical
+from tablegen.base.quantities import Normalised
 from tablegen.compensation.branch import Branch, residual_between
 from tablegen.compensation.line import AppliedBranch, LineShape, Sweep, WantedLine
 from tablegen.compensation.model import Hysteresis, Parameters
 from tablegen.compensation.points import beyond_driver, twice
-from tablegen.figures import at_least, at_most
-from tablegen.problems import Unphysical
-from tablegen.quantities import Normalised
 
 # A calibration serves turning points this far beyond the calibrated ones: the paper sees no major difference
 # between 0.5 and 0.7 except at large sizes, and 10 % to 25 % between 0.7 and 0.9.

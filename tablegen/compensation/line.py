@@ -13,13 +13,13 @@ from typing import Any, Self
 import numpy as np
 from msgspec import Struct
 
+from tablegen.base.input_errors import Document, Problems, Unphysical
 from tablegen.compensation.dynamics import Response
 from tablegen.compensation.expectation import Expectation
 from tablegen.compensation.transient import Transient
-from tablegen.driver import Driver
 from tablegen.numerics.arrays import Floats, FloatsLike
-from tablegen.problems import Document, Problems, Unphysical
-from tablegen.waveform.allowed_error import AllowedError
+from tablegen.numerics.driver import Driver
+from tablegen.waveform.error_allowance import AllowedError
 from tablegen.waveform.series import FourierSeries
 
 _GRID = 1025  # points on which a sweep is inverted first

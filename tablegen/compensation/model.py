@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 from msgspec import Struct
 
+from tablegen.base.reading import file_sha256
 from tablegen.compensation.line import LineShape, WantedLine
-from tablegen.reading import file_sha256
 
 if TYPE_CHECKING:
     from tablegen.compensation.operator.creep import LogarithmicCreep

@@ -9,9 +9,14 @@ from typing import Any
 from msgspec import Struct
 from msgspec.structs import replace
 
+from tablegen.base.figures import shown_path
+from tablegen.base.input_errors import Document, Problem, Problems, Rejected
+from tablegen.base.quantities import MAXIMUM_FILE_NAME
+from tablegen.base.toml import read_toml
 from tablegen.compensation.model import Parameters
 from tablegen.config.decode import decode, meant
 from tablegen.config.hardware import AxisHardware, Place, check_hardware, hardware_of
+from tablegen.config.image_keys import IMAGES, OFFSETS, RATES, SIZES, check_words, solved
 from tablegen.config.like import inherited, told_once
 from tablegen.config.names import why_not_a_name
 from tablegen.config.scanner import Offset, Resonance, Scanner
@@ -27,11 +32,6 @@ from tablegen.config.schema import (
     WrittenScan,
     WrittenTiming,
 )
-from tablegen.config.words import IMAGES, OFFSETS, RATES, SIZES, check_words, solved
-from tablegen.figures import shown_path
-from tablegen.problems import Document, Problem, Problems, Rejected
-from tablegen.quantities import MAXIMUM_FILE_NAME
-from tablegen.toml import read_toml
 
 _LIBRARY = "this file is a library of scans; `tablegen sweep` builds them, each into a directory of its own"
 

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
 
-from tablegen.quantities import FileName, Hertz, Micrometres, Nanometres, Normalised, PositiveVolts, Volts
+from tablegen.base.quantities import FileName, Hertz, Micrometres, Nanometres, Normalised, PositiveVolts, Volts
 
 # Short enough to leave room for what is appended; reserved words are refused beside it, see ``why_not_a_name``.
 MAXIMUM_NAME = 48
@@ -430,7 +430,7 @@ class WrittenScan(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
 
 
 class Scan(WrittenScan, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One scan as it is planned: ``config/words.py`` has solved what was written for sizes, lines and rates.
+    """One scan as it is planned: ``config/image_keys.py`` has solved what was written for sizes, lines and rates.
 
     Sizes stand at the axes, ``timing`` has line periods and a line rate, ``y`` its turn and its window.
     """

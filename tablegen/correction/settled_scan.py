@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from tablegen.base.input_errors import Document, Problems, Rejected, Unphysical
 from tablegen.compensation import models
 from tablegen.compensation.frequency import frequency_gain
 from tablegen.compensation.line import WantedLine
@@ -18,7 +19,6 @@ from tablegen.config.scanner import Scanner, ScannerAxis
 from tablegen.correction.distortion import Distortion, Sweep1D
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.drive import dynamics_of, offset_surface, outside_driver, size_law_of
-from tablegen.problems import Document, Problems, Rejected, Unphysical
 
 _COUNT = 8192  # drives of a period
 _HARMONICS = 512  # on which creep and dynamics act

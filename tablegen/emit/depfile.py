@@ -6,9 +6,9 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
+from tablegen.base.installation import records
+from tablegen.base.resources import PACKAGE
 from tablegen.emit.formats import chosen, own_names
-from tablegen.installation import records
-from tablegen.resources import PACKAGE
 
 
 def depfile(target: str, prerequisites: Iterable[Path]) -> bytes:

@@ -4,6 +4,7 @@ import re
 from collections.abc import Sequence
 from functools import cache
 
+from tablegen.base.resources import own_runtime_folders, resource_folder
 from tablegen.certificate.certificate import Certificate
 from tablegen.certificate.summary import summary
 from tablegen.config.names import of_the_runtime
@@ -14,7 +15,6 @@ from tablegen.manifest.format import MANIFEST, content_hash
 from tablegen.manifest.record import plan_record
 from tablegen.manifest.write import manifest_file
 from tablegen.planning.line_plan import LinePlan, Plan
-from tablegen.resources import own_runtime_folders, resource_folder
 from tablegen.version import __version__
 
 _FILE_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]*(\.[A-Za-z0-9]+)+")  # of plain files, which manifests can list

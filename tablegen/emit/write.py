@@ -8,10 +8,10 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from tablegen.emit.directory_lock import locked
+from tablegen.base.directory_lock import locked
+from tablegen.base.reading import BUILD_FILE, file_sha256, holds, other_than_file, read_bytes
+from tablegen.base.reading import MANIFEST as MANIFEST_KIND
 from tablegen.manifest.format import MANIFEST, read_json
-from tablegen.reading import BUILD_FILE, file_sha256, holds, other_than_file, read_bytes
-from tablegen.reading import MANIFEST as MANIFEST_KIND
 
 _STAGED = ".tablegen-"
 _MOST_THREADS = 64

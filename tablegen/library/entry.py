@@ -9,11 +9,11 @@ from typing import Any
 import msgspec
 from msgspec import Struct
 
+from tablegen.base.reading import BUILD_FILE, file_sha256, read_bytes
 from tablegen.device.widths import least_widths
 from tablegen.emit.content import AxisContent, Content
 from tablegen.library.whole import RECORD
 from tablegen.manifest.format import read_json
-from tablegen.reading import BUILD_FILE, file_sha256, read_bytes
 
 
 class AxisEntry(Struct, frozen=True, kw_only=True, omit_defaults=True):

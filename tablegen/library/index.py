@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from tablegen.base.reading import BUILD_FILE, read_bytes
 from tablegen.emit.formats import chosen
 from tablegen.emit.render import runtime_files
 from tablegen.library.c_index import c_index
@@ -15,7 +16,6 @@ from tablegen.library.sameness import why_not_one_c, why_not_one_sequencer
 from tablegen.library.verilog_index import verilog_index
 from tablegen.library.whole import INDEX
 from tablegen.manifest.format import read_json
-from tablegen.reading import BUILD_FILE, read_bytes
 from tablegen.version import __version__
 
 

@@ -11,12 +11,12 @@ from pathlib import Path
 
 import numpy as np
 
+from tablegen.base.reading import BUILD_FILE, read_bytes, read_text
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS
 from tablegen.emit.constants import DEGREES
 from tablegen.emit.formats.verilog import literal, value_range
 from tablegen.emit.templates import template_text
 from tablegen.library.entry import AxisEntry, Entry
-from tablegen.reading import BUILD_FILE, read_bytes, read_text
 
 MODULE = "dac_library.v"
 FOURIER = 1 << 31

@@ -5,8 +5,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from tablegen.base.reading import BUILD_FILE, read_bytes
 from tablegen.manifest.read import read_build
-from tablegen.reading import BUILD_FILE, read_bytes
 
 INDEX, RECORD = "library.json", "program.json"
 

@@ -22,13 +22,13 @@ from tablegen.link.messages import (
 from tablegen.link.outcome import ProgressCall, UploadResult, UploadState
 from tablegen.link.pace import LATENCY_S, Deadline
 from tablegen.link.readback import read_back
-from tablegen.link.reasons import Limits
+from tablegen.link.refusal_reasons import Limits
 from tablegen.link.session import LinkSession
 from tablegen.link.transport import Opener, Transport, byte_s, open_port
 from tablegen.link.upload import Uploader
 
 if TYPE_CHECKING:
-    from tablegen.link.image import ProgramImage
+    from tablegen.link.program_image import ProgramImage
 
 TIMEOUT_S = 5.0  # timeout of a request
 _UPLOAD_MARGIN_S = 15.0  # margin on top of the transfer time of an upload

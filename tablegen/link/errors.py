@@ -1,6 +1,6 @@
 """What can go wrong between a host and a device, each with what to do about it in its message."""
 
-from tablegen.installation import install_advice
+from tablegen.base.installation import install_advice
 
 
 class LinkError(Exception):

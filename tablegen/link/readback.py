@@ -7,12 +7,12 @@ from tablegen.link.exchange import Answer
 from tablegen.link.frames import MAXIMUM_FRAME
 from tablegen.link.messages import DATA_BYTES, DeviceInfo, Reason, Request
 from tablegen.link.pace import Deadline, back_off
-from tablegen.link.reasons import refused
+from tablegen.link.refusal_reasons import refused
 from tablegen.link.session import LinkSession, SessionEnded
 
 _REQUEST = struct.Struct("<IB")
 _OFFSET = struct.Struct("<I")
-_PROGRAM_BYTES = 192  # as tablegen.link.image has it, without numpy
+_PROGRAM_BYTES = 192  # as tablegen.link.program_image has it, without numpy
 _WORD_BYTES = 4  # at most, bytes per word
 _MAX_IN_VAIN = 8  # rounds of requests without one answer
 _MAX_RESTARTS = 4

@@ -17,7 +17,7 @@ from tablegen.link.messages import (
     Request,
 )
 from tablegen.link.pace import back_off
-from tablegen.link.reasons import keyless, refused
+from tablegen.link.refusal_reasons import keyless, refused
 from tablegen.link.transport import Opener, Transport
 
 HELLO_BYTES = DeviceInfo.LAYOUT.size + DeviceStatus.LAYOUT.size

@@ -12,11 +12,11 @@ from tablegen.link.flight import Flight, Sent
 from tablegen.link.messages import DATA_BYTES, NONCE_BYTES, DeviceStatus, Reason, Request, Upload
 from tablegen.link.outcome import ProgressCall, UploadResult, UploadState, out_of_time
 from tablegen.link.pace import Deadline
-from tablegen.link.reasons import Limits, refused
+from tablegen.link.refusal_reasons import Limits, refused
 from tablegen.link.session import LinkSession, SessionEnded
 
 if TYPE_CHECKING:
-    from tablegen.link.image import ProgramImage
+    from tablegen.link.program_image import ProgramImage
 
 _POLL_S = (0.03, 0.25)  # between two STATUS while a COMMIT is in progress: first, and at most
 _BUSY_S = 0.05
@@ -371,7 +371,7 @@ class Uploader:
     # Errors
 
     def _error(self, answer: Answer) -> Refused:
-        from tablegen.link.image import take_apart
+        from tablegen.link.program_image import take_apart
 
         info, contents = self._image.info, None
         with suppress(ValueError):  # an image that is none is refused for what it is

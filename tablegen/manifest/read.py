@@ -9,6 +9,9 @@ from typing import Any, Literal
 import msgspec
 from msgspec import Struct
 
+from tablegen.base.input_errors import shortened
+from tablegen.base.reading import MANIFEST as MANIFEST_KIND
+from tablegen.base.reading import other_than_file, read_bytes
 from tablegen.config.names import why_not_a_name
 from tablegen.config.schema import DEFAULT_FORMATS, MAXIMUM_SPLINE_BITS, MAXIMUM_SPLINE_LENGTH
 from tablegen.device.dual_program import DualProgram
@@ -18,9 +21,6 @@ from tablegen.fixedpoint.phase import RationalPhase
 from tablegen.fixedpoint.rounding import signed_limits
 from tablegen.manifest.fields import LEAST_V_PER_CODE, Manifest, ManifestAxis, ManifestSequence
 from tablegen.manifest.format import MANIFEST, content_hash, read_json
-from tablegen.problems import shortened
-from tablegen.reading import MANIFEST as MANIFEST_KIND
-from tablegen.reading import other_than_file, read_bytes
 
 
 class NotABuild(Exception):

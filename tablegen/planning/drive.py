@@ -7,6 +7,8 @@ from pathlib import Path
 from msgspec import Struct
 from msgspec.structs import replace
 
+from tablegen.base.figures import at_most
+from tablegen.base.input_errors import Problems, Unphysical
 from tablegen.compensation import models
 from tablegen.compensation.dynamics import Response, SecondOrder
 from tablegen.compensation.frequency import frequency_gain
@@ -18,12 +20,10 @@ from tablegen.compensation.size import SizeLaw
 from tablegen.config.load import Setup
 from tablegen.config.scanner import Offset, Resonance, ScannerAxis, Size
 from tablegen.config.schema import FastAxis, SlowAxis
-from tablegen.driver import Driver
-from tablegen.figures import at_most
 from tablegen.fixedpoint.converter import Converter
+from tablegen.numerics.driver import Driver
 from tablegen.planning.allowed_error import allowed_error
-from tablegen.problems import Problems, Unphysical
-from tablegen.waveform.allowed_error import AllowedError
+from tablegen.waveform.error_allowance import AllowedError
 
 # An axis at rest plays w = 1/2 throughout; gain and table refer to so small a share of v_max.
 RESTING_SHARE = 2.0**-24

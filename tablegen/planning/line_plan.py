@@ -7,13 +7,14 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
+from tablegen.base.figures import at_least
+from tablegen.base.input_errors import Problems
 from tablegen.compensation.dynamics import capped_inverse
 from tablegen.compensation.hold import hold_inverse
 from tablegen.config.load import Setup
 from tablegen.config.schema import DEFAULT_FORMATS, BandLimit, FastAxis, Limits, SlowAxis
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.schedule import Schedule
-from tablegen.figures import at_least
 from tablegen.fixedpoint.converter import Converter, make_output
 from tablegen.fixedpoint.phase import RationalPhase
 from tablegen.fixedpoint.program import Program
@@ -29,8 +30,7 @@ from tablegen.planning.shaping_choice import chosen_shaping
 from tablegen.planning.table_choice import TableChoice, asked_of, choose, possible_shapes, written_shape
 from tablegen.planning.table_maker import TableMaker
 from tablegen.planning.timing import make_schedule
-from tablegen.problems import Problems
-from tablegen.waveform.allowed_error import AllowedError
+from tablegen.waveform.error_allowance import AllowedError
 from tablegen.waveform.series import FourierSeries
 
 
@@ -265,7 +265,7 @@ def _gentle(
 ) -> tuple[FourierSeries, float | None]:
     """Least acceleration at the allowed error. Raises ``Unphysical`` with what would fit."""
     from tablegen.planning.enough_harmonics import straightness, with_remedies  # here: most lines do without the search
-    from tablegen.waveform.gentle_fit import Unreachable
+    from tablegen.waveform.minimum_acceleration import Unreachable
 
     assert drive.allowed is not None
     try:

@@ -6,14 +6,14 @@ All of it is decided in exact fractions: a window edge at 0.1 of the line is 1/1
 from fractions import Fraction
 from math import ceil, floor, gcd
 
+from tablegen.base.figures import at_least, at_most
+from tablegen.base.input_errors import Problems
 from tablegen.config.frame import exact, lines_inside
 from tablegen.config.load import Setup
 from tablegen.config.schema import FastAxis, Timing
 from tablegen.device.schedule import MAXIMUM_LINE_TICKS, Schedule, Window
-from tablegen.figures import at_least, at_most
 from tablegen.fixedpoint.phase import MAXIMUM_TICKS
 from tablegen.planning.windows import line_windows
-from tablegen.problems import Problems
 
 
 def make_schedule(setup: Setup, problems: Problems) -> Schedule | None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from tablegen.calibration.table import Source
+from tablegen.base.data_files import Source
 from tablegen.refinement.image_round import ImageRound, MismatchRound
 from tablegen.refinement.round import Round, TraceRound
 

@@ -6,15 +6,15 @@ from typing import Literal
 
 import numpy as np
 
-from tablegen.calibration.estimate import Estimate, LineSize
-from tablegen.calibration.image_checks import check_size
-from tablegen.calibration.image_scale import size_of_line
-from tablegen.calibration.image_sizes import KnownSample
+from tablegen.base.input_errors import Unphysical
+from tablegen.base.warnings import Remark, spoils
+from tablegen.calibration.laws.image_sizes import KnownSample
 from tablegen.config.load import Setup
-from tablegen.findings import Remark, spoils
+from tablegen.fitting.estimate import Estimate, LineSize
+from tablegen.images.line_length import size_of_line
+from tablegen.images.pair_checks import check_size
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, Plan, make_plan
-from tablegen.problems import Unphysical
 from tablegen.refinement.lattice_line import ImageOptions, LatticeLine, lattice_line
 from tablegen.refinement.learning import Lesson, learn
 from tablegen.refinement.registration import SweepMismatch, mismatch

@@ -7,13 +7,13 @@ import msgspec
 import numpy as np
 from msgspec.structs import replace
 
+from tablegen.base.input_errors import Unphysical
+from tablegen.base.warnings import Remark, spoils
 from tablegen.config.load import Setup
 from tablegen.config.schema import Refinement
-from tablegen.findings import Remark, spoils
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, make_plan
 from tablegen.planning.refinement_layer import model_digest
-from tablegen.problems import Unphysical
 from tablegen.refinement.bound import Bound, bound
 from tablegen.refinement.displacement import Displacement, fit_displacement
 from tablegen.refinement.learning import DEFAULT_GAIN, DEFAULT_HARMONICS, Lesson, learn

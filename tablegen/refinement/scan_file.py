@@ -8,8 +8,8 @@ from typing import Any
 import tomlkit
 from tomlkit.items import Array, InlineTable, Table
 
-from tablegen.problems import Problem, Rejected
-from tablegen.toml import parse_toml
+from tablegen.base.input_errors import Problem, Rejected
+from tablegen.base.toml import parse_toml
 
 KEY = "refinement"
 _COEFFICIENTS_PER_ROW = 6

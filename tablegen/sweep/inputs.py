@@ -7,9 +7,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from tablegen.base.reading import file_sha256
 from tablegen.config.load import Setup
 from tablegen.emit.depfile import deciding_files
-from tablegen.reading import file_sha256
 
 
 class Inputs:

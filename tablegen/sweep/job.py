@@ -6,14 +6,14 @@ from pathlib import Path
 from typing import Any
 
 from tablegen.api.build import Build, build
+from tablegen.base.interruption import ENDINGS, held
+from tablegen.base.reading import holds
 from tablegen.config.load import Setup
 from tablegen.emit.render import plan_content
 from tablegen.emit.write import outdated_files, write_files
-from tablegen.interruption import ENDINGS, held
 from tablegen.library.entry import Entry, entry_file, make_entry
 from tablegen.library.whole import RECORD
 from tablegen.manifest.format import read_json
-from tablegen.reading import holds
 
 
 @dataclass(frozen=True)

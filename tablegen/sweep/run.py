@@ -7,17 +7,17 @@ from pathlib import Path
 from typing import Any, Literal
 
 from tablegen.api.build import BrokenLimit
-from tablegen.api.workers import results
+from tablegen.base.input_errors import Problem, Rejected
+from tablegen.base.interruption import ENDINGS, held
+from tablegen.base.reading import file_sha256, holds
+from tablegen.base.workers import results
 from tablegen.config.schema import DEFAULT_FORMATS
 from tablegen.config.variants import Variant
 from tablegen.emit.formats import UnknownFormat
 from tablegen.emit.write import CannotWrite, write_files
-from tablegen.interruption import ENDINGS, held
 from tablegen.library.entry import Entry, changed_files, is_whole, read_entry
 from tablegen.library.index import listed_files, make_index
 from tablegen.library.whole import INDEX, RECORD
-from tablegen.problems import Problem, Rejected
-from tablegen.reading import file_sha256, holds
 from tablegen.sweep.inputs import Inputs
 from tablegen.sweep.job import Doubtful, Job, Made, make
 

@@ -8,7 +8,7 @@ from typing import Literal
 
 from tablegen.library.whole import whole_build
 from tablegen.manifest.read import read_build
-from tablegen.verification.build import Report, Target, verify_build
+from tablegen.verification.build_report import Report, Target, verify_build
 from tablegen.verification.files_target import FilesTarget
 
 TargetName = Literal["verilog", "c", "cortex-m", "files"]
@@ -50,7 +50,7 @@ def default_target(folder: Path) -> TargetName:
 
 def rendering_clocks(folder: Path, axis: Literal["pipelined", "blocks", "serial"]) -> int:
     """Clocks in which the Verilog of a build renders its tables once. Raises ``NotABuild``."""
-    from tablegen.verification.placement import Placement
+    from tablegen.verification.play.placement import Placement
 
     stored, placement = read_build(folder), Placement(axis, fourier=True)
     tables = [
@@ -72,11 +72,11 @@ def _target(
     if name == "files":
         return FilesTarget(), DEFAULT_TICKS[name]
     if name != "verilog":
-        from tablegen.verification.c_target import CTarget
+        from tablegen.verification.c.target import CTarget
 
         return CTarget(name, fourier), DEFAULT_TICKS[name]
-    from tablegen.verification.placement import Placement
-    from tablegen.verification.verilog_target import VerilogTarget
+    from tablegen.verification.play.placement import Placement
+    from tablegen.verification.verilog.target import VerilogTarget
 
     placement = Placement(axis, fourier)
     apart = simulator == "icarus" and axis == "pipelined" and not fourier and as_usual

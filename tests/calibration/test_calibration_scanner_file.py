@@ -10,11 +10,11 @@ from editing import SCANNER
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tablegen.base.data_files import Source
+from tablegen.base.input_errors import Rejected
 from tablegen.calibration import summary
-from tablegen.calibration.offset import fit_offset
+from tablegen.calibration.laws.offset import fit_offset
 from tablegen.calibration.scanner_file import Change, new_file, updated
-from tablegen.calibration.table import Source
-from tablegen.problems import Rejected
 
 HASH = "0123456789abcdef"
 BRANCH = {"beta_max": 0.04, "rho": 3.0, "u_peak": 0.4}

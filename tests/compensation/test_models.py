@@ -13,6 +13,7 @@ from building import HELPERS
 from editing import SCAN, SCANNER, edited, run
 
 import tablegen
+from tablegen.base.input_errors import Rejected, Unphysical
 from tablegen.compensation import models
 from tablegen.compensation.line import AppliedBranch, LineShape, Sweep, WholeLine
 from tablegen.compensation.models.harmonic import HarmonicModel
@@ -23,7 +24,6 @@ from tablegen.config.load import load
 from tablegen.manifest.read import read_build
 from tablegen.planning.line_plan import make_plan
 from tablegen.planning.refinement_layer import model_digest
-from tablegen.problems import Rejected, Unphysical
 from tablegen.virtual.simulation import models_of, with_model
 from tablegen.waveform.closed_form import fourier_series
 from tablegen.waveform.series import FourierSeries
@@ -73,13 +73,13 @@ def test_names_stand_with_the_models() -> None:
 
 # What says the equations once more does so on purpose; what is compared are operators, in files of their own.
 OTHER_NAMES = {
-    *("verification/scaling.py", "compensation/models/__init__.py"),
+    *("verification/checks/scaling.py", "compensation/models/__init__.py"),
     *("comparison/side.py", "comparison/operators.py"),
 }
 # Bouc-Wen's equation has a gamma of its own, which is none of (17).
 ANOTHER_GAMMA = {
     *("compensation/operator/bouc_wen.py", "compensation/operator/file.py"),
-    *("calibration/operator/bouc_wen_fit.py", "calibration/operator/record.py"),
+    *("calibration/operator/bouc_wen_fit.py", "calibration/operator/file_of_fit.py"),
 }
 
 
@@ -95,7 +95,7 @@ def test_names_and_parameters_of_models_stand_in_no_other_module() -> None:
                 if called in {"xi", "xi_gamma"} or (called == "gamma" and where not in ANOTHER_GAMMA):
                     parameters.add(where)
     assert names == OTHER_NAMES | {f"compensation/models/{name}.py" for name in models.names()}
-    assert parameters == {"compensation/hysteresis.py", "verification/scaling.py"}
+    assert parameters == {"compensation/hysteresis.py", "verification/checks/scaling.py"}
 
 
 def test_a_foreign_model_makes_a_line_that_is_straight_on_it(pair: Path) -> None:

@@ -10,7 +10,8 @@ from foreign_plants import ForeignPlant, ManyPlays, triangle
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tablegen.calibration.size import fit_size
+from tablegen.base.input_errors import Rejected
+from tablegen.calibration.laws.size import fit_size
 from tablegen.compensation.line import WantedLine
 from tablegen.compensation.models.harmonic import HarmonicModel
 from tablegen.compensation.offset import OffsetLaw
@@ -19,7 +20,6 @@ from tablegen.compensation.size import SizeLaw
 from tablegen.config.load import load
 from tablegen.planning.drive import Drive
 from tablegen.planning.line_plan import make_plan
-from tablegen.problems import Rejected
 
 ends = st.tuples(st.floats(0.8, 1.0), st.floats(1.0, 1.4))
 SIZES = "x.offset.sizes = [{ size_v = 40, m_minus = 0.9, m_plus = 1.3 }, { size_v = 10, m_minus = 0.94, m_plus = 1.2 }]"

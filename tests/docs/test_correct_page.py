@@ -12,9 +12,9 @@ from correcting import Off, axes
 from correcting import off as off_the_truth
 from editing import run
 
-from tablegen.calibration.image_files import read_channels
-from tablegen.cli.correct import correct
+from tablegen.cli.images.correct import correct
 from tablegen.correction.job import Choice, OldAxis, OldScan, by_fit, by_scanner, read_scan
+from tablegen.images.files import read_channels
 from tablegen.virtual.imaging import Conditions, FrameImages, hexagonal, triangle_frame
 
 PAGE = (REPOSITORY / "docs" / "correct.md").read_text("utf-8")

@@ -9,7 +9,7 @@ from client_line import VirtualLine
 from client_rig import client, info_for, model
 from editing import run
 
-from tablegen.cli.exit_status import ExitStatus
+from tablegen.cli.shared.exit_status import ExitStatus
 from tablegen.config.load import load
 from tablegen.link.messages import Request
 from tablegen.link.prepare import PreparedScan

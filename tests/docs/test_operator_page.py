@@ -10,6 +10,7 @@ import pytest
 from building import EXAMPLE, REPOSITORY
 from click.testing import CliRunner
 
+from tablegen.base.reading import CONFIGURATION
 from tablegen.calibration.operator import branches, fit, periodic_line, plays_fit
 from tablegen.cli import cli
 from tablegen.compensation.models.operator import CENTRE_REACH, STROKE_REACH
@@ -17,7 +18,6 @@ from tablegen.compensation.operator import operator as operators
 from tablegen.compensation.operator.file import OperatorFile, read_operator
 from tablegen.config.load import load
 from tablegen.planning.line_plan import make_plan
-from tablegen.reading import CONFIGURATION
 from tablegen.virtual.paper import default_x
 from tablegen.virtual.simulation import run_line
 

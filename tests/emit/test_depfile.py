@@ -11,9 +11,9 @@ from editing import SCAN, SCANNER, edited, run, write_pair
 from installing import python
 
 from tablegen.api import build as module
+from tablegen.base.resources import resource_folder
 from tablegen.config.schema import DEFAULT_FORMATS
 from tablegen.emit.depfile import deciding_files, depfile
-from tablegen.resources import resource_folder
 
 # What a file may have in its name and make can take.
 NAMES = [

@@ -27,11 +27,11 @@ from c_threads import play as play_threads
 from limits import ENDED, program_within, within
 from mutants import Verdict
 
-from tablegen.resources import c_runtime
-from tablegen.verification.bench import SequencerShape
-from tablegen.verification.c_bench import CBench, defines
+from tablegen.base.resources import c_runtime
+from tablegen.verification.c.bench import CBench, defines
 from tablegen.verification.failures import SimulationFailed
-from tablegen.verification.stream import Script, compare
+from tablegen.verification.play.sequencer_shape import SequencerShape
+from tablegen.verification.play.stream import Script, compare
 
 HERE = Path(__file__).parent
 OPTIONS = ("-std=c99", "-O1", "-DDAC_WAIT=0")  # as many runs as can be

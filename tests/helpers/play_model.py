@@ -7,11 +7,11 @@ from typing import Annotated, ClassVar
 import numpy as np
 from msgspec import Meta
 
+from tablegen.base.input_errors import Unphysical
+from tablegen.base.quantities import FileName
+from tablegen.base.reading import RESPONSE, read_text
 from tablegen.compensation.line import WantedLine, WholeLine
 from tablegen.compensation.model import Hysteresis
-from tablegen.problems import Unphysical
-from tablegen.quantities import FileName
-from tablegen.reading import RESPONSE, read_text
 from tablegen.waveform.series import FourierSeries
 from tablegen.waveform.window_fit import fit_window
 

@@ -20,7 +20,7 @@ from installing import write_command
 from sets import common
 
 from tablegen import __version__
-from tablegen.resources import c_link, c_runtime
+from tablegen.base.resources import c_link, c_runtime
 
 pytestmark = pytest.mark.common
 

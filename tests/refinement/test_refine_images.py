@@ -20,8 +20,8 @@ from refining import (
 )
 from replacing import replace
 
+from tablegen.base.input_errors import Unphysical
 from tablegen.config.load import Setup
-from tablegen.problems import Unphysical
 from tablegen.refinement.departure import Departure
 from tablegen.refinement.image_round import refine_images, refine_mismatch
 from tablegen.refinement.lattice_line import ImageOptions

@@ -15,7 +15,7 @@ from libraries import BASE, NAMES, write_library
 from limits import PATIENCE_S
 
 import tablegen
-from tablegen.cli.bar import Bar
+from tablegen.cli.shared.progress_bar import Bar
 
 
 def index_of(out: Path) -> dict[str, list[dict[str, object]]]:
@@ -296,7 +296,7 @@ def test_progress_has_a_fraction() -> None:
     bar._shows = True
     shown: list[str] = []
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("tablegen.cli.bar.redraw", shown.append)
+        patch.setattr("tablegen.cli.shared.progress_bar.redraw", shown.append)
         bar(0, 40)
         bar(10, 40)
     assert "[......" in shown[0]

@@ -21,8 +21,8 @@ from tablegen.fixedpoint.phase import RationalPhase
 from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.shaping import MAXIMUM_ZERO, Shaping
 from tablegen.manifest.read import NotABuild, read_build
-from tablegen.verification.certificate_checks import check_certificates
-from tablegen.verification.shaped import shaped_codes
+from tablegen.verification.checks.certificate_checks import check_certificates
+from tablegen.verification.checks.shaped import shaped_codes
 
 SECOND_ORDER = {"frequency_hz": 1000.0, "quality": 10.0}
 SHORT = {"timing.lines": 8, "x.size_nm": 20.0, "y.size_nm": 20.0}

@@ -445,7 +445,7 @@ def test_what_is_simulated_is_kept_on_request(short: Build, tmp_path: Path) -> N
 @pytest.mark.common
 def test_memories_are_what_a_build_writes(short: Build) -> None:
     """The reader of memory files against their writer, signed words included."""
-    from tablegen.verification.directory import memory_words
+    from tablegen.verification.checks.directory import memory_words
 
     words = short.plan.x.program.words
     read = memory_words(short.folder / f"{NAME}_x.mem", len(words))

@@ -40,17 +40,17 @@ from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.shaping import Shaping
 from tablegen.manifest.read import StoredBuild, read_build
-from tablegen.verification.bench import SequencerShape
-from tablegen.verification.c_bench import CBench, script_words
-from tablegen.verification.c_program import c_program
-from tablegen.verification.capture import make_capture
-from tablegen.verification.checks import check_states
-from tablegen.verification.converter_words import codes_of, packed
+from tablegen.verification.c.bench import CBench, script_words
+from tablegen.verification.c.program import c_program
+from tablegen.verification.checks.played_checks import check_states
 from tablegen.verification.failures import SimulationFailed
-from tablegen.verification.placement import Placement
-from tablegen.verification.session import make_session
-from tablegen.verification.stream import Script, read_states
-from tablegen.verification.variation import variation
+from tablegen.verification.play.capture import make_capture
+from tablegen.verification.play.converter_words import codes_of, packed
+from tablegen.verification.play.placement import Placement
+from tablegen.verification.play.sequencer_shape import SequencerShape
+from tablegen.verification.play.session import make_session
+from tablegen.verification.play.stream import Script, read_states
+from tablegen.verification.play.variation import variation
 from tablegen.version import __version__
 
 CAPITAL = NAME.upper()

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from tablegen.calibration.hysteresis import Trace
+from tablegen.base.input_errors import Unphysical
+from tablegen.calibration.laws.hysteresis import Trace
 from tablegen.numerics.arrays import Floats
-from tablegen.problems import Unphysical
 
 _MOST_AT_REST = 0.04  # of a record at its largest or least value: coarse steps of a sine's turn are 0.03
 _FEW = 4  # samples at a turn that may be the same, where there are few of a period

@@ -8,6 +8,9 @@ from typing import Annotated, ClassVar
 import numpy as np
 from msgspec import Meta, structs
 
+from tablegen.base.figures import shown_path
+from tablegen.base.input_errors import Rejected, Unphysical
+from tablegen.base.quantities import FileName
 from tablegen.compensation.branches import WithBranches
 from tablegen.compensation.dynamics import capped_inverse
 from tablegen.compensation.expectation import Expectation, Figure
@@ -15,18 +18,15 @@ from tablegen.compensation.hysteresis import BranchShape
 from tablegen.compensation.line import LineShape, WantedLine, WholeLine
 from tablegen.compensation.operator.creep import LogarithmicCreep
 from tablegen.compensation.operator.file import read_operator
-from tablegen.compensation.operator.gentle_line import Gentle, gentlest_waveform
 from tablegen.compensation.operator.loop import Loop
+from tablegen.compensation.operator.minimum_acceleration_line import Gentle, gentlest_waveform
 from tablegen.compensation.operator.operator import Operator
 from tablegen.compensation.operator.scan_line import Expected, Found, Wanted, find_waveform
 from tablegen.compensation.operator.transient import after_offset, after_size
 from tablegen.compensation.operator.uncertainty import departures, of_formulas, of_places
 from tablegen.compensation.transient import Transient
-from tablegen.driver import Driver
-from tablegen.figures import shown_path
 from tablegen.numerics.arrays import Floats
-from tablegen.problems import Rejected, Unphysical
-from tablegen.quantities import FileName
+from tablegen.numerics.driver import Driver
 from tablegen.waveform.series import FourierSeries
 from tablegen.waveform.window_fit import fit_window
 

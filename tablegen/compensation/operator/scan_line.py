@@ -11,12 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tablegen.base.input_errors import Unphysical
 from tablegen.compensation.operator.loop import POINTS, Loop
 from tablegen.compensation.operator.operator import Operator
 from tablegen.numerics.arrays import Bools, Floats, tree_sum
 from tablegen.numerics.linear import Cholesky
 from tablegen.numerics.turns import sine_and_cosine
-from tablegen.problems import Unphysical
 from tablegen.waveform.series import FourierSeries
 
 CHORD = 0.05  # of the line, for scaling errors

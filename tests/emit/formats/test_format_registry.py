@@ -8,11 +8,11 @@ import pytest
 from building import NAME
 from editing import SCAN, edited, run, write_pair
 
+from tablegen.base.resources import resource_folder
 from tablegen.emit import formats
 from tablegen.emit.depfile import deciding_files
 from tablegen.emit.format import Format
 from tablegen.emit.formats import UnknownFormat, chosen, get, names, own_names
-from tablegen.resources import resource_folder
 
 WORKING = """
 from tablegen.emit.format import Format
@@ -300,7 +300,7 @@ def test_a_format_of_others_may_bring_the_sequencer_itself(tmp_path: Path, monke
     bringing = (
         WORKING.replace("FILE", "'scan.count'")
         + """
-from tablegen.resources import c_runtime
+from tablegen.base.resources import c_runtime
 type(FORMAT).runtime = lambda self: c_runtime()
 """
     )
