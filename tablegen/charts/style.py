@@ -1,6 +1,6 @@
 """How a picture looks: colours that all eyes tell apart, line styles that need no colour, and shades of images.
 
-Colours are for a white page; page.css has those of the page, which may be dark.
+Colours are for a white page; report/page.css has those of the page, which may be dark.
 """
 
 from dataclasses import dataclass

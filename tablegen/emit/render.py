@@ -4,9 +4,11 @@ import re
 from collections.abc import Sequence
 from functools import cache
 
+from tablegen.base.input_errors import Problem, Rejected, Unphysical
 from tablegen.base.resources import own_runtime_folders, resource_folder
 from tablegen.certificate.certificate import Certificate
 from tablegen.certificate.summary import summary
+from tablegen.config.load import Setup
 from tablegen.config.names import of_the_runtime
 from tablegen.emit.content import AxisContent, Content
 from tablegen.emit.format import Format
@@ -46,6 +48,46 @@ def render(plan: Plan, certificates: dict[str, Certificate], formats: Sequence[s
                 raise UnknownFormat(f"{each.name!r} writes {name}, and so does another format, with other content")
     files[MANIFEST] = manifest_file(record, digest, [each.name for each in wanted], certificates, files)
     return files
+
+
+def render_scan(
+    setup: Setup,
+    plan: Plan,
+    certificates: dict[str, Certificate],
+    formats: Sequence[str] | None = None,
+    *,
+    given: bool = False,
+) -> dict[str, bytes]:
+    """Render a planned scan, with a fault of a format at its key of the scan file.
+
+    Parameters
+    ----------
+    setup, plan, certificates
+        The scan as it was planned and certified.
+    formats
+        Names of formats; those of the plan unless given.
+    given
+        The formats stand beside the scan file, as those of ``--format`` do: a fault has no place in it.
+
+    Returns
+    -------
+    dict
+        Content by file name, the manifest last.
+
+    Raises
+    ------
+    Rejected
+        For an unknown format, and for a scan that a format cannot hold.
+    """
+    try:
+        return render(plan, certificates, formats)
+    except (UnknownFormat, Unphysical) as error:
+        raise format_rejected(setup, str(error), given=given) from None
+
+
+def format_rejected(setup: Setup, why: str, *, given: bool) -> Rejected:
+    """Return the rejection of a format, at ``emit.formats`` or, for formats that were ``given``, without a place."""
+    return Rejected([Problem("formats", 0, "", why) if given else setup.scan_file.problem("emit.formats", why)])
 
 
 def plan_content(plan: Plan, certificates: dict[str, Certificate], digest: str) -> Content:
