@@ -42,7 +42,7 @@ from tablegen.config.scanner import Scanner
 from tablegen.emit.write import write_files
 from tablegen.fitting.estimate import Estimate, Fit
 from tablegen.numerics.driver import Driver
-from tablegen.planning.drive import size_law_of
+from tablegen.planning.laws import size_law_of
 
 Kind = Literal["size", "offset", "hysteresis", "frequency", "resonance"]
 _COLUMNS = {

@@ -19,7 +19,7 @@ from tablegen.correction.straight import ScanPicture, StraightScan, put_straight
 from tablegen.images.files import ScanImage, channels_of, read_channels, read_image
 from tablegen.images.pair_checks import check_heights, check_pair, check_size
 from tablegen.numerics.arrays import Floats
-from tablegen.planning.drive import size_law_of
+from tablegen.planning.laws import size_law_of
 from tablegen.planning.line_plan import LinePlan, make_plan
 
 _ALIKE = 0.3  # of the contrast: trace and retrace that differ by less are what they are said to be

@@ -22,7 +22,8 @@ from tablegen.fixedpoint.table_shape import MOST_LENGTH, TableShape
 from tablegen.numerics.arrays import Floats
 from tablegen.numerics.driver import Driver
 from tablegen.planning.allowed_error import MOST_HARMONICS, chosen_by_build
-from tablegen.planning.drive import Drive, outside_driver
+from tablegen.planning.drive import Drive
+from tablegen.planning.laws import outside_driver
 from tablegen.planning.table_maker import StoredWave, TableMaker
 from tablegen.waveform.series import FourierSeries
 

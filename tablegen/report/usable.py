@@ -9,7 +9,7 @@ from tablegen.compensation.models.operator import OperatorLine
 from tablegen.compensation.offset import OffsetLaw
 from tablegen.compensation.offset_sizes import OffsetSurface
 from tablegen.numerics.arrays import Floats
-from tablegen.planning.drive import offset_surface
+from tablegen.planning.laws import offset_surface
 from tablegen.planning.line_plan import LinePlan
 from tablegen.report.blocks import Charts, Paragraph, Section
 from tablegen.report.subject import PlannedScan

@@ -191,7 +191,7 @@ def in_file(common: Common, kind: str, key: str) -> float | None:
 def size_law(common: Common, driver: "Driver", source: str) -> "SizeLaw":
     """The size law of the scanner file, for ``source`` of scan voltages; the rest of the file may be incomplete."""
     from tablegen.base.input_errors import Unphysical
-    from tablegen.planning.drive import size_law_of
+    from tablegen.planning.laws import size_law_of
 
     path = f"{common.axis}.size"
     if in_file(common, "size", "k_nm_per_v") is None:
@@ -220,7 +220,7 @@ def scanner_axis(common: Common, driver: "Driver") -> "tuple[Response | None, Of
     from tablegen.base.input_errors import Unphysical
     from tablegen.compensation.offset import OffsetLaw
     from tablegen.compensation.size import SizeLaw
-    from tablegen.planning.drive import dynamics_of, offset_surface, size_law_of
+    from tablegen.planning.laws import dynamics_of, offset_surface, size_law_of
 
     if common.scanner is None or not common.scanner.exists():
         return None, OffsetLaw()
