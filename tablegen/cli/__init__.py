@@ -25,7 +25,7 @@ _COMMANDS = {
     "sweep": ("sweep", "sweep"),
     "check": ("check", "check"),
     "show": ("show", "show"),
-    "tables": ("table_choice", "tables"),
+    "tables": ("tables", "tables"),
     "report": ("report", "report"),
     "compare": ("compare", "compare"),
     "calibrate": ("calibrate.group", "calibrate"),

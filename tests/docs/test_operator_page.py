@@ -9,6 +9,7 @@ import msgspec.inspect as types
 import pytest
 from building import EXAMPLE, REPOSITORY
 from click.testing import CliRunner
+from paper.printed_numbers import default_x
 
 from tablegen.base.reading import CONFIGURATION
 from tablegen.calibration.operator import branches, fit, periodic_line, plays_fit
@@ -18,7 +19,6 @@ from tablegen.compensation.operator import operator as operators
 from tablegen.compensation.operator.file import OperatorFile, read_operator
 from tablegen.config.load import load
 from tablegen.planning.line_plan import make_plan
-from tablegen.virtual.paper import default_x
 from tablegen.virtual.simulation import run_line
 
 PAGE = (REPOSITORY / "docs" / "operator.md").read_text("utf-8")

@@ -1,6 +1,6 @@
 """Find the parameters of the virtual scanner with a Duhem operator from the numbers that the paper prints.
 
-    python -m tablegen.virtual.identify_duhem > tablegen/virtual/duhem.toml
+    PYTHONPATH=docs python -m paper.identify_duhem > tablegen/virtual/duhem.toml
 
 With the rates given, displacement is linear in the coefficients, so that the least squares of ``identify`` serves. The
 rates are those of the smallest error that a random search found among operators of which no branch can run backwards.
@@ -14,10 +14,7 @@ from itertools import product
 
 import numpy as np
 
-from tablegen.numerics.arrays import Floats
-from tablegen.virtual.creep import logarithmic_creep
-from tablegen.virtual.duhem import Duhem, Lag
-from tablegen.virtual.identify import (
+from paper.identify import (
     FASTEST_S,
     HALF,
     LOSS,
@@ -31,6 +28,9 @@ from tablegen.virtual.identify import (
     Targets,
     row_text,
 )
+from tablegen.numerics.arrays import Floats
+from tablegen.virtual.creep import logarithmic_creep
+from tablegen.virtual.duhem import Duhem, Lag
 
 REVERSIBLE, LAG = 4, 4  # degrees of the polynomials
 RATES = ((7.0, 7.0), (18.0, 2.0))  # rise and fall of each lag, per full drive
@@ -136,7 +136,7 @@ def duhem_text() -> str:
     """The file of the scanner."""
     head = f"""\
 # A virtual scanner with a Duhem operator: a simulation, identified from the numbers that the paper prints.
-# docs/virtual.md says where each comes from; tablegen/virtual/identify_duhem.py makes this file.
+# docs/virtual.md says where each comes from; docs/paper/identify_duhem.py makes this file.
 name = "virtual, Duhem"
 identified_on = "numbers that the paper prints"
 v_max = {V_MAX:g}

@@ -2,7 +2,7 @@
 
 import msgspec
 
-from tablegen.virtual.identify import X_TARGETS, identify
+from paper.identify import X_TARGETS, identify
 from tablegen.virtual.parameters import HysteresisTruth, Truth
 
 

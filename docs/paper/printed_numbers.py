@@ -1,19 +1,19 @@
 """The numbers that the paper prints of its scanner, beside those of the virtual scanners of the package.
 
-python -m tablegen.virtual.paper     prints the table of docs/virtual.md
+PYTHONPATH=docs python -m paper.printed_numbers     prints the table of docs/virtual.md
 """
 
 from collections.abc import Iterator
 
 import numpy as np
 
+from paper.identify import OFFSETS_V, X_TARGETS
 from tablegen.compensation.hysteresis import BranchShape, beta_at
 from tablegen.compensation.line import LineShape
 from tablegen.compensation.models.harmonic import HarmonicModel
 from tablegen.compensation.models.sinusoidal import SinusoidalModel
 from tablegen.numerics.arrays import Floats
 from tablegen.virtual.experiments import apparent_sizes, triangle_size
-from tablegen.virtual.identify import OFFSETS_V, X_TARGETS
 from tablegen.virtual.line_error import BranchError, LineError, ideal_triangle, line_error
 from tablegen.virtual.parameters import BUILT_IN, load_truth
 from tablegen.virtual.scanner import VirtualAxis, VirtualScanner

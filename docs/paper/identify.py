@@ -1,6 +1,6 @@
 """Find the parameters of the default virtual scanner from the numbers that the paper prints.
 
-    python -m tablegen.virtual.identify > tablegen/virtual/default.toml
+    PYTHONPATH=docs python -m paper.identify > tablegen/virtual/default.toml
 
 Displacement is linear in the coefficients of the hysteresis, creep included, so that one least squares with
 coefficients >= 0 fits them to sizes and shapes of triangles at once. What the offset does beyond that is the
@@ -210,7 +210,7 @@ quality = 20
 def default_text() -> str:
     """The file of the default scanner."""
     head = f"""# The default virtual scanner: a simulation, identified from the numbers that the paper prints.
-# docs/virtual.md says where each comes from; tablegen/virtual/identify.py makes this file.
+# docs/virtual.md says where each comes from; docs/paper/identify.py makes this file.
 name = "virtual"
 identified_on = "numbers that the paper prints"
 v_max = {V_MAX:g}
