@@ -190,7 +190,7 @@ def compensate(
         allowed=allowed,
     )
 
-    shape = hysteresis.line(wanted)
+    shape = models.line_of(hysteresis, wanted)
     if len(problems.found) > before or shape is None or size_law is None:
         return None
     return Drive(
@@ -233,7 +233,7 @@ def _factor_at(law: OffsetLaw, driver: Driver, share: float) -> float:
 
 def _line_at(hysteresis: Hysteresis, wanted: WantedLine, v: float) -> LineShape | None:
     apart = Problems()
-    made = hysteresis.line(replace(wanted, v=v, problems=apart))
+    made = models.line_of(hysteresis, replace(wanted, v=v, problems=apart))
     return None if apart.found else made
 
 

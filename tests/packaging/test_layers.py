@@ -13,7 +13,7 @@ import tablegen
 PACKAGE = Path(tablegen.__file__).parent
 # From the lowest to the highest; a module imports from its own layer and from those before it.
 LAYERS = (
-    "version findings problems interruption reading resources installation figures quantities toml user_cache",
+    "version findings problems interruption reading resources installation figures quantities toml user_cache plugins",
     "numerics driver",
     "waveform",
     "compensation",
