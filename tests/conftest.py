@@ -21,6 +21,14 @@ if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
 
 
 @pytest.fixture(scope="session", autouse=True)
+def tracebacks() -> Iterator[None]:
+    """What a command that a test starts does not expect is seen whole."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("TABLEGEN_TRACEBACK", "1")
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
 def cache_of_the_session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """No test finds or leaves anything in the user's cache."""
     with pytest.MonkeyPatch.context() as patch:

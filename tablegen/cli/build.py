@@ -102,8 +102,9 @@ def build(
     try:
         built = planned(scan, list(formats) or None, strict)
         files = rendered(built)
-    except KeyboardInterrupt:
-        fail([f"interrupted; {output} was left as it was"], ExitStatus.INTERRUPTED)
+    except KeyboardInterrupt as interruption:
+        where = f" {interruption}".rstrip()  # that of a plug-in says so
+        fail([f"interrupted{where}; {output} was left as it was"], ExitStatus.INTERRUPTED)
     if only_check:
         from tablegen.cli.shared.directory_difference import differences
 

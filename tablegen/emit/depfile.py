@@ -8,7 +8,7 @@ from pathlib import Path
 
 from tablegen.base.installation import records
 from tablegen.base.resources import PACKAGE
-from tablegen.emit.formats import chosen, own_names
+from tablegen.emit.formats import chosen, failing_as_format, own_names
 
 
 def depfile(target: str, prerequisites: Iterable[Path]) -> bytes:
@@ -48,5 +48,6 @@ def deciding_files(formats: Iterable[str]) -> list[Path]:
     others.add(PACKAGE / "firmware_templates")
     modules = {path for path in PACKAGE.rglob("*.py") if not others.intersection((path, *path.parents))}
     for each in wanted:
-        modules |= {Path(str(sys.modules[type(each).__module__].__file__)), *each.sources()}
+        with failing_as_format(each):
+            modules |= {Path(str(sys.modules[type(each).__module__].__file__)), *each.sources()}
     return sorted({*modules, *records(PACKAGE.parent)})

@@ -12,7 +12,7 @@ from tablegen.config.load import Setup
 from tablegen.config.names import of_the_runtime
 from tablegen.emit.content import AxisContent, Content
 from tablegen.emit.format import Format
-from tablegen.emit.formats import UnknownFormat, chosen
+from tablegen.emit.formats import UnknownFormat, chosen, failing_as_format, files_of
 from tablegen.manifest.format import MANIFEST, content_hash
 from tablegen.manifest.record import plan_record
 from tablegen.manifest.write import manifest_file
@@ -35,7 +35,10 @@ def render(plan: Plan, certificates: dict[str, Certificate], formats: Sequence[s
     files: dict[str, bytes] = {}
     spelt: dict[str, str] = {MANIFEST: MANIFEST}
     for each in wanted:
-        for name, text in {**each.files(content), **runtime_files(each)}.items():
+        own_files = files_of(each, content)
+        with failing_as_format(each):
+            own_files |= runtime_files(each)
+        for name, text in own_files.items():
             if not _FILE_NAME.fullmatch(name) or name == MANIFEST:
                 raise UnknownFormat(f"{each.name!r} writes {name!r}, which cannot be the name of one of its files")
             if of_the_runtime(name) and name not in own_runtime(each):

@@ -60,5 +60,5 @@ class Refused(LinkError):
 class NotUnderstood(LinkError):
     """The device answers, but not as docs/protocol.md has it."""
 
-    def __init__(self, what: str) -> None:
-        super().__init__(f"the device sent an invalid answer: {what}; do the versions of tablegen and firmware match?")
+    def __init__(self, what: str, remedy: str = "do the versions of tablegen and firmware match?") -> None:
+        super().__init__(f"the device sent an invalid answer: {what}; {remedy}")

@@ -8,6 +8,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from tablegen.base.input_errors import Problems
+from tablegen.compensation import models
 from tablegen.compensation.dynamics import Response
 from tablegen.compensation.frequency import frequency_gain
 from tablegen.compensation.line import AppliedBranch, LineRequest, LineShape
@@ -113,7 +114,8 @@ def make_drive(
         allowed=voltages.allowed,
     )
     before = len(problems.found)
-    shape = hysteresis.line(request, ModelProblems(axis, setup.scan_file, setup.scanner_file, problems))
+    places = ModelProblems(axis, setup.scan_file, setup.scanner_file, problems)
+    shape = models.line_of(hysteresis, request, places)
     if len(problems.found) > before or shape is None:
         return None
     return Drive(
@@ -150,5 +152,5 @@ def _factor_at(law: OffsetLaw, driver: Driver, share: float) -> float:
 
 def _line_at(hysteresis: Hysteresis, request: LineRequest, v: float) -> LineShape | None:
     problems = Problems()
-    shape = hysteresis.line(replace(request, v=v), ModelProblems.without_files(request.axis, problems))
+    shape = models.line_of(hysteresis, replace(request, v=v), ModelProblems.without_files(request.axis, problems))
     return None if problems.found else shape

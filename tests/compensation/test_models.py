@@ -232,3 +232,46 @@ def test_the_sweeps_of_a_waveform() -> None:
     error, speed = line.followed("forward", inside, series, line.value(0.5 * inside), line.slope(0.5 * inside))
     assert np.max(np.abs(error)) == 0.0
     assert np.max(np.abs(speed - 1.0)) == 0.0
+
+
+# What fails in the package of a model
+
+
+def broken(pair: Path, name: str, body: str) -> None:
+    """Another module of the package, whose model has one method that is as given."""
+    source = (HELPERS / "play_model.py").read_text("utf-8")
+    subclass = f'\n\nclass Broken(Play, frozen=True, tag="play"):\n    {body}\n'
+    (pair.parent / "packages" / f"{name}.py").write_text(source + subclass, "utf-8")
+    about = pair.parent / "packages" / "tablegen_play-1.0.dist-info"
+    (about / "entry_points.txt").write_text(f"[{models.GROUP}]\nplay = {name}:Broken\n", "utf-8")
+    models.get.cache_clear()
+
+
+@pytest.mark.parametrize(
+    ("body", "why"),
+    [
+        ("def line(self, wanted): return 1 / 0", "'play' of tablegen-play failed: ZeroDivisionError: division by zero"),
+        ("def line(self, wanted): raise SystemExit", "'play' of tablegen-play failed: SystemExit"),
+        ("def line(self, wanted): return 3", "'play' of tablegen-play: line() returned an object of type int"),
+        ("def line(self, wanted): return None", "'play' of tablegen-play: line() returned None, and no problem"),
+        ("def faults(self): return 1 / 0", "a plug-in of tablegen-play failed: ZeroDivisionError: division by zero"),
+        ("def files(self): raise SystemExit", "a plug-in of tablegen-play failed: SystemExit"),
+        ("def described(self, line): raise KeyError('x')", "a plug-in of tablegen-play failed: KeyError: 'x'"),
+    ],
+)
+def test_a_model_that_fails_is_told_with_its_package(pair: Path, body: str, why: str) -> None:
+    broken(pair, f"broken_{abs(hash(body))}", body)
+    outcome = run("build", pair / "scan.toml", "-o", pair / "out", explains=True)
+    assert outcome.status == 2, outcome.err
+    assert why in outcome.err
+    assert not (pair / "out").exists()
+
+
+@pytest.mark.parametrize("source", ["raise SystemExit(0)", "import sys; sys.exit('so long')"])
+def test_a_package_that_exits_as_it_is_loaded_is_told(pair: Path, source: str) -> None:
+    name = f"leaving_{abs(hash(source))}"
+    broken(pair, name, "")
+    (pair.parent / "packages" / f"{name}.py").write_text(source, "utf-8")
+    outcome = run("build", pair / "scan.toml", "-o", pair / "out")
+    assert outcome.status == 2
+    assert "x.hysteresis.model: 'play' of tablegen-play cannot be loaded: SystemExit: " in outcome.err

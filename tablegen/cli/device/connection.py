@@ -73,7 +73,7 @@ def connected(port: str, baud: int, key_file: Path | None, goes_on: str = "as be
         (errors.SerialMissing, ExitStatus.TOOL_MISSING),
         (errors.NoPort, ExitStatus.NO_PORT),
         (errors.NoAnswer, ExitStatus.NO_ANSWER),
-        (errors.NotUnderstood, ExitStatus.NO_ANSWER),
+        (errors.NotUnderstood, ExitStatus.INVALID_ANSWER),
         (errors.Refused, ExitStatus.REFUSED),
         (errors.Unsuitable, ExitStatus.REFUSED),
         (errors.NotPlaying, ExitStatus.MISMATCH),

@@ -34,7 +34,7 @@ def park(port: str, baud: int, key_file: Path | None, wait: bool, timeout: float
 
     \b
     Exit status: 0 done, 6 pyserial is missing, 7 no port, 8 no answer, 9 refused, or it still
-    plays, 10 link lost or timeout.
+    plays, 10 link lost or timeout, 12 invalid answers.
     """
     from tablegen.link.messages import DeviceState
 
@@ -89,7 +89,7 @@ def trigger(port: str, baud: int, key_file: Path | None, frames: int) -> int:
 
     \b
     Exit status: 0 done, 6 pyserial is missing, 7 no port, 8 no answer, 9 refused, or it does
-    not play, 10 link lost.
+    not play, 10 link lost, 12 invalid answers.
     """
     from tablegen.link.errors import OutOfTime
     from tablegen.link.messages import DeviceState
@@ -138,7 +138,7 @@ def clear(port: str, baud: int, key_file: Path | None) -> int:
 
     \b
     Exit status: 0 done, 6 pyserial is missing, 7 no port, 8 no answer, 9 refused, or faults come
-    again, 10 link lost.
+    again, 10 link lost, 12 invalid answers.
     """
     with connected(port, baud, key_file) as device:
         device.clear()

@@ -37,7 +37,7 @@ def readback(
     \b
     Exit status: 0 equal, 2 wrong input, 4 cannot write, 5 different (the first difference is
     printed), 6 pyserial is missing, 7 no port, 8 no answer, 9 refused or no image to read,
-    10 link lost or timeout.
+    10 link lost or timeout, 12 invalid answers.
     """
     if source is None and output is None:
         raise click.UsageError("give a scan or a build to compare with, or a file to write (-o FILE)")

@@ -28,7 +28,8 @@ def device_status(port: str, baud: int, key_file: Path | None, as_json: bool) ->
       tablegen status --port /dev/ttyUSB0
       tablegen status --port /dev/ttyUSB0 --json | jq .status.state
 
-    Exit status: 0 done, 6 pyserial is missing, 7 no port, 8 no answer, 9 refused, 10 link lost.
+    Exit status: 0 done, 6 pyserial is missing, 7 no port, 8 no answer, 9 refused, 10 link lost,
+    12 invalid answers.
     """
     with connected(port, baud, key_file) as device:
         info, limits, status = device.info, device.limits(), device.status()

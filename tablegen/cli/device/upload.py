@@ -79,7 +79,8 @@ def upload(
 
     \b
     Exit status: 0 the scan is active, 2 wrong input, 5 the device plays a different scan,
-    6 pyserial is missing, 7 no port, 8 no answer, 9 refused, 10 link lost or timeout.
+    6 pyserial is missing, 7 no port, 8 no answer, 9 refused, 10 link lost or timeout,
+    12 invalid answers.
     """
     if port is None and not dry_run:
         raise click.UsageError("--port is missing; `tablegen ports` lists those of this machine")

@@ -18,4 +18,6 @@ class ExitStatus(IntEnum):
     REFUSED = 9
     LINK_LOST = 10
     PARTIAL = 11
+    INVALID_ANSWER = 12
+    UNEXPECTED = 70  # EX_SOFTWARE of sysexits.h
     INTERRUPTED = 130

@@ -1,12 +1,12 @@
 /* Plays a script on the C sequencer and captures every tick, as stream_bench.v does with the Verilog one.
  *
- * The words of the script are those of tablegen.verification.play.stream, 64 bits each: what to do in the upper four bits. The bench is
- * both sides of the sequencer. Where it runs is the business of whoever gives it words and takes its captures: bench_read(),
- * bench_write() are theirs. With BENCH_FILL it can play ticks by dac_sequencer_fill() as far as a command lets them; a
- * capture then has no faults, since a fill tells them only at its end. With BENCH_EMITTED the program is that of an emitted
- * header, unless a commit says that it is another, which the script wrote; and a tick is two captures: converter words
- * of up to 32 bits, then markers and faults. After the ticks come the counts of faults, then the states that the script
- * asked for, three captures each, and with BENCH_EMITTED the constants of the header.
+ * The words of the script are those of tablegen.verification.play.stream, 64 bits each: what to do in the upper four bits.
+ * The bench is both sides of the sequencer. Where it runs is the business of whoever gives it words and takes its
+ * captures: bench_read(), bench_write() are theirs. With BENCH_FILL it can play ticks by dac_sequencer_fill() as far as
+ * a command lets them; a capture then has no faults, since a fill tells them only at its end. With BENCH_EMITTED the
+ * program is that of an emitted header, unless a commit says that it is another, which the script wrote; and a tick is
+ * two captures: converter words of up to 32 bits, then markers and faults. After the ticks come the counts of faults,
+ * then the states that the script asked for, three captures each, and with BENCH_EMITTED the constants of the header.
  */
 #include "dac_sequencer.h"
 #include "stream_bench.h"
@@ -99,8 +99,9 @@ static const dac_word *rendered(const dac_axis_program *p, const bench_axis *axi
     if (axis->fourier == NULL)
         return p->table;
     bench_check(p->length <= BENCH_TABLE_WORDS, "a table of this length");
-    bench_check(dac_synthesize(table, BENCH_TABLE_WORDS + DAC_WORDS_BEHIND, p->index_bits & ~(unsigned)DAC_CUBIC, p->bits,
-                               axis->fourier, axis->harmonics, bench_sine, bench_sine_index_bits), "dac_synthesize");
+    bench_check(dac_synthesize(table, BENCH_TABLE_WORDS + DAC_WORDS_BEHIND, p->index_bits & ~(unsigned)DAC_CUBIC,
+                               p->bits, axis->fourier, axis->harmonics, bench_sine, bench_sine_index_bits),
+                "dac_synthesize");
     return table;
 }
 
@@ -132,8 +133,9 @@ static void render(dac_word *table, unsigned index_bits, unsigned bits, const in
     unsigned sine_index_bits = 0;
     while (UINT32_C(5) << sine_index_bits < 4 * sine_words)
         sine_index_bits++;
-    bench_check(dac_synthesize(table, BENCH_TABLE_WORDS + DAC_WORDS_BEHIND, index_bits & ~(unsigned)DAC_CUBIC, bits, fourier,
-                               harmonics, sine, sine_index_bits), "synthesize");
+    bench_check(dac_synthesize(table, BENCH_TABLE_WORDS + DAC_WORDS_BEHIND, index_bits & ~(unsigned)DAC_CUBIC, bits,
+                               fourier, harmonics, sine, sine_index_bits),
+                "synthesize");
 }
 
 /* Converter and tables, before anything else. */
@@ -340,8 +342,8 @@ static void request(unsigned mask, uint32_t frames)
     }
 }
 
-/* The first two words are the shape and the codes at power-up; then commands. After them come four captures, the counts of faults, and
- * those of states. */
+/* The first two words are the shape and the codes at power-up; then commands. After them come four captures, the counts
+ * of faults, and those of states. */
 void bench_play(bool fill)
 {
     uint64_t word;

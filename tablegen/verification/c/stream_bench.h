@@ -25,8 +25,9 @@ void bench_play(bool fill); /* by fills, if it was compiled with BENCH_FILL, or 
 #ifdef BENCH_EMITTED
 #include "dac_sequencer.h"
 
-/* What stands in an emitted header, and is played in place of what a script writes: tablegen.verification.c.target makes the file
- * that holds it. Where `fourier` is NULL the table is played as it was emitted, elsewhere it is rendered. */
+/* What stands in an emitted header, and is played in place of what a script writes: tablegen.verification.c.target
+ * makes the file that holds it. Where `fourier` is NULL the table is played as it was emitted, elsewhere it is
+ * rendered. */
 typedef struct {
     const int32_t *fourier;
     unsigned harmonics;

@@ -1,6 +1,6 @@
-/* The bench as a program: the script from standard input in hexadecimal lines, captures to standard output as 8 bytes each,
- * the lowest first, since text takes many times as long as to play. With an argument, whatever it is, ticks are played one
- * a call, though it was compiled to fill. */
+/* The bench as a program: the script from standard input in hexadecimal lines, captures to standard output as 8 bytes
+ * each, the lowest first, since text takes many times as long as to play. With an argument, whatever it is, ticks are
+ * played one a call, though it was compiled to fill. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>

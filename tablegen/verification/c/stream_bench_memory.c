@@ -1,4 +1,5 @@
-/* The bench on a bare processor under emulation: script and captures are arrays in memory, which the emulator exchanges.
+/* The bench on a bare processor under emulation: script and captures are arrays in memory, which the emulator
+ * exchanges.
  *
  * The emulator starts bench_main() with a stack, and stops the processor at every call of bench_exchange(): it takes
  * the captures, hands out more of the script, and lets the processor return. There is no C library: what compilers call

@@ -6,7 +6,7 @@ from pathlib import Path
 from tablegen.base.reading import BUILD_FILE, read_bytes
 from tablegen.emit.content import Content
 from tablegen.emit.format import Format
-from tablegen.emit.formats import UnknownFormat, get
+from tablegen.emit.formats import UnknownFormat, files_of, get
 from tablegen.manifest.format import MANIFEST
 from tablegen.manifest.read import StoredBuild
 
@@ -29,8 +29,8 @@ Written = list[tuple[Format, dict[str, bytes]]]
 
 
 def written_files(content: Content, formats: list[Format]) -> Written:
-    """Files that follow from a manifest, by format and name. Raises ``Unphysical``."""
-    return [(one, one.files(content)) for one in formats]
+    """Files that follow from a manifest, by format and name. Raises ``Unphysical``, ``FormatFailed``."""
+    return [(one, files_of(one, content)) for one in formats]
 
 
 def listed_files(
