@@ -29,7 +29,7 @@ def broken(tmp_path: Path, error: BaseException | Callable[[], object], *command
         return error()
 
     scan = write_pair(tmp_path)
-    with patch("tablegen.api.build.make_plan", fail):
+    with patch("tablegen.certificate.certified_scan.make_plan", fail):
         return run(*(command or ("check",)), scan, explains=True)
 
 
@@ -40,8 +40,8 @@ def endless() -> object:
 @pytest.mark.parametrize(
     ("error", "status", "why"),
     [
-        (TypeError("no such thing"), 70, "internal error: TypeError: no such thing (api/build.py:"),
-        (AssertionError(), 70, "internal error: AssertionError (api/build.py:"),
+        (TypeError("no such thing"), 70, "internal error: TypeError: no such thing (certificate/certified_scan.py:"),
+        (AssertionError(), 70, "internal error: AssertionError (certificate/certified_scan.py:"),
         (KeyError("x"), 70, "internal error: KeyError: 'x' ("),
         (IndexError("out of range"), 70, "internal error: IndexError: out of range"),
         (ZeroDivisionError("division by zero"), 70, "internal error: ZeroDivisionError"),
@@ -55,17 +55,25 @@ def endless() -> object:
         (SystemExit(), 70, "internal error: SystemExit"),
         (SystemExit(0), 70, "internal error: SystemExit: 0"),
         (SystemExit("stop"), 70, "internal error: SystemExit: stop"),
-        (MemoryError("of 9 GB"), 70, "not enough memory: MemoryError: of 9 GB (api/build.py:"),
+        (MemoryError("of 9 GB"), 70, "not enough memory: MemoryError: of 9 GB (certificate/certified_scan.py:"),
         (
             OSError(errno.ENOSPC, "No space left on device", "/x/y.c"),
             4,
             "/x/y.c: cannot write: No space left on device;",
         ),
         (OSError(errno.EDQUOT, "Disk quota exceeded", b"/x/y.c"), 4, "/x/y.c: cannot write: Disk quota exceeded;"),
-        (OSError(errno.EMFILE, "Too many open files", "a"), 70, "a: Too many open files (api/build.py:"),
-        (PermissionError(errno.EACCES, "Permission denied", "a"), 70, "a: Permission denied (api/build.py:"),
-        (OSError("without a number"), 70, "without a number (api/build.py:"),
-        (TimeoutError(), 70, "TimeoutError (api/build.py:"),
+        (
+            OSError(errno.EMFILE, "Too many open files", "a"),
+            70,
+            "a: Too many open files (certificate/certified_scan.py:",
+        ),
+        (
+            PermissionError(errno.EACCES, "Permission denied", "a"),
+            70,
+            "a: Permission denied (certificate/certified_scan.py:",
+        ),
+        (OSError("without a number"), 70, "without a number (certificate/certified_scan.py:"),
+        (TimeoutError(), 70, "TimeoutError (certificate/certified_scan.py:"),
         (ValueError("steers\x1b[2J\nlines"), 70, "internal error: ValueError: steers\\x1b[2J\\nlines ("),
         (ValueError("x" * 10_000), 70, "internal error: ValueError: xxx"),
         (PluginFailed("'a' of b failed"), 2, "'a' of b failed"),
