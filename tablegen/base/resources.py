@@ -6,7 +6,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Literal
 
-PACKAGE = Path(__file__).parent
+PACKAGE = Path(__file__).parent.parent
 _C_LINK = "dac_link"
 
 

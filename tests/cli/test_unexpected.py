@@ -135,7 +135,7 @@ def test_a_process_of_its_own_ends_so(tmp_path: Path) -> None:
     """Through the entry point, and with a text that ASCII cannot say."""
     scan = write_pair(tmp_path)
     code = (
-        "import sys, tablegen.api.build as b\n"
+        "import sys, tablegen.certificate.certified_scan as b\n"
         "def fail(*_): raise KeyError('µ')\n"
         "b.make_plan = fail\n"
         f"sys.argv = ['tablegen', 'check', {str(scan)!r}]\n"

@@ -15,7 +15,7 @@ from tablegen.cli.shared.exit_status import ExitStatus
 from tablegen.version import __version__
 
 VARIABLE = "TABLEGEN_TRACEBACK"
-_PACKAGE = Path(__file__).resolve().parents[1]
+_PACKAGE = Path(__file__).resolve().parents[2]
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _SHOW = f"set {VARIABLE}=1 and run the command again to see the traceback"
 
