@@ -644,7 +644,7 @@ def test_options_that_cannot_be_read_are_a_failed_check(short: Build) -> None:
     assert "program: CFLAGS cannot be read: No closing quotation" in done.stderr
 
 
-@pytest.mark.common
+@pytest.mark.rest
 def test_those_options_are_not_for_a_cortex_m4(short: Build) -> None:
     done = command(short.folder, "--target", "cortex-m", CFLAGS="-fsanitize=address")
     assert (done.returncode, done.stderr) == (0, "")
