@@ -472,7 +472,7 @@ def test_missing_cocotb_is_status_6_with_its_remedy(short: Build) -> None:
     assert done.stderr == "cocotb is not installed: pip install 'piezo-tablegen[hdl]'\n"
 
 
-@pytest.mark.parametrize("simulator", ["icarus", "verilator"])
+@pytest.mark.parametrize("simulator", quick(["icarus"], ["icarus", "verilator"]))
 def test_a_python_without_its_shared_library_is_status_6_with_its_remedy(short: Build, simulator: str) -> None:
     """As Debian's own is; cocotb loads it into the simulator."""
     absent = "import find_libpython; find_libpython.find_libpython = lambda: None"
