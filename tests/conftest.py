@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 from installing import install, make_wheel, told_pythons
+from tool_paths import pytest_runtest_setup, pytest_unconfigure  # noqa: F401
 
 # Without deadlines: how long an example takes is the machine's affair. In CI Hypothesis's examples are fixed.
 settings.register_profile("tablegen", settings(), deadline=None)

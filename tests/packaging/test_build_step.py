@@ -15,6 +15,7 @@ from pathlib import Path
 
 import pytest
 from building import EXAMPLE, NAME, REPOSITORY, run
+from building import tool as find_tool
 from editing import SCANNER, edited
 from installing import write_command
 from sets import common
@@ -95,7 +96,7 @@ class Project:
     def configure(self, *arguments: str) -> subprocess.CompletedProcess[str]:
         """Let CMake write the makefiles."""
         if self.tool == "Ninja":
-            assert shutil.which("ninja"), "ninja is not installed; `.ci/system-packages ninja-build` installs it"
+            find_tool("ninja")
         return self.call("cmake", "-G", self.tool, "-S", ".", "-B", "build", *arguments)
 
     def build(self, *arguments: str) -> Made:

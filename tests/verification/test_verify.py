@@ -7,6 +7,7 @@ the tests of the sequencer in ``hdl_tests/``.
 import json
 import re
 import signal
+import sys
 from hashlib import sha256
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from verifying import (
     check_first_difference,
     check_interruption,
     command,
+    command_after,
     command_without,
     differing,
     edit,
@@ -468,6 +470,19 @@ def test_missing_cocotb_is_status_6_with_its_remedy(short: Build) -> None:
     done = command_without(["cocotb_tools"], short.folder)
     assert (done.returncode, done.stdout) == (6, "")
     assert done.stderr == "cocotb is not installed: pip install 'piezo-tablegen[hdl]'\n"
+
+
+@pytest.mark.parametrize("simulator", quick(["icarus"], ["icarus", "verilator"]))
+def test_a_python_without_its_shared_library_is_status_6_with_its_remedy(short: Build, simulator: str) -> None:
+    """As Debian's own is; cocotb loads it into the simulator."""
+    absent = "import find_libpython; find_libpython.find_libpython = lambda: None"
+    done = command_after(absent, short.folder, "--sim", simulator)
+    version = "{}.{}".format(*sys.version_info)
+    assert (done.returncode, done.stdout) == (6, "")
+    assert done.stderr == (
+        f"the shared library of Python {version} is not installed: apt-get install libpython{version}, "
+        "or a Python built with --enable-shared\n"
+    )
 
 
 @pytest.mark.common

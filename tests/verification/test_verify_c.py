@@ -625,6 +625,16 @@ def test_a_missing_compiler_is_status_6_with_its_remedy(short: Build, compiler: 
     assert done.stderr == f"{compiler.split(' ')[0]} is not installed: apt-get install gcc, or set CC\n"
 
 
+def test_a_compiler_without_a_c_library_is_status_6_with_its_remedy(short: Build, tmp_path: Path) -> None:
+    """As Debian's gcc is where recommended packages are left out."""
+    compiler = tmp_path / "bare-cc"
+    compiler.write_text("#!/bin/sh\necho 'fatal error: stdint.h: No such file or directory' >&2\nexit 1\n", "ascii")
+    compiler.chmod(0o755)
+    done = command(short.folder, "--target", "c", CC=str(compiler))
+    assert (done.returncode, done.stdout) == (6, "")
+    assert done.stderr == f"{compiler} finds no headers of the C library: apt-get install libc6-dev\n"
+
+
 @pytest.mark.common
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
 def test_the_compiler_and_its_options_are_the_environments(short: Build, compiler: str) -> None:
@@ -644,7 +654,7 @@ def test_options_that_cannot_be_read_are_a_failed_check(short: Build) -> None:
     assert "program: CFLAGS cannot be read: No closing quotation" in done.stderr
 
 
-@pytest.mark.common
+@pytest.mark.rest
 def test_those_options_are_not_for_a_cortex_m4(short: Build) -> None:
     done = command(short.folder, "--target", "cortex-m", CFLAGS="-fsanitize=address")
     assert (done.returncode, done.stderr) == (0, "")

