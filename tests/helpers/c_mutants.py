@@ -4,13 +4,8 @@ A mutant is tried where it shows: by scripts that are played by fills or by step
 the checks of the functions, or between two threads. As a program it needs ``PYTHONPATH=hdl_tests/helpers``.
 """
 
-import atexit
 import faulthandler
-import shutil
-import tempfile
-from collections.abc import Sequence
 from functools import cache
-from hashlib import sha256
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -33,6 +28,7 @@ from c_scripts import LONG_PERIODS as PERIODS
 from c_shaped_waves import WAVES, shaped_waves
 from c_threads import compile_threads
 from c_threads import play as play_threads
+from kept_objects import objects
 from limits import ENDED, limit, program_within
 from mutants import Verdict
 
@@ -131,28 +127,6 @@ def judge(mutant: Mutant | None, folder: Path, where: str = "") -> Verdict:
     return _play(where, folder, runtime)
 
 
-@cache
-def _cache() -> Path:
-    """Return a folder for the objects of this process."""
-    folder = Path(tempfile.mkdtemp(prefix="c_mutants_"))
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    return folder
-
-
-def _objects(sources: list[Path], options: Sequence[str]) -> list[Path]:
-    """Compile the C files among the sources, with the headers in their folders; what was compiled is not again."""
-    folders = sorted({path.parent for path in sources})
-    headers = "".join(path.read_text("utf-8") for folder in folders for path in sorted(folder.glob("*.h")))
-    places = []
-    for path in sources:
-        if path.suffix == ".c":
-            content = repr((path.name, options, path.read_text("utf-8"), headers))
-            places.append(_cache() / f"{sha256(content.encode()).hexdigest()}.o")
-            if not places[-1].exists():
-                run_clean(["gcc", *options, *(f"-I{folder}" for folder in folders), "-c", path, "-o", places[-1]])
-    return places
-
-
 def _check(where: str, folder: Path, runtime: list[Path]) -> Verdict:
     """Run the checks in a process that has all of this one, on libraries as ``compile_both`` makes them."""
     paths = []
@@ -160,7 +134,7 @@ def _check(where: str, folder: Path, runtime: list[Path]) -> Verdict:
         storage = (f"-DDAC_{kind}_STORAGE_BITS={bits}" for kind in ("TABLE", "OUTPUT"))
         options = (*OPTIONS, *CHECKS[where], "-fPIC", *storage, f"-DDAC_STRIDE={stride}")
         paths.append(folder / f"library_{bits}.so")
-        run_clean(["gcc", "-shared", *_objects([*runtime, PROBE], options), "-o", paths[-1]])
+        run_clean(["gcc", "-shared", *objects(["gcc", *options], [*runtime, PROBE]), "-o", paths[-1]])
     hear, tell = _FORK.Pipe(duplex=False)
     process = _FORK.Process(target=_run_checks, args=(paths, tell))
     process.start()
@@ -198,7 +172,7 @@ def _play(where: str, folder: Path, runtime: list[Path]) -> Verdict:
     chosen |= {"DAC_FEW_REGISTERS": 1} if where.endswith("few") else {}
     chosen |= {"DAC_SHAPING": 3} if shaped else {}
     program = folder / "stream_bench"
-    run_clean(["gcc", *_objects([*runtime, *OWN_SOURCES], (*OPTIONS, *macros(chosen))), "-o", program])
+    run_clean(["gcc", *objects(["gcc", *OPTIONS, *macros(chosen)], [*runtime, *OWN_SOURCES]), "-o", program])
     limited = program_within(PLAY_S, program)
     for script, shape in playing:
         words = words_of(script, shape)
