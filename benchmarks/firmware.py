@@ -62,8 +62,8 @@ class Counts:
     stack: Mapping[str, int]
 
 
-def measure(core: str, optimisation: str, folder: Path) -> Counts:
-    """Build the example for a core and count."""
+def measure(core: str, optimisation: str, folder: Path, most_fills: int | None = None) -> Counts:
+    """Build the example for a core and count, over a frame or its first ``most_fills`` calls of ``fill``."""
     plan = make_plan(load(EXAMPLE))
     for name, content in render(plan, certify(plan)).items():
         (folder / name).write_bytes(content)
@@ -74,7 +74,8 @@ def measure(core: str, optimisation: str, folder: Path) -> Counts:
     loaded = machine.call("count_load")
     machine.call("count_start")
     steps = [machine.call("count_step") for _ in range(plan.schedule.ticks)]
-    fills = [machine.call("count_fill") for _ in range(plan.schedule.frame_ticks // TICKS)]
+    frame = range(plan.schedule.frame_ticks // TICKS)[:most_fills]
+    fills = [machine.call("count_fill") for _ in frame]
     marked = [machine.call("count_fill_markers") for _ in fills]
     plain = [machine.call("count_plain").instructions for _ in fills]
     rendered = machine.call("count_synthesize")

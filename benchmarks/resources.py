@@ -6,6 +6,8 @@ and the table has the slowest result. It is not a lower bound: another seed may 
 only.
 """
 
+import hashlib
+import inspect
 import json
 import math
 import re
@@ -21,6 +23,7 @@ MODULES = HERE.parent / "firmware_templates" / "verilog"
 PAGE = HERE.parent / "docs" / "resources.md"
 SEEDS = (1, 2, 3)
 BEGIN, END = "<!-- measured -->\n", "<!-- /measured -->\n"
+DIGEST = re.compile(r"<!-- of (\w+) -->\n")  # behind the table
 
 SYNTHESIS = {
     "HX8K": "synth_ice40 -abc9 -device hx -top {top} -json {netlist}",
@@ -228,12 +231,34 @@ def table() -> str:
     return "\n".join(lines) + "\n"
 
 
+def page_rows() -> dict[str, list[str]]:
+    """Return the cells of each row of docs/resources.md by the name of its case."""
+    rows = PAGE.read_text("utf-8").partition(BEGIN)[2].partition(END)[0].splitlines()[2:]
+    if len(rows) != len(CASES):
+        raise ValueError(f"{PAGE} has {len(rows)} rows of {len(CASES)} cases: run `make resources`")
+    cells = ([cell.strip() for cell in row.split("|")[1:-1]] for row in rows)
+    return dict(zip(CASES, cells, strict=True))
+
+
+def digest(rows: str, modules: Path = MODULES) -> str:
+    """Return a digest of a table and of all that it was measured of, comments in the Verilog aside.
+
+    The page has it, so that a change of the Verilog or of a row is seen without a synthesis.
+    """
+    sources = [*sorted(modules.glob("*.v")), FLAGS]
+    code = [re.sub(r"//.*|\s+", "", path.read_text("utf-8")) for path in sources]
+    how = [inspect.getsource(function) for function in (measure, _place, _counts)]
+    content = repr((rows, code, how, CASES, SYNTHESIS, PRIMITIVES, SEEDS, WITH_FIT))
+    return hashlib.sha256(content.encode("utf-8")).hexdigest()[:32]
+
+
 def main() -> None:
     measured = table()
     print(measured, end="")
     if "--write" in sys.argv[1:]:
         before, _, rest = PAGE.read_text("utf-8").partition(BEGIN)
-        PAGE.write_text(before + BEGIN + measured + END + rest.partition(END)[2], "utf-8")
+        rest = DIGEST.sub("", rest.partition(END)[2], count=1)
+        PAGE.write_text(f"{before}{BEGIN}{measured}{END}<!-- of {digest(measured)} -->\n{rest}", "utf-8")
 
 
 if __name__ == "__main__":

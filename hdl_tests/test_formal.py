@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 from building import REPOSITORY, tool
 from limits import PATIENCE_S
+from sets import long
 
 pytestmark = pytest.mark.rest
 
@@ -151,8 +152,7 @@ def _sat(read: str, how: str, folder: Path, success: str) -> bool:
     return proven
 
 
-@pytest.mark.timeout(86_400)  # of 16 bits it takes two minutes
-@pytest.mark.parametrize("name", BY_SAT)
+@pytest.mark.parametrize("name", long(BY_SAT.keys() - {"slew_16_bits"}, BY_SAT))  # which takes two minutes
 def test_holds_for_ever_by_sat(name: str, tmp_path: Path) -> None:
     assert _proven_by_sat(BY_SAT[name], tmp_path)
 

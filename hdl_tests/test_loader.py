@@ -18,6 +18,7 @@ from loader_device import Loader, LoaderDevice, limited, told_to_be
 from loader_dialogues import Dialogue, Differs, objection
 from loader_mutants import MUTANTS, Mutant
 from replacing import replace
+from sets import long
 
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS, SCAN_WORDS
 from tablegen.device.widths import AxisWidths, Widths, misfits
@@ -78,7 +79,7 @@ def random_dialogue(loader: Loader, seed: int, steps: int, words: list[int]) -> 
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", long(range(12), range(40)))
 def test_random_dialogues(seed: int, loader: Loader) -> None:
     dialogue = random_dialogue(loader, seed, 120, [])
     assert len(dialogue.seen) > 10
@@ -97,7 +98,7 @@ def checked_uploads(loader: Loader, seed: int, uploads: int, words: list[int]) -
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", long(range(8), range(20)))
 def test_every_check_is_that_of_the_model(seed: int, loader: Loader) -> None:
     seen = checked_uploads(loader, seed, 40, []).seen
     reasons = {key[1] for key in seen if isinstance(key, tuple) and key[0] == Request.COMMIT}

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from building import REPOSITORY
+from mutants import Verdict
 from programs import random_dual
 from stream_mutants import BENCHES, MUTANTS, SHAPES, Mutant, bench_of, judge, script_of
 
@@ -14,8 +15,9 @@ from tablegen.verification.play.stream import Script
 @pytest.mark.rest
 @pytest.mark.parametrize("name", BENCHES)
 def test_the_verilog_as_it_is_passes(name: str, tmp_path: Path) -> None:
-    played = bench_of(name, tmp_path).play(script_of(name))
+    played = bench_of(name, tmp_path / "whole").play(script_of(name))
     assert played.equal, played
+    assert judge(None, tmp_path, name) == Verdict(False, "")
 
 
 def test_the_documentation_counts_them() -> None:

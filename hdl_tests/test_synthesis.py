@@ -1,7 +1,8 @@
 """Synthesis: no latch, no net with two drivers, and the areas and rates that docs/resources.md gives.
 
 What is placed and routed takes long, so every run measures the two axes at one seed and the multipliers of each family;
-``-m slow`` measures the whole page again. The page is held against the requirements every time.
+``make test-long`` measures the whole page again. The page is held against the requirements every time, and has a digest
+of the Verilog and of its rows: a change of either is seen at once.
 """
 
 import re
@@ -12,11 +13,10 @@ from pathlib import Path
 
 import pytest
 from building import REPOSITORY, tool
+from sets import LONG_TEST
 
 sys.path.insert(0, str(REPOSITORY / "benchmarks"))
 import resources
-
-pytestmark = pytest.mark.rest
 
 MODULES = resources.MODULES
 CHECKED: dict[str, tuple[str, Mapping[str, int]]] = {
@@ -62,12 +62,14 @@ def check(top: str, parameters: Mapping[str, int], folder: Path = MODULES) -> su
     return subprocess.run([tool("yosys"), "-q", "-p", script], capture_output=True, text=True)
 
 
+@pytest.mark.rest
 @pytest.mark.parametrize("name", CHECKED)
 def test_has_no_latch_and_no_conflict(name: str) -> None:
     done = check(*CHECKED[name])
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.rest
 @pytest.mark.parametrize(
     ("text", "instead"),
     [
@@ -90,16 +92,6 @@ def test_a_fault_would_be_seen(text: str, instead: str, tmp_path: Path) -> None:
 
 
 # The page.
-def page() -> dict[str, list[str]]:
-    """The rows of docs/resources.md by the name of their case."""
-    text = resources.PAGE.read_text("utf-8").partition(resources.BEGIN)[2].partition(resources.END)[0]
-    rows = text.splitlines()[2:]
-    assert len(rows) == len(resources.CASES), "run `make resources`"
-    return {
-        name: [cell.strip() for cell in row.split("|")[1:-1]] for name, row in zip(resources.CASES, rows, strict=True)
-    }
-
-
 def holds(name: str, cells: int | None, mhz: float | None, multipliers: int) -> None:
     case = resources.CASES[name]
     if case.most_cells is not None:
@@ -114,7 +106,7 @@ def holds(name: str, cells: int | None, mhz: float | None, multipliers: int) -> 
 
 @pytest.mark.parametrize("name", resources.CASES)
 def test_page_meets_the_requirements(name: str) -> None:
-    row = page()[name]
+    row = resources.page_rows()[name]
     holds(name, int(row[4] or 0), float(row[9] or 0), int(row[8]))
 
 
@@ -124,13 +116,37 @@ def pinned() -> bool:
     return re.match(r"Yosys 0\.23 ", version) is not None
 
 
+def test_the_page_is_of_this_verilog() -> None:
+    """What is measured follows from what the digest is of, and from the versions of the tools."""
+    rest = resources.PAGE.read_text("utf-8").partition(resources.BEGIN)[2]
+    rows, _, rest = rest.partition(resources.END)
+    digest = resources.DIGEST.match(rest)
+    assert digest is not None
+    assert digest[1] == resources.digest(rows), "run `make resources`"
+
+
+@pytest.mark.parametrize("old", ["+ step", "reg ", "1'b1"])
+def test_a_change_of_the_verilog_changes_the_digest(tmp_path: Path, old: str) -> None:
+    for path in MODULES.glob("*.v"):
+        (tmp_path / path.name).write_text(path.read_text("utf-8"), "utf-8")
+    assert resources.digest("", tmp_path) == resources.digest("") != resources.digest("a row")
+    module = tmp_path / "dac_interpolator.v"
+    text = module.read_text("utf-8")
+    module.write_text(f"// another comment\n{text}", "utf-8")
+    assert resources.digest("", tmp_path) == resources.digest("")
+    assert old in text
+    module.write_text(text.replace(old, f"{old[:-1]}0", 1), "utf-8")
+    assert resources.digest("", tmp_path) != resources.digest("")
+
+
+@pytest.mark.rest
 @pytest.mark.parametrize(
     "name", ["axis", "axis_serial", "loader", "axis_ECP5_16", "axis_ECP5_24", "axis_7-series_16", "axis_7-series_24"]
 )
 def test_meets_the_requirements(name: str) -> None:
     """At the first seed: the cells are near those of the page, the rate is at least that of its slowest seed."""
     result = resources.measure(resources.CASES[name], resources.SEEDS[:1])
-    row = page()[name]
+    row = resources.page_rows()[name]
     holds(name, result.cells, result.mhz, result.counts["multipliers"])
     if pinned():
         assert [str(result.counts[kind]) for kind in ("LUT", "FF", "RAM", "multipliers")] == row[5:9]
@@ -139,8 +155,7 @@ def test_meets_the_requirements(name: str) -> None:
         assert result.mhz >= int(row[9]) - 0.5
 
 
-@pytest.mark.rest
-@pytest.mark.parametrize("name", resources.CASES)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=LONG_TEST) for name in resources.CASES])
 def test_page_is_what_is_measured(name: str) -> None:
     case = resources.CASES[name]
     result = resources.measure(case)

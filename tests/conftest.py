@@ -4,6 +4,7 @@ import signal
 from collections.abc import Iterator
 from pathlib import Path
 
+import kept_objects
 import pytest
 from hypothesis import settings
 from installing import install, make_wheel, told_pythons
@@ -19,6 +20,10 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
     signal.signal(signal.SIGHUP, lambda *_: None)
+
+
+# The processes that run the tests share what was compiled; the first of them makes the folder and removes it.
+kept_objects.folder()
 
 
 @pytest.fixture(scope="session", autouse=True)

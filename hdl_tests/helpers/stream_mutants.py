@@ -3,6 +3,7 @@
 A mutant is played the scripts that the module itself plays equal to the model.
 """
 
+import subprocess
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -10,6 +11,9 @@ from pathlib import Path
 
 import mutants
 import numpy as np
+from building import BENCHES as BENCHES_FOLDER
+from building import run_clean, tool
+from limits import ENDED, within
 from mutants import Verdict
 from programs import random_dual
 from stream_benches import with_sine
@@ -25,12 +29,14 @@ from stream_scripts import (
 )
 
 from tablegen.base.resources import verilog_runtime
+from tablegen.verification.failures import SimulationFailed
 from tablegen.verification.play.placement import Placement
 from tablegen.verification.play.sequencer_shape import SequencerShape
 from tablegen.verification.play.stream import Script
-from tablegen.verification.verilog.sequencer_bench import SequencerBench
+from tablegen.verification.verilog.sequencer_bench import STREAM_BENCH, SequencerBench
 
 HARMONICS = 4
+PLAY_S = 60  # of CPU time: what does not hang takes two seconds
 LEAST_PACE = Placement("serial").tick_clocks
 Y_AXIS_AFTER_LOADS = """
                 .runnings(runnings_now[LATENCY-4:0]),
@@ -113,8 +119,8 @@ def script_of(bench: str) -> Script:
     return script
 
 
-def bench_of(bench: str, folder: Path, mutant: Mutant | None = None) -> SequencerBench:
-    """The bench of this name, with a mutant in it or with none."""
+def design_of(bench: str, folder: Path, mutant: Mutant | None = None) -> tuple[list[Path], dict[str, int | str]]:
+    """Return the sources of the bench of this name, with a mutant in them or with none, and its parameters."""
     sources = list(verilog_runtime())
     folder.mkdir(parents=True, exist_ok=True)
     if mutant is not None:
@@ -129,19 +135,58 @@ def bench_of(bench: str, folder: Path, mutant: Mutant | None = None) -> Sequence
         parameters |= SPLINES[bench][0]
     if bench == "fourier":
         parameters |= with_sine(folder, SHAPES[bench], HARMONICS)
+    return sources, parameters
+
+
+def bench_of(bench: str, folder: Path, mutant: Mutant | None = None) -> SequencerBench:
+    """Return the bench of this name, with a mutant in it or with none."""
+    sources, parameters = design_of(bench, folder, mutant)
     return SequencerBench("icarus", SHAPES[bench], folder / "bench", parameters, sources)
 
 
-def judge(mutant: Mutant, folder: Path) -> Verdict:
-    """Play a mutant to the end of its script."""
-    played = bench_of(mutant.where, folder, mutant).play(script_of(mutant.where))
-    if played.equal:
-        return Verdict(False, "")
-    if played.mismatch is not None:
-        return Verdict(True, f"tick {played.mismatch.tick}")
-    if played.jitter:
+def judge(mutant: Mutant | None, folder: Path, bench: str = "") -> Verdict:
+    """Play a mutant up to its first sample that differs from the model; ``bench`` plays the Verilog as it is.
+
+    The bench is that of ``SequencerBench`` without cocotb, whose start takes longer than most mutants play.
+    """
+    bench = bench if mutant is None else mutant.where
+    script = script_of(bench)
+    sources, parameters = design_of(bench, folder, mutant)
+    files = {name: folder / f"{name.lower()}.hex" for name in ("SCRIPT", "EXPECTED")}
+    files["SCRIPT"].write_text(script.text(), "ascii")
+    files["EXPECTED"].write_text("".join(f"{word:016x}\n" for word in script.expected), "ascii")
+    parameters |= SHAPES[bench].parameters()
+    parameters |= {"SCRIPT": str(files["SCRIPT"]), "CAPTURE": str(folder / "capture.hex")}
+    watched = {"EXPECTED": str(files["EXPECTED"]), "SAMPLES": len(script.expected)}
+    given = [
+        f"-P{top}.{name}=" + (f'"{value}"' if isinstance(value, str) else str(value))
+        for top, values in (("stream_bench", parameters), ("mutant_watch", watched))
+        for name, value in values.items()
+    ]
+    program = folder / "watched"
+    run_clean(
+        [
+            "iverilog", "-g2005", "-Wall", "-Wno-timescale", "-s", "stream_bench", "-s", "mutant_watch", *given,
+            "-o", program, *sources, STREAM_BENCH, BENCHES_FOLDER / "mutant_watch.v",
+        ]
+    )  # fmt: skip
+    done = subprocess.run(within(PLAY_S, [tool("vvp"), "-n", program]), capture_output=True, text=True, check=False)
+    if done.returncode == ENDED:
+        return Verdict(True, "hangs")
+    words = done.stdout.split()
+    if done.returncode == 0 and words[:1] == ["tick"]:
+        return Verdict(True, f"tick {words[1]}")
+    if done.returncode or words[:1] != ["end"]:
+        raise SimulationFailed(f"the bench did not play its script to the end\n{done.stdout}{done.stderr}")
+    samples, refused, jitter, counts = words[1:]
+    if int(samples) != len(script.expected):
+        return Verdict(True, f"tick {samples}")
+    if jitter != "0":
         return Verdict(True, "latency")
-    return Verdict(True, "refused writes" if played.refused else "fault counts")
+    if refused != str(int(script.refused)):
+        return Verdict(True, "refused writes")
+    differs = counts[-16:] != f"{script.counts[1]:08x}{script.counts[0]:08x}"
+    return Verdict(differs, "fault counts" if differs else "")
 
 
 def _axis() -> Iterator[Mutant]:

@@ -12,7 +12,7 @@ import mpmath
 import numpy as np
 import pytest
 from building import IN_C, NAME, REPOSITORY, VARIANTS, Build, Variant, build, build_stressed, constants, run, run_clean
-from sets import by_tool, common
+from sets import by_tool, common, in_pairs
 
 from tablegen.device.played_lines import play_line
 from tablegen.numerics.arrays import Ints
@@ -32,7 +32,12 @@ DIALECTS = {
 STRESS = [(8, 131071), (16, -131072), (21, 131071), (24, -131072), (24, 131071)]
 
 
-@pytest.fixture(scope="module", params=common(("example", "header_only", "direct_steps", "cubic"), IN_C))
+QUICK = ("example", "header_only", "direct_steps", "cubic")
+# With every dialect: these differ in what is emitted and how it is held. The others differ in numbers.
+WHOLE = (*QUICK, "cubic_wide", "left_aligned")
+
+
+@pytest.fixture(scope="module", params=common(QUICK, IN_C))
 def built(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Build:
     return build(tmp_path_factory.mktemp("variant"), IN_C[request.param])
 
@@ -74,7 +79,16 @@ def two_units(built: Build) -> list[Path]:
     return [first, second, *sources(built)]
 
 
-@pytest.mark.parametrize("dialect", by_tool(DIALECTS))
+def of_a_variant(pair: Any) -> Any:
+    """Return a pair of variant and dialect with the mark of its variant."""
+    return pytest.param(*pair.values, marks=pair.marks if pair.values[0] in QUICK else (*pair.marks, pytest.mark.rest))
+
+
+@pytest.mark.parametrize(
+    ("built", "dialect"),
+    map(of_a_variant, in_pairs(list(IN_C), list(DIALECTS), WHOLE, "gcc-c99")),
+    indirect=["built"],
+)
 def test_compiles_without_a_warning(built: Build, dialect: str) -> None:
     run_clean([*DIALECTS[dialect], *WARNINGS, "-fsyntax-only", f"-I{built.folder}", PLAYER, *two_units(built)])
 
@@ -255,12 +269,12 @@ def test_a_damaged_header_does_not_compile(header_only: Build, tmp_path: Path, d
 HOSTILE = ["*/ int broken; /*", "two\nlines", "back\\slash\\", "trigraph ??/", "/* /* */ */", "\u00b5-Scanner \u202e"]
 
 
-@pytest.mark.rest
-@pytest.mark.parametrize("dialect", by_tool(DIALECTS))
+@pytest.mark.common
 @pytest.mark.parametrize("name", HOSTILE, ids=ascii)
-def test_no_scanner_s_name_leaves_its_comment(tmp_path: Path, name: str, dialect: str) -> None:
+def test_no_scanner_s_name_leaves_its_comment(tmp_path: Path, name: str) -> None:
     """The name of a scanner is free text, and the only free text that reaches an emitted file."""
     built = build(tmp_path, Variant({**VARIANTS["short_frame"].scan}, {"name": name}))
     header = built.files[f"{NAME}.h"].decode("ascii")
     assert " * Scanner: " in header
-    compile_player(built, DIALECTS[dialect])
+    for dialect in DIALECTS.values():
+        run_clean([*dialect, *WARNINGS, "-fsyntax-only", f"-I{built.folder}", PLAYER, *sources(built)])

@@ -4,31 +4,37 @@ A mutant is tried where it shows: by scripts that are played by fills or by step
 the checks of the functions, or between two threads. As a program it needs ``PYTHONPATH=hdl_tests/helpers``.
 """
 
-import os
-import subprocess
-import sys
+import faulthandler
 from functools import cache
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
 from pathlib import Path
 
+import c_checks
 import c_mutants_axis
 import c_mutants_fourier
 import c_mutants_program
 import c_mutants_sequencer
 import c_mutants_shaping
 import mutants
+import numpy as np
+from building import run_clean
 from c_benches import FILL, words_of
+from c_devices import Check, Libraries
 from c_faults import Mutant
-from c_library import compile_both
+from c_library import PROBE, Library
 from c_scripts import IN_C, LONG, everything, long_periods, long_play, refused_by_y, shaped_short_lines
 from c_scripts import LONG_PERIODS as PERIODS
 from c_shaped_waves import WAVES, shaped_waves
 from c_threads import compile_threads
 from c_threads import play as play_threads
-from limits import ENDED, program_within, within
+from kept_objects import objects
+from limits import ENDED, limit, program_within
 from mutants import Verdict
 
 from tablegen.base.resources import c_runtime
-from tablegen.verification.c.bench import CBench, defines
+from tablegen.verification.c.bench import OWN_SOURCES, CPlayed, defines, macros
+from tablegen.verification.c.play import run
 from tablegen.verification.failures import SimulationFailed
 from tablegen.verification.play.sequencer_shape import SequencerShape
 from tablegen.verification.play.stream import Script, compare
@@ -37,6 +43,7 @@ HERE = Path(__file__).parent
 OPTIONS = ("-std=c99", "-O1", "-DDAC_WAIT=0")  # as many runs as can be
 CHECKS = {"checks": (), "checks small": ("-DDAC_SMALL=1",), "checks short": ("-DDAC_LONG_MULTIPLY=0",)}
 PLAY_S, CHECK_S = 20, 120  # of CPU time: what does not hang takes a second of it, and two
+_FORK = get_context("fork")  # nothing is imported again
 _PROGRAMS = 3000  # between two threads
 
 PLACES = (
@@ -116,20 +123,44 @@ def judge(mutant: Mutant | None, folder: Path, where: str = "") -> Verdict:
                 return Verdict(True, {66: "a race", ENDED: "hangs"}.get(done.returncode, done.stderr.strip()))
         return Verdict(False, "")
     if where in CHECKS:
-        options = (*OPTIONS, *CHECKS[where])
-        return _check(compile_both(folder, options=options, runtime=runtime))
+        return _check(where, folder, runtime)
     return _play(where, folder, runtime)
 
 
-def _check(paths: tuple[Path, ...]) -> Verdict:
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-    command = within(CHECK_S, [sys.executable, HERE / "c_checks.py", *paths])
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-    if done.returncode == ENDED:
+def _check(where: str, folder: Path, runtime: list[Path]) -> Verdict:
+    """Run the checks in a process that has all of this one, on libraries as ``compile_both`` makes them."""
+    paths = []
+    for bits, stride in ((16, 2), (32, 1)):
+        storage = (f"-DDAC_{kind}_STORAGE_BITS={bits}" for kind in ("TABLE", "OUTPUT"))
+        options = (*OPTIONS, *CHECKS[where], "-fPIC", *storage, f"-DDAC_STRIDE={stride}")
+        paths.append(folder / f"library_{bits}.so")
+        run_clean(["gcc", "-shared", *objects(["gcc", *options], [*runtime, PROBE]), "-o", paths[-1]])
+    hear, tell = _FORK.Pipe(duplex=False)
+    process = _FORK.Process(target=_run_checks, args=(paths, tell))
+    process.start()
+    tell.close()
+    process.join()
+    if process.exitcode == ENDED:
         return Verdict(True, "hangs")
-    if done.returncode == 1 and done.stdout:
-        return Verdict(True, done.stdout.partition(":")[0])
-    return Verdict(done.returncode != 0, "crash" if done.returncode else "")
+    if process.exitcode:
+        return Verdict(True, "crash")
+    failure: str = hear.recv()
+    return Verdict(failure != "", failure)
+
+
+def _run_checks(paths: list[Path], tell: Connection) -> None:
+    limit(CHECK_S)
+    faulthandler.disable()  # some mutants crash, and that is all there is to know
+    libraries = Libraries(*map(Library, paths))
+    tell.send(next((check.__name__ for check in c_checks.CHECKS if not _holds(check, libraries)), ""))
+
+
+def _holds(check: Check, libraries: Libraries) -> bool:
+    try:
+        check(libraries)
+    except Exception:  # whatever a broken runtime leads to
+        return False
+    return True
 
 
 def _play(where: str, folder: Path, runtime: list[Path]) -> Verdict:
@@ -140,12 +171,13 @@ def _play(where: str, folder: Path, runtime: list[Path]) -> Verdict:
     chosen = defines(playing[0][1], fill) | ({"DAC_LONG_MULTIPLY": 0} if where.endswith(("short", "few")) else {})
     chosen |= {"DAC_FEW_REGISTERS": 1} if where.endswith("few") else {}
     chosen |= {"DAC_SHAPING": 3} if shaped else {}
-    bench = CBench(playing[0][1], folder, "gcc", OPTIONS, runtime, chosen=chosen)
-    bench.program = program_within(PLAY_S, bench.program)
+    program = folder / "stream_bench"
+    run_clean(["gcc", *objects(["gcc", *OPTIONS, *macros(chosen)], [*runtime, *OWN_SOURCES]), "-o", program])
+    limited = program_within(PLAY_S, program)
     for script, shape in playing:
         words = words_of(script, shape)
         try:
-            played = bench.run(words)
+            played = CPlayed.of(np.frombuffer(run(limited, words.encode("ascii")), dtype="<u8"), words)
         except SimulationFailed as error:
             return Verdict(True, str(error))
         expected = script.expected if not fill else [word & (1 << 56) - 1 for word in script.expected]

@@ -1,6 +1,6 @@
 """Which parameters of a test are in which set of tests; ``tests/README.md`` tells what the sets are."""
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 from typing import Any
 
 import pytest
@@ -31,7 +31,32 @@ def common(few: Collection[Any], parameters: Iterable[Any]) -> list[Any]:
     return _divided(few, parameters, pytest.mark.rest)
 
 
-def _divided(few: Collection[Any], parameters: Iterable[Any], others: pytest.MarkDecorator) -> list[Any]:
+def long(few: Collection[Any], parameters: Iterable[Any]) -> list[Any]:
+    """Return parameters of which a few are as the test is; with the others it is of ``make test-long``."""
+    return _divided(few, parameters, *LONG_TEST)
+
+
+def in_pairs(names: Sequence[str], others: Sequence[str], whole: Collection[str], always: str) -> list[Any]:
+    """Return pairs of a name and another, marked for the sets of both.
+
+    Names that are ``whole`` are there with every other, each further name with the one that is ``always`` there and
+    one more, in turn. All further pairs are of ``make test-long``: they would find a fault that shows neither in
+    another pair of the name nor in another pair of the other.
+    """
+    assert set(whole) <= set(names)
+    turns = [other for other in others if other != always]
+    tools = dict(zip(others, by_tool(others), strict=True))
+    pairs = []
+    for index, name in enumerate(names):
+        for other in others:
+            marks = list(tools[other].marks)
+            if not (name in whole or other in (always, turns[index % len(turns)])):
+                marks += LONG_TEST
+            pairs.append(pytest.param(name, other, marks=marks))
+    return pairs
+
+
+def _divided(few: Collection[Any], parameters: Iterable[Any], *others: pytest.MarkDecorator) -> list[Any]:
     every = list(parameters)
     assert set(few) <= set(every)
     return [each if each in few else pytest.param(each, marks=others) for each in every]

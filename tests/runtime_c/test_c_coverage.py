@@ -38,7 +38,7 @@ class Measured:
 @pytest.fixture(scope="module")
 def measured(tmp_path_factory: pytest.TempPathFactory) -> Measured:
     folder = tmp_path_factory.mktemp("coverage")
-    benches = Benches(folder / "benches", COVERAGE)
+    benches = Benches(folder / "benches", COVERAGE, kept=False)
     long = [(long_play(name, 30_000), LONG[name][0]) for name in LONG]
     long += [(long_periods(1 << 16, 3641, 3000), LONG_PERIODS)]
     for script, shape in long:
@@ -77,7 +77,7 @@ def test_the_fast_path_plays_most_of_long_lines(measured: Measured) -> None:
 def test_every_line_of_shaping_was_run(tmp_path: Path) -> None:
     """With products of 64 bits and without; ``dac_shaping.c`` is empty in a runtime that does not shape."""
     for more in ((), ("-DDAC_LONG_MULTIPLY=0",)):
-        benches = Benches(tmp_path / "".join(more), (*COVERAGE, "-DDAC_SHAPING=3", *more))
+        benches = Benches(tmp_path / "".join(more), (*COVERAGE, "-DDAC_SHAPING=3", *more), kept=False)
         for script, shape in (*scripts("shaped"), (long_play("bits_24", 12_000, 0, 3), LONG["bits_24"][0])):
             benches.play(script, shape, fill=FILL)
     found = coverage([tmp_path], ["dac_shaping.c"])
@@ -90,6 +90,6 @@ def test_every_line_of_shaping_was_run(tmp_path: Path) -> None:
 def test_the_fast_path_plays_the_second_and_the_third_order(name: str, more: tuple[str, ...], tmp_path: Path) -> None:
     """On converters of other than 16 bits too: ticks that are played one by one are few."""
     script = shaped_waves(WAVES[name])
-    Benches(tmp_path, (*COVERAGE, "-DDAC_SHAPING=3", *more)).play(script, WAVES[name], fill=FILL)
+    Benches(tmp_path, (*COVERAGE, "-DDAC_SHAPING=3", *more), kept=False).play(script, WAVES[name], fill=FILL)
     one_by_one = coverage([tmp_path], ["dac_shaping.c"]).of(SHAPING, "return (int32_t)fed >> bits;")
     assert one_by_one < 2 * len(script.expected) // 100

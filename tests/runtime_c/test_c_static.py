@@ -3,10 +3,11 @@
 import re
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import pytest
 from building import run, run_clean
-from sets import by_tool, common
+from sets import LONG_TEST, by_tool, in_pairs
 
 from tablegen.base.resources import c_link, c_runtime
 
@@ -43,6 +44,9 @@ COMPILERS = {
     "clang-c99-32": ["clang", "-std=c99", "-m32", "-ffreestanding"],
 }
 QUICK = ("default", "small")
+# Each alternative of each #if is in one of these; the others are combinations of them.
+WHOLE = (*QUICK, "wide", "no_long_multiplication", "spline_shaped", "spline_shaped_no_long_multiplication")
+ANALYSED = (*WHOLE, "first_order", "shaped_wide")
 # An analyser reports what it finds in a file that is wrong in this way.
 FAULTY = "int faulty(void);\nint faulty(void)\n{\n    int *nothing = 0;\n    return *nothing;\n}\n"
 ANALYSERS = {
@@ -59,9 +63,15 @@ ANALYSERS = {
 }
 
 
-@pytest.mark.parametrize("choice", common(QUICK, CHOICES))
-@pytest.mark.parametrize("compiler", by_tool(COMPILERS))
-def test_no_warnings(compiler: str, choice: str, tmp_path: Path) -> None:
+def of_a_choice(pair: Any) -> Any:
+    """Return a pair of choice and compiler with the mark of its choice."""
+    return pytest.param(*pair.values, marks=pair.marks if pair.values[0] in QUICK else (*pair.marks, pytest.mark.rest))
+
+
+@pytest.mark.parametrize(
+    ("choice", "compiler"), map(of_a_choice, in_pairs(list(CHOICES), list(COMPILERS), WHOLE, "gcc-c99"))
+)
+def test_no_warnings(choice: str, compiler: str, tmp_path: Path) -> None:
     run_clean([*COMPILERS[compiler], "-O2", *WARNINGS, *CHOICES[choice], "-c", *SOURCES], tmp_path)
 
 
@@ -85,7 +95,12 @@ def test_the_header_is_cplusplus(compiler: str, tmp_path: Path) -> None:
 # clang's takes its time.
 @pytest.mark.rest
 @pytest.mark.parametrize(
-    ("analyser", "choice"), [each for each in product(ANALYSERS, CHOICES) if each[0] != "clang" or each[1] in QUICK]
+    ("analyser", "choice"),
+    [
+        each if each[1] in ANALYSED else pytest.param(*each, marks=LONG_TEST)
+        for each in product(ANALYSERS, CHOICES)
+        if each[0] != "clang" or each[1] in QUICK
+    ],
 )
 def test_analysers_find_nothing(analyser: str, choice: str) -> None:
     definitions = [each for each in CHOICES[choice] if each.startswith("-D")]
