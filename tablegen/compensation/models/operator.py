@@ -17,7 +17,7 @@ from tablegen.compensation.operator.creep import LogarithmicCreep
 from tablegen.compensation.operator.file import read_operator
 from tablegen.compensation.operator.gentle_line import Gentle, gentlest_waveform
 from tablegen.compensation.operator.loop import Loop
-from tablegen.compensation.operator.operator import Operator
+from tablegen.compensation.operator.operator import SMALL_STROKE, Operator
 from tablegen.compensation.operator.scan_line import Expected, Found, Wanted, find_waveform
 from tablegen.compensation.operator.transient import after_offset, after_size
 from tablegen.compensation.operator.uncertainty import departures, of_formulas, of_places
@@ -121,9 +121,10 @@ class OperatorModel(WithBranches, frozen=True, kw_only=True, tag="operator"):
     def line(self, wanted: WantedLine) -> LineShape | None:
         """Learnt on the operator, from a straight line on."""
         operator = self._read(wanted)
-        if operator is None:
-            return None
+        if operator is None or not wanted.size_nm > 0.0 or not 0.0 <= wanted.v_share <= 1.0:
+            return None  # a size or an offset that was refused, and no line to look for
         with wanted.at("file"):
+            _check_sense(operator, wanted)
             return _line(operator, wanted)
         return None
 
@@ -133,6 +134,7 @@ class OperatorModel(WithBranches, frozen=True, kw_only=True, tag="operator"):
         if operator is None:
             return None
         with wanted.at("file"):
+            _check_sense(operator, wanted)
             _check_reach(operator, high - low, 0.5 * (low + high), wanted.driver)
             here, factor = _at(operator, wanted)
             return here.loop(low, high, factor, wanted.v_share), here.creep
@@ -216,6 +218,12 @@ def _line(operator: Operator, wanted: WantedLine) -> OperatorLine | None:
     factor *= with_mean(found.mean)
     between = _BEND_UNKNOWN * found.grown
     _check_reach(operator, found.stroke, found.centre, wanted.driver)
+    if not wanted.v_amplitude > 0.0:
+        raise Unphysical(
+            f"the operator makes {wanted.size_nm:.6g} nm with {found.stroke * wanted.driver.span:.4g} V, and "
+            f"[{wanted.axis}.size] refuses them: the two contradict each other; calibrate `size` again, or lower the "
+            "size"
+        )
     late = replace(operator, creep=operator.creep.down_to(_SLOWEST_HZ))  # for all that a few frames may last
     # w = 0 and 1 are the ends of the laws' amplitude everywhere else.
     scale = found.v_amplitude * wanted.driver.span / wanted.v_amplitude
@@ -241,6 +249,18 @@ def _line(operator: Operator, wanted: WantedLine) -> OperatorLine | None:
             after_size(late, found.stroke, found.centre, factor, wanted.turn, 1.0 / wanted.rate_hz),
         ),
     )
+
+
+def _check_sense(operator: Operator, wanted: WantedLine) -> None:
+    """Refuse an operator that stands still or runs backwards at small drives, which its size is referred to."""
+    for centre in (operator.centre, wanted.v_share):
+        extent = operator.family.extent(SMALL_STROKE, centre)
+        if not extent > 0.0:
+            driver = wanted.driver
+            raise Unphysical(
+                f"at {driver.volts(centre):.4g} V it moves by {extent:.4g} nm for {SMALL_STROKE * driver.span:.4g} V, "
+                "and no piezo stands still or runs backwards; calibrate it again"
+            )
 
 
 def _check_reach(operator: Operator, stroke: float, centre: float, driver: Driver) -> None:
