@@ -149,7 +149,8 @@ class OperatorModel(WithBranches, frozen=True, kw_only=True, tag="operator"):
             wanted.problems.found.extend(rejected.problems)
             return None
         if file.axis != wanted.axis:
-            wanted.problem("file", f"{self.file} is the operator of {file.axis}")
+            why = f"{self.file} is the operator of {file.axis}; [{wanted.axis}.hysteresis] needs a model of its own"
+            wanted.problem("file", why)
         for key in ("v_max", "v_min"):
             its, ours = getattr(file, key), getattr(wanted.driver, key)
             if abs(its - ours) > 1e-6 * wanted.driver.span:
