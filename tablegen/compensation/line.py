@@ -225,7 +225,9 @@ class LineRequest(Struct, frozen=True):
     ``response`` are the dynamics, whose inverse gives no harmonic more than ``max_boost_db``; ``factor_at`` is m of (1)
     at an offset as a share of the driver's range, for small scans, ``rate_gain`` g of (23) at a rate in Hz, None
     where it is not calibrated. ``allowed`` is the scaling error in the window that may be left for the sake of
-    less acceleration: a model that makes the whole waveform itself keeps it, where it is not None.
+    less acceleration: a model that makes the whole waveform itself keeps it, where it is not None. ``v`` and
+    ``v_amplitude`` are 0 where the size law refuses the size, and ``size_nm`` is where nothing gives one; the model is
+    asked all the same, so that its own faults are reported in the same run.
     """
 
     axis: str

@@ -142,6 +142,22 @@ class Refinement(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         ]
         | None
     ) = None
+    before_scaling_percent: (
+        Annotated[
+            float,
+            Meta(ge=0.0, le=1e4, description="scaling error of the same trace, peak to peak, of the worse direction"),
+        ]
+        | None
+    ) = None
+    previous_a: (
+        Annotated[Harmonics, Meta(description="cosine terms of the layer that was played while that was measured")]
+        | None
+    ) = None
+    previous_b: Annotated[Harmonics, Meta(description="sine terms of the same layer")] | None = None
+    best: (
+        Annotated[bool, Meta(description="the round after this layer had a larger scaling error, so it was kept")]
+        | None
+    ) = None
     before_of: (
         Annotated[
             Literal["line", "mismatch"],

@@ -18,7 +18,7 @@ from tablegen.planning.line_plan import LinePlan, Plan, make_plan
 from tablegen.refinement.lattice_line import ImageOptions, LatticeLine, lattice_line
 from tablegen.refinement.learning import Lesson, learn
 from tablegen.refinement.registration import SweepMismatch, mismatch
-from tablegen.refinement.round import Options, Round, allowed, finished, why_worse, with_lesson
+from tablegen.refinement.round import Options, Round, allowed, finished, stop, why_worse, with_lesson
 from tablegen.refinement.slow_line import slow_line
 from tablegen.refinement.window_line import WindowLine, averaged
 
@@ -82,6 +82,7 @@ def refine_images(
         refinement=refinement,
         setup=changed,
         worse=why_worse(setup, axis, lesson),
+        **stop(setup, line, lesson),
         remarks=(*_size_remarks(plan, size), *_remarks(line, frames, lesson)),
         frames=frames,
         measured=measured,
@@ -247,6 +248,7 @@ def refine_mismatch(
         refinement=refinement,
         setup=changed,
         worse=why_worse(setup, axis, lesson, "mismatch"),
+        **stop(setup, plan.x, lesson, "mismatch"),
         remarks=tuple(remarks),
         frames=frames,
         measured=measured,

@@ -19,6 +19,7 @@ TYPICAL_THRESHOLD = 0.5  # as in the paper
 _NAMES = ("k_nm_per_v", "beta", "v_threshold")
 _MIN_SCATTER = 1e-7
 _STEP_SCALES = (0.5, 2.0, 0.25)  # k relative to its start; the others absolute
+_LEAST_DRIVE = 1e-6  # of the driver's range: below it nothing is told from noise
 _LEAST_BETA, _LARGEST_BETA = -0.49, 100.0
 
 
@@ -54,8 +55,11 @@ def fit_size(
     span, v = driver.span, drive_v / driver.span
     if float(np.max(v)) > 1.0:
         raise Unphysical(f"a drive of {np.max(drive_v):g} V is above {driver.full_scale}")
-    if float(np.min(v)) <= 0.0:
-        raise Unphysical(f"a drive of {np.min(drive_v):g} V is not a scan; drives are in volts peak to peak")
+    if float(np.min(v)) < _LEAST_DRIVE:
+        raise Unphysical(
+            f"a drive of {np.min(drive_v):g} V is not a scan; drives are in volts peak to peak, of at least "
+            f"{_LEAST_DRIVE * span:g} V here"
+        )
     different = len(np.unique(np.round(v, 9)))
     if different < 2:
         raise Unphysical("one size does not determine k and beta; measure a second one, best three times as large")

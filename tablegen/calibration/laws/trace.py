@@ -6,6 +6,7 @@ import numpy as np
 
 from tablegen.base.input_errors import Unphysical
 from tablegen.calibration.laws.triangle import Triangle, find_triangle
+from tablegen.calibration.spans import check_spans
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.fitting.correlation import correlation_length
 from tablegen.fitting.estimate import Curve, Estimate
@@ -58,6 +59,7 @@ def fit_trace(
     if not np.all(np.diff(time_s) > 0.0):
         at = int(np.argmin(np.diff(time_s) > 0.0))
         raise Unphysical(f"time does not ascend after {time_s[at]:g} s; give every trace its own file or trace number")
+    check_spans(time_s, displacement_nm, drive_v)
     triangle = find_triangle(time_s, drive_v)
     periods = float(time_s[-1] - time_s[0]) * (1.0 + 1.0 / (len(time_s) - 1)) / triangle.period_s
     per_period = len(time_s) / periods

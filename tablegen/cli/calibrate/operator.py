@@ -305,7 +305,7 @@ def _write(
     """The operator's file, then the scanner file that names it."""
     from tablegen.base.input_errors import Rejected
     from tablegen.calibration.operator.file_of_fit import operator_file
-    from tablegen.calibration.scanner_file import Change, new_file, updated
+    from tablegen.calibration.scanner_file import Change, new_file, updated, with_own_hysteresis
     from tablegen.compensation.models.operator import OperatorModel
 
     assert common.scanner is not None
@@ -317,11 +317,12 @@ def _write(
     try:
         path = common.scanner.resolve()
         text = read_text(path, CONFIGURATION) if path.exists() else new_file(path.stem, driver)
+        kept = with_own_hysteresis(text, name) if common.axis == "x" else text
         summary = f"operator of {len(fit.operator.lines)} traces, family {fit.family}"
         change = Change(
             "hysteresis", {"model": OperatorModel.model(), "file": beside.name}, provenance=[[summary, *sources]]
         )
-        scanner = updated(text, name, common.axis, change).encode("utf-8")
+        scanner = updated(kept, name, common.axis, change).encode("utf-8")
     except Rejected as rejected:
         fail(rejected.problems, ExitStatus.WRONG_INPUT)
     except UnicodeDecodeError:
@@ -332,3 +333,5 @@ def _write(
     changed += written(path.parent, {path.name: scanner})
     done = "written" if changed else "up to date"
     click.echo(f"{name}: {common.axis}.hysteresis and {beside.name} {done}", err=common.as_json)
+    if kept != text:
+        click.echo(f"{name}: y.hysteresis keeps the model that it had by like", err=common.as_json)

@@ -87,7 +87,9 @@ Exit status: 0 done, 2 wrong input, 4 cannot write, 6 a library is missing.""",
     help="Order of the polynomial that describes drift.  [default: 0 to 3, more with more periods]",
 )
 @click.option(
-    "--force", is_flag=True, help="Use the trace even if its error is larger than before, or if it was used already."
+    "--force",
+    is_flag=True,
+    help="Use the trace even if its error is larger than before, or if it was used already: learn on from it.",
 )
 @plot_option("measured and predicted errors, and what was learnt,", by_default=True)
 @click.option("--report", type=OutputFile(), metavar="FILE", help="Write the round to FILE as an HTML page.")
@@ -163,8 +165,10 @@ def refine(
         written(report.parent, {report.name: round_page(found, name, sources, refined.earlier, refused)})
     if refused and not force:
         fail([f"{files}: {refused}"], ExitStatus.WRONG_INPUT)
+    if refined.stopped and not force:
+        click.echo(f"{files}: {refined.stopped}", err=True)
     if write:
-        _write(scan, axis, refined, as_json)
+        _write(scan, axis, refined, force, as_json)
     return ExitStatus.OK
 
 
@@ -191,16 +195,19 @@ def _charts(found: "Round") -> "PlottedCharts":
     return round_charts(found, found.setup.scan.name)
 
 
-def _write(scan: Path, axis: str, refined: "RefinedScan", quiet: bool) -> None:
+def _write(scan: Path, axis: str, refined: "RefinedScan", force: bool, quiet: bool) -> None:
     from tablegen.base.input_errors import Rejected
 
     try:
         path = scan.resolve()
-        content = refined.content()
+        content = refined.content(force)
     except Rejected as rejected:
         fail(rejected.problems, ExitStatus.WRONG_INPUT)
     if not content:
         click.echo(f"{scan}: not changed", err=quiet)
         return
     written(path.parent, {path.name: content})
-    click.echo(f"{scan}: {axis}.refinement written; build, upload and record again", err=quiet)
+    if refined.stopped and not force:
+        click.echo(f"{scan}: {axis}.refinement written, with the best layer; build and upload", err=quiet)
+    else:
+        click.echo(f"{scan}: {axis}.refinement written; build, upload and record again", err=quiet)

@@ -118,6 +118,7 @@ def refine_record(found: Round, name: str, sources: Sequence[Source]) -> dict[st
         },
         "layer": {"a": lesson.layer.a.tolist(), "b": lesson.layer.b.tolist()},
         "worse": found.worse or None,
+        "stopped": found.stopped or None,
         "remarks": list(found.remarks),
     }
 

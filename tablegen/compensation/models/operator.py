@@ -21,7 +21,7 @@ from tablegen.compensation.operator.creep import LogarithmicCreep
 from tablegen.compensation.operator.file import read_operator
 from tablegen.compensation.operator.loop import Loop
 from tablegen.compensation.operator.minimum_acceleration_line import Gentle, gentlest_waveform
-from tablegen.compensation.operator.operator import Operator
+from tablegen.compensation.operator.operator import SMALL_STROKE, Operator
 from tablegen.compensation.operator.scan_line import Expected, Found, Wanted, find_waveform
 from tablegen.compensation.operator.transient import after_offset, after_size
 from tablegen.compensation.operator.uncertainty import departures, of_formulas, of_places
@@ -122,9 +122,10 @@ class OperatorModel(WithBranches, frozen=True, kw_only=True, tag="operator"):
     def line(self, request: LineRequest, problems: ModelProblems) -> LineShape | None:
         """Learn the waveform on the operator, from a straight line on."""
         operator = self._read(request, problems)
-        if operator is None:
-            return None
+        if operator is None or not request.size_nm > 0.0 or not 0.0 <= request.v_share <= 1.0:
+            return None  # a size or an offset that was refused, and no line to look for
         with problems.at("file"):
+            _check_sense(operator, request)
             return _line(operator, request, problems)
         return None
 
@@ -136,6 +137,7 @@ class OperatorModel(WithBranches, frozen=True, kw_only=True, tag="operator"):
         if operator is None:
             return None
         with problems.at("file"):
+            _check_sense(operator, request)
             _check_reach(operator, high - low, 0.5 * (low + high), request.driver)
             here, factor = _at(operator, request)
             return here.loop(low, high, factor, request.v_share), here.creep
@@ -150,7 +152,8 @@ class OperatorModel(WithBranches, frozen=True, kw_only=True, tag="operator"):
             problems.extend(rejected.problems)
             return None
         if file.axis != request.axis:
-            problems.add("file", f"{self.file} is the operator of {file.axis}")
+            why = f"{self.file} is the operator of {file.axis}; [{request.axis}.hysteresis] needs a model of its own"
+            problems.add("file", why)
         for key in ("v_max", "v_min"):
             its, ours = getattr(file, key), getattr(request.driver, key)
             if abs(its - ours) > 1e-6 * request.driver.span:
@@ -219,6 +222,12 @@ def _line(operator: Operator, request: LineRequest, problems: ModelProblems) -> 
     factor *= with_mean(found.mean)
     between = _BEND_UNKNOWN * found.grown
     _check_reach(operator, found.stroke, found.centre, request.driver)
+    if not request.v_amplitude > 0.0:
+        raise Unphysical(
+            f"the operator makes {request.size_nm:.6g} nm with {found.stroke * request.driver.span:.4g} V, and "
+            f"[{request.axis}.size] refuses them: the two contradict each other; calibrate `size` again, or lower the "
+            "size"
+        )
     late = replace(operator, creep=operator.creep.down_to(_SLOWEST_HZ))  # for all that a few frames may last
     # w = 0 and 1 are the ends of the laws' amplitude everywhere else.
     scale = found.v_amplitude * request.driver.span / request.v_amplitude
@@ -244,6 +253,18 @@ def _line(operator: Operator, request: LineRequest, problems: ModelProblems) -> 
             after_size(late, found.stroke, found.centre, factor, request.turn, 1.0 / request.rate_hz),
         ),
     )
+
+
+def _check_sense(operator: Operator, request: LineRequest) -> None:
+    """Refuse an operator that stands still or runs backwards at small drives, which its size is referred to."""
+    for centre in (operator.centre, request.v_share):
+        extent = operator.family.extent(SMALL_STROKE, centre)
+        if not extent > 0.0:
+            driver = request.driver
+            raise Unphysical(
+                f"at {driver.volts(centre):.4g} V it moves by {extent:.4g} nm for {SMALL_STROKE * driver.span:.4g} V, "
+                "and no piezo stands still or runs backwards; calibrate it again"
+            )
 
 
 def _check_reach(operator: Operator, stroke: float, centre: float, driver: Driver) -> None:
