@@ -17,6 +17,8 @@ from tablegen.emit.formats import UnknownFormat, chosen
 from tablegen.emit.render import render, runtime_files
 from tablegen.emit.write import leftover_files, outdated_files, write_files
 from tablegen.findings import Finding
+from tablegen.manifest.format import MANIFEST
+from tablegen.manifest.write import TooLongManifest, UnreadableManifest, require_readable
 from tablegen.planning.line_plan import Plan, make_plan
 from tablegen.problems import Problem, Rejected, Unphysical
 
@@ -128,9 +130,22 @@ class Build:
     def files(self) -> dict[str, bytes]:
         """Every file by its name, the manifest last. Raises ``Rejected`` for a scan that a format cannot hold."""
         try:
-            return render(self.plan, self.certificates, self.formats)
+            files = render(self.plan, self.certificates, self.formats)
+            require_readable(files[MANIFEST])
         except (UnknownFormat, Unphysical) as error:
             raise _refused(self.setup, str(error), self._given) from None
+        except UnreadableManifest as error:
+            raise Rejected([self._unreadable(error)]) from None
+        return files
+
+    def _unreadable(self, error: UnreadableManifest) -> Problem:
+        """Say that no command would take the build, and why; at the table that makes its manifest too long."""
+        key, why = "", f"manifest.json of this build would be refused when it is read back: {error}"
+        longest = max(self.plan.lines, key=lambda line: len(line.program.words))
+        if isinstance(error, TooLongManifest) and longest.program.mode == "direct":
+            words = len(longest.program.words)
+            key, why = f"{longest.axis}.table.mode", f"'direct' takes {words} words, and {why}; use 'interpolated'"
+        return self.setup.scan_file.problem(key, why)
 
     @property
     def runtime(self) -> set[str]:

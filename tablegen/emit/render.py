@@ -10,6 +10,8 @@ from tablegen.config.names import of_the_runtime
 from tablegen.emit.content import AxisContent, Content
 from tablegen.emit.format import Format
 from tablegen.emit.formats import UnknownFormat, chosen
+from tablegen.emit.templates import comment_safe
+from tablegen.manifest.fields import MAXIMUM_FILE_NAME
 from tablegen.manifest.format import MANIFEST, content_hash
 from tablegen.manifest.record import plan_record
 from tablegen.manifest.write import manifest_file
@@ -34,7 +36,7 @@ def render(plan: Plan, certificates: dict[str, Certificate], formats: Sequence[s
     spelt: dict[str, str] = {MANIFEST: MANIFEST}
     for each in wanted:
         for name, text in {**each.files(content), **runtime_files(each)}.items():
-            if not _FILE_NAME.fullmatch(name) or name == MANIFEST:
+            if not _FILE_NAME.fullmatch(name) or len(name) > MAXIMUM_FILE_NAME or name == MANIFEST:
                 raise UnknownFormat(f"{each.name!r} writes {name!r}, which cannot be the name of one of its files")
             if of_the_runtime(name) and name not in own_runtime(each):
                 raise UnknownFormat(
@@ -64,7 +66,7 @@ def plan_content(plan: Plan, certificates: dict[str, Certificate], digest: str) 
         header_only=plan.header_only,
         version=__version__,
         scanner=plan.scanner,
-        summary=tuple(summary(plan, certificates)),
+        summary=tuple(map(comment_safe, summary(plan, certificates))),  # they name files, in any characters
     )
 
 
