@@ -162,7 +162,8 @@ def _finite(value: Any) -> bool:
     if isinstance(value, dict):
         return all(map(_finite, value.values()))
     if isinstance(value, list | tuple):
-        return all(map(_finite, value))
+        kind = type(value[0]) if value else int  # the types of fields have arrays of one kind of number only
+        return kind is int or all(map(isfinite if kind is float else _finite, value))
     return not isinstance(value, float) or isfinite(value)
 
 
