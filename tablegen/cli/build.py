@@ -118,7 +118,7 @@ def build(
         again = "".join(f" -f {name}" for name in formats)
         fail([f"{output} is stale; run: tablegen build {scan} -o {output}{again}"], ExitStatus.STALE)
     if rule is not None:
-        rule.note(built.setup.files, built.formats)
+        rule.note(built.setup, built.formats)
     removed: list[str] = []
     kept: list[str] = []
 

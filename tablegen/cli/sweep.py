@@ -47,7 +47,7 @@ _SHOWN = 20  # scans with the same reason, by name
     "--check",
     "only_check",
     is_flag=True,
-    help="Write nothing. Exit with status 1 and print the files in DIR that are not up to date.",
+    help="Write nothing. Make all programs again; exit with status 1 and print the files in DIR that differ.",
 )
 @strict_option
 @click.option("-q", "--quiet", is_flag=True, help="Print failures and warnings only.")
@@ -133,13 +133,14 @@ def _listed(found: "ScanLibrary", formats: list[str] | None) -> int:
     from tablegen.library.entry import Entry
     from tablegen.sweep.inputs import Inputs
     from tablegen.sweep.run import state
+    from tablegen.sweep.written_records import WrittenRecords
 
-    inputs, wrong = Inputs(), 0
+    inputs, written, wrong = Inputs(), WrittenRecords(), 0
     width = max(len(variant.name) for variant in found.variants)
     for variant in found.variants:
         told = ", ".join(f"{key} = {json.dumps(value, default=str)}" for key, value in variant.settings.items())
         try:
-            what = "up to date" if isinstance(state(found, variant, formats, inputs), Entry) else "to build"
+            what = "up to date" if isinstance(state(found, variant, formats, inputs, written), Entry) else "to build"
         except Rejected as rejected:
             wrong += 1
             what = f"wrong: {rejected.problems[0]}"

@@ -77,13 +77,24 @@ class Setup(Struct, frozen=True, dict=True):
     @property
     def files(self) -> list[Path]:
         """Every file that decides this scan, each once: the scan, the scanner, and the files that it names."""
-        files = [Path(file.name) for file in (self.scan_file, self.scanner_file) if file.lines is not None]
-        for axis in (self.scanner.x, self.scanner.y):
+        return list(dict.fromkeys(path for path, _, _ in self.named_files))
+
+    @property
+    def named_files(self) -> list[tuple[Path, Document, str]]:
+        """The same files with the key that names each, and the document of the key; "" for the scan file itself.
+
+        One that several keys name stands there several times.
+        """
+        files = [(self.scan_file, self.scan_file, ""), (self.scanner_file, self.scan_file, "scanner")]
+        named = [(Path(file.name), document, key) for file, document, key in files if file.lines is not None]
+        for name, axis in (("x", self.scanner.x), ("y", self.scanner.y)):
             if axis.resonance is not None and axis.resonance.response is not None:
-                files.append(self.scanner_folder / axis.resonance.response)
+                path = self.scanner_folder / axis.resonance.response
+                named.append((path, self.scanner_file, f"{name}.resonance.response"))
             if axis.hysteresis is not None:
-                files += [self.scanner_folder / name for name in axis.hysteresis.files()]
-        return list(dict.fromkeys(files))
+                key = f"{name}.hysteresis.file"
+                named += [(self.scanner_folder / path, self.scanner_file, key) for path in axis.hysteresis.files()]
+        return named
 
 
 def load(path: str | Path) -> Setup:

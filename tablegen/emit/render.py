@@ -13,9 +13,11 @@ from tablegen.config.names import of_the_runtime
 from tablegen.emit.content import AxisContent, Content
 from tablegen.emit.format import Format
 from tablegen.emit.formats import UnknownFormat, chosen, failing_as_format, files_of
+from tablegen.emit.templates import comment_safe
+from tablegen.manifest.fields import MAXIMUM_FILE_NAME
 from tablegen.manifest.format import MANIFEST, content_hash
 from tablegen.manifest.record import plan_record
-from tablegen.manifest.write import manifest_file
+from tablegen.manifest.write import TooLongManifest, UnreadableManifest, manifest_file, require_readable
 from tablegen.planning.line_plan import LinePlan, Plan
 from tablegen.version import __version__
 
@@ -39,7 +41,7 @@ def render(plan: Plan, certificates: dict[str, Certificate], formats: Sequence[s
         with failing_as_format(each):
             own_files |= runtime_files(each)
         for name, text in own_files.items():
-            if not _FILE_NAME.fullmatch(name) or name == MANIFEST:
+            if not _FILE_NAME.fullmatch(name) or len(name) > MAXIMUM_FILE_NAME or name == MANIFEST:
                 raise UnknownFormat(f"{each.name!r} writes {name!r}, which cannot be the name of one of its files")
             if of_the_runtime(name) and name not in own_runtime(each):
                 raise UnknownFormat(
@@ -80,12 +82,26 @@ def render_scan(
     Raises
     ------
     Rejected
-        For an unknown format, and for a scan that a format cannot hold.
+        For an unknown format, for a scan that a format cannot hold, and for a build that could not be read back.
     """
     try:
-        return render(plan, certificates, formats)
+        files = render(plan, certificates, formats)
+        require_readable(files[MANIFEST])
     except (UnknownFormat, Unphysical) as error:
         raise format_rejected(setup, str(error), given=given) from None
+    except UnreadableManifest as error:
+        raise Rejected([_unreadable(setup, plan, error)]) from None
+    return files
+
+
+def _unreadable(setup: Setup, plan: Plan, error: UnreadableManifest) -> Problem:
+    """Say that no command would take the build, and why; at the table that makes its manifest too long."""
+    key, why = "", f"manifest.json of this build would be refused when it is read back: {error}"
+    longest = max(plan.lines, key=lambda line: len(line.program.words))
+    if isinstance(error, TooLongManifest) and longest.program.mode == "direct":
+        words = len(longest.program.words)
+        key, why = f"{longest.axis}.table.mode", f"'direct' takes {words} words, and {why}; use 'interpolated'"
+    return setup.scan_file.problem(key, why)
 
 
 def format_rejected(setup: Setup, why: str, *, given: bool) -> Rejected:
@@ -109,7 +125,7 @@ def plan_content(plan: Plan, certificates: dict[str, Certificate], digest: str) 
         header_only=plan.header_only,
         version=__version__,
         scanner=plan.scanner,
-        summary=tuple(summary(plan, certificates)),
+        summary=tuple(map(comment_safe, summary(plan, certificates))),  # they name files, in any characters
     )
 
 
