@@ -11,8 +11,7 @@ from msgspec import Struct
 
 from tablegen.device.widths import least_widths
 from tablegen.emit.content import AxisContent, Content
-from tablegen.library.whole import RECORD
-from tablegen.manifest.format import read_json
+from tablegen.manifest.format import RECORD, read_json
 from tablegen.reading import BUILD_FILE, file_sha256, read_bytes
 
 

@@ -11,8 +11,7 @@ from tablegen.emit.render import plan_content
 from tablegen.emit.write import outdated_files, write_files
 from tablegen.interruption import ENDINGS, held
 from tablegen.library.entry import Entry, entry_file, make_entry
-from tablegen.library.whole import RECORD
-from tablegen.manifest.format import read_json
+from tablegen.manifest.format import RECORD, read_json
 from tablegen.reading import holds
 
 

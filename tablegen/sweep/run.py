@@ -15,7 +15,7 @@ from tablegen.emit.write import CannotWrite, write_files
 from tablegen.interruption import ENDINGS, held
 from tablegen.library.entry import Entry, changed_files, is_whole, read_entry
 from tablegen.library.index import listed_files, make_index
-from tablegen.library.whole import INDEX, RECORD
+from tablegen.manifest.format import INDEX, RECORD
 from tablegen.problems import Problem, Rejected
 from tablegen.reading import file_sha256, holds
 from tablegen.sweep.inputs import Inputs
