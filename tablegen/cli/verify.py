@@ -179,6 +179,8 @@ def verify(
         tell(line, bold=line.endswith(_FAILED))
     for note in report.notes:
         click.echo(f"note: {note}")
+    if report.unplayed:
+        click.echo(f"not played: {'; '.join(report.unplayed)}")
     written = junit is None or _write(junit, report, digest)
     if report.failures:
         lines = ["", *report.failures]

@@ -31,6 +31,7 @@ class Outcome:
     difference: str | None = None  # the first tick that differs
     whole_frame: bool = False  # a frame was played apart from the session
     notes: list[str] = field(default_factory=list)
+    unplayed: list[str] = field(default_factory=list)  # files, and options of a module
 
 
 class Target(Protocol):
@@ -72,6 +73,7 @@ class Report:
     difference: str | None
     notes: list[str]
     seconds: float = 0.0
+    unplayed: list[str] = field(default_factory=list)  # what of the sequencer was not played, where one was
 
     def __repr__(self) -> str:
         failed = len(self.failures)
@@ -132,7 +134,9 @@ def verify_build(
         notes.append(f"scaling errors of the model {names} were not compared: its equations are not those of tablegen")
     if outcome.session is not None:
         notes += _coverage(stored, outcome)
-    return Report(stored.manifest.name, checks, outcome.difference, notes + outcome.notes, watch.seconds)
+    return Report(
+        stored.manifest.name, checks, outcome.difference, notes + outcome.notes, watch.seconds, outcome.unplayed
+    )
 
 
 class Stopwatch:
