@@ -13,9 +13,8 @@ from tablegen.base.reading import BUILD_FILE, file_sha256, read_bytes
 from tablegen.config.names import why_not_a_name
 from tablegen.device.widths import least_widths
 from tablegen.emit.content import AxisContent, Content
-from tablegen.library.whole import RECORD
 from tablegen.manifest.fields import Digest, FileName
-from tablegen.manifest.format import read_json
+from tablegen.manifest.format import RECORD, read_json
 
 
 class AxisEntry(Struct, frozen=True, kw_only=True, omit_defaults=True):

@@ -16,8 +16,7 @@ from tablegen.library.c_index import c_index
 from tablegen.library.entry import Entry
 from tablegen.library.sameness import why_not_one_c, why_not_one_sequencer
 from tablegen.library.verilog_index import verilog_index
-from tablegen.library.whole import INDEX
-from tablegen.manifest.format import read_json
+from tablegen.manifest.format import INDEX, read_json
 from tablegen.version import __version__
 
 _PLAIN = re.compile(r"[A-Za-z0-9_]+\.[A-Za-z0-9]+")

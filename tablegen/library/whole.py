@@ -6,9 +6,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from tablegen.base.reading import BUILD_FILE, read_bytes
+from tablegen.manifest.format import INDEX, RECORD
 from tablegen.manifest.read import read_build
-
-INDEX, RECORD = "library.json", "program.json"
 
 
 @contextmanager

@@ -23,7 +23,7 @@ from tablegen.fixedpoint.output import GAIN_BITS, UNIT_GAIN_BITS
 from tablegen.fixedpoint.phase import RationalPhase
 from tablegen.fixedpoint.rounding import signed_limits
 from tablegen.manifest.fields import LEAST_V_PER_CODE, Manifest, ManifestAxis, ManifestSequence
-from tablegen.manifest.format import MANIFEST, content_hash, read_json
+from tablegen.manifest.format import MANIFEST, RECORD, content_hash, read_json
 
 
 class NotABuild(Exception):
@@ -80,6 +80,11 @@ def read_build(folder: str | Path) -> StoredBuild:
     try:
         content = read_bytes(path, MANIFEST_KIND)
     except OSError as error:
+        if isinstance(error, FileNotFoundError) and (example := _a_program(path.parent)) is not None:
+            raise NotABuild(
+                f"{folder}: is a library of `tablegen sweep`, not a build; name one of its programs, for example "
+                f"{example}"
+            ) from None
         raise NotABuild(
             f"{path}: cannot be read: {error.strerror or error}; the directory is the one of `tablegen build -o DIR`"
         ) from None
@@ -119,6 +124,14 @@ def parse_manifest(content: bytes) -> StoredBuild:
     if wrong := [*_wrong_names(manifest), *_wrong_schedule(manifest.sequence), *_wrong_axes(manifest)]:
         raise DamagedManifest(wrong)
     return StoredBuild(manifest, program, plain)
+
+
+def _a_program(folder: Path) -> Path | None:
+    """Find the first program of a library in a folder; None if the folder holds none."""
+    try:
+        return min((path for path in folder.iterdir() if (path / RECORD).is_file()), default=None)
+    except OSError:
+        return None
 
 
 def _wrong_names(manifest: Manifest) -> list[str]:

@@ -13,8 +13,7 @@ from tablegen.config.names import of_the_runtime
 from tablegen.emit.render import plan_content
 from tablegen.emit.write import leftover_files, outdated_files, write_files
 from tablegen.library.entry import Entry, entry_file, make_entry
-from tablegen.library.whole import RECORD
-from tablegen.manifest.format import read_json
+from tablegen.manifest.format import RECORD, read_json
 from tablegen.sweep.written_records import WrittenRecords
 
 

@@ -18,8 +18,7 @@ from tablegen.emit.formats import UnknownFormat
 from tablegen.emit.write import CannotWrite, names_of_build, write_files
 from tablegen.library.entry import Entry, changed_files, is_whole, parse_entry, read_record
 from tablegen.library.index import is_indexed, listed_files, make_index
-from tablegen.library.whole import INDEX, RECORD
-from tablegen.manifest.format import MANIFEST
+from tablegen.manifest.format import INDEX, MANIFEST, RECORD
 from tablegen.manifest.read import NotABuild, StoredBuild, read_build
 from tablegen.sweep.inputs import Inputs
 from tablegen.sweep.job import Doubtful, Job, Made, make

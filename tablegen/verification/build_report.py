@@ -37,6 +37,7 @@ class Outcome:
     difference: str | None = None  # the first tick that differs
     whole_frame: bool = False  # a frame was played apart from the session
     notes: list[str] = field(default_factory=list)
+    unplayed: list[str] = field(default_factory=list)  # files, and options of a module
 
 
 class Target(Protocol):
@@ -78,6 +79,7 @@ class Report:
     difference: str | None
     notes: list[str]
     seconds: float = 0.0
+    unplayed: list[str] = field(default_factory=list)  # what of the sequencer was not played, where one was
 
     def __repr__(self) -> str:
         failed = len(self.failures)
@@ -89,10 +91,21 @@ class Report:
         return [check.failure for check in self.checks if check.failure is not None]
 
 
-def verify_build(folder: Path, work: Path, target: Target, most_ticks: int, seed: int, progress: Progress) -> Report:
+def verify_build(
+    folder: Path,
+    work: Path,
+    target: Target,
+    most_ticks: int,
+    seed: int,
+    progress: Progress,
+    *,
+    other_version: bool = False,
+) -> Report:
     """Verify the build in ``folder`` for a target; it is played in ``work``, an empty directory.
 
-    Raises ``NotABuild`` and ``ToolMissing``. Everything else that is wrong is a failed check, and none hides another.
+    A build of another version fails unless ``other_version``, since its runtime cannot be compared with the installed
+    one. Raises ``NotABuild`` and ``ToolMissing``. Everything else that is wrong is a failed check, and none hides
+    another.
     """
     stored = read_build(folder)
     if target.format_name is not None and target.format_name not in stored.formats:
@@ -110,14 +123,14 @@ def verify_build(folder: Path, work: Path, target: Target, most_ticks: int, seed
     notes = [f"{why}; only the SHA-256 of its files was checked" for why in unknown]
     content = stored_content(stored)
     checks = watch.timed(_manifest_checks(folder, stored))
-    checks += watch.timed(_file_checks(folder, stored, content, known, same))
+    checks += watch.timed(_file_checks(folder, stored, content, known, other_version))
     checks += watch.timed(_format_checks(folder, content, known))
     progress("measuring the certificate")
     certificates = check_certificates(stored, same)
     checks += watch.timed(certificates.checks)
     outcome = target.play(PlayJob(folder, work, stored, certificates.limits, most_ticks, seed, progress))
     checks += watch.timed(outcome.checks)
-    if not same:
+    if not same and other_version:
         notes.append(
             f"built by tablegen {stored.manifest.tablegen}, verified by {__version__}: its runtime was not compared "
             "with the installed one, nor its scaling errors with the words"
@@ -127,7 +140,9 @@ def verify_build(folder: Path, work: Path, target: Target, most_ticks: int, seed
         notes.append(f"scaling errors of the model {names} were not compared: its equations are not those of tablegen")
     if outcome.session is not None:
         notes += _coverage(stored, outcome)
-    return Report(stored.manifest.name, checks, outcome.difference, notes + outcome.notes, watch.seconds)
+    return Report(
+        stored.manifest.name, checks, outcome.difference, notes + outcome.notes, watch.seconds, outcome.unplayed
+    )
 
 
 class Stopwatch:
@@ -159,9 +174,12 @@ def _manifest_checks(folder: Path, stored: StoredBuild) -> list[Check]:
     ]
 
 
-def _file_checks(folder: Path, stored: StoredBuild, content: Content, formats: list[Format], same: bool) -> list[Check]:
+def _file_checks(
+    folder: Path, stored: StoredBuild, content: Content, formats: list[Format], other_version: bool
+) -> list[Check]:
     """The files that a build has, their digests, and those that are the same in every build of a version."""
-    files = stored.manifest.files
+    files, version = stored.manifest.files, stored.manifest.tablegen
+    same = version == __version__
     written: Written = []
     try:
         written = written_files(content, formats)
@@ -176,6 +194,13 @@ def _file_checks(folder: Path, stored: StoredBuild, content: Content, formats: l
         compared, unlike = unlike_installed(folder, written)
         if compared:
             checks.append(differing_check("files", f"tablegen {__version__}", f"{compared} files", unlike))
+    elif not other_version:
+        why = (
+            f"files: built by tablegen {shortened(version)}, and this is {__version__}: its runtime cannot be compared "
+            f"with the installed one; build it again, verify it with tablegen {shortened(version)}, or leave the "
+            "verdict on its runtime to what is played, with --other-version"
+        )
+        checks.append(Check("files", f"tablegen {__version__}", "0 files", failure=why))
     return checks
 
 

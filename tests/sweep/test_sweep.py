@@ -377,6 +377,20 @@ def test_programs_that_one_runtime_cannot_play_have_no_index(tmp_path: Path) -> 
     assert len(index_of(tmp_path / "out")["programs"]) == 2
 
 
+@pytest.mark.parametrize("index", [True, False])
+@pytest.mark.parametrize("command", [["verify"], ["upload", "--port", "none"], ["report"]])
+def test_a_library_is_not_a_build_and_its_programs_are_named(library: Path, command: list[str], index: bool) -> None:
+    """One line, with something to do; also where a sweep was interrupted before its index."""
+    out = library / "out"
+    if not index:
+        (out / "library.json").unlink()
+    done = run(*command, out)
+    assert (done.status, done.out) == (2, "")
+    assert done.err == (
+        f"{out}: is a library of `tablegen sweep`, not a build; name one of its programs, for example {out}/broad\n"
+    )
+
+
 @pytest.mark.common
 def test_a_program_is_verified_and_read_like_a_build(library: Path) -> None:
     out = library / "out"

@@ -174,7 +174,7 @@ def test_a_sequencer_that_shapes_otherwise_is_found(
     assert count >= 1
     path.write_text(text, "ascii")
     make_right(tmp_path / "out", version="0.2.0")
-    outcome = run("verify", tmp_path / "out", *target)
+    outcome = run("verify", tmp_path / "out", "--other-version", *target)
     assert {("x", "integer model"), ("x", "shaped codes")} <= failed(outcome)
 
 

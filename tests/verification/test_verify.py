@@ -385,12 +385,31 @@ def test_a_damaged_manifest_is_wrong_input(folder: Path, path: tuple[str | int, 
     assert why in outcome.err
 
 
-@pytest.mark.common
-def test_a_build_of_another_version_is_noted(folder: Path) -> None:
+def test_a_build_of_another_version_fails_unless_that_is_asked_for(folder: Path) -> None:
+    """Nothing of its runtime is compared, so that nothing but the play can vouch for it."""
     edit_manifest(folder, "tablegen", value="0.0.7")
-    outcome = verify(folder)
-    assert outcome.status == 0
-    assert "note: built by tablegen 0.0.7, verified by " in outcome.out
+    outcome = verify(folder, "--target", "files")
+    assert (outcome.status, failed(outcome)) == (5, {INSTALLED})
+    assert f"files: built by tablegen 0.0.7, and this is {__version__}: its runtime cannot be compared" in outcome.err
+    assert "--other-version" in outcome.err
+    assert "note: built by" not in outcome.out
+    outcome = verify(folder, "--target", "files", "--other-version")
+    assert (outcome.status, outcome.err) == (0, "")
+    assert f"note: built by tablegen 0.0.7, verified by {__version__}: its runtime was not compared" in outcome.out
+
+
+def test_the_option_hides_nothing_of_a_build_of_this_version(folder: Path) -> None:
+    edit(folder / "dac_slew.v", "endmodule", "endmodule // and more")
+    outcome = verify(folder, "--target", "files", "--other-version")
+    assert failed(outcome) == {("files", "SHA-256 in the manifest"), INSTALLED}
+
+
+@pytest.mark.common
+def test_a_build_of_another_version_is_played(folder: Path) -> None:
+    edit_manifest(folder, "tablegen", value="0.0.7")
+    outcome = verify(folder, "--other-version")
+    assert (outcome.status, outcome.err) == (0, "")
+    assert set(verdicts(outcome).values()) == {"ok"}
 
 
 @pytest.mark.common

@@ -1,21 +1,23 @@
 /* Plays a script on the C sequencer and captures every tick, as stream_bench.v does with the Verilog one.
  *
- * The words of the script are those of tablegen.verification.play.stream, 64 bits each: what to do in the upper four bits.
- * The bench is both sides of the sequencer. Where it runs is the business of whoever gives it words and takes its
+ * The words of the script are those of tablegen.verification.play.stream, 64 bits each: what to do in the upper four
+ * bits. The bench is both sides of the sequencer. Where it runs is the business of whoever gives it words and takes its
  * captures: bench_read(), bench_write() are theirs. With BENCH_FILL it can play ticks by dac_sequencer_fill() as far as
  * a command lets them; a capture then has no faults, since a fill tells them only at its end. With BENCH_EMITTED the
  * program is that of an emitted header, unless a commit says that it is another, which the script wrote; and a tick is
  * two captures: converter words of up to 32 bits, then markers and faults. After the ticks come the counts of faults,
- * then the states that the script asked for, three captures each, and with BENCH_EMITTED the constants of the header.
+ * then the states that the script asked for, four captures each (the last is 0: what a converter holds is not the
+ * sequencer's business), and with BENCH_EMITTED the constants of the header.
  */
 #include "dac_sequencer.h"
 #include "stream_bench.h"
 
 enum { END, WAIT, WRITE, REQUEST, PERIOD, SHAPE, STATE, EXTRA };              /* commands */
 enum { PROGRAM, X_TABLE, Y_TABLE, X_FOURIER, Y_FOURIER, SINE, REGIONS };      /* regions of a write */
-enum { RESET = 1, COMMIT = 2, WITHDRAW = 4, ARM = 8, TRIGGER = 16, PARK = 32, CLEAR_FAULTS = 64, UNDERRUN = 128 };
+enum { RESET = 1, COMMIT = 2, WITHDRAW = 4, ARM = 8, TRIGGER = 16, PARK = 32, CLEAR_FAULTS = 64, UNDERRUN = 128,
+       UNFIT = 256 };
 enum { PAGE = 16, SCAN = 0, X = PAGE, Y = 2 * PAGE };                         /* pages of the registers */
-enum { STATES = 64, STATE_WORDS = 3, WRITABLE = 1, REFUSED = 2, COMMITTED = 4 };  /* states */
+enum { STATES = 160, STATE_WORDS = 4, WRITABLE = 1, REFUSED = 2, COMMITTED = 4 };  /* states */
 
 static dac_sequencer sequencer;
 static dac_word x_table[2][BENCH_TABLE_WORDS + DAC_WORDS_BEHIND], y_table[2][BENCH_TABLE_WORDS + DAC_WORDS_BEHIND];
@@ -223,7 +225,8 @@ static void written(dac_program *p, unsigned idle)
 #endif
 }
 
-static void load(uint32_t variation)
+/* An `unfit` program has to be refused: the state that is asked for next says so. */
+static void load(uint32_t variation, bool unfit)
 {
     static const char *const outcomes[] = {
         "", "load: DAC_BUSY", "load: DAC_OTHER_CONVERTER",
@@ -242,6 +245,10 @@ static void load(uint32_t variation)
         written(&p, idle);
     (void)variation;
     const dac_loaded outcome = dac_sequencer_load(&sequencer, &p);
+    if (unfit) {
+        refused |= outcome != DAC_LOADED;
+        return;
+    }
     bench_check(outcome == DAC_LOADED, outcomes[outcome]);
 }
 
@@ -311,6 +318,7 @@ static void state(void)
     words[0] = (uint64_t)status.faults << 8 | (refused ? REFUSED : 0) | (writable ? WRITABLE : COMMITTED);
     words[1] = (uint64_t)status.fault_counts[1] << 32 | status.fault_counts[0];
     words[2] = (uint64_t)status.fault_counts[3] << 32 | status.fault_counts[2];
+    words[3] = 0;
     states_stored++;
 }
 
@@ -337,8 +345,8 @@ static void request(unsigned mask, uint32_t frames)
         dac_sequencer_report(&sequencer, DAC_FAULT_UNDERRUN);
     if (mask & COMMIT && !(mask & (WITHDRAW | RESET))) {
         if (dac_sequencer_writable(&sequencer))
-            load(frames);
-        commits_in = 1;
+            load(frames, mask & UNFIT);
+        commits_in = mask & UNFIT ? 0 : 1;
     }
 }
 
@@ -367,7 +375,7 @@ void bench_play(bool fill)
             break;
         case REQUEST:
             pass(1);
-            request(word >> 16 & 255, word & 0xffff);
+            request(word >> 16 & 511, word & 0xffff);
             break;
         case STATE:
             pass(1);

@@ -28,15 +28,16 @@ from tablegen.verification.checks.played_checks import (
     check_waveform,
     first_difference,
 )
+from tablegen.verification.coverage import unplayed_c
 from tablegen.verification.failures import SimulationFailed
 from tablegen.verification.play.capture import make_capture, recaptured
 from tablegen.verification.play.converter_words import packed
 from tablegen.verification.play.placement import Placement
 from tablegen.verification.play.sequencer_shape import SCRIPT, SequencerShape
 from tablegen.verification.play.session import make_session
-from tablegen.verification.play.stream import Script, read_states
+from tablegen.verification.play.stream import OUTPUTS, Script, read_states
 
-_UNTOLD = ("armed", "running")  # what the status of the C sequencer does not tell
+_UNTOLD = ("armed", "running", OUTPUTS)  # what the status of the C sequencer does not tell
 _MAX_TABLE_WORDS = 1 << 17  # words of a direct table that dac_sequencer_load() accepts
 
 
@@ -112,7 +113,8 @@ class CTarget:
             checks.append(check_filled(filled, _states(script, fill), fill.counts, script.all_counts))
         except (SimulationFailed, OSError, ValueError) as error:
             checks.append(Check("fill", "integer model", f"{ticks} ticks", failure=f"fill: {error}"))
-        return Outcome(checks, session, first_difference(capture))
+        unplayed = unplayed_c(stored.runtime(".c"), self.fourier)
+        return Outcome(checks, session, first_difference(capture), unplayed=unplayed)
 
     @property
     def _name(self) -> str:

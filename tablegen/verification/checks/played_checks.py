@@ -216,7 +216,9 @@ def check_states(
 
 def _told(state: StoredState) -> list[str]:
     flags = [name if flag else f"not {name}" for name, flag in zip(STATES, state.flags, strict=True)]
-    return [*flags, f"faults {_raised(state.faults)}", *_counts(list(state.counts)).split(", ")]
+    held = Sample.of(state.outputs)
+    outputs = [f"x {held.x}", f"y {held.y}", f"markers {' '.join(held.flags) or 'none'}"]
+    return [*flags, f"faults {_raised(state.faults)}", *_counts(list(state.counts)).split(", "), *outputs]
 
 
 def _converter(capture: Capture, axis: str, content: ManifestAxis, words: Ints) -> Check:
@@ -257,6 +259,29 @@ def check_wires(capture: Capture, stored: StoredBuild, sent: Mapping[int, int], 
     elif len(numbers) < max(least, len(sent)):
         failure = f"serial: {len(numbers)} samples came over the wires, {max(least, len(sent))} were sent"
     return Check("serial", "converter word", f"{len(numbers)} samples", f"{len(wrong)} differ", "0", failure)
+
+
+_BESIDE = {  # modules that stand beside the sequencer: what they are to do, and what of it is lost on purpose
+    "coding": ("dac_coding", "words", ""),
+    "spi": ("dac_spi", "samples, 8 ways to wire two converters", "missed"),
+    "axi_stream": ("dac_axi_stream", "beats, 2 widths", "missed"),
+    "boot": ("dac_boot", "words, 5 ways to boot", "refused"),
+}
+
+
+def check_outputs(results: Mapping[str, tuple[int, int, int]]) -> list[Check]:
+    """Modules beside the sequencer on random words, clock by clock against what their headers say."""
+    checks = []
+    for name, (module, unit, lost_name) in _BESIDE.items():
+        done, lost, errors = results.get(name, (0, 0, 0))
+        failure = None
+        if errors:
+            failure = f"{module}: wrong on {errors} clocks of the bench of outputs (output_bench.v says how it is used)"
+        elif not done or (lost_name and not lost):
+            failure = f"{module}: the bench of outputs did not come to its end"
+        compared = f"{done} {unit}" + (f", {lost} {lost_name}" if lost_name else "")
+        checks.append(Check(module, "its options", compared, f"{errors} clocks", "0", failure))
+    return checks
 
 
 def check_whole(subject: str, capture: Capture, how: str) -> Check:

@@ -6,8 +6,11 @@ from dataclasses import dataclass, field
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS, program_words
 from tablegen.verification.play.placement import Placement
+from tablegen.verification.play.sequencer_shape import SequencerShape
 from tablegen.verification.play.stream import PROGRAM, X_FOURIER, X_TABLE, Y_FOURIER, Y_TABLE, Script
+from tablegen.verification.play.unfit_words import c_edges, device_widths, edges
 from tablegen.verification.play.variation import Kind, variation
+from tablegen.verification.play.wide_program import Part, wide_program
 
 _LOADING_PACE, _LOADING_TICKS = 7, 500  # clocks between ticks while words are written, at least, and how many at most
 _OWN_TABLE = 0  # in place of the length of a variation's table
@@ -78,6 +81,25 @@ class Loader:
                 script.write(region, axis.words)
             self._tables[self._bank, region] = len(axis.words)
         return program
+
+    @property
+    def has_long_tables(self) -> bool:
+        """True if tables serve a period of any length."""
+        return "direct" not in (self.own.x.mode, self.own.y.mode)
+
+    def load_wide(self, part: Part) -> DualProgram:
+        """Write a program that fills its registers, with the tables of a variation."""
+        wide = wide_program(part, self.load("free"))
+        self.script.write(PROGRAM, wide.words)
+        return wide.program
+
+    def edges(self, words: list[int]) -> tuple[list[tuple[int, int]], list[dict[int, int]]]:
+        """Words about the edges of what fits the device, near those of a program: ``unfit.edges``, or those of C."""
+        shape = SequencerShape.of((self.own.x, self.own.y))
+        if self.memories is None:
+            return c_edges(shape, words, max(one.output.shaping.order for one in (self.own.x, self.own.y))), []
+        harmonics = max(self.memories.x_harmonics, self.memories.y_harmonics)
+        return edges(words, device_widths(shape, self.placement, harmonics))
 
     def commit(self, program: DualProgram) -> None:
         """Commit a variation that was loaded."""

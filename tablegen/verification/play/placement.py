@@ -40,6 +40,14 @@ class Placement:
         return _SPLINE_CLOCKS if self.spline else _SCANNER_CLOCKS if self.shaping == 3 else 1
 
     @property
+    def latency(self) -> int:
+        """Clocks from a tick to its sample."""
+        if self.axis == "serial":
+            return self.tick_clocks
+        spline, plain = self.spline, self.axis == "blocks"
+        return (45 if spline else 12 if plain else 17) + (12 if plain else 19) + (1 if self.shaping else 0)
+
+    @property
     def drain_clocks(self) -> int:
         """Clocks after which a sample has left: more than it takes."""
         return (_SPLINE_LATENCY if self.spline else _LATENCY) + self.tick_clocks

@@ -13,6 +13,7 @@ from tablegen.verification.play.loading import Loader, Memories
 from tablegen.verification.play.placement import Placement
 from tablegen.verification.play.requests import Requests
 from tablegen.verification.play.stream import Script
+from tablegen.verification.play.variation import variation
 
 _CATCH_UP_STRIDE = 64  # ticks after which it is seen whether an output has caught up
 _PARK_TICKS = 500  # in which most programs have parked, whatever the ticks are that were asked for
@@ -112,7 +113,7 @@ def make_session(
     every one to three clocks, and the end is played so slowly that a serial converter gets every sample.
     """
     pace, schedule = placement.tick_clocks, program.schedule
-    codes = power_up_codes(program)
+    codes = power_up_codes(variation(program, "free", 0) if requests else program)
     script = Script(power_up=codes, drain=placement.drain_clocks, commit_clocks=placement.commit_clocks())
     loader = Loader(script, program, memories, placement)
     own = _Own(script, loader, most - WIRED_TICKS, seed, pace)

@@ -7,6 +7,7 @@ description of what it does. ``stream_bench.v`` plays it and captures; ``compare
 import re
 from array import array
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, field
 from operator import attrgetter
 from pathlib import Path
@@ -30,8 +31,12 @@ FAULTS = ("slew", "clamp", "overrun", "underrun")
 _flags_of = attrgetter(*FLAGS)
 _VALID = 1 << 48 + FLAGS.index("valid")
 _FAULTS_AT = 56
+_WITH_COMMIT = 1 << 52  # of a write: a commit on the same clock
+_WRITTEN = 1  # as the argument of a commit: the program is what was written
+_UNFIT = 1 << 24  # of a request: its commit has to be refused
 STATES = ("writable", "refused", "committed", "armed", "running", "busy")
-STATE_WORDS = 3  # 64-bit words of a stored state
+OUTPUTS = "outputs"  # of a state, where a device does not hold what it has put out
+STATE_WORDS = 4  # 64-bit words of a stored state
 
 Words = NDArray[np.uint64]
 
@@ -69,23 +74,25 @@ class Sample:
 
 @dataclass(frozen=True)
 class StoredState:
-    """What a device says of itself while nothing is on its way: its flags, its faults and their counts."""
+    """What a device says of itself while nothing is on its way: its flags, its faults, their counts, its outputs."""
 
     flags: tuple[bool, ...]  # in the order of STATES
     faults: int
     counts: tuple[int, ...]  # in the order of FAULTS
+    outputs: int  # codes and markers that it holds, as ``pack`` has them; 0 before the first tick
 
     @classmethod
     def of(cls, words: list[int]) -> "StoredState":
         """The state of its stored words."""
         flags = tuple(bool(words[0] >> bit & 1) for bit in range(len(STATES)))
-        counts = tuple(word >> shift & 0xFFFFFFFF for word in words[1:] for shift in (0, 32))
-        return cls(flags, words[0] >> 8 & 0xF, counts)
+        counts = tuple(word >> shift & 0xFFFFFFFF for word in words[1:3] for shift in (0, 32))
+        return cls(flags, words[0] >> 8 & 0xF, counts, words[3] & ~(0xFF << _FAULTS_AT))
 
     def limited(self, most_counted: int, ignored: tuple[str, ...] = ()) -> "StoredState":
         """As a device has it whose counters end at ``most_counted``, and that does not tell the ``ignored`` flags."""
         flags = tuple(flag and name not in ignored for name, flag in zip(STATES, self.flags, strict=True))
-        return StoredState(flags, self.faults, tuple(min(count, most_counted) for count in self.counts))
+        outputs = 0 if OUTPUTS in ignored else self.outputs
+        return StoredState(flags, self.faults, tuple(min(count, most_counted) for count in self.counts), outputs)
 
 
 @dataclass
@@ -111,6 +118,7 @@ class Script:
         self._period = self._until = self._ticked_at = 0
         self._commits: DualProgram | None = None
         self._commits_at = self._writable_at = 0
+        self._faulty_after = -1  # so many ticks: what the last of them imaged is not valid any more
         self._reported = {"overrun": 0, "underrun": 0}  # the model has no clock, and no faults of it
         self.programs.append((0, None))
 
@@ -134,6 +142,12 @@ class Script:
             self.commands.append(_WAIT | clocks)
             self._pass(clocks)
 
+    def with_tick(self, *names: str, frames: int = 0) -> None:
+        """Requests on the clock of the next tick."""
+        assert self._period, "no tick comes"
+        self.wait(self._until)
+        self.request(*names, frames=frames)
+
     def wait_ticks(self, ticks: int) -> None:
         """Let clocks pass until so many more ticks have been played."""
         if ticks:
@@ -151,6 +165,21 @@ class Script:
         """Writes that must not have an effect, since a program waits or the last one is still on its way out."""
         assert not self.writable
         self.write(region, words, first)
+        self.refused = True
+
+    def write_unfit(self, address: int, word: int, *, at_once: bool = False) -> None:
+        """Write a register of the idle program and commit it, ``at_once`` on the same clock: it does not fit."""
+        base = _WRITE | PROGRAM << 48 | address << 32 | word
+        self._command(base | (_WITH_COMMIT if at_once else 0))
+        if at_once:
+            self.refused = True
+        else:
+            self.commit_unfit()
+
+    def commit_unfit(self) -> None:
+        """Commit an idle program that does not fit the device, or that was never written: it is refused."""
+        assert self.writable
+        self._command(_REQUEST | _UNFIT | 1 << 16 + _REQUESTS.index("commit") | _WRITTEN)
         self.refused = True
 
     def load(self, program: DualProgram, x: FourierWords | None = None, y: FourierWords | None = None) -> None:
@@ -201,6 +230,7 @@ class Script:
         if "underrun" in names:
             assert not self._period, "samples that are on their way would have it too"
             self._reported["underrun"] += 1
+            self._faulty_after = len(self.expected)
         if "commit" in names and not {"withdraw", "reset"} & set(names):
             assert program is not None, "a commit needs its program"
             self._commits = program
@@ -211,21 +241,53 @@ class Script:
         self.tick_every(0)
         self.wait(self.drain)
 
-    def state(self, when: str) -> None:
-        """Store what the device says of itself; ticks stop. A commit has to have come through."""
-        self.come_to_rest()
+    def missed_with_sample(self, latency: int) -> None:
+        """A tick at rest, and an underrun on the clock on which its sample leaves, ``latency`` clocks after it."""
+        self.tick_every(2 * latency)
+        self.wait(1)
+        self.tick_every(0)
+        self.wait(latency - 3)
+        self.request("underrun")
+        self.expected[-1] = self._with_reported(self.expected[-1])
+
+    def state(self, when: str, rests: bool = False) -> None:
+        """Store what the device says of itself; ticks stop, or it ``rests`` already. No commit may be on its way."""
+        if not rests:
+            self.come_to_rest()
+        assert not self._period, "samples are on their way"
         assert self._commits is None, "a commit is on its way"
         model = self.model
         flags = (self.writable, self.refused, model.idle is not None, model.armed, model.running, False)
         reported = sum(1 << FAULTS.index(name) for name, count in self._reported.items() if count)
         counts = (*self.counts, *self._reported.values())
-        self.states.append((when, StoredState(flags, int(model.faults) | reported, counts)))
+        self.states.append((when, StoredState(flags, int(model.faults) | reported, counts, self._outputs)))
         self._command(_STATE)
+
+    @property
+    def images(self) -> bool:
+        """True if the last tick is a valid one of an image."""
+        return bool(self.expected and self.expected[-1] & _VALID)
+
+    @property
+    def image_goes_on(self) -> bool:
+        """True if the next tick will be a valid one too, while nothing else comes."""
+        ahead = copy(self.model)
+        ahead.fault_counts = dict(self.model.fault_counts)
+        return bool(ahead.step().valid)
+
+    @property
+    def _outputs(self) -> int:
+        """Codes and markers that the device holds."""
+        if not self.expected:
+            return self.power_up[1] << 24 | self.power_up[0]
+        held = self.expected[-1] & ~(0xFF << _FAULTS_AT)
+        return held & ~_VALID if self._faulty_after == len(self.expected) else held
 
     def lost_tick(self, under_way: bool) -> None:
         """A tick that comes too early: while the last sample is ``under_way``, or reported by a driver at rest."""
         assert not self._period
         self._reported["overrun"] += 1
+        self._faulty_after = len(self.expected)
         if under_way:
             self.expected[-1] = self._with_reported(self.expected[-1])
         self._command(_EXTRA)

@@ -27,6 +27,7 @@ _LEAST_CODES = 12  # of its amplitude, unless the converter has fewer
 _MAX_STEP = (1 << 24) - 1  # that a sequencer takes
 _ROOM = 40  # of a guard above the largest step
 _PEAK = 0.9  # of a table's full scale
+_LIFTING_GAIN = (1 << (GAIN_BITS - 1)) - 3  # almost twice full scale
 _ZERO = 45  # of a shaping of order 3: no power of 2
 
 
@@ -41,8 +42,7 @@ def variation(own: DualProgram, kind: Kind, bank: int, longer: int = 0) -> DualP
     ticks = min(_LEAST_TICKS + {"free": 24, "clamped": 21, "held": 23}[kind] + longer, x_words)
     lines = min({"free": 3, "clamped": 2, "held": 4}[kind], _room(own.y))
     steps = kind == "held" or (kind == "free" and longer > 0) or lines * ticks > _room(own.y)
-    settle_lines = {"free": 1 - bank, "clamped": 0, "held": 2}[kind]
-    schedule = _schedule(ticks, lines, settle_lines, at_once=kind == "free" and bank == 1)
+    schedule = _schedule(kind, bank, ticks, lines)
     y_phase, hold = RationalPhase(lines if steps else lines * ticks), ticks if steps else 1
     highest = max(own.x.output.shaping.order, own.y.output.shaping.order)
     x_shaping, y_shaping = _shapings(highest, kind, bank)
@@ -65,22 +65,32 @@ def _room(own: Program) -> int:
     return 1 << 16 if own.mode != "direct" else 1 << max(index_bits_of(len(own.words)), 3)
 
 
-def _schedule(ticks: int, lines: int, settle_lines: int, at_once: bool) -> Schedule:
-    """Both sweeps image, on the last line and the one before it; ``at_once`` on the first, all of it the sweep back."""
+def _schedule(kind: Kind, bank: int, ticks: int, lines: int) -> Schedule:
+    """Both sweeps image, on the last line and the one before it.
+
+    A ``free`` one of bank 0 settles for all lines but the last; of bank 1 it images at once, on its first tick, and all
+    of it is the sweep back. Windows of a ``clamped`` one end with the line, a ``held`` one has empty windows.
+    """
     turn, count = ticks // 2 + 1, ticks * 3 // 8 - 1
+    at_once, last = kind == "free" and bank == 1, max(lines - 1, 0)
+    backward = {
+        "free": Window(turn + 1, count - 1),
+        "clamped": Window(turn + 1, ticks - turn - 1),
+        "held": Window(2 + count // 2, 0),  # where the other sweep images
+    }[kind]
     return Schedule(
         ticks=ticks,
         lines=lines,
         update_rate_hz=Fraction(1),
         requested_hz=1.0,
-        pixels=max(count * 2 // 3, 1),
-        settle_lines=settle_lines,
+        pixels=max(count // 3 if at_once else count * 2 // 3, 1),
+        settle_lines={"free": 0 if bank else last, "clamped": 0, "held": 2}[kind],
         turn_tick=0 if at_once else turn,
-        forward=Window(1, count),
-        backward=Window(turn + 1, count - 1),
-        turn_line=max(lines - 1, 1),
-        up=Window(0 if at_once else max(lines - 2, 0), 1),
-        down=Window(lines - 1, 1) if lines > 1 else Window(0, 0),
+        forward=Window(0 if at_once else 1, count),
+        backward=backward,
+        turn_line=max(last, 1),
+        up=Window(0 if at_once else max(last - 1, 0), 0 if kind == "held" else 1),
+        down=Window(last, 1) if lines > 1 else Window(0, 0),
     )
 
 
@@ -88,12 +98,16 @@ def _axis(
     own: Program, phase: RationalPhase, hold: int, kind: Kind, bank: int, shaping: Shaping, roomy: bool
 ) -> Program:
     """One axis; the guard of a ``roomy`` one is far above its steps, as that of a build is."""
-    words = _words(own, phase.ticks, bank)
     room = ceil(shaping.excess) if shaping.order else 0
     gain, middle = _gain(own.output, room)
+    words, lifted = _words(own, phase.ticks, bank), bank == 1 and _is_lifted(own)
     gain_q = own.output.gain_q
     # Nobody's gain or offset: the sign and the bits below a code are others in each bank.
     offset = (middle << gain_q) + (((2 * bank + 1) << gain_q) // 5)
+    if lifted:
+        gain = _LIFTING_GAIN
+        flat = Program(phase, hold, own.mode, own.bits, np.full_like(words, _lift(own)), _unlimited(own.output))
+        offset += gain * int(flat.samples(np.zeros(1, dtype=np.int64))[0])
     wide = replace(own.output, gain_word=-gain if bank else gain, offset_word=offset, shaping=OFF)
     free = Program(phase, hold, own.mode, own.bits, words, _unlimited(wide))
     codes = free.codes(np.arange(free.ticks, dtype=np.int64))
@@ -114,13 +128,33 @@ def _axis(
 
 
 def _words(own: Program, advances: int, bank: int) -> Ints:
-    """Two harmonics over most of full scale; a bank each has its own."""
+    """Two harmonics, a bank each has its own; over most of full scale, or about the words that lift the codes."""
     length = len(own.words) if own.mode != "direct" else advances
     t = np.arange(length) / length
     shape = np.sin(2.0 * np.pi * t + 1.0 + bank) + 0.25 * np.sin(6.0 * np.pi * t + 0.3)
     half = 1 << (own.bits - 1)
+    if bank == 1 and _is_lifted(own):
+        small: Ints = np.rint(_lift(own) + _lifted_words(own) / 1.25 * shape).astype(np.int64)
+        return small
     words: Ints = np.rint(_PEAK * half / 1.25 * shape).astype(np.int64)
     return words
+
+
+def _lifted_words(own: Program) -> float:
+    """The amplitude in words of a table whose gain is ``_LIFTING_GAIN``."""
+    gain, _ = _gain(own.output, 0)
+    return gain * _PEAK * (1 << (own.bits - 1)) / _LIFTING_GAIN
+
+
+def _is_lifted(own: Program) -> bool:
+    """True if the table has words enough for a variation whose offset is negative."""
+    lifted = -_lift(own) / (1 << (own.bits - 1))  # share of the converter's range, since the gain is almost 2
+    return _lifted_words(own) >= _LEAST_CODES and own.output.park_code < (lifted - 0.1) * (1 << own.output.dac_bits)
+
+
+def _lift(own: Program) -> int:
+    """The mean of words that a negative gain lifts far above the park code: only a negative offset takes them back."""
+    return ceil(_lifted_words(own)) + 2 - (1 << (own.bits - 1))
 
 
 def _gain(output: Output, room: int) -> tuple[int, int]:

@@ -5,7 +5,10 @@ the serial output, and are written down, so that what the simulator reads is com
 """
 
 from collections.abc import Mapping
+from importlib.resources import files
 from pathlib import Path
+
+import numpy as np
 
 from tablegen.emit.constants import scan_constants
 from tablegen.emit.content import Content
@@ -13,6 +16,8 @@ from tablegen.verification.play.stream import Words, read_capture
 
 TOP = "verify_bench"
 WORDS, WIRES, STATES, CONSTANTS = "words.hex", "wires.hex", "states.hex", "constants.txt"  # in the folder of a bench
+OUTPUTS, BOOT_PROGRAM, BOOT_WORDS = "outputs.txt", "boot_program.hex", "boot_words.hex"
+OUTPUT_BENCH = Path(str(files("tablegen.verification.verilog"))) / "output_bench.v"
 SPACING_CLOCKS = 200  # a strobe so long after the one before it is sent on the wires
 COUNT_BITS = 8  # of a fault counter: few enough that it ends at its largest number
 WIRE_WORDS = 2  # 64-bit words of a sample on the wires: its number, then both words
@@ -24,7 +29,8 @@ _MODULE = """\
 
 module verify_bench #(
     parameter SCRIPT = "", parameter CAPTURE = "", parameter STATES = "", parameter WORDS = "", parameter WIRES = "",
-    parameter CONSTANTS = "", parameter CONVERTERS = 1, parameter COUNT_BITS = 16, parameter PLAIN_MULTIPLIER = 0,
+    parameter CONSTANTS = "", parameter OUTPUTS = "", parameter BOOT_PROGRAM = "", parameter BOOT_WORDS = "",
+    parameter CONVERTERS = 1, parameter COUNT_BITS = 16, parameter PLAIN_MULTIPLIER = 0,
     parameter LOW_AREA = 0, parameter FOURIER = 0, parameter HARMONICS = 64, parameter SINE_FILE = "",
     parameter SHAPING = 0, parameter X_POWER_UP_CODE = 0, parameter Y_POWER_UP_CODE = 0
 );
@@ -113,6 +119,9 @@ module verify_bench #(
                 $fclose(words);
                 $fclose(wires);
             end
+
+            // What stands beside the sequencer, with the options that this build does not use.
+            output_bench #(.RESULTS(OUTPUTS), .PROGRAM_FILE(BOOT_PROGRAM), .WORDS_FILE(BOOT_WORDS)) outputs ();
         end
     endgenerate
 endmodule
@@ -148,9 +157,34 @@ def bench_parameters(script: str, capture: str, converters: bool) -> dict[str, i
 
     They are named from the folder in which the model runs, so that the model is the same wherever that is.
     """
-    names = {"SCRIPT": script, "CAPTURE": capture, "STATES": STATES, "WORDS": WORDS, "WIRES": WIRES}
-    files: dict[str, int | str] = {key: f"../{name}" for key, name in names.items()}
-    return {**files, "CONSTANTS": f"../{CONSTANTS}", "CONVERTERS": int(converters), "COUNT_BITS": COUNT_BITS}
+    names = {
+        "SCRIPT": script,
+        "CAPTURE": capture,
+        "STATES": STATES,
+        "WORDS": WORDS,
+        "WIRES": WIRES,
+        "CONSTANTS": CONSTANTS,
+    }
+    names |= {"OUTPUTS": OUTPUTS, "BOOT_PROGRAM": BOOT_PROGRAM, "BOOT_WORDS": BOOT_WORDS}
+    paths: dict[str, int | str] = {key: f"../{name}" for key, name in names.items()}
+    return {**paths, "CONVERTERS": int(converters), "COUNT_BITS": COUNT_BITS}
+
+
+def write_boot_files(folder: Path) -> None:
+    """Memory files that a ``dac_boot`` loads in the bench of the outputs: 48 words of 32 bits, and 9 of 16."""
+    random = np.random.default_rng(1)
+    for name, count, bits in ((BOOT_PROGRAM, 48, 32), (BOOT_WORDS, 9, 16)):
+        words = random.integers(0, 1 << bits, count)
+        (folder / name).write_text("".join(f"{word:0{bits // 4}x}\n" for word in words), "ascii")
+
+
+def read_outputs(folder: Path) -> dict[str, tuple[int, int, int]]:
+    """What came of each module beside the sequencer: what it did, what it lost on purpose, and wrong clocks."""
+    lines = (folder / OUTPUTS).read_text("ascii", "replace").splitlines()
+    rows = [line.split() for line in lines]
+    return {
+        row[0]: (int(row[1]), int(row[2]), int(row[3])) for row in rows if " ".join(row[1:]).replace(" ", "").isdigit()
+    }
 
 
 def different_constants(folder: Path, content: Content) -> list[str]:

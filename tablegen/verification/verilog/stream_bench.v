@@ -1,9 +1,10 @@
 // Bench of dac_sequencer: plays a script of writes and requests, one a clock, and captures what leaves with every
 // strobe.
 //
-// The script is a text file of 64-bit words in hexadecimal (tablegen/verification/play/stream.py writes it), the capture a
-// text file of 64-bit words: faults, flags, y code, x code. STATES, if given, gets three words for every state that the
-// script asks for: flags and faults, and the four counts. `finished` rises at the end of the script, after the last
+// The script is a text file of 64-bit words in hexadecimal (tablegen/verification/play/stream.py writes it), the capture
+// a text file of 64-bit words: faults, flags, y code, x code. STATES, if given, gets four words for every state that the
+// script asks for: flags and faults, the four counts, and the outputs that the device holds. `finished` rises at the
+// end of the script, after the last
 // sample.
 
 `timescale 1ns / 1ps
@@ -121,16 +122,19 @@ module stream_bench #(
                 if (fields != 1) command = 0;
                 case (command[63:60])
                     WAIT: wait_left = command[31:0] - 1;
-                    WRITE: write = 1;
+                    WRITE: begin
+                        write = 1;
+                        requests[1] = command[52];
+                    end
                     REQUEST: requests = command[23:16];
                     PERIOD: begin
                         period = command[31:0];
                         until_tick = 0;
                     end
                     STATE: if (STATES != "")
-                        $fwrite(states, "%016x\n%016x\n%016x\n",
+                        $fwrite(states, "%016x\n%016x\n%016x\n%016x\n",
                                 {52'd0, faults, 2'd0, busy, running, armed, committed, refused, writable},
-                                {clamps, slews}, {underruns, overruns});
+                                {clamps, slews}, {underruns, overruns}, sample);
                     EXTRA: extra = 1;
                     default: begin
                         finished = 1;

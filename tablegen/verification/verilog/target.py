@@ -22,6 +22,7 @@ from tablegen.verification.checks.played_checks import (
     check_codes,
     check_faults,
     check_no_faults,
+    check_outputs,
     check_states,
     check_timing,
     check_waveform,
@@ -29,6 +30,7 @@ from tablegen.verification.checks.played_checks import (
     check_wires,
     first_difference,
 )
+from tablegen.verification.coverage import unplayed_verilog
 from tablegen.verification.failures import SimulationFailed
 from tablegen.verification.play.capture import Capture, make_capture
 from tablegen.verification.play.loading import Memories
@@ -38,14 +40,17 @@ from tablegen.verification.play.session import BuildSession, make_session, neede
 from tablegen.verification.play.stream import read_capture, read_states
 from tablegen.verification.verilog.bench import (
     COUNT_BITS,
+    OUTPUT_BENCH,
     STATES,
     TOP,
     WORDS,
     bench_parameters,
     bench_text,
     different_constants,
+    read_outputs,
     read_wires,
     wanted_constants,
+    write_boot_files,
 )
 from tablegen.verification.verilog.sequencer_bench import STREAM_BENCH, run_bench
 from tablegen.verification.verilog.simulate import Design, compile_design, require
@@ -149,6 +154,7 @@ class VerilogTarget:
             *check_codes(capture, stored, {axis: part.astype(np.int64) for axis, part in sent.items()}),
             *check_waveform(captures[-1], stored, job.limits),
             check_wires(capture, stored, read_wires(run.folder), run.session.wired_ticks),
+            *check_outputs(read_outputs(run.folder)),
             check_no_faults(capture),
             check_faults(capture, counted, counts),
             check_states(script.states, states, most_counted),
@@ -157,8 +163,12 @@ class VerilogTarget:
         if len(runs) > 1:
             checks.append(check_whole("frame", captures[1], ", multiplier blocks"))
         differences = [first_difference(one) for one in captures]
+        programs = (stored.program.x, stored.program.y)
         whole = len(runs) > 1 and runs[1].session.whole_frame
-        return Outcome(checks, run.session, next(filter(None, differences), None), whole)
+        unplayed = unplayed_verilog(
+            (name for name in stored.manifest.files if name.endswith(".v")), [one.placement for one in runs], programs
+        )
+        return Outcome(checks, run.session, next(filter(None, differences), None), whole, unplayed=unplayed)
 
 
 @dataclass
@@ -177,11 +187,12 @@ class SimulatedRun:
         (folder / SCRIPT).write_text(script.text(), "ascii")
         shape = SequencerShape.of((stored.program.x, stored.program.y))
         bench = folder / f"{TOP}.v"
+        write_boot_files(folder)
         bench.write_text(bench_text(stored_content(stored), (shape.x_index_bits, shape.y_index_bits)), "ascii")
         harmonics = max(self.memories.x_harmonics, self.memories.y_harmonics)
         self.job = {
             "simulator": simulator,
-            "sources": [str(path) for path in (*sources, STREAM_BENCH, bench)],
+            "sources": [str(path) for path in (*sources, STREAM_BENCH, OUTPUT_BENCH, bench)],
             "includes": [str(sources[0].parent)],
             "parameters": {
                 **bench_parameters(SCRIPT, CAPTURE, self.session.wired_ticks > 0),
