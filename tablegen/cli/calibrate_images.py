@@ -14,6 +14,8 @@ from tablegen.cli.calibration_options import (
     window_option,
 )
 from tablegen.cli.calibration_run import Common, driver_of, finish, shared_options
+from tablegen.cli.common import fail
+from tablegen.cli.exit_status import ExitStatus
 from tablegen.cli.image_pairs import (
     CommandOfPairs,
     channel_option,
@@ -60,6 +62,8 @@ def images(
     Columns: pixels at equal time steps within --window of each sweep.
     Rows:    scan lines in order of time. Both images have the left end of the line at the
              left; otherwise give --retrace-mirrored.
+    Angle:   files of instruments state the scan angle. The fast axis is x at 0 degrees and y
+             at 90; --axis has to be that one.
 
     \b
     Example:
@@ -67,8 +71,15 @@ def images(
       tablegen calibrate images --axis x --v-max 100 --pair 50 1.ibw --pair 100 2.ibw --channel Height
     """
     from tablegen.calibration.images import Pair, fit_images
+    from tablegen.calibration.scan_angle import require_fast_axis
+    from tablegen.problems import Rejected
 
     read = [read_both(trace, retrace, channel, retrace_channel, frame) for _, trace, retrace in pairs]
+    files = [image for both in read for image in both]
+    try:
+        require_fast_axis(files, common.axis)
+    except Rejected as rejected:
+        fail(rejected.problems, ExitStatus.WRONG_INPUT)
     driver = driver_of(common)
     taken = [
         Pair(
@@ -76,6 +87,5 @@ def images(
         )
         for (volts, *_), (trace, retrace) in zip(pairs, read, strict=True)
     ]
-    files = [image for both in read for image in both]
     fit = partial(fit_images, taken, driver, rho, turn, window, retrace_mirrored, delay_pixels)
     return finish(common, files, fit, points)

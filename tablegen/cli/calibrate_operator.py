@@ -97,7 +97,9 @@ def operator(
     from tablegen.calibration.operator.fit import fit_operator
     from tablegen.calibration.operator.periodic_line import periodic_line
     from tablegen.calibration.operator.units import check_size
+    from tablegen.calibration.scan_angle import angle_remarks
     from tablegen.calibration.traces import split_traces
+    from tablegen.findings import of_remarks, worst_first
     from tablegen.problems import Unphysical
 
     wanted_delay = delay_of(delay_s)
@@ -135,6 +137,8 @@ def operator(
         click.echo(json.dumps(_record(fit, lines, further, common.axis, sources, delay), indent=2, allow_nan=False))
     else:
         click.echo("\n".join(_text(fit, lines, further, common.axis, driver, delay)))
+        for finding in worst_first(of_remarks(angle_remarks(sources, common.axis))):
+            click.echo(finding.line)
     plot_fit(common, lambda: _charts(fit, lines, further, driver, common.axis))
     if common.report is not None:
         written(common.report.parent, {common.report.name: _page(fit, lines, further, common.axis, driver, sources)})
@@ -261,6 +265,7 @@ def _record(
     delay: "Estimate",
 ) -> dict[str, Any]:
     """The same for programs."""
+    from tablegen.calibration.scan_angle import angle_remarks
     from tablegen.compensation.models.operator import OperatorModel
 
     traces = [
@@ -290,6 +295,7 @@ def _record(
             "standard_error": delay.standard_error if isfinite(delay.standard_error) else None,
         },
         "traces": traces,
+        "remarks": list(angle_remarks(tables, axis)),
         "next_trace": {"size_v": further.size_v, "offset_v": further.offset_v, "rate_hz": further.rate_hz},
         "sources": [{"file": table.source.name, "sha256": table.source.sha256} for table in tables],
     }

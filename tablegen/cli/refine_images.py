@@ -1,7 +1,7 @@
 """``tablegen refine --images``: its options, and the round that trace and retrace of the running scan give."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
@@ -70,6 +70,7 @@ class ImageArguments:
     def learn(self, scan: Path, axis: Literal["x", "y"], options: "Options") -> "RefinedScan":
         """The round; what is wrong ends the command."""
         from tablegen.api.refine import RefinedScan
+        from tablegen.calibration.scan_angle import running_scan_remarks
         from tablegen.config.load import load
         from tablegen.problems import Rejected, Unphysical
         from tablegen.refinement.image_round import refine_images, refine_mismatch
@@ -101,6 +102,8 @@ class ImageArguments:
             fail([f"{self.names}: {reason}"], ExitStatus.WRONG_INPUT)
         except OSError as error:
             fail([f"{scan}: {error.strerror or error}"], ExitStatus.WRONG_INPUT)
+        remarks = running_scan_remarks(image for pair in read for image in pair)
+        found = replace(found, remarks=(*remarks, *found.remarks))
         return RefinedScan(found, tuple(sources), scan, text)
 
 
