@@ -127,6 +127,10 @@ class Device:
         except ValueError as error:
             raise NotUnderstood(str(error)) from None
 
+    def needs_key(self) -> bool:
+        """Return whether uploads carry a tag; raises ``Refused`` if they do and no key was given. Sends nothing."""
+        return self._session.needs_key(Request.COMMIT)
+
     def upload(
         self,
         image: "ProgramImage",
