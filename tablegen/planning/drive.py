@@ -113,37 +113,10 @@ def compensate(
         with problems.at(scanner_file, f"{axis}.offset{'.points' if scanner.offset.points is not None else ''}"):
             surface = offset_surface(scanner.offset, driver, size_law)
 
-    v_offset = driver.middle
-    if scan.offset_v is not None:
-        v_offset = scan.offset_v
-        with problems.at(scan_file, f"{axis}.offset_v"):
-            if driver.beyond(v_offset, v_offset) > 0.0:
-                raise Unphysical(outside_driver(v_offset, driver))
-    elif scan.offset_nm is not None:
-        with problems.at(scan_file, f"{axis}.offset_nm"):
-            v_offset = surface.small.voltage_at(scan.offset_nm, driver, scanner.size.k_nm_per_v)
-
+    v_offset = _offset_v(setup, axis, surface, problems)
     low, high = scan.band_limit.window
     resting = isinstance(scan, SlowAxis) and scan.off
-    v, size_nm = (RESTING_SHARE if resting else 0.0), 0.0
-    if resting:
-        pass
-    elif size_law is not None and scan.size_nm is not None:
-        with problems.at(scan_file, f"{axis}.size_nm"):
-            size_nm = scan.size_nm / (high - low) if scan.size_of == "window" else scan.size_nm
-            try:
-                v = size_law.voltage(size_nm)
-            except Unphysical as reason:
-                if scan.size_of == "line":
-                    raise
-                window_nm = at_most(size_law.size_nm(1.0) * (high - low), 6)
-                raise Unphysical(f"its line of {reason}, a window of {window_nm} nm") from None
-    elif size_law is not None and scan.size_v is not None:
-        with problems.at(scan_file, f"{axis}.size_v"):
-            if scan.size_v > driver.span:
-                raise Unphysical(f"{scan.size_v:g} V is above {driver.full_scale}")
-            v = scan.size_v / driver.span
-            size_nm = size_law.size_nm(v)
+    v, size_nm = (RESTING_SHARE, 0.0) if resting else _size(setup, axis, size_law, problems)
 
     g = 1.0
     if scanner.frequency is not None and not resting:
@@ -219,6 +192,48 @@ def compensate(
             for name, digest in zip(hysteresis.files(), hysteresis.contents(setup.scanner_folder), strict=True)
         ),
     )
+
+
+def _offset_v(setup: Setup, axis: str, surface: OffsetSurface, problems: Problems) -> float:
+    """Return the offset voltage that the scan asks for, in V; the middle of the driver where it asks for none."""
+    scan: FastAxis = getattr(setup.scan, axis)
+    scanner: ScannerAxis = getattr(setup.scanner, axis)
+    driver = setup.scanner.driver
+    v_offset = driver.middle
+    if scan.offset_v is not None:
+        v_offset = scan.offset_v
+        with problems.at(setup.scan_file, f"{axis}.offset_v"):
+            if driver.beyond(v_offset, v_offset) > 0.0:
+                raise Unphysical(outside_driver(v_offset, driver))
+    elif scan.offset_nm is not None:
+        with problems.at(setup.scan_file, f"{axis}.offset_nm"):
+            v_offset = surface.small.voltage_at(scan.offset_nm, driver, scanner.size.k_nm_per_v)
+    return v_offset
+
+
+def _size(setup: Setup, axis: str, size_law: SizeLaw | None, problems: Problems) -> tuple[float, float]:
+    """Return the share of v_max that the size of a line needs, (9)-(12), and that size in nm; 0 where it has none."""
+    scan: FastAxis = getattr(setup.scan, axis)
+    driver = setup.scanner.driver
+    low, high = scan.band_limit.window
+    v = size_nm = 0.0
+    if size_law is not None and scan.size_nm is not None:
+        with problems.at(setup.scan_file, f"{axis}.size_nm"):
+            size_nm = scan.size_nm / (high - low) if scan.size_of == "window" else scan.size_nm
+            try:
+                v = size_law.voltage(size_nm)
+            except Unphysical as reason:
+                if scan.size_of == "line":
+                    raise
+                window_nm = at_most(size_law.size_nm(1.0) * (high - low), 6)
+                raise Unphysical(f"its line of {reason}, a window of {window_nm} nm") from None
+    elif size_law is not None and scan.size_v is not None:
+        with problems.at(setup.scan_file, f"{axis}.size_v"):
+            if scan.size_v > driver.span:
+                raise Unphysical(f"{scan.size_v:g} V is above {driver.full_scale}")
+            v = scan.size_v / driver.span
+            size_nm = size_law.size_nm(v)
+    return v, size_nm
 
 
 def outside_driver(volts: float, driver: Driver) -> str:

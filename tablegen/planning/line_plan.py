@@ -195,12 +195,7 @@ def _line_plan(setup: Setup, axis: Literal["x", "y"], schedule: Schedule, proble
         return None
     target, kept = None, None
     with problems.at(file, key):
-        if drive.resting:
-            target = FourierSeries(0.5, np.zeros(1), np.zeros(1))
-        elif drive.allowed is None:
-            target = band_limited(drive.shape, limit, harmonics, layer)
-        else:
-            target, kept = _gentle(drive, limit, harmonics, layer, most, float(rate))
+        target, kept = _target(drive, limit, harmonics, layer, most, float(rate))
     if target is None:
         return None
     at_piezo: FourierSeries = target
@@ -258,6 +253,17 @@ def _line_plan(setup: Setup, axis: Literal["x", "y"], schedule: Schedule, proble
         kept_percent=kept,
         asked_table=asked,
     )
+
+
+def _target(
+    drive: Drive, limit: BandLimit, harmonics: int, layer: FourierSeries | None, most: int, rate_hz: float
+) -> tuple[FourierSeries, float | None]:
+    """Return the waveform that the piezo is to get, and the scaling error in percent that it keeps, None for none."""
+    if drive.resting:
+        return FourierSeries(0.5, np.zeros(1), np.zeros(1)), None
+    if drive.allowed is None:
+        return band_limited(drive.shape, limit, harmonics, layer), None
+    return _gentle(drive, limit, harmonics, layer, most, rate_hz)
 
 
 def _gentle(
