@@ -120,6 +120,14 @@ def test_a_build_that_is_checked_is_not_called_stale(tmp_path: Path) -> None:
     assert broken(tmp_path, KeyError("x"), "build", "--check", "-o", str(tmp_path / "out")).status == 70
 
 
+@pytest.mark.parametrize("error", [BrokenPipeError(errno.EPIPE, "Broken pipe"), OSError(errno.EPIPE, "Broken pipe")])
+def test_a_pipe_that_is_not_stdout_is_no_success(tmp_path: Path, error: OSError) -> None:
+    """Of a simulator or a worker that died. Where the reader of stdout has gone, there is nothing left to say."""
+    outcome = broken(tmp_path, error, "build", "-o", str(tmp_path / "out"))
+    assert (outcome.status, outcome.err.startswith("Broken pipe (api/build.py:")) == (70, True)
+    assert not (tmp_path / "out").exists()
+
+
 def test_an_interruption_is_still_one(tmp_path: Path) -> None:
     outcome = broken(tmp_path, KeyboardInterrupt())
     assert (outcome.status, outcome.err.lstrip()) == (130, "interrupted\n")

@@ -60,7 +60,7 @@ _MEASURES = "    rms   scaling  mismatch"
     (PAIR_NAME,),
 )
 @sample_options
-def operator(
+def operator(  # noqa: C901
     common: Common,
     data: tuple[Path, ...],
     delay_s: str,
