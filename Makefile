@@ -17,17 +17,22 @@
 # make reference the pages of commands, keys and Python, into docs
 # make paper     the paper's numbers beside ours, into docs/paper
 # make check-python PYTHON=python3.13  `make check` under another Python, in an environment of its own
+# make bare      both commands of the README in a Debian that has nothing else, on the last commit; as root (BARE=FOLDER)
 # make clean     remove what these made
 
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+# Whose shared library `libpython` is.
+export ENVIRONMENT_PYTHON := $(BIN)/python
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 
+# What the README asks for; every list below adds to it.
+README_PACKAGES := ca-certificates git gpgv make python3 python3-venv
 # What the sets of tests compile, simulate, prove and synthesise with; tests/README.md tells the sets.
-CHECK_TOOLS := gcc iverilog
-COMMON_TOOLS := $(CHECK_TOOLS) make g++ ccache clang libclang-rt-dev cmake ninja-build srecord chromium groff man-db
-HDL_TOOLS := make g++ ccache iverilog yosys nextpnr-ice40 z3
+CHECK_TOOLS := gcc libc6-dev iverilog libpython
+COMMON_TOOLS := $(CHECK_TOOLS) make g++ ccache clang libclang-rt-dev cmake ninja-build ghdl srecord chromium groff man-db
+HDL_TOOLS := make g++ ccache iverilog libpython yosys z3
 FIRMWARE_TOOLS := gcc-arm-none-eabi qemu-system-arm gcc-avr avr-libc simavr gcc-riscv64-unknown-elf gcc-mips-linux-gnu \
     libc6-dev-mips-cross qemu-user \
     arduino-builder arduino-core-avr libsimavr-dev libelf-dev nodejs npm
@@ -73,7 +78,7 @@ test-long: $(VENV)/installed-test
 	$(PYTEST) -m long
 
 resources: $(VENV)/installed-test
-	@.ci/system-packages $(HDL_TOOLS)
+	@.ci/system-packages $(HDL_TOOLS) nextpnr-ice40
 	$(BIN)/python benchmarks/resources.py --write
 
 instructions: $(VENV)/installed-test
@@ -108,7 +113,7 @@ $(OTHERS)/installed: benchmarks/others.txt
 
 ONLY ?=
 bench: $(VENV)/installed-test $(OTHERS)/installed
-	@.ci/system-packages gcc iverilog yosys nextpnr-ice40 gcc-arm-none-eabi gcc-riscv64-unknown-elf gcc-avr avr-libc \
+	@.ci/system-packages gcc iverilog libpython yosys nextpnr-ice40 gcc-arm-none-eabi gcc-riscv64-unknown-elf gcc-avr avr-libc \
 	    libsimavr-dev libelf-dev
 	$(BIN)/python benchmarks/results.py $(ONLY:%=--only %)
 
@@ -168,6 +173,16 @@ pythons: $(VENV)/installed
 
 check-python:
 	$(MAKE) check VENV=.venv-$$($(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2])')
+
+# The packages of lists, for scripts: make packages LIST='README_PACKAGES CHECK_TOOLS'
+LIST ?= README_PACKAGES
+.PHONY: packages bare
+packages:
+	@echo $(sort $(foreach list,$(LIST),$($(list))))
+
+BARE ?= /tmp/tablegen-bare
+bare:
+	@.ci/bare-debian $(BARE)
 
 clean:
 	rm -rf $(VENV) .venv-* build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

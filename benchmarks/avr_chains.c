@@ -1,5 +1,5 @@
-/* On an ATmega2560: the chains and the sequencer over a line each. GPIOR0 tells the simulator's host (avr_count.c) which
- * of them runs, 0 for none; the codes go to GPIOR1, byte by byte. */
+/* On an ATmega2560: the chains and the sequencer over a line each. GPIOR0 tells the simulator's host (avr_count.c)
+ * which of them runs, 0 for none; the codes go to GPIOR1, byte by byte. */
 #include <avr/interrupt.h>
 #include <avr/io.h>
 #include <avr/sleep.h>

@@ -14,7 +14,8 @@ static void named(struct avr_t *avr, avr_io_addr_t address, uint8_t value, void 
 {
     (void)address, (void)unused;
     if (value == 0)
-        printf("\n%u %llu %llu ", name, instructions - first_instruction, (unsigned long long)(avr->cycle - first_cycle));
+        printf("\n%u %llu %llu ", name, instructions - first_instruction,
+               (unsigned long long)(avr->cycle - first_cycle));
     name = value;
     first_instruction = instructions;
     first_cycle = avr->cycle;

@@ -44,7 +44,7 @@ def with_operators(folder: Path) -> dict[str, Path]:
     from editing import SCAN, SCANNER, edited
     from operator_scans import fitted, virtual_traces
 
-    from tablegen.calibration.operator.record import operator_file
+    from tablegen.calibration.operator.file_of_fit import operator_file
     from tablegen.virtual.parameters import load_truth
     from tablegen.virtual.scanner import VirtualScanner
 

@@ -1,5 +1,6 @@
-/* The task of an axis, as others do it: phase, linear interpolation, gain, offset, clamp. Each call makes TICKS codes of
- * x of annexin_200nm, after those of the call before. What benchmarks/sections/instructions.py counts and compares. */
+/* The task of an axis, as others do it: phase, linear interpolation, gain, offset, clamp. Each call makes TICKS codes
+ * of x of annexin_200nm, after those of the call before. What benchmarks/sections/instructions.py counts and compares.
+ */
 #include "annexin_200nm.h"
 #include "block_functions.h"
 #include "chains.h"

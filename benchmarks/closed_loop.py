@@ -6,13 +6,19 @@
 import argparse
 import os
 import re
+import sys
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+ROOT = Path(__file__).parent.parent
+sys.path.insert(0, str(ROOT / "docs"))
 
+from paper.other_plants import same_numbers, uniform_density
+
+from tablegen.base.input_errors import Unphysical
 from tablegen.config.load import Setup, load
 from tablegen.config.schema import BandLimit
-from tablegen.problems import Unphysical
+from tablegen.virtual.calibration_day import OFFSETS, calibrate
 from tablegen.virtual.closed_loop import (
     MAP_SIZES,
     SHARP,
@@ -22,13 +28,10 @@ from tablegen.virtual.closed_loop import (
     uncorrected,
     with_scan,
 )
-from tablegen.virtual.laboratory import OFFSETS, calibrate
-from tablegen.virtual.other_plants import same_numbers, uniform_density
 from tablegen.virtual.parameters import BUILT_IN, load_truth
 from tablegen.virtual.scanner import VirtualScanner
 from tablegen.virtual.simulation import with_model
 
-ROOT = Path(__file__).parent.parent
 PAGE = ROOT / "docs" / "virtual.md"
 SCANNERS = {name: VirtualScanner.of(load_truth(name)) for name in BUILT_IN}
 SIZES_V = (20.0, 40.0, 60.0, 80.0, 100.0)

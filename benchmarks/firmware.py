@@ -13,12 +13,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from tablegen.base.resources import c_runtime
 from tablegen.certificate.certificate import certify
 from tablegen.config.load import load
 from tablegen.emit.render import render
 from tablegen.planning.line_plan import make_plan
-from tablegen.resources import c_runtime
-from tablegen.verification.emulate import COMPILERS, CORES, Processor, compile_bare
+from tablegen.verification.c.emulate import COMPILERS, CORES, Processor, compile_bare
 
 HERE = Path(__file__).parent
 EXAMPLE = HERE.parent / "examples" / "annexin_200nm.toml"

@@ -80,7 +80,8 @@ void count_synthesize(void)
                          annexin_200nm_sine, ANNEXIN_200NM_SINE_INDEX_BITS);
 }
 
-/* To compare with: a loop that does what has to be done tick by tick, for one program, whose constants the compiler knows. */
+/* To compare with: a loop that does what has to be done tick by tick, for one program, whose constants the compiler
+ * knows. */
 struct plain {
     uint32_t phase, rest;
     int32_t code;

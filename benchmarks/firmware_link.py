@@ -14,15 +14,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from tablegen.base.resources import c_link, c_runtime
 from tablegen.certificate.certificate import certify
 from tablegen.config.load import load
 from tablegen.emit.render import render
 from tablegen.link.frames import Frame, FrameReader
-from tablegen.link.image import ProgramImage, make_image
 from tablegen.link.messages import ANSWER, DATA_BYTES, TAG_BYTES, VERSION, Request
+from tablegen.link.program_image import ProgramImage, make_image
 from tablegen.planning.line_plan import make_plan
-from tablegen.resources import c_link, c_runtime
-from tablegen.verification.emulate import CORES, Processor, compile_bare
+from tablegen.verification.c.emulate import CORES, Processor, compile_bare
 
 HERE = Path(__file__).parent
 EXAMPLE = HERE.parent / "examples" / "annexin_200nm.toml"

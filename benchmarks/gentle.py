@@ -16,10 +16,10 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "tests" / "helpers"))
 
 from scaling import SECTION_8
 
+from tablegen.base.input_errors import Unphysical
 from tablegen.certificate.optimum import least_acceleration
 from tablegen.compensation.line import LineShape
-from tablegen.problems import Unphysical
-from tablegen.waveform.gentle_fit import Straightness, gentlest, least_percent
+from tablegen.waveform.minimum_acceleration import Straightness, gentlest, least_percent
 from tablegen.waveform.window_fit import fit_window
 
 PAGE = Path(__file__).parent.parent / "docs" / "waveform.md"

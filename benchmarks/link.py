@@ -19,12 +19,12 @@ sys.path.insert(0, str(HERE.parent / "tests" / "helpers"))  # the line and the d
 
 from link_line import Line  # noqa: E402
 
+from tablegen.base.resources import c_link, c_runtime  # noqa: E402
 from tablegen.certificate.certificate import certify  # noqa: E402
 from tablegen.config.load import load  # noqa: E402
 from tablegen.emit.render import render  # noqa: E402
 from tablegen.link.device import Device  # noqa: E402
 from tablegen.link.frames import Frame, FrameReader  # noqa: E402
-from tablegen.link.image import ProgramImage  # noqa: E402
 from tablegen.link.messages import (  # noqa: E402
     ANSWER,
     DATA_BYTES,
@@ -34,12 +34,12 @@ from tablegen.link.messages import (  # noqa: E402
     Feature,
     Request,
 )
-from tablegen.link.model import ModelDevice  # noqa: E402
+from tablegen.link.model_device import ModelDevice  # noqa: E402
 from tablegen.link.players import LinePlayer  # noqa: E402
 from tablegen.link.prepare import PreparedScan  # noqa: E402
+from tablegen.link.program_image import ProgramImage  # noqa: E402
 from tablegen.planning.line_plan import make_plan  # noqa: E402
-from tablegen.resources import c_link, c_runtime  # noqa: E402
-from tablegen.verification.emulate import Processor, compile_bare  # noqa: E402
+from tablegen.verification.c.emulate import Processor, compile_bare  # noqa: E402
 
 EXAMPLE = HERE.parent / "examples" / "annexin_200nm.toml"
 MEMORY = HERE.parent / "examples" / "firmware" / "memory.c"

@@ -24,6 +24,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "tests" / "helpers"))
 
 from foreign_plants import SIX, TEN, V_MAX, BoucWen, Floats, ForeignPlant, JilesAtherton, ManyPlays, record, triangle
 
+from tablegen.base.input_errors import Rejected
 from tablegen.certificate.expected import certified_expectation
 from tablegen.certificate.line_errors import EmittedPeriod
 from tablegen.cli import cli as tablegen
@@ -31,7 +32,6 @@ from tablegen.compensation.expectation import Expectation, Figure
 from tablegen.config.load import Setup, load
 from tablegen.numerics.arrays import Bools
 from tablegen.planning.line_plan import make_plan
-from tablegen.problems import Rejected
 from tablegen.virtual.closed_loop import with_scan
 from tablegen.virtual.played import played
 

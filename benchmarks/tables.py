@@ -18,8 +18,10 @@ import firmware
 import resources
 from msgspec import structs
 
+from tablegen.base.resources import c_runtime
 from tablegen.certificate.certificate import certify
 from tablegen.certificate.line_errors import EmittedPeriod
+from tablegen.charts.picture_file import picture
 from tablegen.cli.tables_text import tables_text
 from tablegen.config.load import from_values, load
 from tablegen.config.schema import Table
@@ -30,12 +32,10 @@ from tablegen.planning.line_plan import LinePlan, make_plan
 from tablegen.planning.other_table import maker_of, with_table
 from tablegen.planning.table_choice import possible_shapes
 from tablegen.planning.table_search import TableSearch
-from tablegen.report.picture import picture
 from tablegen.report.table_charts import table_charts
 from tablegen.report.table_costs import CELLS, INSTRUCTIONS
 from tablegen.report.table_rows import axis_tables
-from tablegen.resources import c_runtime
-from tablegen.verification.emulate import Processor, compile_bare
+from tablegen.verification.c.emulate import Processor, compile_bare
 
 HERE = Path(__file__).parent
 EXAMPLE = HERE.parent / "examples" / "annexin_200nm.toml"

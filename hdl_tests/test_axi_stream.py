@@ -19,7 +19,7 @@ from spi_bench import (
     equal,
 )
 
-from tablegen.verification.simulate import Design, compile_design
+from tablegen.verification.verilog.simulate import Design, compile_design
 
 pytestmark = pytest.mark.common
 

@@ -16,11 +16,11 @@ import pytest
 from building import BENCHES, REPOSITORY
 from programs import random_dual, random_fourier
 
+from tablegen.base.resources import verilog_runtime
 from tablegen.device.registers import program_words
 from tablegen.emit.memory import memory_files
-from tablegen.resources import verilog_runtime
-from tablegen.verification.bench import SequencerShape
-from tablegen.verification.simulate import Design, compile_design
+from tablegen.verification.play.sequencer_shape import SequencerShape
+from tablegen.verification.verilog.simulate import Design, compile_design
 
 pytestmark = pytest.mark.common
 

@@ -7,7 +7,7 @@ import pytest
 from building import BENCHES
 from spi_bench import AD5541A, CODING, Mutant, Spi
 
-from tablegen.verification.simulate import Design, compile_design
+from tablegen.verification.verilog.simulate import Design, compile_design
 
 pytestmark = pytest.mark.common
 

@@ -10,10 +10,10 @@ import pytest
 from building import BENCHES, REPOSITORY, VARIANTS, build, run_clean
 from spi_monitor import Converter, ProtocolFault, Wires, quiet, receive
 
+from tablegen.base.resources import verilog_runtime
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.sequencer import Sequencer
-from tablegen.resources import verilog_runtime
-from tablegen.verification.simulate import Design, compile_design
+from tablegen.verification.verilog.simulate import Design, compile_design
 
 pytestmark = pytest.mark.common
 

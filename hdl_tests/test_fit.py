@@ -13,11 +13,12 @@ from building import BENCHES, tool
 from programs import random_dual
 from stream_scripts import play
 
+from tablegen.base.resources import verilog_runtime
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS, SCAN_WORDS, program_words
 from tablegen.device.widths import AxisWidths, Widths, least_widths, misfits
-from tablegen.resources import verilog_runtime
-from tablegen.verification.bench import SequencerBench, SequencerShape
-from tablegen.verification.stream import PROGRAM, Script
+from tablegen.verification.play.sequencer_shape import SequencerShape
+from tablegen.verification.play.stream import PROGRAM, Script
+from tablegen.verification.verilog.sequencer_bench import SequencerBench
 
 FIT = [path for path in verilog_runtime() if path.name == "dac_fit.v"]
 WIDTHS = {

@@ -22,7 +22,7 @@ from variants import plan_of
 from tablegen.fixedpoint.rounding import signed_limits
 from tablegen.fixedpoint.synthesis import FourierWords, sine_quarter, sine_table, synthesize
 from tablegen.numerics.arrays import Ints
-from tablegen.verification.simulate import Design, compile_design
+from tablegen.verification.verilog.simulate import Design, compile_design
 
 MODULES = REPOSITORY / "firmware_templates" / "verilog"
 RENDERER = [MODULES / f"dac_fourier{part}.v" for part in ("", "_product", "_sum")]

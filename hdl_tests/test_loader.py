@@ -23,8 +23,8 @@ from sets import long
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS, SCAN_WORDS
 from tablegen.device.widths import AxisWidths, Widths, misfits
 from tablegen.link.frames import FrameReader
-from tablegen.link.image import ProgramImage, take_apart
 from tablegen.link.messages import AxisLimits, DeviceInfo, DeviceStatus, ImageInfo, Reason, Refusal, Request, Upload
+from tablegen.link.program_image import ProgramImage, take_apart
 
 MADE = GOLDEN["devices"]["open"]
 TOLD = DeviceInfo.unpack(bytes.fromhex(MADE["device"]))

@@ -13,6 +13,7 @@ from loader_device import Loader
 from programs import random_dual
 from test_loader import checked_uploads, random_dialogue
 
+from tablegen.base.resources import verilog_runtime
 from tablegen.link.messages import (
     ANSWER,
     CUBIC,
@@ -23,8 +24,7 @@ from tablegen.link.messages import (
     Refusal,
     Request,
 )
-from tablegen.resources import verilog_runtime
-from tablegen.verification.bench import SequencerShape
+from tablegen.verification.play.sequencer_shape import SequencerShape
 
 INDEX_BITS = {"X": 7, "Y": 6}  # of the bench
 OF_DEGREE = {0: lambda index_bits: 0, 1: lambda index_bits: index_bits, 3: lambda index_bits: index_bits + CUBIC}

@@ -19,8 +19,8 @@ from loader_device import Loader
 from replacing import replace
 
 from tablegen.device.dual_program import DualProgram
-from tablegen.link.image import ProgramImage, make_image
 from tablegen.link.messages import ANSWER, DeviceState, DeviceStatus, Request, Upload
+from tablegen.link.program_image import ProgramImage, make_image
 
 pytestmark = pytest.mark.rest
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from building import BENCHES
 
+from tablegen.base.resources import verilog_runtime
 from tablegen.fixedpoint.synthesis import sine_quarter
-from tablegen.resources import verilog_runtime
-from tablegen.verification.simulate import Design, compile_design
+from tablegen.verification.verilog.simulate import Design, compile_design
 
 WORDS = sine_quarter(4).tolist()  # of the bench: 16 words of x, 8 of y
 TAKEN, REFUSED = ("1", "0"), ("0", "1")

@@ -9,7 +9,7 @@ from mutants import Verdict
 from programs import random_dual
 from stream_mutants import BENCHES, MUTANTS, SHAPES, Mutant, bench_of, judge, script_of
 
-from tablegen.verification.stream import Script
+from tablegen.verification.play.stream import Script
 
 
 @pytest.mark.rest

@@ -38,8 +38,9 @@ from stream_scripts import (
     sweep,
 )
 
-from tablegen.verification.bench import SequencerBench, SequencerShape
-from tablegen.verification.stream import FLAGS, Script
+from tablegen.verification.play.sequencer_shape import SequencerShape
+from tablegen.verification.play.stream import FLAGS, Script
+from tablegen.verification.verilog.sequencer_bench import SequencerBench
 
 SAMPLES_ON_ICARUS = 100_000
 

@@ -22,11 +22,12 @@ from stream_scripts import (
     rendering_clocks,
 )
 
+from tablegen.base.resources import verilog_runtime
 from tablegen.certificate.certificate import certify
-from tablegen.resources import verilog_runtime
-from tablegen.verification.bench import SequencerBench, SequencerShape
-from tablegen.verification.placement import Placement
-from tablegen.verification.stream import Script
+from tablegen.verification.play.placement import Placement
+from tablegen.verification.play.sequencer_shape import SequencerShape
+from tablegen.verification.play.stream import Script
+from tablegen.verification.verilog.sequencer_bench import SequencerBench
 
 
 @pytest.mark.common

@@ -21,8 +21,9 @@ from stream_scripts import (
     swaps_at_every_tick,
 )
 
-from tablegen.verification.bench import SequencerBench, SequencerShape
-from tablegen.verification.stream import Script
+from tablegen.verification.play.sequencer_shape import SequencerShape
+from tablegen.verification.play.stream import Script
+from tablegen.verification.verilog.sequencer_bench import SequencerBench
 
 SAMPLES_ON_VERILATOR = 1_000_000
 

@@ -9,9 +9,9 @@ import numpy as np
 from building import BENCHES, REPOSITORY, tool
 from programs import random_dual
 
+from tablegen.base.resources import verilog_runtime
 from tablegen.device.registers import program_words
-from tablegen.resources import verilog_runtime
-from tablegen.verification.bench import SequencerShape
+from tablegen.verification.play.sequencer_shape import SequencerShape
 
 PAGE = REPOSITORY / "docs" / "verilog.md"
 BEGIN, END = "<!-- simulated -->\n", "<!-- /simulated -->\n"

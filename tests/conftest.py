@@ -8,6 +8,7 @@ import kept_objects
 import pytest
 from hypothesis import settings
 from installing import install, make_wheel, told_pythons
+from tool_paths import pytest_runtest_setup, pytest_unconfigure  # noqa: F401
 
 # Without deadlines: how long an example takes is the machine's affair. In CI Hypothesis's examples are fixed.
 settings.register_profile("tablegen", settings(), deadline=None)
@@ -23,6 +24,14 @@ if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
 
 # The processes that run the tests share what was compiled; the first of them makes the folder and removes it.
 kept_objects.folder()
+
+
+@pytest.fixture(scope="session", autouse=True)
+def tracebacks() -> Iterator[None]:
+    """What a command that a test starts does not expect is seen whole."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("TABLEGEN_TRACEBACK", "1")
+        yield
 
 
 @pytest.fixture(scope="session", autouse=True)

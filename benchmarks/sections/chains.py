@@ -11,13 +11,13 @@ from pathlib import Path
 
 import numpy as np
 
+from tablegen.base.resources import c_runtime
 from tablegen.certificate.certificate import certify
 from tablegen.config.load import load
 from tablegen.emit.render import render
 from tablegen.numerics.arrays import Ints
 from tablegen.planning.line_plan import Plan, make_plan
-from tablegen.resources import c_runtime
-from tablegen.verification.emulate import Processor, compile_bare
+from tablegen.verification.c.emulate import Processor, compile_bare
 
 BENCHMARKS = Path(__file__).resolve().parents[1]
 MEMORY = BENCHMARKS.parent / "examples" / "firmware" / "memory.c"

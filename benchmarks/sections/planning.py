@@ -13,7 +13,7 @@ from gentle import LINES
 from sections.processes import PYTHON, least_cpu, python_version
 from sections.section import EXAMPLE, ROOT, Section
 from tablegen.certificate.optimum import least_acceleration
-from tablegen.waveform.gentle_fit import gentlest
+from tablegen.waveform.minimum_acceleration import gentlest
 
 HERE = Path(__file__).parent
 ROUNDS = 3

@@ -9,11 +9,11 @@ from editing import SCAN, edited, write_pair
 
 from sections.processes import python_version
 from sections.section import Section
+from tablegen.base.input_errors import Rejected
 from tablegen.certificate.certificate import certify
 from tablegen.config.load import load
 from tablegen.config.schema import Table
 from tablegen.planning.line_plan import LinePlan, make_plan
-from tablegen.problems import Rejected
 
 TITLE = "Bits of a table"
 TEXT = """The example, 16-bit codes: the smallest table of each mode, length (powers of two) and word (8 to 20 bits)

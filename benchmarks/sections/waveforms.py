@@ -21,7 +21,7 @@ from tablegen.numerics.arrays import Floats
 from tablegen.planning.band_limit import band_limited
 from tablegen.planning.enough_harmonics import plain_line
 from tablegen.planning.line_plan import make_plan
-from tablegen.waveform.gentle_fit import Straightness, fewest_harmonics, gentlest
+from tablegen.waveform.minimum_acceleration import Straightness, fewest_harmonics, gentlest
 from tablegen.waveform.series import FourierSeries
 
 WINDOW = (0.1, 0.9)

@@ -9,8 +9,8 @@ import numpy as np
 
 from tablegen.config.load import load
 from tablegen.planning.line_plan import make_plan
+from tablegen.virtual.calibration_day import calibrate
 from tablegen.virtual.imaging import Conditions, FrameImages, hexagonal, running_frame, triangle_frame
-from tablegen.virtual.laboratory import calibrate
 from tablegen.virtual.parameters import load_truth
 from tablegen.virtual.scanner import VirtualScanner
 

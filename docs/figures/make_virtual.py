@@ -1,17 +1,21 @@
 """Draw the pictures of docs/virtual.md: a simulation. Usage: make figures"""
 
+import sys
 from pathlib import Path
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
 
+FOLDER = Path(__file__).parent
+sys.path.insert(0, str(FOLDER.parent))
+
+from paper.identify import X_TARGETS
+from paper.printed_numbers import default_x, triangle_line
+
 from tablegen.compensation.hysteresis import beta_at
 from tablegen.virtual.experiments import apparent_sizes, frequency_response
-from tablegen.virtual.identify import X_TARGETS
-from tablegen.virtual.paper import default_x, triangle_line
 
-FOLDER = Path(__file__).parent
 GREY, RED, BLUE = "#777777", "#c23b22", "#1f5fa8"
 
 

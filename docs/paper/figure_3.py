@@ -9,7 +9,7 @@ from paper import laws
 from paper.drawing import BLUE, GREY, ORANGE, RED, key, printed, sheet
 from paper.measured import RATE_HZ, V_MAX, axis, sizes_by_operator
 from paper.rows import Row, Source, about, between, exact, limits
-from tablegen.calibration.size import SizeFit, fit_size
+from tablegen.calibration.laws.size import SizeFit, fit_size
 from tablegen.compensation.size import SizeLaw
 from tablegen.numerics.arrays import Floats
 from tablegen.virtual.experiments import triangle_size

@@ -6,11 +6,11 @@ from math import pi
 import numpy as np
 
 from paper.measured import V_MAX, axis, by_operator, calibrated, full_scale, modelled, optimised
+from paper.printed_numbers import triangle_line
 from paper.rows import Row, Source, about, exact, limits
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.compensation.line import LineShape
 from tablegen.virtual.line_error import BranchError, LineError
-from tablegen.virtual.paper import triangle_line
 
 TITLE = "Figures 5a, 5c to 5f, 5i, 5j: a line of 100 V"
 TEXT = """[full_scale.toml](full_scale.toml) is planned for each model, and every tick of its 16-bit codes is played on

@@ -10,7 +10,7 @@ from paper.drawing import BLUE, GREY, ORANGE, key, printed, sheet
 from paper.laws import LOSS
 from paper.measured import RATE_HZ, axis
 from paper.rows import Row, Source, about, exact, limits
-from tablegen.calibration.frequency import fit_frequency
+from tablegen.calibration.laws.frequency import fit_frequency
 from tablegen.compensation.frequency import frequency_gain
 from tablegen.virtual.experiments import frequency_response
 

@@ -9,10 +9,11 @@ import msgspec
 import numpy as np
 from msgspec.structs import replace
 
-from tablegen.calibration.hysteresis import HysteresisFit, Trace, fit_hysteresis
+from paper.printed_numbers import SECTION_8, default_x, played_line
+from tablegen.calibration.laws.hysteresis import HysteresisFit, Trace, fit_hysteresis
+from tablegen.calibration.operator.file_of_fit import operator_file
 from tablegen.calibration.operator.fit import OperatorFit, fit_operator
 from tablegen.calibration.operator.periodic_line import periodic_line
-from tablegen.calibration.operator.record import operator_file
 from tablegen.compensation.branch import Branch
 from tablegen.compensation.branches import Branches
 from tablegen.compensation.hysteresis import BranchShape
@@ -24,7 +25,6 @@ from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import make_plan
 from tablegen.virtual.experiments import triangle_size
 from tablegen.virtual.line_error import LineError, about_window_line, ideal_triangle, line_error
-from tablegen.virtual.paper import SECTION_8, default_x, played_line
 from tablegen.virtual.played import PlayedDrive, played
 from tablegen.virtual.scanner import VirtualAxis
 from tablegen.virtual.simulation import with_model

@@ -5,8 +5,8 @@
  *     ./play 2
  *
  * prints one row per DAC tick for this number of lines (here 2): the codes of x and y, and the words that are sent
- * to the converters. A program for an instrument calls play_tick() from its timer interrupt instead. Slew guard, markers
- * and the change of programs while they play are the business of a sequencer, not of this example.
+ * to the converters. A program for an instrument calls play_tick() from its timer interrupt instead. Slew guard,
+ * markers and the change of programs while they play are the business of a sequencer, not of this example.
  *
  * The compiler must provide int64_t, and an arithmetic >> of negative numbers; C99 does not require these, but every
  * compiler for piezo controllers has them.

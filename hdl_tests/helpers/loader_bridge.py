@@ -18,8 +18,8 @@ from typing import Any, Self
 from building import BENCHES, REPOSITORY
 from limits import PATIENCE_S
 
-from tablegen.resources import verilog_runtime
-from tablegen.verification.simulate import Compiled, Design, compile_design
+from tablegen.base.resources import verilog_runtime
+from tablegen.verification.verilog.simulate import Compiled, Design, compile_design
 
 sys.path.insert(0, str(REPOSITORY / "firmware_templates" / "loader"))
 _before, sys.dont_write_bytecode = sys.dont_write_bytecode, True  # nothing but sources in a folder that ships

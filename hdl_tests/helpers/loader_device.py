@@ -14,8 +14,8 @@ from tablegen.emit.memory import memory_file
 from tablegen.fixedpoint.synthesis import sine_quarter
 from tablegen.link.frames import Frame, FrameReader
 from tablegen.link.messages import ANSWER, SPLINE_DEGREE, AxisLimits, AxisShape, DeviceInfo, Feature, Request
-from tablegen.verification.bench import SequencerShape
-from tablegen.verification.simulate import Compiled
+from tablegen.verification.play.sequencer_shape import SequencerShape
+from tablegen.verification.verilog.simulate import Compiled
 
 _LINE_AT = 12  # in a status
 _MEMORY_BYTES = 2048

@@ -19,11 +19,11 @@ from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS
 from tablegen.link import model_bank
 from tablegen.link.acceptance import Finding, first_objection
 from tablegen.link.frames import Frame, FrameReader
-from tablegen.link.image import Contents, ProgramImage
 from tablegen.link.messages import ANSWER, DeviceInfo, Reason, Refusal, Request
-from tablegen.link.model import ModelDevice
+from tablegen.link.model_device import ModelDevice
 from tablegen.link.players import SequencerPlayer
-from tablegen.verification.bench import SequencerShape
+from tablegen.link.program_image import Contents, ProgramImage
+from tablegen.verification.play.sequencer_shape import SequencerShape
 
 MOST_FRAMES = (1 << 16) - 1
 _NOT_CHECKED = {Reason.RANGE, Reason.SLEW, Reason.JUMP}  # docs/verilog.md says why not

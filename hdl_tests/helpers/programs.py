@@ -16,7 +16,7 @@ from tablegen.fixedpoint.phase import RationalPhase
 from tablegen.fixedpoint.program import Mode, Program
 from tablegen.fixedpoint.shaping import Shaping
 from tablegen.fixedpoint.synthesis import FourierWords, synthesize
-from tablegen.verification.bench import SequencerShape
+from tablegen.verification.play.sequencer_shape import SequencerShape
 
 Kind = Literal["wild", "tame", "smooth", "held"]
 

@@ -16,7 +16,7 @@ from spi_monitor import Converter, Wires, quiet, receive, two_channels, updates
 
 from tablegen.fixedpoint.output import Output
 from tablegen.numerics.arrays import Ints
-from tablegen.verification.simulate import Design, compile_design
+from tablegen.verification.verilog.simulate import Design, compile_design
 
 MODULES = REPOSITORY / "firmware_templates" / "verilog"
 CODING, SPI, STREAM = (MODULES / f"{name}.v" for name in ("dac_coding", "dac_spi", "dac_axi_stream"))

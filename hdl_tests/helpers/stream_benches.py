@@ -6,8 +6,9 @@ from stream_laws import steps_are_limited
 
 from tablegen.emit.memory import memory_file
 from tablegen.fixedpoint.synthesis import sine_quarter
-from tablegen.verification.bench import BenchRun, SequencerBench, SequencerShape
-from tablegen.verification.stream import Script
+from tablegen.verification.play.sequencer_shape import SequencerShape
+from tablegen.verification.play.stream import Script
+from tablegen.verification.verilog.sequencer_bench import BenchRun, SequencerBench
 
 HARMONICS = 5
 

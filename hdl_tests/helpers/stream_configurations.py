@@ -9,9 +9,9 @@ from stream_scripts import random_play
 
 from tablegen.device.dual_program import DualProgram
 from tablegen.emit.constants import DEGREES
-from tablegen.verification.bench import SequencerShape
-from tablegen.verification.placement import Placement
-from tablegen.verification.stream import Script
+from tablegen.verification.play.placement import Placement
+from tablegen.verification.play.sequencer_shape import SequencerShape
+from tablegen.verification.play.stream import Script
 
 SWAPS, SWAPS_SLOW = 10_000, 100_000
 FEW = (

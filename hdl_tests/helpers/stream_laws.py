@@ -10,7 +10,7 @@ import numpy as np
 from stream_scripts import codes, flag
 
 from tablegen.device.dual_program import DualProgram
-from tablegen.verification.stream import Words
+from tablegen.verification.play.stream import Words
 
 
 class Broken(Exception):

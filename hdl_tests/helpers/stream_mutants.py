@@ -28,11 +28,12 @@ from stream_scripts import (
     sweep,
 )
 
-from tablegen.resources import verilog_runtime
-from tablegen.verification.bench import STREAM_BENCH, SequencerBench, SequencerShape
+from tablegen.base.resources import verilog_runtime
 from tablegen.verification.failures import SimulationFailed
-from tablegen.verification.placement import Placement
-from tablegen.verification.stream import Script
+from tablegen.verification.play.placement import Placement
+from tablegen.verification.play.sequencer_shape import SequencerShape
+from tablegen.verification.play.stream import Script
+from tablegen.verification.verilog.sequencer_bench import STREAM_BENCH, SequencerBench
 
 HARMONICS = 4
 PLAY_S = 60  # of CPU time: what does not hang takes two seconds

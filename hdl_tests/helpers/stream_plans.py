@@ -14,7 +14,7 @@ from tablegen.certificate.certificate import certify
 from tablegen.config.load import load
 from tablegen.numerics.arrays import Floats, Ints
 from tablegen.planning.line_plan import LinePlan, Plan, make_plan
-from tablegen.verification.stream import Words
+from tablegen.verification.play.stream import Words
 
 TIMING = {"pixels": 40, "lines": 8, "line_rate_hz": 100.0, "ticks_per_line": 331, "settle_lines": 1}
 SHORT: dict[str, object] = {

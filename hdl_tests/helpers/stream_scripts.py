@@ -12,9 +12,9 @@ from tablegen.device.dual_program import DualProgram
 from tablegen.device.registers import PAGE_WORDS, program_words
 from tablegen.device.schedule import Window
 from tablegen.fixedpoint.synthesis import FourierWords
-from tablegen.verification.bench import SequencerShape
-from tablegen.verification.placement import Placement
-from tablegen.verification.stream import FLAGS, PROGRAM, X_FOURIER, X_TABLE, Y_FOURIER, Y_TABLE, Script, Words
+from tablegen.verification.play.placement import Placement
+from tablegen.verification.play.sequencer_shape import SequencerShape
+from tablegen.verification.play.stream import FLAGS, PROGRAM, X_FOURIER, X_TABLE, Y_FOURIER, Y_TABLE, Script, Words
 
 FAULTS = ("slew", "clamp", "overrun", "underrun")
 _KINDS: tuple[Kind, ...] = ("wild", "tame", "smooth", "held")

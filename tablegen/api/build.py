@@ -1,24 +1,26 @@
 """From a scan file, or from values, to a plan, its certificate, its arrays and its files."""
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from tablegen.certificate.certificate import Certificate, broken_limits
+from tablegen.base.input_errors import Rejected
+from tablegen.base.warnings import Finding
+from tablegen.certificate.certificate import Certificate
 from tablegen.certificate.certificate import certify as certify_plan
-from tablegen.certificate.scan_findings import scan_findings
-from tablegen.certificate.scan_warnings import brief_warnings, limit_advice, scan_warnings
+from tablegen.certificate.certified_scan import certify_scan
+from tablegen.certificate.scan_notes import scan_findings
+from tablegen.certificate.scan_warnings import brief_warnings, scan_warnings
 from tablegen.certificate.summary import summary
 from tablegen.config.load import Setup, from_values
 from tablegen.config.load import load as load_files
+from tablegen.config.schema import DEFAULT_FORMATS
 from tablegen.emit.format import Format
 from tablegen.emit.formats import UnknownFormat, chosen
-from tablegen.emit.render import render, runtime_files
+from tablegen.emit.render import format_rejected, render_scan, runtime_files
 from tablegen.emit.write import leftover_files, outdated_files, write_files
-from tablegen.findings import Finding
 from tablegen.planning.line_plan import Plan, make_plan
-from tablegen.problems import Problem, Rejected, Unphysical
 
 if TYPE_CHECKING:
     from tablegen.api.samples import Samples
@@ -73,17 +75,12 @@ def build(
     ``progress`` is called with what is being done. Raises ``Rejected`` for wrong input, ``BrokenLimit`` where the
     certificate exceeds a limit of the scan, ``CannotWrite`` where the directory cannot be written.
     """
-    progress("shaping the waveforms")
     setup = _setup(source, scan, scanner)
-    made = make_plan(setup)
-    wanted = _formats(setup, made, formats)
-    progress("measuring every tick of a line and a frame")
-    certificates = certify_plan(made)
-    if broken := broken_limits(
-        made, certificates, setup.scan_file, partial(limit_advice, setup, made, certificates), setup.hardware_problem
-    ):
-        raise BrokenLimit(broken)
-    built = Build(setup, made, certificates, [each.name for each in wanted], formats is not None)
+    wanted = _formats(setup, formats)
+    certified = certify_scan(setup, progress)
+    if certified.broken:
+        raise BrokenLimit(list(certified.broken))
+    built = Build(setup, certified.plan, certified.certificates, [each.name for each in wanted], formats is not None)
     if out is not None:
         progress("writing the files")
         built.write(out)
@@ -127,10 +124,7 @@ class Build:
     @cached_property
     def files(self) -> dict[str, bytes]:
         """Every file by its name, the manifest last. Raises ``Rejected`` for a scan that a format cannot hold."""
-        try:
-            return render(self.plan, self.certificates, self.formats)
-        except (UnknownFormat, Unphysical) as error:
-            raise _refused(self.setup, str(error), self._given) from None
+        return render_scan(self.setup, self.plan, self.certificates, self.formats, given=self._given)
 
     @property
     def runtime(self) -> set[str]:
@@ -225,13 +219,8 @@ def _setup(source: Source | None, scan: Mapping[str, Any] | None, scanner: Mappi
     return source if isinstance(source, Setup) else load_files(source)
 
 
-def _formats(setup: Setup, plan: Plan, wanted: Sequence[str] | None) -> list[Format]:
+def _formats(setup: Setup, given: Sequence[str] | None) -> list[Format]:
     try:
-        return chosen(plan.formats if wanted is None else wanted)
+        return chosen(setup.scan.emit.formats or DEFAULT_FORMATS if given is None else given)
     except UnknownFormat as error:
-        raise _refused(setup, str(error), wanted is not None) from None
-
-
-def _refused(setup: Setup, why: str, given: bool) -> Rejected:
-    """A fault of the formats, at their key or, where they were given beside the file, without a place."""
-    return Rejected([Problem("formats", 0, "", why) if given else setup.scan_file.problem("emit.formats", why)])
+        raise format_rejected(setup, str(error), given=given is not None) from None

@@ -6,7 +6,20 @@ from pathlib import Path
 from typing import Any, Literal
 
 from tablegen.api.measured import Measured, table_of
-from tablegen.calibration.columns import (
+from tablegen.base.data_files import Source
+from tablegen.base.input_errors import Problem, Problems, Rejected, Unphysical
+from tablegen.base.reading import CONFIGURATION, RESPONSE, read_bytes, read_text
+from tablegen.base.toml import read_toml
+from tablegen.calibration.fit_checks import doubts
+from tablegen.calibration.laws.frequency import fit_frequency
+from tablegen.calibration.laws.hysteresis import fit_hysteresis
+from tablegen.calibration.laws.offset import fit_offset
+from tablegen.calibration.laws.offset_sizes import fit_offset_sizes
+from tablegen.calibration.laws.resonance import ResonanceFit, fit_resonance
+from tablegen.calibration.laws.size import fit_size
+from tablegen.calibration.scanner_file import new_file, updated
+from tablegen.calibration.summary import change, parameters, record
+from tablegen.calibration.tables.columns import (
     ACTUAL,
     APPARENT,
     DISPLACEMENT,
@@ -19,29 +32,17 @@ from tablegen.calibration.columns import (
     TIME,
     TRACE,
 )
-from tablegen.calibration.doubts import doubts
-from tablegen.calibration.estimate import Estimate, Fit
-from tablegen.calibration.frequency import fit_frequency
-from tablegen.calibration.hysteresis import fit_hysteresis
-from tablegen.calibration.offset import fit_offset
-from tablegen.calibration.offset_sizes import fit_offset_sizes
-from tablegen.calibration.resonance import ResonanceFit, fit_resonance
-from tablegen.calibration.response_csv import MARK, response_csv
-from tablegen.calibration.scanner_file import new_file, updated
-from tablegen.calibration.size import fit_size
-from tablegen.calibration.summary import change, parameters, record
-from tablegen.calibration.table import MeasuredTable, Source
-from tablegen.calibration.traces import split_traces
+from tablegen.calibration.tables.response_csv import MARK, response_csv
+from tablegen.calibration.tables.table import MeasuredTable
+from tablegen.calibration.tables.traces import split_traces
 from tablegen.compensation.size import SizeLaw
 from tablegen.config.decode import decode
 from tablegen.config.like import inherited
 from tablegen.config.scanner import Scanner
-from tablegen.driver import Driver
 from tablegen.emit.write import write_files
-from tablegen.planning.drive import size_law_of
-from tablegen.problems import Problem, Problems, Rejected, Unphysical
-from tablegen.reading import CONFIGURATION, RESPONSE, read_bytes, read_text
-from tablegen.toml import read_toml
+from tablegen.fitting.estimate import Estimate, Fit
+from tablegen.numerics.driver import Driver
+from tablegen.planning.laws import size_law_of
 
 Kind = Literal["size", "offset", "hysteresis", "frequency", "resonance"]
 _COLUMNS = {

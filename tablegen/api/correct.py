@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from tablegen.calibration.image_files import ScanImage
-from tablegen.calibration.table import Source
+from tablegen.base.data_files import Source
+from tablegen.base.input_errors import Problem, Rejected
 from tablegen.correction.job import Choice, Images, OldAxis, OldScan, by_fit, by_scan_file, by_scanner, read_scan
 from tablegen.correction.output_files import files_of
 from tablegen.correction.straight import StraightScan
 from tablegen.emit.write import write_files
+from tablegen.images.files import ScanImage
 from tablegen.numerics.arrays import Floats
-from tablegen.problems import Problem, Rejected
 
 Image = str | Path | Floats
 _AXIS = ("size_v", "size_nm", "offset_v", "turn", "window")

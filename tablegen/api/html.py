@@ -5,9 +5,9 @@ from html import escape
 from tablegen.certificate.certificate import Certificate
 from tablegen.certificate.scan_warnings import brief_warnings
 from tablegen.certificate.summary import certificate_lines, drive_lines, rate
+from tablegen.charts.svg import embedded
 from tablegen.planning.line_plan import Plan
 from tablegen.report.scan_charts import drive_of, modelled_error
-from tablegen.report.svg import embedded
 
 
 def build_html(plan: Plan, certificates: dict[str, Certificate]) -> str:

@@ -11,8 +11,8 @@ import numpy as np
 
 from tablegen.config.load import Setup, load, load_scanner
 from tablegen.config.scanner import Scanner
-from tablegen.driver import Driver
 from tablegen.numerics.arrays import Floats
+from tablegen.numerics.driver import Driver
 from tablegen.planning.line_plan import Plan, make_plan
 from tablegen.virtual.experiments import apparent_sizes, frequency_response, sensor_trace, triangle_size
 from tablegen.virtual.imaging import Conditions, FrameImages, Surface, grating, hexagonal, running_frame, triangle_frame

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from tablegen.api.build import Build, build, load
-from tablegen.api.workers import default_jobs, results
+from tablegen.base.workers import default_jobs, results
 from tablegen.config.load import Setup
 from tablegen.config.variants import Variant
 from tablegen.config.variants import variants as library_and_variants

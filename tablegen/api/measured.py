@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tablegen.calibration.columns import Column
-from tablegen.calibration.table import MeasuredTable, Source, read_table
+from tablegen.base.data_files import Source
+from tablegen.base.input_errors import Problem, Rejected
+from tablegen.calibration.tables.columns import Column
+from tablegen.calibration.tables.table import MeasuredTable, read_table
 from tablegen.numerics.arrays import Floats
-from tablegen.problems import Problem, Rejected
 
 Measured = str | Path | Mapping[str, ArrayLike]
 VALUES = "values"  # what messages and comments call arrays that are of no file

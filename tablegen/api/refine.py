@@ -7,14 +7,14 @@ from typing import Any, Literal
 import msgspec
 
 from tablegen.api.measured import Measured, table_of
-from tablegen.calibration.columns import DISPLACEMENT, DRIVE, TIME
-from tablegen.calibration.table import Source
+from tablegen.base.data_files import Source
+from tablegen.base.input_errors import Problem, Rejected
+from tablegen.base.reading import CONFIGURATION, read_text
+from tablegen.calibration.tables.columns import DISPLACEMENT, DRIVE, TIME
 from tablegen.config.load import Setup, load
 from tablegen.emit.write import write_files
-from tablegen.problems import Problem, Rejected
-from tablegen.reading import CONFIGURATION, read_text
 from tablegen.refinement.comment import provenance
-from tablegen.refinement.round import Options, Round
+from tablegen.refinement.round import Options, Round, with_refinement
 from tablegen.refinement.round import refine as learn_from
 from tablegen.refinement.scan_file import rounds_of, with_layer
 
@@ -54,6 +54,7 @@ class RefinedScan:
     """A round: ``setup`` is the scan with the new layer, ``refused`` why it must not be used, if so.
 
     ``round`` has residuals and remarks; ``scan`` and ``text`` are the scan file that was learnt for, and what it said.
+    ``stopped`` is why learning ends here, if so: the scaling error rose, and the layer of the best round is kept.
     """
 
     round: Round
@@ -63,8 +64,14 @@ class RefinedScan:
 
     @property
     def setup(self) -> Setup:
-        """The scan with what was learnt: ``tablegen.build(refined.setup)`` needs no file."""
-        return self.round.setup
+        """The scan with what was learnt, or the best layer: ``tablegen.build(refined.setup)`` needs no file."""
+        found = self.round
+        return found.setup if found.best is None else with_refinement(found.setup, found.line.axis, found.best)
+
+    @property
+    def stopped(self) -> str:
+        """Why no further layer is to be played, empty where one is."""
+        return self.round.stopped
 
     @property
     def before_percent(self) -> float:
@@ -89,24 +96,30 @@ class RefinedScan:
 
     @property
     def refused(self) -> str:
-        """Why the round must not be used: the residual grew, or the file was learnt from before. Empty where it may."""
+        """Why the round must not be used: an error grew, or the file was learnt from before. Empty where it may."""
         if self.round.worse:
             return self.round.worse
+        if self.round.stopped and self.round.best is None:
+            return self.round.stopped
         if not any(source.sha256 in row for row in self.earlier for source in self.sources):
             return ""
         what = "this trace" if len(self.sources) == 1 else "these images"
         return f"[{self.round.line.axis}.refinement] was already learnt from {what}; build, upload and record again"
 
-    def content(self) -> bytes:
-        """The scan file with the new layer; empty where nothing was learnt. Raises ``Rejected``."""
+    def content(self, force: bool = False) -> bytes:
+        """The scan file with the new layer; empty where nothing was learnt. Raises ``Rejected``.
+
+        Where the round stopped it is the file with the best layer, unless by ``force``.
+        """
         if self.scan is None:
             raise ValueError("the scan was given as a setup; give the path of its file to write into it")
         found = self.round
-        if found.refinement is None or not found.lesson.harmonics:
+        best = None if force else found.best
+        if best is None and (found.refinement is None or not found.lesson.harmonics):
             return b""
-        plain = msgspec.json.decode(msgspec.json.encode(found.refinement))
+        plain = msgspec.json.decode(msgspec.json.encode(best or found.refinement))
         values = {key: value for key, value in plain.items() if value is not None}  # as a file has it
-        comment = provenance(found, self.sources)
+        comment = provenance(found, self.sources, stopped=best is not None)
         return with_layer(self.text, str(self.scan), found.line.axis, values, comment).encode("utf-8")
 
     def write(self, force: bool = False) -> list[str]:
@@ -116,7 +129,7 @@ class RefinedScan:
         """
         if self.refused and not force:
             raise Rejected([Problem(str(self.scan or ""), 0, self.round.line.axis, self.refused)])
-        content = self.content()
+        content = self.content(force)
         path = Path() if self.scan is None else self.scan.resolve()
         return write_files(path.parent, {path.name: content}) if content else []
 
@@ -124,4 +137,5 @@ class RefinedScan:
         axis, name = self.round.line.axis, self.round.setup.scan.name
         residual = f"residual {self.before_percent:.3g} % rms, {self.after_percent:.2g} % predicted after it"
         refused = f"\n  not to be used: {self.refused}" if self.refused else ""
-        return f"<tablegen refinement of {axis} of {name!r}: {residual}{refused}>"
+        stopped = f"\n  stopped: {self.stopped}" if self.stopped and not self.refused else ""
+        return f"<tablegen refinement of {axis} of {name!r}: {residual}{refused}{stopped}>"

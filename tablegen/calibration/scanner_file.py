@@ -10,13 +10,15 @@ from typing import Any
 import tomlkit
 from tomlkit.items import AoT, InlineTable, Table
 
-from tablegen.calibration.hysteresis import TURN_TOLERANCE
+from tablegen.base.input_errors import Problem, Problems, Rejected
+from tablegen.base.toml import parse_toml
+from tablegen.calibration.laws.hysteresis import TURN_TOLERANCE
 from tablegen.compensation.branch import LAW, MEASURED
+from tablegen.compensation.models import UNCOMPENSATED
 from tablegen.config.decode import decode
+from tablegen.config.like import inherited
 from tablegen.config.scanner import Scanner
-from tablegen.driver import Driver
-from tablegen.problems import Problem, Problems, Rejected
-from tablegen.toml import parse_toml
+from tablegen.numerics.driver import Driver
 
 _PROVENANCE_MARK = "# calibrate "
 _FIRST_MARK = re.compile(r"# calibrate (\w+)(?:, turn ([\d.]+))?: ")
@@ -76,6 +78,28 @@ def updated(text: str, name: str, axis: str, change: Change) -> str:
     return changed.replace("\n", "\r\n") if windows else changed
 
 
+def with_own_hysteresis(text: str, name: str) -> str:
+    """Return the text with a hysteresis table of y that names its model itself, where y has that of x by ``like``.
+
+    An operator is that of the axis that was measured. So y keeps what it had before x gets one: the model and branches
+    that it shared, or no compensation where there was none. Raises ``Rejected``.
+    """
+    values, document = parse_toml(text, name)
+    y = values.get("y")
+    if not isinstance(y, dict) or y.get("like") != "x":
+        return text
+    own: Any = y.get("hysteresis", {})
+    shared: Any = inherited(values, document)[0]["y"].get("hysteresis", {}) if "x" in values else {}
+    if not isinstance(own, dict) or not isinstance(shared, dict) or "model" in own:
+        return text
+    change = Change(
+        "hysteresis",
+        {"model": shared.get("model", UNCOMPENSATED)},
+        branches=[] if "branches" in own else shared.get("branches", []),
+    )
+    return updated(text, name, "y", change)
+
+
 def _put(document: tomlkit.TOMLDocument, before: Mapping[str, Any], axis: str, change: Change, name: str) -> None:
     """Put the values into the parsed document."""
     outer = before.get(axis, {})
@@ -89,6 +113,8 @@ def _put(document: tomlkit.TOMLDocument, before: Mapping[str, Any], axis: str, c
     if change.kind not in parent:
         parent[change.kind] = tomlkit.inline_table() if isinstance(parent, InlineTable) else tomlkit.table()
     table: Any = parent[change.kind]
+    if isinstance(table, Table) and table.is_super_table():  # its header appears now, with the comment of the next one
+        table.trivia.comment_ws = table.trivia.comment = ""
     for key in change.removed:
         table.pop(key, None)
     for key, value in change.values.items():

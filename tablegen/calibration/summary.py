@@ -4,22 +4,22 @@ from collections.abc import Sequence
 from math import isfinite
 from typing import Any
 
-from tablegen.calibration.branch import AmplitudeFit
-from tablegen.calibration.doubts import doubts
-from tablegen.calibration.estimate import Estimate, Fit, ImageSize
-from tablegen.calibration.frequency import FrequencyFit
-from tablegen.calibration.hysteresis import HysteresisFit, TurnFit
-from tablegen.calibration.image_fit import ImageFit
-from tablegen.calibration.offset import OffsetFit
-from tablegen.calibration.offset_sizes import OffsetSizesFit
-from tablegen.calibration.points import estimates, measured_points
-from tablegen.calibration.resonance import ResonanceFit
+from tablegen.base.data_files import Source
+from tablegen.calibration.fit_checks import doubts
+from tablegen.calibration.laws.frequency import FrequencyFit
+from tablegen.calibration.laws.hysteresis import HysteresisFit, TurnFit
+from tablegen.calibration.laws.offset import OffsetFit
+from tablegen.calibration.laws.offset_sizes import OffsetSizesFit
+from tablegen.calibration.laws.points import estimates, measured_points
+from tablegen.calibration.laws.resonance import ResonanceFit
+from tablegen.calibration.laws.size import SizeFit
+from tablegen.calibration.laws.trace import TraceFit
 from tablegen.calibration.scanner_file import Change
-from tablegen.calibration.size import SizeFit
-from tablegen.calibration.table import Source
-from tablegen.calibration.trace import TraceFit
 from tablegen.compensation.branch import LAW, MEASURED
 from tablegen.compensation.models.harmonic import HarmonicModel
+from tablegen.fitting.estimate import Estimate, Fit, ImageSize
+from tablegen.fitting.measured_branch import AmplitudeFit
+from tablegen.images.pair_fit import ImageFit
 
 _FACTORS = ("m_minus", "m_plus")
 _DIRECTIONS = ("forward", "backward")

@@ -6,6 +6,7 @@ from math import floor, log10, sqrt
 import numpy as np
 from msgspec import Struct
 
+from tablegen.base.input_errors import Document, Problem
 from tablegen.certificate.expected import certified_expectation
 from tablegen.certificate.line_errors import (
     EmittedPeriod,
@@ -20,7 +21,6 @@ from tablegen.certificate.shaped_periods import largest_and_rms
 from tablegen.compensation.expectation import Expectation
 from tablegen.compensation.line import Sweep
 from tablegen.planning.line_plan import LinePlan, Plan
-from tablegen.problems import Document, Problem
 
 
 class Certificate(Struct, frozen=True):

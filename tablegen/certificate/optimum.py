@@ -13,7 +13,7 @@ from tablegen.certificate.certificate import Certificate
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.enough_harmonics import straightness
 from tablegen.planning.line_plan import LinePlan
-from tablegen.waveform.gentle_fit import Straightness
+from tablegen.waveform.minimum_acceleration import Straightness
 
 _SLOPES_PER_HARMONIC, _MORE_SLOPES = 8, 33  # over a window, denser towards its edges
 _PER_WAVE = 16  # of the highest harmonic: accelerations outside the windows, and values

@@ -15,6 +15,8 @@ import numpy as np
 from msgspec import structs
 from msgspec.structs import replace
 
+from tablegen.base.figures import at_least, at_most, shown_path
+from tablegen.base.input_errors import Rejected
 from tablegen.certificate.certificate import scaling_errors
 from tablegen.certificate.excess import Cause, Excess, excess
 from tablegen.certificate.expected import expected_of
@@ -22,11 +24,9 @@ from tablegen.certificate.line_errors import EmittedPeriod
 from tablegen.config.hardware import Place
 from tablegen.config.load import Setup
 from tablegen.config.schema import FastAxis
-from tablegen.figures import at_least, at_most, shown_path
 from tablegen.fixedpoint.phase import MAXIMUM_TICKS
 from tablegen.fixedpoint.table_shape import MOST_LENGTH
 from tablegen.planning.line_plan import LinePlan, Plan, make_plan
-from tablegen.problems import Rejected
 
 _MOST_TRIALS = 6  # of one key
 _MARGIN = 1.1  # what a first guess allows for: errors of rounding do not scale exactly

@@ -3,14 +3,14 @@
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from tablegen.base.input_errors import Problem
+from tablegen.base.warnings import Finding, as_printed, worst_first
 from tablegen.certificate.certificate import Certificate
-from tablegen.certificate.doubts import Doubt, doubts
 from tablegen.certificate.excess import Excess, excess
+from tablegen.certificate.expectation_checks import Doubt, doubts
 from tablegen.certificate.matching import apart_percent, apart_warning
 from tablegen.config.load import Setup
-from tablegen.findings import Finding, as_printed, worst_first
 from tablegen.planning.line_plan import LinePlan, Plan
-from tablegen.problems import Problem
 
 if TYPE_CHECKING:
     from tablegen.certificate.remedies import Remedy

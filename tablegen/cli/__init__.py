@@ -1,4 +1,4 @@
-"""The command line. Results go to stdout, messages to stderr; see ``tablegen.cli.exit_status`` for the exit statuses.
+"""The command line. Results go to stdout, messages to stderr; ``shared/exit_status.py`` has the exit statuses.
 
 Commands import what they need when they run, so that ``--version`` and ``--help`` answer at once.
 """
@@ -9,10 +9,10 @@ from importlib import import_module
 
 import click
 
-from tablegen.cli.common import Failure
-from tablegen.cli.exit_status import ExitStatus
-from tablegen.cli.terminal import guard_streams
-from tablegen.interruption import endings_interrupt
+from tablegen.base.interruption import endings_interrupt
+from tablegen.cli.shared.common import Failure
+from tablegen.cli.shared.exit_status import ExitStatus
+from tablegen.cli.shared.terminal import guard_streams
 from tablegen.version import __version__
 
 # Python looks for cycles of objects whenever there are 700 more, which is nearly a tenth of a build, though almost all
@@ -25,22 +25,22 @@ _COMMANDS = {
     "sweep": ("sweep", "sweep"),
     "check": ("check", "check"),
     "show": ("show", "show"),
-    "tables": ("table_choice", "tables"),
+    "tables": ("tables", "tables"),
     "report": ("report", "report"),
     "compare": ("compare", "compare"),
-    "calibrate": ("calibrate", "calibrate"),
-    "channels": ("channels", "channels"),
+    "calibrate": ("calibrate.group", "calibrate"),
+    "channels": ("images.channels", "channels"),
     "simulate": ("simulate", "simulate"),
-    "refine": ("refine", "refine"),
-    "correct": ("correct", "correct"),
+    "refine": ("images.refine", "refine"),
+    "correct": ("images.correct", "correct"),
     "verify": ("verify", "verify"),
-    "upload": ("upload", "upload"),
-    "status": ("device_status", "device_status"),
-    "readback": ("readback", "readback"),
-    "park": ("control", "park"),
-    "trigger": ("control", "trigger"),
-    "clear": ("control", "clear"),
-    "ports": ("ports", "ports"),
+    "upload": ("device.upload", "upload"),
+    "status": ("device.status", "device_status"),
+    "readback": ("device.readback", "readback"),
+    "park": ("device.control", "park"),
+    "trigger": ("device.control", "trigger"),
+    "clear": ("device.control", "clear"),
+    "ports": ("device.ports", "ports"),
     "init": ("init", "init"),
     "formats": ("formats", "formats"),
     "paths": ("paths", "paths"),
@@ -87,6 +87,8 @@ Exit status of all commands:
     9 refused by the device
    10 link lost, or timeout
    11 some scans of a sweep could not be built; the others were
+   12 invalid answers of the device
+   70 unexpected error; the message says what to report
   130 interrupted, by Ctrl-C, SIGTERM or SIGHUP""",
 )
 @click.version_option(__version__, prog_name="tablegen", message="%(prog)s %(version)s")
@@ -97,6 +99,8 @@ def cli() -> None:
     scanner. Names of quantities contain the unit, such as size_nm. All voltages are voltages at the piezo.
 
     `tablegen COMMAND --help` explains each command.
+
+    TABLEGEN_TRACEBACK=1 in the environment shows the traceback of an unexpected error.
     """
 
 
@@ -123,18 +127,51 @@ def _run() -> int:
     except click.ClickException as error:
         error.show()
         return error.exit_code
-    except (click.Abort, KeyboardInterrupt):
-        click.echo("interrupted", err=True)
+    except (click.Abort, KeyboardInterrupt) as interruption:
+        if isinstance(interruption.__cause__, EOFError):  # click takes it for the end of an answer; nothing asks here
+            return _unexpected(interruption.__cause__)
+        where = str(interruption.__cause__ or "") or str(interruption)  # that of a plug-in says so
+        click.echo(f"interrupted {where}".rstrip(), err=True)
         return ExitStatus.INTERRUPTED
     except BrokenPipeError:
         return _reader_left()
     except SystemExit as end:
         # Click ends so after a broken pipe, having replaced stdout, and after completing for a shell.
-        return _reader_left() if sys.stdout is not stdout else int(end.code or 0)
+        if sys.stdout is not stdout:
+            return _reader_left()
+        if isinstance(end.code, int) and _raised_in(end, "click"):
+            return end.code
+        return _unexpected(end)
     except OSError as error:
+        if error.filename is not None or not _raised_in(
+            error, "click.utils", "tablegen.cli", "tablegen.cli.shared.terminal"
+        ):
+            return _unexpected(error)
         sys.stdout = None
         click.echo(f"cannot write to stdout: {error.strerror or error}", err=True)
         return ExitStatus.CANNOT_WRITE
+    except BaseException as error:
+        return _unexpected(error)
+
+
+def _raised_in(error: BaseException, *modules: str) -> bool:
+    """True if the innermost frame of an exception is of one of these modules, or of a package of that name."""
+    trace, name = error.__traceback__, ""
+    while trace is not None:
+        name = str(trace.tb_frame.f_globals.get("__name__", ""))
+        trace = trace.tb_next
+    return name in modules or name.partition(".")[0] in modules
+
+
+def _unexpected(error: BaseException) -> int:
+    """Explain what no command expects; a traceback of Python would end with status 1, which means something else."""
+    try:
+        from tablegen.cli.shared.unexpected import report
+
+        return report(error)
+    except Exception:  # an installation that lacks what the report needs
+        click.echo(f"internal error: {type(error).__name__}: {error}", err=True)
+        return ExitStatus.UNEXPECTED
 
 
 def _reader_left() -> int:

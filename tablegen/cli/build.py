@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tablegen.cli.common import (
+from tablegen.cli.depfile import Depfile
+from tablegen.cli.shared.common import (
     OutputFile,
     OutputFolder,
     fail,
@@ -16,9 +17,8 @@ from tablegen.cli.common import (
     strict_option,
     written,
 )
-from tablegen.cli.depfile import Depfile
-from tablegen.cli.exit_status import ExitStatus
-from tablegen.cli.plot import PlottingCommand, check_plot, in_terminal, plot_option, put_plot
+from tablegen.cli.shared.exit_status import ExitStatus
+from tablegen.cli.shared.plot import PlottingCommand, check_plot, in_terminal, plot_option, put_plot
 
 if TYPE_CHECKING:
     from tablegen.api.build import Build
@@ -102,10 +102,11 @@ def build(
     try:
         built = planned(scan, list(formats) or None, strict)
         files = rendered(built)
-    except KeyboardInterrupt:
-        fail([f"interrupted; {output} was left as it was"], ExitStatus.INTERRUPTED)
+    except KeyboardInterrupt as interruption:
+        where = f" {interruption}".rstrip()  # that of a plug-in says so
+        fail([f"interrupted{where}; {output} was left as it was"], ExitStatus.INTERRUPTED)
     if only_check:
-        from tablegen.cli.difference import differences
+        from tablegen.cli.shared.directory_difference import differences
 
         found = differences(output, files)
         outdated, leftovers = built.outdated(output), built.leftovers(output)
@@ -117,7 +118,7 @@ def build(
         again = "".join(f" -f {name}" for name in formats)
         fail([f"{output} is stale; run: tablegen build {scan} -o {output}{again}"], ExitStatus.STALE)
     if rule is not None:
-        rule.note(built.setup.files, built.formats)
+        rule.note(built.setup, built.formats)
     removed: list[str] = []
     kept: list[str] = []
 
@@ -131,7 +132,7 @@ def build(
     for name in kept:
         click.echo(f"note: {_leftover(output / name)}", err=True)
     if not quiet:
-        from tablegen.cli.tables import certificate_table
+        from tablegen.cli.certificate_text import certificate_table
 
         click.echo("\n".join(certificate_table(built.plan, built.certificates)))
         for finding in built.findings:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from tablegen.cli.common import planned, scan_argument, strict_option
+from tablegen.cli.shared.common import planned, scan_argument, strict_option
 
 
 @click.command(short_help="Check a scan file and its scanner file.")

@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tablegen.cli.common import OutputFile, fail, written
-from tablegen.cli.exit_status import ExitStatus
-from tablegen.cli.plot import PlottingCommand, check_plot, plot_option, put_plot
-from tablegen.cli.progress import Progress
+from tablegen.cli.shared.common import OutputFile, fail, written
+from tablegen.cli.shared.exit_status import ExitStatus
+from tablegen.cli.shared.plot import PlottingCommand, check_plot, plot_option, put_plot
+from tablegen.cli.shared.progress import Progress
 
 if TYPE_CHECKING:
+    from tablegen.charts.chart import Chart
+    from tablegen.charts.picture_file import PlottedCharts
     from tablegen.comparison.comparison import SideBySide
-    from tablegen.report.chart import Chart
-    from tablegen.report.picture import PlottedCharts
 
 _IN_TERMINAL = 6  # charts
 _path = click.Path(path_type=Path)
@@ -78,8 +78,8 @@ def compare(a: Path, b: Path, everything: bool, output: Path | None, plot: Path 
 
 def _plotted(both: "SideBySide", charts: "list[Chart]") -> "PlottedCharts":
     """All in a file, what differs in it first; in the terminal only that, the first of them."""
+    from tablegen.charts.picture_file import PlottedCharts
     from tablegen.comparison.charts import differing_charts
-    from tablegen.report.picture import PlottedCharts
 
     first = differing_charts(charts)
     rest = [chart for chart in charts if chart not in first]
@@ -88,9 +88,9 @@ def _plotted(both: "SideBySide", charts: "list[Chart]") -> "PlottedCharts":
 
 
 def _read(a: Path, b: Path, progress: Progress) -> "SideBySide":
+    from tablegen.base.input_errors import Rejected, Unphysical
     from tablegen.comparison.comparison import compared
     from tablegen.manifest.read import NotABuild
-    from tablegen.problems import Rejected, Unphysical
 
     try:
         return compared(a, b, progress.now)

@@ -2,9 +2,9 @@
 
 from collections.abc import Iterator
 
+from tablegen.comparison.cells import HEAD, cells
 from tablegen.comparison.comparison import SideBySide
 from tablegen.comparison.side import WORDS
-from tablegen.comparison.words import HEAD, cells
 
 _WORD = 20  # characters; longer words are cut
 

@@ -5,9 +5,13 @@ import stat
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from tablegen.cli.common import fail, written
-from tablegen.cli.exit_status import ExitStatus
+from tablegen.cli.shared.common import fail, written
+from tablegen.cli.shared.exit_status import ExitStatus
+
+if TYPE_CHECKING:
+    from tablegen.config.load import Setup
 
 
 class Depfile:
@@ -24,15 +28,25 @@ class Depfile:
         self._started_ns = time.time_ns()
         _remove(path, scan)
 
-    def note(self, read: Sequence[Path], formats: Sequence[str]) -> None:
-        """Note the files that were read, and those of the package that decide these formats."""
-        from tablegen.emit.depfile import deciding_files
+    def note(self, setup: "Setup", formats: Sequence[str]) -> None:
+        """Note the files that were read, and those of the package that decide these formats.
 
-        self._prerequisites = [*read, *deciding_files(formats)]
-        for name in (self._target, *map(str, self._prerequisites)):
-            if "\n" in name or "\t" in name:
-                why = "a dependency file cannot contain a path with a line end or a tab; rename it"
-                fail([f"{name!r}: {why}"], ExitStatus.WRONG_INPUT)
+        A name that cannot be written for make and Ninja ends the command before anything is written.
+        """
+        from tablegen.emit.depfile import deciding_files, why_unsafe
+
+        own = deciding_files(formats)
+        self._prerequisites = [*setup.files, *own]
+        problems = [
+            document.problem(key, f"{str(path)!r} {why}; rename it") if key else f"{str(path)!r}: {why}; rename it"
+            for path, document, key in setup.named_files
+            if (why := why_unsafe(str(path)))
+        ]
+        for name in (self._target, *map(str, own)):
+            if why := why_unsafe(name):
+                problems.append(f"{name!r}: {why}; rename it")
+        if problems:
+            fail(problems, ExitStatus.WRONG_INPUT)
 
     def write(self) -> None:
         """Write the file; the last step of a build."""

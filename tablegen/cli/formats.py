@@ -2,7 +2,7 @@
 
 import click
 
-from tablegen.cli.terminal import tell
+from tablegen.cli.shared.terminal import tell
 
 
 @click.command(short_help="List the output formats of build.")

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tablegen.cli.common import OutputFolder, fail, finite, written
-from tablegen.cli.exit_status import ExitStatus
+from tablegen.cli.shared.common import OutputFolder, fail, finite, written
+from tablegen.cli.shared.exit_status import ExitStatus
 
 if TYPE_CHECKING:
     from tablegen.cli.init_files import Wishes
@@ -133,9 +133,9 @@ def _checked(wishes: "Wishes") -> dict[str, str]:
     """The files, with tables as long as the scan needs; where none can be built the command ends, with the reasons."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from tablegen.api.build import BrokenLimit, build
+    from tablegen.base.input_errors import Rejected
+    from tablegen.base.toml import parse_toml
     from tablegen.cli.init_files import SCANNER_FILE, TABLE_LENGTHS, files
-    from tablegen.problems import Rejected
-    from tablegen.toml import parse_toml
 
     for length in TABLE_LENGTHS:
         made = files(replace(wishes, table_length=length))

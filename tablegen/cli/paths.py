@@ -4,7 +4,7 @@ import os
 
 import click
 
-from tablegen.cli.exit_status import ExitStatus
+from tablegen.cli.shared.exit_status import ExitStatus
 
 
 @click.command(short_help="Print the paths of the make, CMake, C and Verilog files.")
@@ -34,7 +34,7 @@ def paths(**asked: bool) -> int:
       less "$(tablegen paths --runtime-verilog)/dac_sequencer.v"
       iverilog -g2005 -Wall -t null "$(tablegen paths --runtime-verilog)"/dac_*.v
     """
-    from tablegen.resources import resource_folder
+    from tablegen.base.resources import resource_folder
 
     folder = resource_folder("firmware_templates")
     found = {

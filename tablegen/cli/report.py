@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tablegen.cli.common import OutputFile, OutputFolder, fail, require, written
-from tablegen.cli.exit_status import ExitStatus
-from tablegen.cli.progress import Progress
+from tablegen.cli.shared.common import OutputFile, OutputFolder, fail, require, written
+from tablegen.cli.shared.exit_status import ExitStatus
+from tablegen.cli.shared.progress import Progress
 
 if TYPE_CHECKING:
-    from tablegen.report.chart import Chart
-    from tablegen.report.record import VerifyRecord
+    from tablegen.charts.chart import Chart
     from tablegen.report.subject import Subject
+    from tablegen.report.verify_record import VerifyRecord
 
 
 @click.command(short_help="Write an HTML page of a scan: errors, charts, certificate.")
@@ -94,7 +94,7 @@ def report(
 
 
 def _record(path: Path) -> "VerifyRecord":
-    from tablegen.report.record import read_record
+    from tablegen.report.verify_record import read_record
 
     try:
         return read_record(path)
@@ -115,8 +115,8 @@ def _of_directory(folder: Path, record: "VerifyRecord | None") -> "Subject":
 
 
 def _of_scan(scan: Path, record: "VerifyRecord | None", progress: Progress) -> "Subject":
-    from tablegen.problems import Rejected
-    from tablegen.report.planned import planned_scan
+    from tablegen.base.input_errors import Rejected
+    from tablegen.report.planned_scan import planned_scan
 
     try:
         return planned_scan(scan, record, progress.now)
@@ -132,7 +132,7 @@ def _chosen(charts: "dict[str, Chart]", wanted: tuple[str, ...]) -> "dict[str, C
 
 
 def _write_charts(charts: "dict[str, Chart]", svg: Path | None, png: Path | None, pdf: Path | None) -> None:
-    from tablegen.report.picture import picture
+    from tablegen.charts.picture_file import picture
 
     for folder, kind in ((svg, "svg"), (png, "png"), (pdf, "pdf")):
         if folder is not None:

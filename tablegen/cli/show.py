@@ -5,13 +5,13 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tablegen.cli.common import format_option, planned, rendered, require, scan_argument
-from tablegen.cli.plot import PlottingCommand, check_plot, in_terminal, plot_option, put_plot
-from tablegen.cli.terminal import tell
+from tablegen.cli.shared.common import format_option, planned, rendered, require, scan_argument
+from tablegen.cli.shared.plot import PlottingCommand, check_plot, in_terminal, plot_option, put_plot
+from tablegen.cli.shared.terminal import tell
 
 if TYPE_CHECKING:
     from tablegen.api.build import Build
-    from tablegen.report.picture import PlottedCharts
+    from tablegen.charts.picture_file import PlottedCharts
 
 
 @click.command(cls=PlottingCommand, short_help="Show drive, rates, accuracy and plots of a scan.")

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import click
 from click.core import ParameterSource
 
-from tablegen.cli.common import OutputFile, fail, finite, require, scan_argument, written
-from tablegen.cli.exit_status import ExitStatus
-from tablegen.cli.plot import PlottingCommand, check_plot, plot_option, put_plot
-from tablegen.cli.progress import Progress
+from tablegen.cli.shared.common import OutputFile, fail, finite, require, scan_argument, written
+from tablegen.cli.shared.exit_status import ExitStatus
+from tablegen.cli.shared.plot import PlottingCommand, check_plot, plot_option, put_plot
+from tablegen.cli.shared.progress import Progress
 
 if TYPE_CHECKING:
     from tablegen.config.load import Setup
@@ -102,8 +102,8 @@ def simulate(
     from msgspec.structs import replace
 
     from tablegen.api.laboratory import Laboratory
+    from tablegen.base.input_errors import Rejected, Unphysical
     from tablegen.config.load import load
-    from tablegen.problems import Rejected, Unphysical
     from tablegen.virtual import report
     from tablegen.virtual.own_run import own_axes
     from tablegen.virtual.report import SimulationStage
@@ -140,7 +140,7 @@ def simulate(
                 list(dict.fromkeys(why for _, reasons in stages[0].rejected for why in reasons)), ExitStatus.WRONG_INPUT
             )
         if calibrated:
-            from tablegen.virtual.laboratory import calibrate
+            from tablegen.virtual.calibration_day import calibrate
 
             progress.now("calibrating")
             heading = f"with one calibrated on the virtual scanner's own data, {noise:g} % noise"
@@ -187,7 +187,7 @@ def _plays_own(context: click.Context, setup: "Setup", truth_file: str | None) -
 
 
 def _simulate_own(setup: "Setup", seed: int, plot: Path | None, as_json: bool) -> None:
-    from tablegen.problems import Rejected, Unphysical
+    from tablegen.base.input_errors import Rejected, Unphysical
     from tablegen.virtual import own_report
     from tablegen.virtual.own_run import own_axes, simulate_own
 
@@ -215,7 +215,7 @@ def _play(
     name: str, heading: str, setup: "Setup", scanner: "VirtualScanner", truth_file: str, progress: Progress
 ) -> "SimulationStage":
     """Every model that can be played, and why the others cannot."""
-    from tablegen.problems import Rejected
+    from tablegen.base.input_errors import Rejected
     from tablegen.virtual.report import SimulationStage
     from tablegen.virtual.simulation import models_of, simulate
 

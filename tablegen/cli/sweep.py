@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tablegen.cli.common import OutputFolder, fail, format_option, scan_argument, strict_option
-from tablegen.cli.exit_status import ExitStatus
+from tablegen.cli.shared.common import OutputFolder, fail, format_option, scan_argument, strict_option
+from tablegen.cli.shared.exit_status import ExitStatus
 
 if TYPE_CHECKING:
     from tablegen.sweep.run import ScanLibrary
@@ -47,7 +47,7 @@ _SHOWN = 20  # scans with the same reason, by name
     "--check",
     "only_check",
     is_flag=True,
-    help="Write nothing. Exit with status 1 and print the files in DIR that are not up to date.",
+    help="Write nothing. Make all programs again; exit with status 1 and print the files in DIR that differ.",
 )
 @strict_option
 @click.option("-q", "--quiet", is_flag=True, help="Print failures and warnings only.")
@@ -83,9 +83,9 @@ def sweep(
     3 no scan could be built, and some for a limit of the certificate (with --strict: or a
     warning), 4 cannot write, 11 some scans could not be built.
     """
-    from tablegen.api.workers import default_jobs
-    from tablegen.cli.bar import Bar
-    from tablegen.cli.common import quiet_blas
+    from tablegen.base.workers import default_jobs
+    from tablegen.cli.shared.common import quiet_blas
+    from tablegen.cli.shared.progress_bar import Bar
 
     quiet_blas()
     from tablegen.emit.write import CannotWrite, NoPlace
@@ -115,9 +115,9 @@ def sweep(
 
 def _asked(scan: Path, texts: tuple[str, ...], output: Path) -> "ScanLibrary":
     """The scans that are asked for; a file that cannot be read, or a wrong setting, ends the command."""
+    from tablegen.base.input_errors import Rejected
     from tablegen.config.settings import parse_setting
     from tablegen.config.variants import variants
-    from tablegen.problems import Rejected
     from tablegen.sweep.run import ScanLibrary
 
     try:
@@ -129,17 +129,18 @@ def _asked(scan: Path, texts: tuple[str, ...], output: Path) -> "ScanLibrary":
 
 def _listed(found: "ScanLibrary", formats: list[str] | None) -> int:
     """A line a scan: what a sweep would do with it."""
+    from tablegen.base.input_errors import Rejected
     from tablegen.library.entry import Entry
-    from tablegen.problems import Rejected
     from tablegen.sweep.inputs import Inputs
     from tablegen.sweep.run import state
+    from tablegen.sweep.written_records import WrittenRecords
 
-    inputs, wrong = Inputs(), 0
+    inputs, written, wrong = Inputs(), WrittenRecords(), 0
     width = max(len(variant.name) for variant in found.variants)
     for variant in found.variants:
         told = ", ".join(f"{key} = {json.dumps(value, default=str)}" for key, value in variant.settings.items())
         try:
-            what = "up to date" if isinstance(state(found, variant, formats, inputs), Entry) else "to build"
+            what = "up to date" if isinstance(state(found, variant, formats, inputs, written), Entry) else "to build"
         except Rejected as rejected:
             wrong += 1
             what = f"wrong: {rejected.problems[0]}"

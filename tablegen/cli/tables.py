@@ -1,48 +1,88 @@
-"""The table of a build for the terminal."""
+"""``tablegen tables``: which tables would do, and the smallest of them."""
 
-from tablegen.certificate.certificate import Certificate
-from tablegen.certificate.summary import expected_lines, rate
-from tablegen.planning.line_plan import Plan
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import click
+
+from tablegen.cli.shared.common import fail, quiet_blas, scan_argument
+from tablegen.cli.shared.exit_status import ExitStatus
+from tablegen.cli.shared.plot import PlottingCommand, check_plot, plot_option, put_plot
+from tablegen.cli.shared.progress import Progress
+from tablegen.cli.shared.terminal import tell
+
+if TYPE_CHECKING:
+    from tablegen.report.table_rows import AxisTables
 
 
-def certificate_table(plan: Plan, certificates: dict[str, Certificate]) -> list[str]:
-    """The certificate of both axes, a line an axis."""
-    schedule = plan.schedule
-    lines = [
-        f"{plan.name} on {plan.scanner!r}: {rate(schedule.line_rate)} lines of {schedule.ticks} ticks, "
-        f"{schedule.lines} lines a frame, {rate(schedule.frame_rate)} frames",
-        "",
-        "                      error [LSB]   scaling error in the window [%, peak to peak]",
-        "axis  drive [V p-p]    max    rms   direction  uncompensated  emitted  band limit  size   step/limit",
-    ]
-    for line in plan.lines:
-        certificate = certificates[line.axis]
-        for i, (side, error) in enumerate(certificate.scaling.items()):
-            start = f"{line.axis:<4}  {line.drive.v_amplitude:13.4f}  {certificate.max_error_lsb:5.3f}  "
-            start += f"{certificate.rms_error_lsb:5.3f}"
-            step = f"{certificate.largest_step}/{certificate.max_step}"
+@click.command(
+    cls=PlottingCommand,
+    short_help="Show which tables would do, and the smallest of them.",
+    epilog="""\b
+Examples:
+  tablegen tables annexin_200nm.toml
+  tablegen tables annexin_200nm.toml --axis x --plot tables.svg
+  tablegen tables annexin_200nm.toml --json
+
+\b
+Exit status: 0 done, 2 wrong input, 4 cannot write, 6 a library is missing.""",
+)
+@scan_argument
+@click.option("--axis", type=click.Choice(["x", "y"]), help="One axis only.  [default: every axis that moves]")
+@plot_option("memory and error of the tables")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")
+def tables(scan: Path, axis: Literal["x", "y"] | None, plot: Path | None, as_json: bool) -> None:
+    """Show which tables would do for a scan, and the smallest of them. Writes no file of a build.
+
+    A table stores one period of the waveform. With more words, wider words, or more arithmetic between the words
+    (mode), the emitted codes are nearer to what was asked for. A code is rounded to a whole LSB of the converter, so
+    that it errs by up to 0.5 LSB, whatever its table is.
+
+    Each line is a table of which there is none smaller, as simple to play, and better by 5 %: memory in bits, the
+    largest and the rms error of a code over all ticks, and what the mode takes of a device for a sample. * is the
+    least memory within [x.table] max_error_lsb of the scan file; without that key within limits.max_error_lsb, or
+    within 1 LSB if that is less. Tables that not all formats of the scan file play are marked -, and not chosen.
+    """
+    check_plot(plot, as_json)
+    name, found = _found(scan, axis)
+    if as_json:
+        click.echo(json.dumps({"name": name, "axes": [one.record() for one in found]}, indent=2, allow_nan=False))
+    else:
+        from tablegen.cli.tables_text import tables_text
+
+        for i, one in enumerate(found):
             if i:
-                start, step = " " * len(start), ""
-            lines.append(
-                f"{start}   {side:<9}  {error.uncompensated:13.2f}  {error.total:7.3f}  {error.band_limit:10.4f}  "
-                f"{error.size:+.3f}  {step}".rstrip()
-            )
-        if line.drive.resting:
-            step = f"{certificate.largest_step}/{certificate.max_step}"
-            lines.append(
-                f"{line.axis:<4}  rests at {line.drive.v_offset:.6g} V, code {certificate.lowest_code}; {step}"
-            )
-    for line in plan.lines:
-        for side, moved in (certificates[line.axis].refinement or {}).items():
-            lines.append(
-                f"{line.axis:<4}  refinement, {side}: moves up to {moved.position:.3g} % of the line and takes away "
-                f"{moved.scaling:.3g} % of scaling error, peak to peak"
-            )
-        expected = certificates[line.axis].expected
-        if expected is not None and expected.basis == "traces":
-            told = expected_lines(expected)
-            lines += [
-                f"{line.axis if i == 0 else '':<4}  {'' if i else 'on the scanner':<14}  {text}"
-                for i, text in enumerate(told)
-            ]
-    return lines
+                click.echo()
+            for number, text in enumerate(tables_text(one)):
+                tell(text, bold=number == 0)
+    if plot is not None:
+        from tablegen.report.table_charts import table_charts
+
+        put_plot(plot, lambda: table_charts(name, found))
+
+
+def _found(scan: Path, axis: str | None) -> "tuple[str, list[AxisTables]]":
+    quiet_blas()
+    from tablegen.base.input_errors import Problems, Rejected
+    from tablegen.config.load import load
+    from tablegen.planning.line_plan import make_plan
+    from tablegen.report.table_rows import axis_tables
+
+    try:
+        with Progress() as progress:
+            progress.now("shaping the waveforms")
+            setup = load(scan)
+            plan = make_plan(setup)
+            lines = [line for line in plan.moving if axis in (None, line.axis)]
+            if not lines:
+                raise click.UsageError(f"{axis} rests in this scan: it has no table to choose.")
+            problems, found = Problems(), []
+            for line in lines:
+                progress.now(f"measuring tables of {line.axis}")
+                with problems.at(setup.scan_file, f"{line.axis}.table"):
+                    found.append(axis_tables(setup, line))
+            problems.stop_if_any()
+    except Rejected as rejected:
+        fail(rejected.problems, ExitStatus.WRONG_INPUT)
+    return plan.name, found

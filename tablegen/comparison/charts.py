@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from tablegen.charts.chart import POSITION, Chart, Mark
 from tablegen.comparison.comparison import SideBySide
 from tablegen.comparison.law_charts import law_charts
 from tablegen.comparison.operators import SIDES, ComparedOperator, Place, residuals
@@ -13,9 +14,8 @@ from tablegen.manifest.fields import ManifestAxis
 from tablegen.numerics.arrays import Floats
 from tablegen.report.blocks import Charts as ChartsBlock
 from tablegen.report.blocks import Section
-from tablegen.report.chart import POSITION, Chart, Mark
-from tablegen.report.errors import inside
 from tablegen.report.playing import PlayedAxis, played_axes
+from tablegen.report.scan_errors import inside
 from tablegen.report.subject import Subject, series_of
 
 _POINTS = 801

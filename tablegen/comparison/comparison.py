@@ -6,10 +6,10 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from tablegen.base.input_errors import Problem, Rejected
 from tablegen.comparison.difference import SURE, ComparedPair, pairs
 from tablegen.comparison.operators import operator_quantities
 from tablegen.comparison.side import WORDS, ComparedSide, folder_of, kind_of, read_side, together
-from tablegen.problems import Problem, Rejected
 
 
 @dataclass(frozen=True, eq=False)

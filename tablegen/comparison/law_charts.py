@@ -5,18 +5,19 @@ from pathlib import Path
 
 import numpy as np
 
+from tablegen.base.input_errors import Problems, Unphysical
+from tablegen.charts.chart import POSITION, Chart, Mark
 from tablegen.comparison.operators import SIDES
 from tablegen.comparison.overlay import overlaid
 from tablegen.compensation.branches import WithBranches
 from tablegen.compensation.frequency import frequency_gain
-from tablegen.compensation.line import LineShape, WantedLine
+from tablegen.compensation.line import LineRequest, LineShape
+from tablegen.compensation.model_problems import ModelProblems
 from tablegen.compensation.offset import OffsetLaw
 from tablegen.config.scanner import Scanner, ScannerAxis
-from tablegen.driver import Driver
 from tablegen.numerics.arrays import Floats
-from tablegen.planning.drive import offset_surface, size_law_of
-from tablegen.problems import Document, Problems, Unphysical
-from tablegen.report.chart import POSITION, Chart, Mark
+from tablegen.numerics.driver import Driver
+from tablegen.planning.laws import offset_surface, size_law_of
 
 _POINTS = 201
 _DECADES = (0.1, 10.0)  # about the rates at which the scanners were calibrated
@@ -107,8 +108,8 @@ def _shape(axis: str, scanner: Scanner, turn: float, share: float) -> LineShape 
     table = getattr(scanner, axis).hysteresis
     if isinstance(table, OperatorModel):
         table = HarmonicModel.like(table)
-    problems, nowhere = Problems(), Document("", None)
-    wanted = WantedLine(
+    problems = Problems()
+    request = LineRequest(
         axis=axis,
         turn=turn,
         v=share,
@@ -125,11 +126,8 @@ def _shape(axis: str, scanner: Scanner, turn: float, share: float) -> LineShape 
         factor_at=lambda _: 1.0,
         rate_gain=None,
         folder=Path(),
-        scan_file=nowhere,
-        scanner_file=nowhere,
-        problems=problems,
     )
-    made = None if table is None else table.line(wanted)
+    made = None if table is None else table.line(request, ModelProblems.without_files(axis, problems))
     return None if problems.found else made
 
 

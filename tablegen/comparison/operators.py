@@ -7,14 +7,14 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
+from tablegen.base.input_errors import Unphysical
 from tablegen.comparison.quantity import ComparedQuantity, keys_of
 from tablegen.compensation.operator.file import OperatorFile, read_operator
 from tablegen.compensation.operator.loop import POINTS, Loop
 from tablegen.compensation.operator.operator import Operator
 from tablegen.compensation.operator.uncertainty import departures
-from tablegen.driver import Driver
 from tablegen.numerics.arrays import Floats
-from tablegen.problems import Unphysical
+from tablegen.numerics.driver import Driver
 
 _WINDOW = (0.1, 0.9)  # of the drive, in which shapes are compared
 _DEVIATIONS = 1.645  # standard errors within which 90 % are: the level of uncertainties of operators

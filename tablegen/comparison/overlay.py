@@ -2,8 +2,8 @@
 
 from typing import Any
 
+from tablegen.charts.chart import Chart, DrawnCurve, Role
 from tablegen.numerics.arrays import Floats
-from tablegen.report.chart import Chart, DrawnCurve, Role
 
 A_ROLE: Role = "before"
 B_ROLE: Role = "other"

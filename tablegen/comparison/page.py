@@ -2,13 +2,13 @@
 
 from collections.abc import Sequence
 
+from tablegen.charts.chart import Chart
+from tablegen.comparison.cells import HEAD, cells
 from tablegen.comparison.charts import chart_section
 from tablegen.comparison.comparison import SideBySide
 from tablegen.comparison.difference import ComparedPair
 from tablegen.comparison.side import WORDS
-from tablegen.comparison.words import HEAD, cells
 from tablegen.report.blocks import Grid, Section, TableCell, row
-from tablegen.report.chart import Chart
 from tablegen.report.document import document
 from tablegen.report.ranking import Finding
 from tablegen.version import __version__

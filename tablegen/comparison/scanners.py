@@ -8,10 +8,10 @@ from pathlib import Path
 
 import msgspec
 
+from tablegen.base.input_errors import Document
+from tablegen.base.reading import CONFIGURATION, read_text
 from tablegen.comparison.quantity import ComparedQuantity, keys_of
 from tablegen.config.scanner import Scanner
-from tablegen.problems import Document
-from tablegen.reading import CONFIGURATION, read_text
 
 _MARK = "# standard errors: "
 _ENTRY = re.compile(r"([\w.\[\]]+) (\S+) \+- (\S+)$")

@@ -5,22 +5,18 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from tablegen.certificate.certificate import broken_limits, certify
+from tablegen.base.input_errors import Problem, Rejected
+from tablegen.base.toml import read_toml
 from tablegen.comparison.operators import ComparedOperator
 from tablegen.comparison.quantity import ComparedQuantity
 from tablegen.comparison.scanners import scanner_quantities
 from tablegen.comparison.scans import scan_quantities
 from tablegen.compensation.models.operator import OperatorModel
-from tablegen.config.load import load, load_scanner
+from tablegen.config.load import load_scanner
 from tablegen.config.scanner import Scanner
-from tablegen.emit.formats import UnknownFormat
-from tablegen.emit.render import render
 from tablegen.manifest.format import MANIFEST
-from tablegen.planning.line_plan import make_plan
-from tablegen.problems import Problem, Rejected, Unphysical
-from tablegen.report.ranking import placed
-from tablegen.report.subject import PlannedScan, Subject, of_directory, of_scan
-from tablegen.toml import read_toml
+from tablegen.report.planned_scan import planned_scan
+from tablegen.report.subject import Subject, of_directory
 
 Kind = Literal["scan", "build", "scanner", "operator"]
 WORDS: dict[Kind, str] = {
@@ -95,8 +91,9 @@ def read_side(path: Path, kind: Kind, tell: Callable[[str], None] = lambda _: No
         notes = (f"{path.name or path}: not as its manifest says: {names}",) if wrong else ()
         return ComparedSide(path, kind, scan_quantities(subject), notes, subject)
     if kind == "scan":
-        subject, broken = _planned(path, tell)
-        return ComparedSide(path, kind, scan_quantities(subject), broken, subject)
+        subject = planned_scan(path, progress=tell, remedies=False)
+        assert subject.planned is not None
+        return ComparedSide(path, kind, scan_quantities(subject), subject.planned.broken, subject)
     if kind == "operator":
         return ComparedSide(path, kind, [], operators={"": ComparedOperator.read(path)})
     scanner, file = load_scanner(path)
@@ -106,21 +103,3 @@ def read_side(path: Path, kind: Kind, tell: Callable[[str], None] = lambda _: No
         for name in table.files() if isinstance(table, OperatorModel) else ():
             operators[axis] = ComparedOperator.read(path.parent / name)
     return ComparedSide(path, kind, scanner_quantities(file, scanner), (), None, scanner, operators)
-
-
-def _planned(scan: Path, tell: Callable[[str], None]) -> tuple[Subject, tuple[str, ...]]:
-    """A scan as it would be built, and the limits that it exceeds; no remedies are tried. Raises ``Rejected``."""
-    tell("shaping the waveforms")
-    setup = load(scan)
-    plan = make_plan(setup)
-    tell("measuring every tick of a line and a frame")
-    certificates = certify(plan)
-    broken = tuple(
-        map(placed, broken_limits(plan, certificates, setup.scan_file, hardware_problem=setup.hardware_problem))
-    )
-    tell("writing the formats")
-    try:
-        files = render(plan, certificates, list(plan.formats))
-    except (UnknownFormat, Unphysical) as error:
-        raise Rejected([setup.scan_file.problem("emit.formats", str(error))]) from None
-    return of_scan(PlannedScan(setup, plan, certificates, broken), files), broken

@@ -5,11 +5,11 @@ from typing import Annotated, Any
 
 from msgspec import Meta, Struct
 
+from tablegen.base.quantities import Normalised
 from tablegen.compensation.hysteresis import beta_at
 from tablegen.compensation.model import Parameters
 from tablegen.compensation.points import HysteresisPoint, OffsetRows, Residual, Rows, between_points, rows_of
-from tablegen.driver import Driver
-from tablegen.quantities import Normalised
+from tablegen.numerics.driver import Driver
 
 Decay = Annotated[float, Meta(ge=1e-6, le=100.0)]
 LAW = ("beta_max", "rho", "u_peak")  # keys of (22)

@@ -6,13 +6,14 @@ from typing import Annotated, Self
 
 from msgspec import Meta, field
 
+from tablegen.base.figures import at_least, at_most
+from tablegen.base.input_errors import Unphysical
+from tablegen.base.quantities import Normalised
 from tablegen.compensation.branch import Branch, residual_between
-from tablegen.compensation.line import AppliedBranch, LineShape, Sweep, WantedLine
+from tablegen.compensation.line import AppliedBranch, LineRequest, LineShape, Sweep
 from tablegen.compensation.model import Hysteresis, Parameters
+from tablegen.compensation.model_problems import ModelProblems
 from tablegen.compensation.points import beyond_driver, twice
-from tablegen.figures import at_least, at_most
-from tablegen.problems import Unphysical
-from tablegen.quantities import Normalised
 
 # A calibration serves turning points this far beyond the calibrated ones: the paper sees no major difference
 # between 0.5 and 0.7 except at large sizes, and 10 % to 25 % between 0.7 and 0.9.
@@ -87,13 +88,13 @@ class ByBranches(WithBranches, frozen=True):
                 found += [(f"branches[{i}].{side}.{key}", why) for key, why in wrong]
         return found
 
-    def line(self, wanted: WantedLine) -> LineShape | None:
+    def line(self, request: LineRequest, problems: ModelProblems) -> LineShape | None:
         """Both branches at this turn and scan size."""
-        self._check_amplitudes(wanted)
-        turn, entries = wanted.turn, sorted(enumerate(self.branches), key=lambda entry: entry[1].turn)
+        self._check_amplitudes(request, problems)
+        turn, entries = request.turn, sorted(enumerate(self.branches), key=lambda entry: entry[1].turn)
         turns = [entry.turn for _, entry in entries]
         if not turns[0] - TURN_REACH - 1e-9 <= turn <= turns[-1] + TURN_REACH + 1e-9:
-            _refuse_turn(wanted, turns)
+            _refuse_turn(request.turn, problems, turns)
             return None
         right = next((i for i, t in enumerate(turns) if t >= turn), len(turns) - 1)
         left = right if turns[right] <= turn or right == 0 else right - 1
@@ -105,24 +106,24 @@ class ByBranches(WithBranches, frozen=True):
             other: Branch = getattr(entries[right][1], side)
             key = f"branches[{entries[left if share < 0.5 else right][0]}].{side}"
             found = None
-            with wanted.at(f"{key}.points"):
-                found = residual_between(one, other, share, wanted.v, wanted.driver, wanted.v_offset)
+            with problems.at(f"{key}.points"):
+                found = residual_between(one, other, share, request.v, request.driver, request.v_offset)
             if found is None:
                 continue
             beta, u_peak, beta_max = found
             name = "points" if beta_max is None else self.wrong_key(beta, u_peak) or "beta_max"
-            with wanted.at(f"{key}.{name}"):
+            with problems.at(f"{key}.{name}"):
                 shapes.append(self._shape(beta, beta_max, u_peak))
                 applied.append(AppliedBranch(beta, self.peak_at(beta, u_peak)))
         if len(shapes) < 2:
             return None
         return LineShape(turn, shapes[0], shapes[1], (applied[0], applied[1]))
 
-    def _check_amplitudes(self, wanted: WantedLine) -> None:
+    def _check_amplitudes(self, request: LineRequest, problems: ModelProblems) -> None:
         for i, entry in enumerate(self.branches):
             for side, branch in entry.sides:
-                for key, why in beyond_driver(branch.points or [], wanted.driver):
-                    wanted.problem(f"branches[{i}].{side}.{key}", why)
+                for key, why in beyond_driver(branch.points or [], request.driver):
+                    problems.add(f"branches[{i}].{side}.{key}", why)
 
     def _shape(self, beta: float, beta_max: float | None, u_peak: float) -> Sweep:
         """The sweep; where there is none, ``Unphysical`` with the residual that would fit."""
@@ -150,15 +151,13 @@ def _largest(build: Callable[[float], object]) -> float:
     return fits
 
 
-def _refuse_turn(wanted: WantedLine, turns: list[float]) -> None:
-    turn = wanted.turn
+def _refuse_turn(turn: float, problems: ModelProblems, turns: list[float]) -> None:
     nearest = min(turns, key=lambda t: abs(t - turn))
     low = at_least(max(turns[0] - TURN_REACH - 1e-10, 0.0), 6)
     high = at_most(min(turns[-1] + TURN_REACH + 1e-10, 1.0), 6)
-    wanted.problems.add(
-        wanted.scan_file,
-        f"{wanted.axis}.turn",
+    problems.add_to_scan(
+        "turn",
         f"{turn:.9g} is {abs(turn - nearest):.9g} from the nearest calibrated branch (turn = {nearest:g}); "
         f"{low} to {high} can be served, "
-        f"or calibrate one in {wanted.scanner_file.name}",
+        f"or calibrate one in {problems.scanner_file.name}",
     )

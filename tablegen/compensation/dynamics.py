@@ -6,10 +6,10 @@ from typing import Protocol
 import numpy as np
 from msgspec import Struct
 
+from tablegen.base.input_errors import Unphysical
 from tablegen.numerics.arrays import Bools, Floats
 from tablegen.numerics.elementary import exp
 from tablegen.numerics.turns import sine_and_cosine
-from tablegen.problems import Unphysical
 
 
 class Response(Protocol):

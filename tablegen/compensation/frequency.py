@@ -1,8 +1,8 @@
 """Loss of amplitude with the scan rate, equation (23)."""
 
-from tablegen.figures import at_most
+from tablegen.base.figures import at_most
+from tablegen.base.input_errors import Unphysical
 from tablegen.numerics.elementary import log10
-from tablegen.problems import Unphysical
 
 _MIN_RESPONSE = 0.5
 

@@ -5,12 +5,12 @@ from typing import ClassVar
 
 import numpy as np
 
+from tablegen.base.input_errors import Unphysical
 from tablegen.compensation.line import Sweep
 from tablegen.numerics.arrays import Floats, FloatsLike
 from tablegen.numerics.elementary import exp
 from tablegen.numerics.moments import plain_moment, ramp_moment
 from tablegen.numerics.turns import sine_and_cosine, sine_and_cosine_of
-from tablegen.problems import Unphysical
 
 # Where 1 - (pi/2) sin(pi u) = 0: the poles of (20), beyond which the residual peaks with the opposite sign.
 LOWEST_PEAK = atan(0.5 * (pi - sqrt(pi * pi - 4.0))) * 2.0 / pi

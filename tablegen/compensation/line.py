@@ -5,21 +5,20 @@ whole periodic waveform itself gives a ``WholeLine``.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 from msgspec import Struct
 
+from tablegen.base.input_errors import Unphysical
 from tablegen.compensation.dynamics import Response
 from tablegen.compensation.expectation import Expectation
 from tablegen.compensation.transient import Transient
-from tablegen.driver import Driver
 from tablegen.numerics.arrays import Floats, FloatsLike
-from tablegen.problems import Document, Problems, Unphysical
-from tablegen.waveform.allowed_error import AllowedError
+from tablegen.numerics.driver import Driver
+from tablegen.waveform.error_allowance import AllowedError
 from tablegen.waveform.series import FourierSeries
 
 _GRID = 1025  # points on which a sweep is inverted first
@@ -101,7 +100,7 @@ class LineShape(Struct, frozen=True):
 
     @property
     def kept_percent(self) -> float | None:
-        """The scaling error that ``waveform`` was made for, where that was ``WantedLine.allowed``."""
+        """The scaling error that ``waveform`` was made for, where that was ``LineRequest.allowed``."""
         return None
 
     @property
@@ -217,8 +216,8 @@ class WholeLine(LineShape, frozen=True, kw_only=True):
         return self.series.value(t, 1)
 
 
-class WantedLine(Struct, frozen=True):
-    """What a scan wants of the model of one axis, and where a fault is reported.
+class LineRequest(Struct, frozen=True):
+    """What a scan asks the model of one axis for.
 
     ``v`` is the normalised scan voltage V_scan / V_max, in [0, 1], V_max the whole range of the
     ``driver``; ``v_amplitude`` = m g V_scan, volts peak to peak at
@@ -226,7 +225,9 @@ class WantedLine(Struct, frozen=True):
     ``response`` are the dynamics, whose inverse gives no harmonic more than ``max_boost_db``; ``factor_at`` is m of (1)
     at an offset as a share of the driver's range, for small scans, ``rate_gain`` g of (23) at a rate in Hz, None
     where it is not calibrated. ``allowed`` is the scaling error in the window that may be left for the sake of
-    less acceleration: a model that makes the whole waveform itself keeps it, where it is not None.
+    less acceleration: a model that makes the whole waveform itself keeps it, where it is not None. ``v`` and
+    ``v_amplitude`` are 0 where the size law refuses the size, and ``size_nm`` is where nothing gives one; the model is
+    asked all the same, so that its own faults are reported in the same run.
     """
 
     axis: str
@@ -245,22 +246,9 @@ class WantedLine(Struct, frozen=True):
     factor_at: Callable[[float], float]
     rate_gain: Callable[[float], float] | None
     folder: Path
-    scan_file: Document
-    scanner_file: Document
-    problems: Problems
     allowed: AllowedError | None = None
 
     @property
     def v_share(self) -> float:
         """The offset as a share of the driver's range."""
         return self.driver.share(self.v_offset)
-
-    @contextmanager
-    def at(self, key: str) -> Iterator[None]:
-        """Turn an ``Unphysical`` raised inside into a problem of this key of the hysteresis table."""
-        with self.problems.at(self.scanner_file, f"{self.axis}.hysteresis.{key}"):
-            yield
-
-    def problem(self, key: str, why: str) -> None:
-        """Note a fault of a key of the hysteresis table."""
-        self.problems.add(self.scanner_file, f"{self.axis}.hysteresis.{key}", why)

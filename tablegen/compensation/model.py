@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 from msgspec import Struct
 
-from tablegen.compensation.line import LineShape, WantedLine
-from tablegen.reading import file_sha256
+from tablegen.base.reading import file_sha256
+from tablegen.compensation.line import LineRequest, LineShape
+from tablegen.compensation.model_problems import ModelProblems
 
 if TYPE_CHECKING:
     from tablegen.compensation.operator.creep import LogarithmicCreep
@@ -65,25 +66,27 @@ class Hysteresis(Parameters, frozen=True, tag_field="model"):
         """Files that the table names, relative to the scanner file: builds depend on them."""
         return ()
 
-    def line(self, wanted: WantedLine) -> LineShape | None:
-        """The line of one axis; None where ``wanted.problems`` grew."""
+    def line(self, request: LineRequest, problems: ModelProblems) -> LineShape | None:
+        """Return the line of one axis; None where it cannot be served, with the reason in ``problems``."""
         raise NotImplementedError(type(self))
 
-    def loop(self, wanted: WantedLine, low: float, high: float) -> "tuple[Loop, LogarithmicCreep] | None":
+    def loop(
+        self, request: LineRequest, low: float, high: float, problems: ModelProblems
+    ) -> "tuple[Loop, LogarithmicCreep] | None":
         """What a settled drive between two shares of v_max does, and the creep behind it; its mean is the offset.
 
-        The loop is ``wanted.size_nm`` long. None where ``wanted.problems`` grew. By default it is that of the line's
+        The loop is ``request.size_nm`` long. None where ``problems`` grew. By default it is that of the line's
         sweeps, without creep.
         """
         from tablegen.compensation.operator.creep import NO_CREEP  # here: a build of a law asks for none
         from tablegen.compensation.operator.loop import POINTS, Loop
 
-        line = self.line(wanted)
+        line = self.line(request, problems)
         if line is None:
             return None
         u = np.arange(POINTS) / (POINTS - 1)
         rising, falling = line.forward.inverse(u), 1.0 - line.backward.inverse(1.0 - u)
-        return Loop(low, high, rising, falling, wanted.size_nm), NO_CREEP
+        return Loop(low, high, rising, falling, request.size_nm), NO_CREEP
 
     def described(self, line: LineShape) -> str:
         """What is applied, in a line of text."""

@@ -3,11 +3,11 @@
 import numpy as np
 from msgspec import Struct
 
-from tablegen.driver import Driver
-from tablegen.figures import at_least, at_most
+from tablegen.base.figures import at_least, at_most
+from tablegen.base.input_errors import Unphysical
 from tablegen.numerics.arrays import tree_sum
+from tablegen.numerics.driver import Driver
 from tablegen.numerics.linear import Cholesky
-from tablegen.problems import Unphysical
 
 _MIN_SPAN = 1e-3  # span of p, which runs from -1 to 1; a parabola through points closer than that is noise
 _SIMPSON_PANELS = 1024  # panels of Simpson's rule; the integrand is smooth and the error below 1e-13

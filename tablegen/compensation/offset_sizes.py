@@ -5,10 +5,10 @@ from itertools import pairwise
 
 from msgspec import Struct
 
+from tablegen.base.input_errors import Unphysical
 from tablegen.compensation.offset import OffsetLaw
 from tablegen.compensation.size import SizeLaw
-from tablegen.driver import Driver
-from tablegen.problems import Unphysical
+from tablegen.numerics.driver import Driver
 
 _ROUNDS = 40  # of a contraction that leaves a third of an error
 

@@ -6,11 +6,11 @@ from typing import Annotated
 
 from msgspec import Meta, Struct
 
+from tablegen.base.figures import at_least, at_most
+from tablegen.base.input_errors import Unphysical
+from tablegen.base.quantities import Normalised, PositiveVolts, Volts
 from tablegen.compensation.model import Parameters
-from tablegen.driver import Driver
-from tablegen.figures import at_least, at_most
-from tablegen.problems import Unphysical
-from tablegen.quantities import Normalised, PositiveVolts, Volts
+from tablegen.numerics.driver import Driver
 
 # Measured points serve scans this much larger than the largest of them, of v_max.
 SIZE_REACH = 0.1

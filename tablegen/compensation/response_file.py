@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
+from tablegen.base.figures import shown_path
+from tablegen.base.input_errors import Unphysical
+from tablegen.base.reading import RESPONSE, read_bytes
 from tablegen.compensation.dynamics import Measured
-from tablegen.figures import shown_path
-from tablegen.problems import Unphysical
-from tablegen.reading import RESPONSE, read_bytes
 
 
 def read_response(path: Path) -> Measured:

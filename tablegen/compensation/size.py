@@ -4,8 +4,8 @@ from math import sqrt
 
 from msgspec import Struct
 
-from tablegen.figures import at_most
-from tablegen.problems import Unphysical
+from tablegen.base.figures import at_most
+from tablegen.base.input_errors import Unphysical
 
 
 class SizeLaw(Struct, frozen=True):

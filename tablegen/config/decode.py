@@ -10,10 +10,10 @@ import msgspec.inspect as types
 from msgspec import Struct
 from msgspec.structs import FieldInfo, fields
 
+from tablegen.base.input_errors import Document, Problems
+from tablegen.base.toml import join_key
 from tablegen.compensation import models
 from tablegen.compensation.model import Hysteresis
-from tablegen.problems import Document, Problems
-from tablegen.toml import join_key
 
 T = TypeVar("T", bound=Struct)
 

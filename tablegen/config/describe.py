@@ -8,9 +8,9 @@ from msgspec.json import schema_components
 
 from tablegen.compensation import models
 from tablegen.compensation.model import Hysteresis
+from tablegen.config.image_keys import RATES
 from tablegen.config.scanner import SlowScannerAxis
 from tablegen.config.schema import WrittenTiming
-from tablegen.config.words import RATES
 
 _MODEL_KEY = "model"
 # Keys of which one has to be given, and no two, by the table.

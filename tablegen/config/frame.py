@@ -12,7 +12,7 @@ from typing import Literal
 
 from msgspec import Struct
 
-from tablegen.problems import Unphysical
+from tablegen.base.input_errors import Unphysical
 
 # Of y at rest: so near to the end of the frame that no line comes after it.
 RESTING_TURN = 0.999999999999

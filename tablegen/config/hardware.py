@@ -9,10 +9,10 @@ from typing import Any, Literal, NamedTuple, TypeAlias
 
 from msgspec import Struct
 
+from tablegen.base.input_errors import Document, Problems
 from tablegen.config.decode import decode, meant
 from tablegen.config.scanner import Scanner
 from tablegen.config.schema import Amplifier, Dac, WrittenScan
-from tablegen.problems import Document, Problems
 
 _AXES = ("x", "y")
 _KINDS: Mapping[str, type[Dac] | type[Amplifier]] = {"dac": Dac, "amplifier": Amplifier}

@@ -5,8 +5,8 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from tablegen.problems import Document, Problems
-from tablegen.toml import join_key
+from tablegen.base.input_errors import Document, Problems
+from tablegen.base.toml import join_key
 
 _NOTHING: Mapping[str, tuple[str, ...]] = {}
 # By the table of an axis: what is not taken from x beside a key of y, since both would say the same or contradict.

@@ -9,9 +9,14 @@ from typing import Any
 from msgspec import Struct
 from msgspec.structs import replace
 
+from tablegen.base.figures import shown_path
+from tablegen.base.input_errors import Document, Problem, Problems, Rejected
+from tablegen.base.quantities import MAXIMUM_FILE_NAME
+from tablegen.base.toml import read_toml
 from tablegen.compensation.model import Parameters
 from tablegen.config.decode import decode, meant
 from tablegen.config.hardware import AxisHardware, Place, check_hardware, hardware_of
+from tablegen.config.image_keys import IMAGES, OFFSETS, RATES, SIZES, check_words, solved
 from tablegen.config.like import inherited, told_once
 from tablegen.config.names import why_not_a_name
 from tablegen.config.scanner import Offset, Resonance, Scanner
@@ -27,11 +32,6 @@ from tablegen.config.schema import (
     WrittenScan,
     WrittenTiming,
 )
-from tablegen.config.words import IMAGES, OFFSETS, RATES, SIZES, check_words, solved
-from tablegen.figures import shown_path
-from tablegen.problems import Document, Problem, Problems, Rejected
-from tablegen.quantities import MAXIMUM_FILE_NAME
-from tablegen.toml import read_toml
 
 _LIBRARY = "this file is a library of scans; `tablegen sweep` builds them, each into a directory of its own"
 
@@ -77,13 +77,24 @@ class Setup(Struct, frozen=True, dict=True):
     @property
     def files(self) -> list[Path]:
         """Every file that decides this scan, each once: the scan, the scanner, and the files that it names."""
-        files = [Path(file.name) for file in (self.scan_file, self.scanner_file) if file.lines is not None]
-        for axis in (self.scanner.x, self.scanner.y):
+        return list(dict.fromkeys(path for path, _, _ in self.named_files))
+
+    @property
+    def named_files(self) -> list[tuple[Path, Document, str]]:
+        """The same files with the key that names each, and the document of the key; "" for the scan file itself.
+
+        One that several keys name stands there several times.
+        """
+        files = [(self.scan_file, self.scan_file, ""), (self.scanner_file, self.scan_file, "scanner")]
+        named = [(Path(file.name), document, key) for file, document, key in files if file.lines is not None]
+        for name, axis in (("x", self.scanner.x), ("y", self.scanner.y)):
             if axis.resonance is not None and axis.resonance.response is not None:
-                files.append(self.scanner_folder / axis.resonance.response)
+                path = self.scanner_folder / axis.resonance.response
+                named.append((path, self.scanner_file, f"{name}.resonance.response"))
             if axis.hysteresis is not None:
-                files += [self.scanner_folder / name for name in axis.hysteresis.files()]
-        return list(dict.fromkeys(files))
+                key = f"{name}.hysteresis.file"
+                named += [(self.scanner_folder / path, self.scanner_file, key) for path in axis.hysteresis.files()]
+        return named
 
 
 def load(path: str | Path) -> Setup:

@@ -7,10 +7,10 @@ from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
 
+from tablegen.base.quantities import FileName, Hertz, Name, Nanometres, PositiveVolts, Volts
 from tablegen.compensation.model import Hysteresis
 from tablegen.config.schema import Amplifier, Dac
-from tablegen.driver import Driver
-from tablegen.quantities import FileName, Hertz, Name, Nanometres, PositiveVolts, Volts
+from tablegen.numerics.driver import Driver
 
 Factor = Annotated[float, Meta(ge=0.1, le=10.0)]
 

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
 
-from tablegen.quantities import FileName, Hertz, Micrometres, Nanometres, Normalised, PositiveVolts, Volts
+from tablegen.base.quantities import FileName, Hertz, Micrometres, Nanometres, Normalised, PositiveVolts, Volts
 
 # Short enough to leave room for what is appended; reserved words are refused beside it, see ``why_not_a_name``.
 MAXIMUM_NAME = 48
@@ -140,6 +140,22 @@ class Refinement(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         Annotated[
             float, Meta(ge=0.0, le=100.0, description="rms residual of the trace from which the layer was learnt")
         ]
+        | None
+    ) = None
+    before_scaling_percent: (
+        Annotated[
+            float,
+            Meta(ge=0.0, le=1e4, description="scaling error of the same trace, peak to peak, of the worse direction"),
+        ]
+        | None
+    ) = None
+    previous_a: (
+        Annotated[Harmonics, Meta(description="cosine terms of the layer that was played while that was measured")]
+        | None
+    ) = None
+    previous_b: Annotated[Harmonics, Meta(description="sine terms of the same layer")] | None = None
+    best: (
+        Annotated[bool, Meta(description="the round after this layer had a larger scaling error, so it was kept")]
         | None
     ) = None
     before_of: (
@@ -430,7 +446,7 @@ class WrittenScan(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
 
 
 class Scan(WrittenScan, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One scan as it is planned: ``config/words.py`` has solved what was written for sizes, lines and rates.
+    """One scan as it is planned: ``config/image_keys.py`` has solved what was written for sizes, lines and rates.
 
     Sizes stand at the axes, ``timing`` has line periods and a line rate, ``y`` its turn and its window.
     """

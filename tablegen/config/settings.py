@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
 from typing import Any
 
-from tablegen.problems import Problem, Rejected, shortened
-from tablegen.toml import parse_toml
+from tablegen.base.input_errors import Problem, Rejected, shortened
+from tablegen.base.toml import parse_toml
 
 MOST_VALUES = 65_536  # of one key, and of scans in one sweep
 _OPENING, _CLOSING = "[{", "]}"

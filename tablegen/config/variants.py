@@ -9,12 +9,12 @@ from typing import Any
 
 import msgspec
 
+from tablegen.base.input_errors import Document, Problem, Rejected
+from tablegen.config.image_keys import IMAGES, OFFSETS, RATES, SIZES
 from tablegen.config.load import Scanners, Setup, assembled, read_scan_file
 from tablegen.config.names import why_not_a_name
 from tablegen.config.schema import MAXIMUM_NAME
 from tablegen.config.settings import MOST_VALUES, Setting, given
-from tablegen.config.words import IMAGES, OFFSETS, RATES, SIZES
-from tablegen.problems import Document, Problem, Rejected
 
 
 class VariedDocument(Document, frozen=True):

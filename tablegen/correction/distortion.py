@@ -12,8 +12,8 @@ from functools import cached_property
 import numpy as np
 from scipy.ndimage import map_coordinates
 
+from tablegen.base.input_errors import Unphysical
 from tablegen.numerics.arrays import Bools, Floats
-from tablegen.problems import Unphysical
 
 _ORDER = 3  # of the splines
 _MARGIN = 12  # pixels: what is further away does not matter to a spline

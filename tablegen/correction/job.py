@@ -7,8 +7,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from tablegen.calibration.image_checks import check_heights, check_pair, check_size
-from tablegen.calibration.image_files import ScanImage, channels_of, read_channels, read_image
+from tablegen.base.input_errors import Problem, Rejected, Unphysical
+from tablegen.base.reading import CONFIGURATION, file_sha256
 from tablegen.compensation import models
 from tablegen.config.load import load, load_scanner
 from tablegen.correction.agreement import difference
@@ -16,11 +16,11 @@ from tablegen.correction.distortion import Distortion, Resampler
 from tablegen.correction.periodic_scan import PeriodicScan, periodic_scan
 from tablegen.correction.settled_scan import AxisScan, ScannerModel, lines_of, scanner_distortion, triangle
 from tablegen.correction.straight import ScanPicture, StraightScan, put_straight
+from tablegen.images.files import ScanImage, channels_of, read_channels, read_image
+from tablegen.images.pair_checks import check_heights, check_pair, check_size
 from tablegen.numerics.arrays import Floats
-from tablegen.planning.drive import size_law_of
+from tablegen.planning.laws import size_law_of
 from tablegen.planning.line_plan import LinePlan, make_plan
-from tablegen.problems import Problem, Rejected, Unphysical
-from tablegen.reading import CONFIGURATION, file_sha256
 
 _ALIKE = 0.3  # of the contrast: trace and retrace that differ by less are what they are said to be
 _BETTER = 0.6  # times the difference: how much better mirrored or exchanged images have to agree

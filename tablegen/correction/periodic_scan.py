@@ -12,12 +12,12 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import gaussian_filter1d
 
-from tablegen.calibration.image_fit import check_fit
-from tablegen.calibration.image_model import begin, grown, prepared
-from tablegen.calibration.periodic import LAG, FitState, PeriodicModel, settle
+from tablegen.base.input_errors import Unphysical
 from tablegen.correction.distortion import Distortion, Sweep1D
+from tablegen.images.model_start import begin, grown, prepared
+from tablegen.images.pair_fit import check_fit
+from tablegen.images.periodic_model import LAG, FitState, PeriodicModel, settle
 from tablegen.numerics.arrays import Bools, Floats
-from tablegen.problems import Unphysical
 
 Complexes = npt.NDArray[np.complex128]
 _MOST_BENDS = 20  # terms of what the branches leave, in each direction

@@ -7,9 +7,11 @@ from typing import Literal
 
 import numpy as np
 
+from tablegen.base.input_errors import Document, Problems, Rejected, Unphysical
 from tablegen.compensation import models
 from tablegen.compensation.frequency import frequency_gain
-from tablegen.compensation.line import WantedLine
+from tablegen.compensation.line import LineRequest
+from tablegen.compensation.model_problems import ModelProblems
 from tablegen.compensation.offset import OffsetLaw
 from tablegen.compensation.offset_sizes import OffsetSurface
 from tablegen.compensation.operator.settled import settled
@@ -17,8 +19,7 @@ from tablegen.compensation.size import SizeLaw
 from tablegen.config.scanner import Scanner, ScannerAxis
 from tablegen.correction.distortion import Distortion, Sweep1D
 from tablegen.numerics.arrays import Floats
-from tablegen.planning.drive import dynamics_of, offset_surface, outside_driver, size_law_of
-from tablegen.problems import Document, Problems, Rejected, Unphysical
+from tablegen.planning.laws import dynamics_of, offset_surface, outside_driver, size_law_of
 
 _COUNT = 8192  # drives of a period
 _HARMONICS = 512  # on which creep and dynamics act
@@ -103,7 +104,7 @@ class ScannerModel:
         amplitude, offset_v = (high - low) / driver.span, float(np.mean(drive))
         share = _scan_share(surface, driver.p(offset_v), gain, amplitude)
         hysteresis = models.get(models.UNCOMPENSATED)() if its.hysteresis is None else its.hysteresis
-        wanted = WantedLine(
+        request = LineRequest(
             axis=axis,
             turn=scan.turn,
             v=share,
@@ -120,11 +121,13 @@ class ScannerModel:
             factor_at=lambda v: surface.small.factor(driver.p(driver.volts(v))),
             rate_gain=None if law is None else lambda hz: frequency_gain(hz, law.alpha, law.reference_hz),
             folder=self.folder,
-            scan_file=Document("the image", None),
-            scanner_file=self.file,
-            problems=problems,
         )
-        found = hysteresis.loop(wanted, driver.share(low), driver.share(high))
+        found = hysteresis.loop(
+            request,
+            driver.share(low),
+            driver.share(high),
+            ModelProblems(axis, Document("the image", None), self.file, problems),
+        )
         problems.stop_if_any()
         if found is None:
             raise Rejected(problems.found)

@@ -6,15 +6,24 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-from tablegen.emit.formats import chosen, own_names
-from tablegen.installation import records
-from tablegen.resources import PACKAGE
+from tablegen.base.installation import records
+from tablegen.base.resources import PACKAGE
+from tablegen.emit.formats import chosen, failing_as_format, own_names
+
+# Of ASCII, what make or Ninja takes for something else and cannot be told not to: ends of commands and of names,
+# patterns, and assignments. They were tried in GNU make 4.3 and Ninja 1.11, as tests/emit/test_depfile.py does.
+_UNSAFE = frozenset("\"%&'*;<=>?[^`|")
+_SUFFIX_RULE = re.compile(
+    r"(\.(out|a|ln|o|c|cc|C|cpp|p|f|F|m|r|y|l|ym|yl|s|S|mod|sym|def|h|info|dvi|tex|texinfo|texi|"
+    r"txinfo|w|ch|web|sh|elc|el)){1,2}"
+)  # the suffixes that make knows by itself
 
 
 def depfile(target: str, prerequisites: Iterable[Path]) -> bytes:
     """A rule for the target, and a target without a rule for each prerequisite.
 
-    The latter are why a prerequisite that was removed makes its dependents be built again, and not make fail.
+    The latter are why a prerequisite that was removed makes its dependents be built again, and not make fail. Names are
+    those of which ``why_unsafe`` says nothing.
     """
     names = [_escaped(os.fsencode(path)) for path in prerequisites]
     rule = b" \\\n ".join([_escaped(os.fsencode(target)) + b":", *names])
@@ -26,12 +35,33 @@ def _escaped(name: bytes) -> bytes:
     return re.sub(rb"(\\*)([ #:])", rb"\1\1\\\2", name).replace(b"$", b"$$")
 
 
+def why_unsafe(name: str) -> str | None:
+    """Say why make or Ninja would not take a name for the one that it is, or would run a part of it; None if they do.
+
+    An escape serves only where both read it alike: Ninja has none for most characters, and reads a backslash before
+    another escaped character as a part of the name.
+    """
+    for character in name:
+        if character in _UNSAFE or ord(character) < 0x20 or character == "\x7f":
+            return f"has {character!r}, which make or Ninja does not take for a part of a name"
+    if name.endswith((" ", "\\", ":", ")")):
+        return f"ends in {name[-1]!r}, which make or Ninja does not take for a part of a name"
+    if pair := re.search(r"\\[#$:]", name):
+        return f"has {pair[0]!r}, which make and Ninja read differently"
+    if name.startswith("~"):
+        return "begins with '~', which make takes for a home directory"
+    if re.fullmatch(r"\.[A-Z_]+", name) or _SUFFIX_RULE.fullmatch(name):
+        return "is the name of a special target of make"
+    return None
+
+
 # What no build reads, beside the commands: the independent side, and what works out the input of builds.
 _OTHER_FOLDERS = (
-    *("api", "calibration", "cli", "library", "link", "refinement", "sweep", "verification", "virtual"),
+    *("api", "calibration", "charts", "cli", "comparison", "correction", "fitting", "images", "library", "link"),
+    *("refinement", "report", "sweep", "verification", "virtual"),
     "examples",
 )
-_OTHER_MODULES = ("manifest/read.py", "firmware_templates/__init__.py")
+_OTHER_MODULES = ("firmware_templates/__init__.py",)
 
 
 def deciding_files(formats: Iterable[str]) -> list[Path]:
@@ -48,5 +78,6 @@ def deciding_files(formats: Iterable[str]) -> list[Path]:
     others.add(PACKAGE / "firmware_templates")
     modules = {path for path in PACKAGE.rglob("*.py") if not others.intersection((path, *path.parents))}
     for each in wanted:
-        modules |= {Path(str(sys.modules[type(each).__module__].__file__)), *each.sources()}
+        with failing_as_format(each):
+            modules |= {Path(str(sys.modules[type(each).__module__].__file__)), *each.sources()}
     return sorted({*modules, *records(PACKAGE.parent)})

@@ -12,9 +12,9 @@ from typing import ClassVar
 
 from msgspec import Struct
 
+from tablegen.base.input_errors import Unphysical
+from tablegen.base.reading import BUILD_FILE, read_bytes
 from tablegen.emit.content import Content
-from tablegen.problems import Unphysical
-from tablegen.reading import BUILD_FILE, read_bytes
 
 
 class Comparison(Struct, frozen=True):

@@ -4,17 +4,21 @@ import re
 from collections.abc import Sequence
 from functools import cache
 
+from tablegen.base.input_errors import Problem, Rejected, Unphysical
+from tablegen.base.resources import own_runtime_folders, resource_folder
 from tablegen.certificate.certificate import Certificate
 from tablegen.certificate.summary import summary
+from tablegen.config.load import Setup
 from tablegen.config.names import of_the_runtime
 from tablegen.emit.content import AxisContent, Content
 from tablegen.emit.format import Format
-from tablegen.emit.formats import UnknownFormat, chosen
+from tablegen.emit.formats import UnknownFormat, chosen, failing_as_format, files_of
+from tablegen.emit.templates import comment_safe
+from tablegen.manifest.fields import MAXIMUM_FILE_NAME
 from tablegen.manifest.format import MANIFEST, content_hash
 from tablegen.manifest.record import plan_record
-from tablegen.manifest.write import manifest_file
+from tablegen.manifest.write import TooLongManifest, UnreadableManifest, manifest_file, require_readable
 from tablegen.planning.line_plan import LinePlan, Plan
-from tablegen.resources import own_runtime_folders, resource_folder
 from tablegen.version import __version__
 
 _FILE_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]*(\.[A-Za-z0-9]+)+")  # of plain files, which manifests can list
@@ -33,8 +37,11 @@ def render(plan: Plan, certificates: dict[str, Certificate], formats: Sequence[s
     files: dict[str, bytes] = {}
     spelt: dict[str, str] = {MANIFEST: MANIFEST}
     for each in wanted:
-        for name, text in {**each.files(content), **runtime_files(each)}.items():
-            if not _FILE_NAME.fullmatch(name) or name == MANIFEST:
+        own_files = files_of(each, content)
+        with failing_as_format(each):
+            own_files |= runtime_files(each)
+        for name, text in own_files.items():
+            if not _FILE_NAME.fullmatch(name) or len(name) > MAXIMUM_FILE_NAME or name == MANIFEST:
                 raise UnknownFormat(f"{each.name!r} writes {name!r}, which cannot be the name of one of its files")
             if of_the_runtime(name) and name not in own_runtime(each):
                 raise UnknownFormat(
@@ -46,6 +53,60 @@ def render(plan: Plan, certificates: dict[str, Certificate], formats: Sequence[s
                 raise UnknownFormat(f"{each.name!r} writes {name}, and so does another format, with other content")
     files[MANIFEST] = manifest_file(record, digest, [each.name for each in wanted], certificates, files)
     return files
+
+
+def render_scan(
+    setup: Setup,
+    plan: Plan,
+    certificates: dict[str, Certificate],
+    formats: Sequence[str] | None = None,
+    *,
+    given: bool = False,
+) -> dict[str, bytes]:
+    """Render a planned scan, with a fault of a format at its key of the scan file.
+
+    Parameters
+    ----------
+    setup, plan, certificates
+        The scan as it was planned and certified.
+    formats
+        Names of formats; those of the plan unless given.
+    given
+        The formats stand beside the scan file, as those of ``--format`` do: a fault has no place in it.
+
+    Returns
+    -------
+    dict
+        Content by file name, the manifest last.
+
+    Raises
+    ------
+    Rejected
+        For an unknown format, for a scan that a format cannot hold, and for a build that could not be read back.
+    """
+    try:
+        files = render(plan, certificates, formats)
+        require_readable(files[MANIFEST])
+    except (UnknownFormat, Unphysical) as error:
+        raise format_rejected(setup, str(error), given=given) from None
+    except UnreadableManifest as error:
+        raise Rejected([_unreadable(setup, plan, error)]) from None
+    return files
+
+
+def _unreadable(setup: Setup, plan: Plan, error: UnreadableManifest) -> Problem:
+    """Say that no command would take the build, and why; at the table that makes its manifest too long."""
+    key, why = "", f"manifest.json of this build would be refused when it is read back: {error}"
+    longest = max(plan.lines, key=lambda line: len(line.program.words))
+    if isinstance(error, TooLongManifest) and longest.program.mode == "direct":
+        words = len(longest.program.words)
+        key, why = f"{longest.axis}.table.mode", f"'direct' takes {words} words, and {why}; use 'interpolated'"
+    return setup.scan_file.problem(key, why)
+
+
+def format_rejected(setup: Setup, why: str, *, given: bool) -> Rejected:
+    """Return the rejection of a format, at ``emit.formats`` or, for formats that were ``given``, without a place."""
+    return Rejected([Problem("formats", 0, "", why) if given else setup.scan_file.problem("emit.formats", why)])
 
 
 def plan_content(plan: Plan, certificates: dict[str, Certificate], digest: str) -> Content:
@@ -64,7 +125,7 @@ def plan_content(plan: Plan, certificates: dict[str, Certificate], digest: str) 
         header_only=plan.header_only,
         version=__version__,
         scanner=plan.scanner,
-        summary=tuple(summary(plan, certificates)),
+        summary=tuple(map(comment_safe, summary(plan, certificates))),  # they name files, in any characters
     )
 
 

@@ -13,8 +13,8 @@ from importlib.util import MAGIC_NUMBER
 import jinja2
 from jinja2.bccache import Bucket, BytecodeCache
 
-from tablegen.reading import BUILD_FILE, read_private_bytes
-from tablegen.user_cache import keep_newest, private_folder
+from tablegen.base.reading import BUILD_FILE, read_private_bytes
+from tablegen.base.user_cache import keep_newest, private_folder
 
 _MOST_FILES = 60  # the least recently written go
 _DIGEST_BYTES = sha256().digest_size

@@ -4,8 +4,8 @@ from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any
 
+from tablegen.base.resources import resource_folder
 from tablegen.numerics.arrays import Ints
-from tablegen.resources import resource_folder
 
 _WORDS_PER_ROW = 10
 _SETTINGS: dict[str, Any] = {

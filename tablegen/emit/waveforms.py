@@ -5,10 +5,10 @@ from typing import Literal
 
 import numpy as np
 
+from tablegen.base.input_errors import Unphysical
 from tablegen.device.period import period_of
 from tablegen.emit.content import Content
 from tablegen.numerics.arrays import Bools, Floats, Ints
-from tablegen.problems import Unphysical
 
 MOST_TICKS = 1 << 22
 

@@ -8,10 +8,11 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from tablegen.emit.directory_lock import locked
-from tablegen.manifest.format import MANIFEST, read_json
-from tablegen.reading import BUILD_FILE, file_sha256, holds, other_than_file, read_bytes
-from tablegen.reading import MANIFEST as MANIFEST_KIND
+from tablegen.base.directory_lock import locked
+from tablegen.base.reading import BUILD_FILE, file_sha256, holds, other_than_file, read_bytes
+from tablegen.base.reading import MANIFEST as MANIFEST_KIND
+from tablegen.config.names import of_the_runtime
+from tablegen.manifest.format import MANIFEST
 
 _STAGED = ".tablegen-"
 _MOST_THREADS = 64
@@ -124,9 +125,10 @@ def settle(folder: Path) -> None:
 
 
 def outdated_files(folder: Path, files: Iterable[str]) -> list[str]:
-    """Files of an earlier build that this one does not make, in order: its manifest lists them, and they are unchanged.
+    """List the files of an earlier build that this one does not make, in order.
 
-    A file that somebody has edited since is not among them; ``leftover_files`` names it.
+    They are files that a manifest of ours lists, whose hash is that of its plan; their names are those of a build, and
+    their content is unchanged. A file that somebody has edited since is not among them; ``leftover_files`` names it.
     """
     files = set(files)
     try:
@@ -135,6 +137,11 @@ def outdated_files(folder: Path, files: Iterable[str]) -> list[str]:
     except OSError:
         return []
     return sorted(name for name, digest in _listed(folder, files).items() if _digest(folder / name) == digest)
+
+
+def names_of_build(build: str, names: Iterable[str]) -> list[str]:
+    """Those names that files of a build of this name can have: its own begin with it, others are the sequencer's."""
+    return [name for name in names if name.startswith((f"{build}.", f"{build}_")) or of_the_runtime(name)]
 
 
 def leftover_files(folder: Path, files: Iterable[str]) -> list[str]:
@@ -157,19 +164,20 @@ def leftover_files(folder: Path, files: Iterable[str]) -> list[str]:
 
 
 def _listed(folder: Path, files: Iterable[str]) -> dict[str, str]:
-    """What the manifest in a folder lists beyond these files, with digests; nothing where it cannot be read."""
+    """What the manifest in a folder lists beyond these files, with digests; nothing where it is not one of a build.
+
+    A manifest of another program, or one that somebody has edited, says nothing of what may be removed.
+    """
+    from tablegen.manifest.read import DamagedManifest, ForeignManifest, parse_manifest  # here: seldom needed
+
     try:
-        found = read_json(read_bytes(folder / MANIFEST, MANIFEST_KIND))
-        listed = found["files"] if isinstance(found, dict) else {}
-        pairs = listed.items() if isinstance(listed, dict) else ()
-    except (OSError, ValueError, KeyError):
+        stored = parse_manifest(read_bytes(folder / MANIFEST, MANIFEST_KIND))
+    except (OSError, DamagedManifest, ForeignManifest):
         return {}
-    mine = {*files, MANIFEST}
-    return {
-        name: digest
-        for name, digest in pairs
-        if isinstance(digest, str) and name not in mine and name == os.path.basename(name) and not name.startswith(".")
-    }
+    if stored.own_hash != stored.manifest.hash:
+        return {}
+    listed, mine = stored.manifest.files, {*files, MANIFEST}
+    return {name: listed[name] for name in names_of_build(stored.manifest.name, listed) if name not in mine}
 
 
 def _remove(folder: Path, names: Iterable[str]) -> None:

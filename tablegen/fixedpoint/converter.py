@@ -6,11 +6,11 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from tablegen.config.hardware import AxisAmplifier, AxisDac
-from tablegen.driver import Driver
 from tablegen.fixedpoint.interpolation import guard_bits
 from tablegen.fixedpoint.output import UNIT_GAIN_BITS, Output
 from tablegen.fixedpoint.rounding import round_number
 from tablegen.fixedpoint.shaping import OFF, Shaping
+from tablegen.numerics.driver import Driver
 
 
 class Converter(Struct, frozen=True):

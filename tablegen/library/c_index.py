@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from tablegen.base.reading import BUILD_FILE, read_text
 from tablegen.emit.formats.c import literal
 from tablegen.emit.templates import template_text
 from tablegen.fixedpoint.spline import WORDS_BEHIND
 from tablegen.library.entry import Entry
 from tablegen.library.sameness import words_in_memory
-from tablegen.reading import BUILD_FILE, read_text
 
 _FOLDER = Path(__file__).parent
 

@@ -9,11 +9,12 @@ from typing import Any
 import msgspec
 from msgspec import Struct
 
+from tablegen.base.reading import BUILD_FILE, file_sha256, read_bytes
+from tablegen.config.names import why_not_a_name
 from tablegen.device.widths import least_widths
 from tablegen.emit.content import AxisContent, Content
-from tablegen.library.whole import RECORD
-from tablegen.manifest.format import read_json
-from tablegen.reading import BUILD_FILE, file_sha256, read_bytes
+from tablegen.manifest.fields import Digest, FileName
+from tablegen.manifest.format import RECORD, read_json
 
 
 class AxisEntry(Struct, frozen=True, kw_only=True, omit_defaults=True):
@@ -40,7 +41,7 @@ class Entry(Struct, frozen=True, kw_only=True):
 
     library: str
     name: str
-    hash: str
+    hash: Digest
     settings: dict[str, Any]
     formats: list[str]
     update_rate_hz: float
@@ -50,8 +51,8 @@ class Entry(Struct, frozen=True, kw_only=True):
     x: AxisEntry
     y: AxisEntry
     warnings: list[str]
-    inputs: str
-    files: dict[str, str]
+    inputs: Digest
+    files: dict[FileName, Digest]
 
     @property
     def axes(self) -> tuple[AxisEntry, AxisEntry]:
@@ -120,12 +121,24 @@ def entry_file(entry: Entry) -> bytes:
     return (json.dumps(msgspec.to_builtins(entry), indent=1) + "\n").encode("ascii")
 
 
-def read_entry(folder: Path) -> Entry | None:
-    """The entry in the folder of a program; None where there is none, or a damaged one."""
+def read_record(folder: Path) -> bytes | None:
+    """The content of ``program.json`` in the folder of a program; None where it cannot be read."""
     try:
-        return msgspec.convert(read_json(read_bytes(folder / RECORD, BUILD_FILE)), Entry)
-    except (OSError, ValueError, RecursionError):  # a ValidationError is a ValueError
+        return read_bytes(folder / RECORD, BUILD_FILE)
+    except OSError:
         return None
+
+
+def parse_entry(record: bytes | None, folder: Path) -> Entry | None:
+    """The entry in a record of the program in ``folder``; None for one that no sweep has written there."""
+    if record is None:
+        return None
+    try:
+        entry = msgspec.convert(read_json(record), Entry)
+    except (ValueError, RecursionError):  # a ValidationError is a ValueError
+        return None
+    right = entry.name == folder.name and why_not_a_name(entry.name) is None and why_not_a_name(entry.library) is None
+    return entry if right else None
 
 
 def is_whole(folder: Path, entry: Entry) -> bool:

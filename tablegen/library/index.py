@@ -2,21 +2,25 @@
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from tablegen.base.reading import BUILD_FILE, read_bytes
+from tablegen.config.names import of_the_runtime, why_not_a_name
 from tablegen.emit.formats import chosen
 from tablegen.emit.render import runtime_files
 from tablegen.library.c_index import c_index
 from tablegen.library.entry import Entry
 from tablegen.library.sameness import why_not_one_c, why_not_one_sequencer
 from tablegen.library.verilog_index import verilog_index
-from tablegen.library.whole import INDEX
-from tablegen.manifest.format import read_json
-from tablegen.reading import BUILD_FILE, read_bytes
+from tablegen.manifest.format import INDEX, read_json
 from tablegen.version import __version__
+
+_PLAIN = re.compile(r"[A-Za-z0-9_]+\.[A-Za-z0-9]+")
+_INDEX_FILE = re.compile(r"[A-Za-z0-9_]+_library(\.(h|c|vh)|_(tables|fourier|sine)\.mem)")
 
 
 @dataclass(frozen=True)
@@ -28,12 +32,16 @@ class Index:
 
 
 def make_index(
-    library: str, entries: Sequence[Entry], failed: Sequence[Mapping[str, Any]], formats: Sequence[str], folder: Path
+    library: str,
+    entries: Sequence[Entry],
+    failed: Sequence[Mapping[str, Any]],
+    formats: Sequence[str],
+    content: Callable[[str, str], bytes],
 ) -> Index:
-    """The index of the programs in ``folder``, numbered as they come, and the runtime of their formats.
+    """The index of programs, numbered as they come, and the runtime of their formats.
 
-    ``failed`` are the scans that could not be built, as the index shows them. Raises ``OSError`` where a file of a
-    program cannot be read.
+    ``failed`` are the scans that could not be built, as the index shows them; ``content`` of the name of a program and
+    that of a file is what the file holds, and may raise ``OSError``.
     """
     wanted = chosen(formats)
     names = {each.name for each in wanted}
@@ -50,7 +58,7 @@ def make_index(
         if why := why_not_one_sequencer(entries):
             notes.append(f"no index in Verilog: {why}")
         else:
-            files |= verilog_index(library, entries, folder, __version__)
+            files |= verilog_index(library, entries, content, __version__)
     rates = sorted({entry.update_rate_hz for entry in entries})
     if len(rates) > 1:
         few = ", ".join(f"{rate:g}" for rate in rates[:4])
@@ -69,11 +77,23 @@ def make_index(
 
 
 def listed_files(folder: Path) -> dict[str, str]:
-    """The files that the index in a directory lists, with their digests; nothing where there is none."""
+    """The files that the index in a directory lists, with their digests; nothing where there is none of ours.
+
+    Only names that an index of that library can list are among them, whatever else stands in it.
+    """
     try:
         found = read_json(read_bytes(folder / INDEX, BUILD_FILE))
     except (OSError, ValueError):
         return {}
-    files = found.get("files") if isinstance(found, dict) else None
-    pairs = files.items() if isinstance(files, dict) else ()
-    return {name: digest for name, digest in pairs if isinstance(digest, str) and name == Path(name).name}
+    if not isinstance(found, dict) or not {"tablegen", "library", "programs", "files"} <= found.keys():
+        return {}
+    library, files = found["library"], found["files"]
+    if not isinstance(library, str) or why_not_a_name(library) is not None or not isinstance(files, dict):
+        return {}
+    own = [name for name in files if name.startswith(f"{library}_library") or of_the_runtime(name)]
+    return {name: files[name] for name in own if isinstance(files[name], str) and is_indexed(name)}
+
+
+def is_indexed(name: str) -> bool:
+    """Whether a file of this name can be one of an index, or of the runtime beside it."""
+    return _INDEX_FILE.fullmatch(name) is not None or (of_the_runtime(name) and _PLAIN.fullmatch(name) is not None)

@@ -6,17 +6,17 @@ sign-extended; and the CRC-32 of all of these, of their bytes from the lowest.
 """
 
 import zlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 
+from tablegen.base.reading import BUILD_FILE, read_bytes, read_text
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS
 from tablegen.emit.constants import DEGREES
 from tablegen.emit.formats.verilog import literal, value_range
 from tablegen.emit.templates import template_text
 from tablegen.library.entry import AxisEntry, Entry
-from tablegen.reading import BUILD_FILE, read_bytes, read_text
 
 MODULE = "dac_library.v"
 FOURIER = 1 << 31
@@ -24,18 +24,21 @@ _FOLDER = Path(__file__).parent
 _HARMONICS = AXIS_WORDS.index("harmonics")
 
 
-def verilog_index(library: str, entries: Sequence[Entry], folder: Path, version: str) -> dict[str, bytes]:
+Contents = Callable[[str, str], bytes]
+"""What the file of a program holds, by the name of the program and its own."""
+
+
+def verilog_index(library: str, entries: Sequence[Entry], content: Contents, version: str) -> dict[str, bytes]:
     """``NAME_library.vh``, its memories, and the module that reads them; programs that one sequencer can play.
 
-    Words are those of the ``.mem`` files of the programs in ``folder``. Raises ``OSError`` where one cannot be read.
+    Words are those of the ``.mem`` files of the programs.
     """
-    files = {f"{library}_library_tables.mem": _memory(entries, folder, fourier=False)}
+    files = {f"{library}_library_tables.mem": _memory(entries, content, fourier=False)}
     rendered = all(axis.interpolated for entry in entries for axis in entry.axes)
     if rendered:
-        files[f"{library}_library_fourier.mem"] = _memory(entries, folder, fourier=True)
+        files[f"{library}_library_fourier.mem"] = _memory(entries, content, fourier=True)
         longest = max(entries, key=lambda entry: max(axis.index_bits for axis in entry.axes))
-        sine = read_bytes(folder / longest.name / f"{longest.name}_sine.mem", BUILD_FILE)
-        files[f"{library}_library_sine.mem"] = sine
+        files[f"{library}_library_sine.mem"] = content(longest.name, f"{longest.name}_sine.mem")
     context = {
         "version": version,
         "library": library,
@@ -70,19 +73,19 @@ def _index_bits(axis: AxisEntry) -> int:
     return axis.index_bits if axis.interpolated else max((axis.table_words - 1).bit_length(), 2)
 
 
-def _memory(entries: Sequence[Entry], folder: Path, fourier: bool) -> bytes:
-    records = [_record(entry, folder / entry.name, fourier) for entry in entries]
+def _memory(entries: Sequence[Entry], content: Contents, fourier: bool) -> bytes:
+    records = [_record(entry, content, fourier) for entry in entries]
     starts = np.cumsum([len(entries), *(len(record) for record in records)])
     words = np.concatenate([starts[:-1].astype(np.uint32), *records])
     return "".join(f"{word:08x}\n" for word in words.tolist()).encode("ascii")
 
 
-def _record(entry: Entry, folder: Path, fourier: bool) -> "np.ndarray[tuple[int], np.dtype[np.uint32]]":
+def _record(entry: Entry, content: Contents, fourier: bool) -> "np.ndarray[tuple[int], np.dtype[np.uint32]]":
     """A record as words."""
     kind = "_fourier" if fourier else ""
-    program = _words(folder / f"{entry.name}_program.mem", 32)
+    program = _words(content(entry.name, f"{entry.name}_program.mem"), 32)
     axes = [
-        _words(folder / f"{entry.name}_{name}{kind}.mem", 32 if fourier else axis.table_bits)
+        _words(content(entry.name, f"{entry.name}_{name}{kind}.mem"), 32 if fourier else axis.table_bits)
         for name, axis in (("x", entry.x), ("y", entry.y))
     ]
     if fourier:
@@ -93,7 +96,7 @@ def _record(entry: Entry, folder: Path, fourier: bool) -> "np.ndarray[tuple[int]
     return np.append(record, np.uint32(zlib.crc32(record.astype("<u4").tobytes())))
 
 
-def _words(path: Path, bits: int) -> "np.ndarray[tuple[int], np.dtype[np.uint32]]":
+def _words(memory: bytes, bits: int) -> "np.ndarray[tuple[int], np.dtype[np.uint32]]":
     """The words of a memory file, sign-extended to 32 bits."""
-    words = np.array([int(word, 16) for word in read_text(path, BUILD_FILE, "ascii").split()], dtype=np.int64)
+    words = np.array([int(word, 16) for word in memory.split()], dtype=np.int64)
     return (words - ((words >> (bits - 1)) << bits)).astype(np.uint32)

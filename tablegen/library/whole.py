@@ -5,10 +5,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from tablegen.base.reading import BUILD_FILE, read_bytes
+from tablegen.manifest.format import INDEX, RECORD
 from tablegen.manifest.read import read_build
-from tablegen.reading import BUILD_FILE, read_bytes
-
-INDEX, RECORD = "library.json", "program.json"
 
 
 @contextmanager

@@ -13,8 +13,8 @@ from tablegen.fixedpoint.phase import MAXIMUM_TICKS, PHASE_BITS
 from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.rounding import signed_limits
 from tablegen.fixedpoint.synthesis import FRACTION_BITS
-from tablegen.link.image import Contents
 from tablegen.link.messages import AxisLimits, Reason
+from tablegen.link.program_image import Contents
 from tablegen.numerics.arrays import Bools
 
 _CLAMP_ALLOWANCE_CODES = (

@@ -9,6 +9,7 @@ from random import Random
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
+from tablegen.link.claims import check_length, check_limits, most_bytes
 from tablegen.link.errors import NotPlaying, NotUnderstood, OutOfTime, Refused
 from tablegen.link.messages import (
     DATA_BYTES,
@@ -22,22 +23,25 @@ from tablegen.link.messages import (
 from tablegen.link.outcome import ProgressCall, UploadResult, UploadState
 from tablegen.link.pace import LATENCY_S, Deadline
 from tablegen.link.readback import read_back
-from tablegen.link.reasons import Limits
+from tablegen.link.refusal_reasons import Limits
 from tablegen.link.session import LinkSession
 from tablegen.link.transport import Opener, Transport, byte_s, open_port
 from tablegen.link.upload import Uploader
 
 if TYPE_CHECKING:
-    from tablegen.link.image import ProgramImage
+    from tablegen.link.program_image import ProgramImage
 
 TIMEOUT_S = 5.0  # timeout of a request
 _UPLOAD_MARGIN_S = 15.0  # margin on top of the transfer time of an upload
 _UPLOAD_TIME_FACTOR = 4.0  # factor on the transfer time of an upload
 _MAX_LATE_S = 5.0  # by which answers may be late, in what is allowed
+_MAX_LATE_SUM_S = 900.0  # of all answers of a transfer, in what is allowed
+_MAX_LINE_S = 600.0  # a device that announces a rate of 1 Hz must not hold the host for months
 _MAX_TRIES = 8  # for which there is time where answers are late
 _POLL_S = 0.05
 _HELLO_FRESH_S = 0.25  # a HELLO so young need not be repeated: an upload sees for itself what is not so any more
 _MAX_READINGS = 3
+_GENERATION_BYTES = 4
 _KEY_BYTES = range(16, 33)
 _NO_HASH = bytes(32)
 
@@ -122,10 +126,7 @@ class Device:
     def status(self) -> DeviceStatus:
         """What it does now."""
         payload = self._session.ask(Request.STATUS, b"", DeviceStatus.LAYOUT.size, self._until(None))
-        try:
-            return DeviceStatus.unpack(payload)
-        except ValueError as error:
-            raise NotUnderstood(str(error)) from None
+        return self._session.status_of(payload)
 
     def upload(
         self,
@@ -154,6 +155,7 @@ class Device:
             status = self.status()  # the device may have been reset since
         if status.hash == image.info.hash and not force:
             return UploadResult(True, status.generation, None, len(image.data), 0, 0, 0, 0.0)
+        before = status
         session.status_at = -math.inf  # whatever comes of it, that will have changed
         self._uploader = Uploader(session, image, deadline, progress, limits)
         result = self._uploader.run()
@@ -164,20 +166,25 @@ class Device:
                 f"the device took the upload, and plays {playing.hash.hex()[:12]} instead of "
                 f"{image.info.hash.hex()[:12]}; did another program upload too, or was the device reset?"
             )
+        if playing.boot == before.boot and result.generation > playing.generation:
+            raise NotUnderstood(
+                f"COMMIT: generation is {result.generation}, and that of STATUS after it {playing.generation}"
+            )
         return result
 
     def upload_time_s(self, image: "ProgramImage") -> float:
         """What is allowed for an upload by default, in seconds: many times what it takes, and two long lines.
 
-        Answers that come late, through a long way or a slow line, add to it, each by at most 5 s.
+        Answers that come late, through a long way or a slow line, add to it, each by at most 5 s and all of them by at
+        most an hour. A line counts as 10 minutes at most, whatever rate the device announces.
         """
         rate = self.info.update_rate_hz
         line_s = int.from_bytes(image.data[:4], "little") / rate if rate else 0.0  # line_ticks is the first word
-        return self._transfer_time_s(len(image.data)) + 2.0 * line_s
+        return self._transfer_time_s(len(image.data)) + 2.0 * min(line_s, _MAX_LINE_S)
 
     def _transfer_time_s(self, size: int) -> float:
         exchange, info = self._session.exchange, self.info
-        late_s = -(-size // (info.window * DATA_BYTES)) * self._late_s()
+        late_s = min(-(-size // (info.window * DATA_BYTES)) * self._late_s(), _MAX_LATE_SUM_S)
         return _UPLOAD_MARGIN_S + _UPLOAD_TIME_FACTOR * (size * byte_s(exchange.transport.baud) + late_s)
 
     def readback(self, *, timeout_s: float | None = None) -> bytes:
@@ -185,16 +192,16 @@ class Device:
 
         Raises ``Refused`` where the device does not hold it: a scan that came with the firmware, or memory in use.
         """
-        size = self.info.image_bytes
+        size = most_bytes(self.info)
         deadline = Deadline(
             self._session.now(), lambda: self._transfer_time_s(size) if timeout_s is None else timeout_s
         )
         for _ in range(_MAX_READINGS):
             before = self.status()
-            image = read_back(self._session, deadline)
+            reading = read_back(self._session, deadline)
             after = self.status()
             if (before.boot, before.generation) == (after.boot, after.generation):
-                return image
+                return reading.image()
         raise OutOfTime("the scan changed while it was read; is another program uploading?")
 
     def park(self) -> None:
@@ -217,13 +224,15 @@ class Device:
 
     def abort(self) -> int:
         """Forget an upload, and withdraw a program that waits; the generation that plays."""
-        return int.from_bytes(self._act(Request.ABORT, plain=True)[:4], "little")
+        payload = self._act(Request.ABORT, plain=True)
+        check_length("ABORT", payload, _GENERATION_BYTES)
+        return int.from_bytes(payload[:_GENERATION_BYTES], "little")
 
     def limits(self) -> Limits:
         """The active limits of x and y."""
         size = 2 * AxisLimits.LAYOUT.size
         try:
-            return _limits(self._session.ask(Request.LIMITS, b"", size, self._until(None)))
+            return self._limits(self._session.ask(Request.LIMITS, b"", size, self._until(None)))
         except Refused as refusal:
             if refusal.reason != Reason.TYPE:
                 raise
@@ -236,7 +245,7 @@ class Device:
 
         Raises ``Refused`` for a device that cannot (``Feature.NARROWS``).
         """
-        return _limits(self._act(Request.LIMITS, x.pack() + y.pack(), 2 * AxisLimits.LAYOUT.size))
+        return self._limits(self._act(Request.LIMITS, x.pack() + y.pack(), 2 * AxisLimits.LAYOUT.size))
 
     def wait_for(self, state: DeviceState, timeout_s: float) -> DeviceStatus:
         """Wait until the sequencer is in a state. Raises ``OutOfTime``."""
@@ -269,10 +278,9 @@ class Device:
         """By which answers are late."""
         return min(self._session.exchange.pace.late_s, _MAX_LATE_S)
 
-
-def _limits(payload: bytes) -> Limits:
-    size = AxisLimits.LAYOUT.size
-    try:
-        return AxisLimits.unpack(payload), AxisLimits.unpack(payload[size:])
-    except ValueError as error:
-        raise NotUnderstood(str(error)) from None
+    def _limits(self, payload: bytes) -> Limits:
+        size = AxisLimits.LAYOUT.size
+        check_length("LIMITS", payload, 2 * size)
+        limits = AxisLimits.unpack(payload), AxisLimits.unpack(payload[size:])
+        check_limits(limits, self.info)
+        return limits

@@ -1,6 +1,6 @@
 """What can go wrong between a host and a device, each with what to do about it in its message."""
 
-from tablegen.installation import install_advice
+from tablegen.base.installation import install_advice
 
 
 class LinkError(Exception):
@@ -60,5 +60,5 @@ class Refused(LinkError):
 class NotUnderstood(LinkError):
     """The device answers, but not as docs/protocol.md has it."""
 
-    def __init__(self, what: str) -> None:
-        super().__init__(f"the device sent an invalid answer: {what}; do the versions of tablegen and firmware match?")
+    def __init__(self, what: str, remedy: str = "do the versions of tablegen and firmware match?") -> None:
+        super().__init__(f"the device sent an invalid answer: {what}; {remedy}")

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from random import Random
 
+from tablegen.link.errors import NotUnderstood
 from tablegen.link.frames import MAXIMUM_FRAME, Frame, FrameReader
 from tablegen.link.messages import ANSWER, REFUSAL, Refusal, Request
 from tablegen.link.pace import Pace
@@ -106,6 +107,8 @@ class Exchange:
                 refusal = Refusal.unpack(frame.payload)
             except ValueError:
                 return []
+            if not refusal.reason:  # taken for a reason, it would say that the request was carried out
+                raise NotUnderstood(f"a refusal of request {refusal.type}: reason is 0; possible: 1 to 255")
             answer = Answer(refusal.type, frame.seq, b"", refusal.reason, refusal.detail)
         self.pace.answered((answer.kind, answer.seq), self.now(), len(frame.payload))
         return [answer]

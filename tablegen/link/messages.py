@@ -272,6 +272,9 @@ class DeviceStatus:
             raise ValueError(f"{len(payload)} bytes, too few for a status")
         state, upload, *numbers, counts, bad, digest = cls.LAYOUT.unpack_from(payload)
         faults, flags, boot, generation, line, received, crc = numbers
+        for field, value, known in (("state", state, DeviceState), ("upload", upload, Upload)):
+            if value not in list(known):
+                raise ValueError(f"{field} is {value}; possible: 0 to {max(known)}")
         return cls(
             DeviceState(state),
             Upload(upload),

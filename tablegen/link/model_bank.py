@@ -11,9 +11,9 @@ from tablegen.device.dual_program import DualProgram
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS
 from tablegen.device.schedule import Schedule, Window
 from tablegen.link.acceptance import Playing, first_objection
-from tablegen.link.image import PROGRAM_BYTES, Contents, layout, make_image, take_apart
 from tablegen.link.messages import SPLINE_DEGREE, AxisLimits, DeviceInfo, DeviceState, ImageInfo, Reason, Upload
 from tablegen.link.players import Player
+from tablegen.link.program_image import PROGRAM_BYTES, Contents, layout, make_image, take_apart
 
 _MIN_INDEX_BITS = 3  # least index bits of an interpolated table
 

@@ -12,9 +12,9 @@ from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.program import Program
 from tablegen.link.acceptance import first_objection
 from tablegen.link.errors import Unsuitable
-from tablegen.link.image import FOURIER_BYTES, PROGRAM_BYTES, ProgramImage, make_image, shape_of, take_apart
 from tablegen.link.messages import SPLINE_DEGREE, AxisShape, DeviceInfo, Feature
-from tablegen.link.reasons import Limits, explain
+from tablegen.link.program_image import FOURIER_BYTES, PROGRAM_BYTES, ProgramImage, make_image, shape_of, take_apart
+from tablegen.link.refusal_reasons import Limits, explain
 from tablegen.manifest.format import content_hash
 from tablegen.manifest.read import NotABuild, read_build
 from tablegen.manifest.record import plan_record

@@ -1,25 +1,60 @@
 """The image of the program that plays, read out of a device: several requests on their way at a time."""
 
 import struct
+from dataclasses import dataclass
 
+from tablegen.link.claims import PROGRAM_BYTES, check_length, most_bytes
 from tablegen.link.errors import LinkLost, NotUnderstood, OutOfTime, Silent
 from tablegen.link.exchange import Answer
 from tablegen.link.frames import MAXIMUM_FRAME
-from tablegen.link.messages import DATA_BYTES, DeviceInfo, Reason, Request
+from tablegen.link.messages import DATA_BYTES, Reason, Request
 from tablegen.link.pace import Deadline, back_off
-from tablegen.link.reasons import refused
+from tablegen.link.refusal_reasons import refused
 from tablegen.link.session import LinkSession, SessionEnded
 
 _REQUEST = struct.Struct("<IB")
 _OFFSET = struct.Struct("<I")
-_PROGRAM_BYTES = 192  # as tablegen.link.image has it, without numpy
-_WORD_BYTES = 4  # at most, bytes per word
 _MAX_IN_VAIN = 8  # rounds of requests without one answer
 _MAX_RESTARTS = 4
 
 
-def read_back(session: LinkSession, deadline: Deadline) -> bytes:
-    """The whole image.
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """Pieces of an image by their offset, and the bytes that no image of the device exceeds."""
+
+    pieces: dict[int, bytes]
+    most: int
+
+    @property
+    def end(self) -> int | None:
+        """Bytes of the image: the first piece that is short is its last; None where none was short so far."""
+        ends = [at + len(piece) for at, piece in self.pieces.items() if len(piece) < DATA_BYTES]
+        return min(ends, default=None)
+
+    def missing(self) -> list[int]:
+        """Return the offsets that were not answered, up to the end or just beyond all that an image may have."""
+        end = self.most + 1 if self.end is None else self.end
+        return [at for at in range(0, end, DATA_BYTES) if at not in self.pieces]
+
+    def image(self) -> bytes:
+        """Join the pieces. Raises ``NotUnderstood`` where they make no image."""
+        last = max(self.pieces)
+        end = last + len(self.pieces[last]) if self.end is None else self.end
+        if end > self.most:
+            raise NotUnderstood(
+                f"READBACK: {len(self.pieces[last])} bytes at offset {last}; by the widths in HELLO no image has more "
+                f"than {self.most}"
+            )
+        for at, piece in self.pieces.items():
+            if at > end and piece:
+                raise NotUnderstood(f"READBACK: {len(piece)} bytes at offset {at}, though the image ended at {end}")
+        if end < PROGRAM_BYTES:
+            raise NotUnderstood(f"READBACK: the image has {end} bytes; possible: {PROGRAM_BYTES} to {self.most}")
+        return b"".join(self.pieces[at] for at in sorted(self.pieces))[:end]
+
+
+def read_back(session: LinkSession, deadline: Deadline) -> Reading:
+    """Read all pieces. The caller looks whether the scan changed meanwhile, and takes the image if it did not.
 
     Raises ``Refused`` where the device does not hold it, ``OutOfTime``, and what lines raise.
     """
@@ -31,15 +66,16 @@ class _ImageReader:
 
     def __init__(self, session: LinkSession, deadline: Deadline) -> None:
         self._session, self._until = session, deadline
-        self._found: dict[int, bytes] = {}
+        self._reading = Reading({}, most_bytes(session.info))
+        self._found = self._reading.pieces
         self._asked: dict[int, int] = {}  # offsets by seq
         self._window = session.info.window
         self._in_vain = 0
 
-    def read(self) -> bytes:
+    def read(self) -> Reading:
         """All pieces, up to the first that is short."""
         restarts = 0
-        while missing := [at for at in range(0, self._end(), DATA_BYTES) if at not in self._found]:
+        while missing := self._reading.missing():
             if self._session.now() >= self._deadline:
                 raise self._out_of_time()
             try:
@@ -55,16 +91,11 @@ class _ImageReader:
                     raise self._session.contested() from None
                 self._session.greet(self._deadline, anew=True)
                 self._asked.clear()
-        return b"".join(self._found[at] for at in sorted(self._found))[: self._end()]
+        return self._reading
 
     @property
     def _deadline(self) -> float:
         return self._until.at
-
-    def _end(self) -> int:
-        """Bytes of the image, as far as is known: the first piece that is short is its last."""
-        ends = [at + len(piece) for at, piece in self._found.items() if len(piece) < DATA_BYTES]
-        return min(ends, default=_most(self._session.info))
 
     def _out_of_time(self) -> OutOfTime:
         exchange = self._session.exchange
@@ -108,13 +139,9 @@ class _ImageReader:
         return True
 
 
-def _most(info: DeviceInfo) -> int:
-    """Bytes that no image exceeds: tables may be longer than what was uploaded for them."""
-    tables = sum(_WORD_BYTES << axis.index_bits for axis in (info.x, info.y))
-    return max(info.image_bytes, _PROGRAM_BYTES + tables)
-
-
 def _piece(payload: bytes, at: int) -> bytes:
-    if len(payload) < _OFFSET.size or _OFFSET.unpack_from(payload)[0] != at:
-        raise NotUnderstood("READBACK of another offset")
+    check_length("READBACK", payload, _OFFSET.size)
+    (offset,) = _OFFSET.unpack_from(payload)
+    if offset != at:
+        raise NotUnderstood(f"READBACK: offset is {offset} in the answer to a request for {at}")
     return payload[_OFFSET.size :]

@@ -4,6 +4,7 @@ import hashlib
 from collections.abc import Callable
 from random import Random
 
+from tablegen.link.claims import check_device, check_length, check_status, check_unchanged
 from tablegen.link.errors import LinkError, LinkLost, NoAnswer, NoPort, NotUnderstood, Refused, Silent
 from tablegen.link.exchange import Answer, Exchange
 from tablegen.link.messages import (
@@ -17,7 +18,7 @@ from tablegen.link.messages import (
     Request,
 )
 from tablegen.link.pace import back_off
-from tablegen.link.reasons import keyless, refused
+from tablegen.link.refusal_reasons import keyless, refused
 from tablegen.link.transport import Opener, Transport
 
 HELLO_BYTES = DeviceInfo.LAYOUT.size + DeviceStatus.LAYOUT.size
@@ -66,14 +67,24 @@ class LinkSession:
             self.exchange.new_session()
         payload = self._repeat(Request.HELLO, None, bytes([VERSION]), HELLO_BYTES, deadline)
         size = DeviceInfo.LAYOUT.size
-        try:
-            self.info = DeviceInfo.unpack(payload)
-            self.status, self.status_at = DeviceStatus.unpack(payload[size:]), self.now()
-        except ValueError as error:
-            raise NotUnderstood(str(error)) from None
-        if not self.info.window or not self.info.data_bytes:
-            raise NotUnderstood(f"a window of {self.info.window}, a DATA of {self.info.data_bytes} bytes")
+        check_length("HELLO", payload, HELLO_BYTES)
+        info = DeviceInfo.unpack(payload)
+        check_device(info)
+        if self._heard:
+            check_unchanged(self.info, info)
+        self.info = info
+        self.status, self.status_at = self.status_of(payload[size:], "HELLO"), self.now()
         self._heard = True
+
+    def status_of(self, payload: bytes, source: str = "STATUS") -> DeviceStatus:
+        """Unpack a status that answered the request ``source``. Raises ``NotUnderstood`` for an impossible one."""
+        check_length(source, payload, DeviceStatus.LAYOUT.size)
+        try:
+            status = DeviceStatus.unpack(payload)
+        except ValueError as error:
+            raise NotUnderstood(f"{source}: {error}") from None
+        check_status(status, self.info, source)
+        return status
 
     def greet(self, deadline: float, anew: bool = False) -> None:
         """HELLO again, on a port that may have gone meanwhile."""
@@ -166,8 +177,7 @@ class LinkSession:
     def tag_of(self, nonce: bytes, kind: int, number: int, payload: bytes, digest: bytes) -> bytes:
         """BLAKE2s of a request under the key; ``digest`` is that of the image, with COMMIT."""
         assert self.key is not None
-        if len(nonce) < NONCE_BYTES:
-            raise NotUnderstood("a challenge that is too short")
+        check_length("CHALLENGE", nonce, NONCE_BYTES)
         head = bytes([kind, number]) + self.exchange.session.to_bytes(4, "little")
         message = nonce[:NONCE_BYTES] + head + payload + digest
         return hashlib.blake2s(message, key=self.key, digest_size=TAG_BYTES).digest()

@@ -6,17 +6,18 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from tablegen.link.claims import check_length
 from tablegen.link.errors import LinkError, LinkLost, NotUnderstood, OutOfTime, Refused, Silent
 from tablegen.link.exchange import Answer
 from tablegen.link.flight import Flight, Sent
 from tablegen.link.messages import DATA_BYTES, NONCE_BYTES, DeviceStatus, Reason, Request, Upload
 from tablegen.link.outcome import ProgressCall, UploadResult, UploadState, out_of_time
 from tablegen.link.pace import Deadline
-from tablegen.link.reasons import Limits, refused
+from tablegen.link.refusal_reasons import Limits, refused
 from tablegen.link.session import LinkSession, SessionEnded
 
 if TYPE_CHECKING:
-    from tablegen.link.image import ProgramImage
+    from tablegen.link.program_image import ProgramImage
 
 _POLL_S = (0.03, 0.25)  # between two STATUS while a COMMIT is in progress: first, and at most
 _BUSY_S = 0.05
@@ -253,26 +254,27 @@ class Uploader:
             sent = self._commit  # it was late, and STATUS had been asked
         if answer.reason in (Reason.SESSION, Reason.OLD):
             raise SessionEnded
-        try:
-            if sent.kind == Request.COMMIT:
-                return self._take_commit(answer, sent)
-            if answer.reason:
-                self._take_refusal(answer, sent)
-            elif sent.kind == Request.BEGIN:
-                self._take_begin(_CRC.unpack_from(answer.payload)[0])
-            elif sent.kind == Request.DATA:
-                self._take_data(_CRC.unpack_from(answer.payload)[0], sent)
-            elif sent.kind == Request.STATUS:
-                return self._take_status(DeviceStatus.unpack(answer.payload))
-            else:
-                self._nonce = answer.payload
-        except (struct.error, ValueError) as error:
-            raise NotUnderstood(str(error)) from None
+        if sent.kind == Request.COMMIT:
+            return self._take_commit(answer, sent)
+        if answer.reason:
+            self._take_refusal(answer, sent)
+            return None
+        if sent.kind == Request.STATUS:
+            return self._take_status(self._session.status_of(answer.payload))
+        if sent.kind == Request.CHALLENGE:
+            self._nonce = answer.payload
+            return None
+        check_length(sent.kind.name, answer.payload, _CRC.size)
+        (received,) = _CRC.unpack_from(answer.payload)
+        if sent.kind == Request.BEGIN:
+            self._take_begin(received)
+        else:
+            self._take_data(received, sent)
         return None
 
     def _take_begin(self, received: int) -> None:
         if received > len(self._image.data):
-            raise NotUnderstood(f"{received} bytes received, of {len(self._image.data)}")
+            raise NotUnderstood(f"BEGIN: received is {received}; the image has {len(self._image.data)} bytes")
         self._begun = True
         if self._resumed is None:
             self._resumed = min(received, self._had)  # an answer that was lost, and DATA, may have come before this one
@@ -284,7 +286,10 @@ class Uploader:
     def _take_data(self, received: int, sent: Sent) -> None:
         if not self._begun or received > len(self._image.data):
             self._pipelined = False  # BEGIN, or its answer, was lost
-            return  # it may belong to the upload before
+            if self._begun:  # it may belong to the upload before, but not again and again
+                what = f"DATA: received is {received}; the image has {len(self._image.data)} bytes"
+                self._count(Reason.LENGTH, NotUnderstood(what))
+            return
         self._confirm(received)
         if received < sent.end and sent.round == self._round:
             self._lost()
@@ -302,6 +307,7 @@ class Uploader:
     def _take_commit(self, answer: Answer, sent: Sent) -> tuple[int, int | None] | None:
         if not answer.reason:
             self._confirm(len(self._image.data))
+            check_length("COMMIT", answer.payload, _COMMITTED.size)
             generation, line = _COMMITTED.unpack_from(answer.payload)
             return generation, line
         # The number is used up, but for a wrong key.
@@ -309,7 +315,11 @@ class Uploader:
         self._poll_s = _POLL_S[0]
         error = self._error(answer)
         if answer.reason == Reason.INCOMPLETE:
-            received = min(answer.detail, len(self._image.data))
+            received = answer.detail
+            if received >= len(self._image.data):
+                raise NotUnderstood(
+                    f"COMMIT refused as incomplete: received is {received}; the image has {len(self._image.data)} bytes"
+                )
             self._confirm(received, lower=True)
             if sent.round == self._round:
                 self._go_back(received)
@@ -371,7 +381,7 @@ class Uploader:
     # Errors
 
     def _error(self, answer: Answer) -> Refused:
-        from tablegen.link.image import take_apart
+        from tablegen.link.program_image import take_apart
 
         info, contents = self._image.info, None
         with suppress(ValueError):  # an image that is none is refused for what it is

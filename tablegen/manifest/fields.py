@@ -25,7 +25,10 @@ Bits = Annotated[int, Meta(ge=8, le=24)]
 Pair = tuple[Natural, Natural]
 Digest = Annotated[str, Meta(pattern=r"^[0-9a-f]{64}\Z")]
 # Never outside the directory.
-FileName = Annotated[str, Meta(max_length=200, pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]*\Z")]
+MAXIMUM_FILE_NAME = 200
+FileName = Annotated[str, Meta(max_length=MAXIMUM_FILE_NAME, pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]*\Z")]
+# Of a file beside the scanner: what it was called. It may have any characters, for no path is made from it.
+SourceName = Annotated[str, Meta(min_length=1, max_length=255)]
 Version = Annotated[str, Meta(max_length=64, pattern=r"^[A-Za-z0-9][A-Za-z0-9.+!-]*\Z")]
 Number = Annotated[int, Meta(ge=-(1 << 43), lt=1 << 43)]
 Volts = Annotated[float, Meta(ge=-1e9, le=1e9)]
@@ -63,7 +66,7 @@ class ManifestDrive(Struct):
     forward: ManifestBranch
     backward: ManifestBranch
     resonance: ManifestResonance | None = None
-    model_files: dict[FileName, Digest] | None = None
+    model_files: dict[SourceName, Digest] | None = None
 
 
 class ManifestLine(Struct):

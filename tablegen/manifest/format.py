@@ -5,6 +5,7 @@ import json
 from typing import Any
 
 MANIFEST = "manifest.json"
+INDEX, RECORD = "library.json", "program.json"  # of a library, and of each of its programs
 CONVERTER_KEYS = ("v_zero", "v_per_code", "coding", "align", "word_bits")  # of an output: its converter and amplifier
 
 

@@ -1,6 +1,9 @@
-"""A build read back from its ``manifest.json``: the programs that the model plays, and the floats they came from."""
+"""A build read back from its ``manifest.json``: the programs that the model plays, and the floats they came from.
 
-from dataclasses import dataclass
+The writer of manifests reads with it too, so that nothing reaches a disk that is refused afterwards.
+"""
+
+from functools import cached_property
 from hashlib import sha256
 from math import isfinite
 from pathlib import Path
@@ -9,6 +12,9 @@ from typing import Any, Literal
 import msgspec
 from msgspec import Struct
 
+from tablegen.base.input_errors import shortened
+from tablegen.base.reading import MANIFEST as MANIFEST_KIND
+from tablegen.base.reading import other_than_file, read_bytes
 from tablegen.config.names import why_not_a_name
 from tablegen.config.schema import DEFAULT_FORMATS, MAXIMUM_SPLINE_BITS, MAXIMUM_SPLINE_LENGTH
 from tablegen.device.dual_program import DualProgram
@@ -17,28 +23,41 @@ from tablegen.fixedpoint.output import GAIN_BITS, UNIT_GAIN_BITS
 from tablegen.fixedpoint.phase import RationalPhase
 from tablegen.fixedpoint.rounding import signed_limits
 from tablegen.manifest.fields import LEAST_V_PER_CODE, Manifest, ManifestAxis, ManifestSequence
-from tablegen.manifest.format import MANIFEST, content_hash, read_json
-from tablegen.problems import shortened
-from tablegen.reading import MANIFEST as MANIFEST_KIND
-from tablegen.reading import other_than_file, read_bytes
+from tablegen.manifest.format import MANIFEST, RECORD, content_hash, read_json
 
 
 class NotABuild(Exception):
     """The directory holds no manifest, or one that is none of ours or cannot be played; says which and why."""
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class StoredBuild:
-    """A build as its manifest has it."""
+class DamagedManifest(ValueError):
+    """The content of a manifest is damaged, or cannot be played; ``reasons`` says why, each on its own."""
+
+    def __init__(self, reasons: list[str]) -> None:
+        self.reasons = [shortened(why) for why in reasons]
+        super().__init__("; ".join(self.reasons))
+
+
+class ForeignManifest(ValueError):
+    """The content is that of another program."""
+
+
+class StoredBuild(Struct, frozen=True, eq=False, dict=True):
+    """A build as its manifest has it; ``plain`` is the manifest as JSON."""
 
     manifest: Manifest
     program: DualProgram
-    own_hash: str  # the hash worked out again from what the manifest says
+    plain: dict[str, Any]
 
     def __repr__(self) -> str:
         schedule, name = self.program.schedule, self.manifest.name
         rate = f"{float(schedule.line_rate):.6g} Hz lines of {schedule.ticks} ticks, {schedule.lines} a frame"
         return f"<tablegen build {name!r}: {rate}\n  formats {', '.join(self.formats)}\n  plan {self.manifest.hash}>"
+
+    @cached_property
+    def own_hash(self) -> str:
+        """The hash worked out again from what the manifest says."""
+        return _hash(self.plain)
 
     @property
     def axes(self) -> tuple[tuple[Literal["x", "y"], ManifestAxis], ...]:
@@ -61,26 +80,58 @@ def read_build(folder: str | Path) -> StoredBuild:
     try:
         content = read_bytes(path, MANIFEST_KIND)
     except OSError as error:
+        if isinstance(error, FileNotFoundError) and (example := _a_program(path.parent)) is not None:
+            raise NotABuild(
+                f"{folder}: is a library of `tablegen sweep`, not a build; name one of its programs, for example "
+                f"{example}"
+            ) from None
         raise NotABuild(
             f"{path}: cannot be read: {error.strerror or error}; the directory is the one of `tablegen build -o DIR`"
         ) from None
     try:
+        stored = parse_manifest(content)
+    except ForeignManifest:
+        raise NotABuild(f"{path}: is not a manifest of tablegen") from None
+    except DamagedManifest as damage:
+        raise NotABuild("\n".join(f"{path}: is damaged: {why}; build it again" for why in damage.reasons)) from None
+    for name in stored.manifest.files:  # simulators and compilers open them too, and would wait for a pipe
+        if other := other_than_file(path.parent / name):
+            raise NotABuild(f"{path.parent / name}: is {other}, where a file of the build has to be")
+    return stored
+
+
+def parse_manifest(content: bytes) -> StoredBuild:
+    """Read a build from the content of its manifest, without looking at its files.
+
+    Raises
+    ------
+    ForeignManifest
+        The content is JSON, and no manifest of tablegen.
+    DamagedManifest
+        The content is no JSON, or no device can play it.
+    """
+    try:
         plain: Any = read_json(content)
     except ValueError as error:
-        raise NotABuild(f"{path}: is damaged: {shortened(str(error))}; build it again") from None
+        raise DamagedManifest([str(error)]) from None
     if not isinstance(plain, dict) or not {"tablegen", "hash", "axes"} <= plain.keys():
-        raise NotABuild(f"{path}: is not a manifest of tablegen")
+        raise ForeignManifest
     try:
         manifest = msgspec.convert(plain, Manifest)
         program = DualProgram(manifest.axes.x.program, manifest.axes.y.program, manifest.sequence.schedule)
     except (msgspec.ValidationError, ValueError, RecursionError) as error:
-        raise NotABuild(f"{path}: is damaged: {shortened(str(error))}; build it again") from None
+        raise DamagedManifest([str(error)]) from None
     if wrong := [*_wrong_names(manifest), *_wrong_schedule(manifest.sequence), *_wrong_axes(manifest)]:
-        raise NotABuild("\n".join(f"{path}: is damaged: {why}; build it again" for why in wrong))
-    for name in manifest.files:  # simulators and compilers open them too, and would wait for a pipe
-        if other := other_than_file(path.parent / name):
-            raise NotABuild(f"{path.parent / name}: is {other}, where a file of the build has to be")
-    return StoredBuild(manifest, program, _hash(plain))
+        raise DamagedManifest(wrong)
+    return StoredBuild(manifest, program, plain)
+
+
+def _a_program(folder: Path) -> Path | None:
+    """Find the first program of a library in a folder; None if the folder holds none."""
+    try:
+        return min((path for path in folder.iterdir() if (path / RECORD).is_file()), default=None)
+    except OSError:
+        return None
 
 
 def _wrong_names(manifest: Manifest) -> list[str]:
@@ -124,7 +175,8 @@ def _finite(value: Any) -> bool:
     if isinstance(value, dict):
         return all(map(_finite, value.values()))
     if isinstance(value, list | tuple):
-        return all(map(_finite, value))
+        kind = type(value[0]) if value else int  # the types of fields have arrays of one kind of number only
+        return kind is int or all(map(isfinite if kind is float else _finite, value))
     return not isinstance(value, float) or isfinite(value)
 
 

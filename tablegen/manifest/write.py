@@ -5,12 +5,22 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from tablegen.base.reading import MANIFEST as MANIFEST_KIND
 from tablegen.certificate.certificate import Certificate
 from tablegen.config.schema import DEFAULT_FORMATS
+from tablegen.manifest.read import DamagedManifest, parse_manifest
 from tablegen.manifest.record import certificate_record
 from tablegen.version import __version__
 
 _json = json.JSONEncoder(ensure_ascii=True, allow_nan=False).encode  # one, for there are hundreds of values
+
+
+class UnreadableManifest(ValueError):
+    """The manifest of a build would be refused when it is read back; the message says why."""
+
+
+class TooLongManifest(UnreadableManifest):
+    """It has more bytes than are read of a manifest."""
 
 
 def manifest_file(
@@ -22,7 +32,8 @@ def manifest_file(
 ) -> bytes:
     """The plan's record with its hash, the certificates, and the SHA-256 of every other file of the build.
 
-    ``formats`` stand in it unless they are those that a build has by default.
+    ``formats`` stand in it unless they are those that a build has by default. ``require_readable`` belongs before the
+    disk.
     """
     axes = {
         axis: {**content, "certificate": certificate_record(certificates[axis])}
@@ -37,6 +48,16 @@ def manifest_file(
         "axes": axes,
     }
     return (_readable(manifest) + "\n").encode("ascii")
+
+
+def require_readable(content: bytes) -> None:
+    """Raise ``UnreadableManifest`` for a manifest that a build may have and that its own reader refuses."""
+    if len(content) > MANIFEST_KIND.most_bytes:
+        raise TooLongManifest(f"it has {len(content)} bytes, above the {MANIFEST_KIND.most_bytes} that are read")
+    try:
+        parse_manifest(content)
+    except DamagedManifest as damage:
+        raise UnreadableManifest(str(damage)) from None
 
 
 def _readable(value: Any, indent: str = "") -> str:

@@ -1,7 +1,7 @@
 """The scaling error that a waveform may have for the sake of less acceleration: as asked, or what does not show."""
 
 from tablegen.config.schema import BandLimit, Limits
-from tablegen.waveform.allowed_error import AllowedError
+from tablegen.waveform.error_allowance import AllowedError
 
 CHORD = 0.05  # share of the line over which the certificate measures emitted integers
 _UNLIMITED_PERCENT = 1.0  # the error that nobody is told of

@@ -2,11 +2,11 @@
 
 import numpy as np
 
+from tablegen.base.input_errors import Unphysical
 from tablegen.compensation.line import LineShape
 from tablegen.config.schema import BandLimit
 from tablegen.numerics.turns import sinc
-from tablegen.problems import Unphysical
-from tablegen.waveform.allowed_error import AllowedError
+from tablegen.waveform.error_allowance import AllowedError
 from tablegen.waveform.refined import RefinedShape
 from tablegen.waveform.series import FourierSeries
 from tablegen.waveform.window_fit import fit_window
@@ -47,7 +47,7 @@ def gently_limited(
     """
     if shape.waveform is None:
         from tablegen.planning.enough_harmonics import straightness  # here: most lines are fitted to their window
-        from tablegen.waveform.gentle_fit import gentlest
+        from tablegen.waveform.minimum_acceleration import gentlest
 
         try:
             return gentlest(straightness(shape, limit, layer), harmonics, allowed.percent), allowed.percent

@@ -1,4 +1,4 @@
-"""What is applied to one axis, factor by factor: V(t) = V_offset + m g V_scan (w(t) - 1/2)."""
+"""The drive of one axis: its voltages, and the shape w of the line that the model of the piezo asks for."""
 
 from collections.abc import Callable
 from functools import partial
@@ -7,26 +7,20 @@ from pathlib import Path
 from msgspec import Struct
 from msgspec.structs import replace
 
+from tablegen.base.input_errors import Problems
 from tablegen.compensation import models
-from tablegen.compensation.dynamics import Response, SecondOrder
+from tablegen.compensation.dynamics import Response
 from tablegen.compensation.frequency import frequency_gain
-from tablegen.compensation.line import AppliedBranch, LineShape, WantedLine
+from tablegen.compensation.line import AppliedBranch, LineRequest, LineShape
 from tablegen.compensation.model import Hysteresis
+from tablegen.compensation.model_problems import ModelProblems
 from tablegen.compensation.offset import OffsetLaw
-from tablegen.compensation.offset_sizes import OffsetSurface, surface_of
 from tablegen.compensation.size import SizeLaw
 from tablegen.config.load import Setup
-from tablegen.config.scanner import Offset, Resonance, ScannerAxis, Size
-from tablegen.config.schema import FastAxis, SlowAxis
-from tablegen.driver import Driver
-from tablegen.figures import at_most
-from tablegen.fixedpoint.converter import Converter
-from tablegen.planning.allowed_error import allowed_error
-from tablegen.problems import Problems, Unphysical
-from tablegen.waveform.allowed_error import AllowedError
-
-# An axis at rest plays w = 1/2 throughout; gain and table refer to so small a share of v_max.
-RESTING_SHARE = 2.0**-24
+from tablegen.config.schema import FastAxis
+from tablegen.numerics.driver import Driver
+from tablegen.planning.voltages import Voltages
+from tablegen.waveform.error_allowance import AllowedError
 
 
 class Drive(Struct, frozen=True, eq=False):
@@ -35,8 +29,7 @@ class Drive(Struct, frozen=True, eq=False):
     ``v_scan`` is from (9)/(12), before ``m`` of (1) and ``g`` of (23). The amplitude played is m g v_scan, peak to
     peak, for w from 0 to 1. ``position_nm`` is that of the offset, above the one at 0 V. ``line_at`` is the line that
     the model makes at another normalised scan voltage, None where it makes none; ``model_files`` has the files that the
-    model names, and their SHA-256. ``harmonics`` is the highest that is played, ``allowed`` the scaling error that may
-    be left for less acceleration.
+    model names, and their SHA-256. ``allowed`` is the scaling error that may be left for less acceleration.
     """
 
     driver: Driver
@@ -57,7 +50,6 @@ class Drive(Struct, frozen=True, eq=False):
     response: Response | None
     max_boost_db: float
     line_at: Callable[[float], LineShape | None]
-    harmonics: int
     allowed: AllowedError | None
     model_files: tuple[tuple[str, str], ...] = ()
 
@@ -91,129 +83,61 @@ class Drive(Struct, frozen=True, eq=False):
         return self.offset_law.factor(self.driver.p(v_offset)) * self.g * self.v_scan
 
 
-def compensate(
-    setup: Setup, axis: str, rate_hz: float, harmonics: Callable[[AllowedError | None], int], problems: Problems
+def make_drive(
+    setup: Setup, axis: str, rate_hz: float, voltages: Voltages, harmonics: int, problems: Problems
 ) -> Drive | None:
-    """Apply the scanner's calibration to one axis ("x" or "y") at its rate; None where ``problems`` grew.
+    """Ask the model of the piezo for the line of one axis ("x" or "y").
 
-    ``harmonics`` gives the highest that is played, where so much of a scaling error is allowed.
+    ``harmonics`` is the highest that a model may use which makes the whole waveform itself. None where the model
+    refuses; why goes to ``problems``.
     """
     scan: FastAxis = getattr(setup.scan, axis)
-    scanner: ScannerAxis = getattr(setup.scanner, axis)
-    driver = setup.scanner.driver
-    scan_file, scanner_file = setup.scan_file, setup.scanner_file
-    before = len(problems.found)
-
-    size_law = None
-    with problems.at(scanner_file, f"{axis}.size.base_nm"):
-        size_law = size_law_of(scanner.size, driver)
-    surface = OffsetSurface.everywhere(OffsetLaw())
-    if scanner.offset is not None and size_law is not None:
-        _check_points(setup, axis, problems)
-        with problems.at(scanner_file, f"{axis}.offset{'.points' if scanner.offset.points is not None else ''}"):
-            surface = offset_surface(scanner.offset, driver, size_law)
-
-    v_offset = driver.middle
-    if scan.offset_v is not None:
-        v_offset = scan.offset_v
-        with problems.at(scan_file, f"{axis}.offset_v"):
-            if driver.beyond(v_offset, v_offset) > 0.0:
-                raise Unphysical(outside_driver(v_offset, driver))
-    elif scan.offset_nm is not None:
-        with problems.at(scan_file, f"{axis}.offset_nm"):
-            v_offset = surface.small.voltage_at(scan.offset_nm, driver, scanner.size.k_nm_per_v)
-
     low, high = scan.band_limit.window
-    resting = isinstance(scan, SlowAxis) and scan.off
-    v, size_nm = (RESTING_SHARE if resting else 0.0), 0.0
-    if resting:
-        pass
-    elif size_law is not None and scan.size_nm is not None:
-        with problems.at(scan_file, f"{axis}.size_nm"):
-            size_nm = scan.size_nm / (high - low) if scan.size_of == "window" else scan.size_nm
-            try:
-                v = size_law.voltage(size_nm)
-            except Unphysical as reason:
-                if scan.size_of == "line":
-                    raise
-                window_nm = at_most(size_law.size_nm(1.0) * (high - low), 6)
-                raise Unphysical(f"its line of {reason}, a window of {window_nm} nm") from None
-    elif size_law is not None and scan.size_v is not None:
-        with problems.at(scan_file, f"{axis}.size_v"):
-            if scan.size_v > driver.span:
-                raise Unphysical(f"{scan.size_v:g} V is above {driver.full_scale}")
-            v = scan.size_v / driver.span
-            size_nm = size_law.size_nm(v)
-
-    g = 1.0
-    if scanner.frequency is not None and not resting:
-        with problems.at(scanner_file, f"{axis}.frequency.alpha"):
-            g = frequency_gain(rate_hz, scanner.frequency.alpha, scanner.frequency.reference_hz)
-
-    p = driver.p(v_offset)
-    offset_law = surface.at(v)
-    m = offset_law.factor(p)
-    response, max_boost_db, law = None, 0.0, scanner.frequency
-    if scanner.resonance is not None and not resting:
-        max_boost_db = scanner.resonance.max_boost_db
-        key = f"{axis}.resonance.response" if scanner.resonance.response is not None else f"{axis}.resonance"
-        with problems.at(scanner_file, key):
-            response = dynamics_of(scanner.resonance, setup.scanner_folder)
-    uncompensated = scanner.hysteresis is None or resting
-    hysteresis = models.get(models.UNCOMPENSATED)() if uncompensated else scanner.hysteresis
-    assert hysteresis is not None
-    v_amplitude = m * g * v * driver.span
-    hardware = setup.hardware(axis)
-    codes = abs(v_amplitude / Converter.of(hardware.dac, hardware.amplifier).v_per_code)
-    allowed = None if resting else allowed_error(scan.band_limit, setup.scan.limits, codes, hysteresis.counts_turns)
-    most = harmonics(allowed)
-    wanted = WantedLine(
+    driver, law, hysteresis = voltages.driver, voltages.rate_law, voltages.hysteresis
+    request = LineRequest(
         axis=axis,
         turn=scan.turn,
-        v=v,
+        v=voltages.v,
         driver=driver,
-        v_amplitude=v_amplitude,
-        v_offset=v_offset,
-        size_nm=size_nm,
+        v_amplitude=voltages.v_amplitude,
+        v_offset=voltages.v_offset,
+        size_nm=voltages.size_nm,
         rate_hz=rate_hz,
-        harmonics=most,
+        harmonics=harmonics,
         window=(low, high),
         both=scan.band_limit.directions == "both",
-        response=response,
-        max_boost_db=max_boost_db,
-        factor_at=partial(_factor_at, surface.small, driver),
+        response=voltages.response,
+        max_boost_db=voltages.max_boost_db,
+        factor_at=partial(_factor_at, voltages.small_scans, driver),
         rate_gain=None if law is None else partial(frequency_gain, alpha=law.alpha, reference_hz=law.reference_hz),
         folder=setup.scanner_folder,
-        scan_file=scan_file,
-        scanner_file=scanner_file,
-        problems=problems,
-        allowed=allowed,
+        allowed=voltages.allowed,
     )
-
-    shape = hysteresis.line(wanted)
-    if len(problems.found) > before or shape is None or size_law is None:
+    before = len(problems.found)
+    places = ModelProblems(axis, setup.scan_file, setup.scanner_file, problems)
+    shape = models.line_of(hysteresis, request, places)
+    if len(problems.found) > before or shape is None:
         return None
     return Drive(
         driver=driver,
-        v_offset=v_offset,
-        position_nm=surface.small.position_nm(v_offset, driver, scanner.size.k_nm_per_v),
-        size_nm=size_nm,
-        window_nm=size_nm * (high - low),
-        v_scan=v * driver.span,
-        v_scan_normalised=v,
-        p_offset=p,
-        m=m,
-        g=g,
+        v_offset=voltages.v_offset,
+        position_nm=voltages.position_nm,
+        size_nm=voltages.size_nm,
+        window_nm=voltages.size_nm * (high - low),
+        v_scan=voltages.v * driver.span,
+        v_scan_normalised=voltages.v,
+        p_offset=voltages.p_offset,
+        m=voltages.m,
+        g=voltages.g,
         hysteresis=hysteresis,
         turn=scan.turn,
-        offset_law=offset_law,
-        size_law=size_law,
+        offset_law=voltages.offset_law,
+        size_law=voltages.size_law,
         shape=shape,
-        response=response,
-        max_boost_db=max_boost_db,
-        line_at=partial(_line_at, hysteresis, wanted),
-        harmonics=most,
-        allowed=allowed,
+        response=voltages.response,
+        max_boost_db=voltages.max_boost_db,
+        line_at=partial(_line_at, hysteresis, request),
+        allowed=voltages.allowed,
         model_files=tuple(
             (Path(name).name, digest)
             for name, digest in zip(hysteresis.files(), hysteresis.contents(setup.scanner_folder), strict=True)
@@ -221,66 +145,12 @@ def compensate(
     )
 
 
-def outside_driver(volts: float, driver: Driver) -> str:
-    """Say that a voltage is outside the driver's range, and by how much."""
-    return f"{volts:.6g} V is outside the driver's {driver}, by {driver.beyond(volts, volts):.4g} V"
-
-
 # Functions of a module, not of a call: a plan that travels to another process takes them along.
 def _factor_at(law: OffsetLaw, driver: Driver, share: float) -> float:
     return law.factor(driver.p(driver.volts(share)))
 
 
-def _line_at(hysteresis: Hysteresis, wanted: WantedLine, v: float) -> LineShape | None:
-    apart = Problems()
-    made = hysteresis.line(replace(wanted, v=v, problems=apart))
-    return None if apart.found else made
-
-
-def _check_points(setup: Setup, axis: str, problems: Problems) -> None:
-    """No point can have been measured where the driver does not reach."""
-    driver = setup.scanner.driver
-    offset: Offset = getattr(setup.scanner, axis).offset
-    for i, point in enumerate(offset.points or []):
-        if driver.beyond(point.offset_v, point.offset_v) > 0.0:
-            key = f"{axis}.offset.points[{i}].offset_v"
-            problems.add(setup.scanner_file, key, outside_driver(point.offset_v, driver))
-    sizes = [("points", i, point.size_v) for i, point in enumerate(offset.points or [])]
-    sizes += [("sizes", i, entry.size_v) for i, entry in enumerate(offset.sizes or [])]
-    for name, i, size_v in sizes:
-        if size_v is not None and size_v > driver.span:
-            why = f"{size_v:g} V is above {driver.full_scale}"
-            problems.add(setup.scanner_file, f"{axis}.offset.{name}[{i}].size_v", why)
-
-
-def size_law_of(size: Size, driver: Driver) -> SizeLaw:
-    """The law of a scanner file. Raises ``Unphysical``."""
-    return SizeLaw.calibrated(size.k_nm_per_v, driver.span, size.beta, size.base_nm, size.v_threshold)
-
-
-def offset_surface(offset: Offset, driver: Driver, size: SizeLaw) -> OffsetSurface:
-    """m of a scanner file over offset and size; ``size`` serves points with ``size_v`` alone. Raises ``Unphysical``."""
-    if offset.sizes is not None:
-        entries = sorted(offset.sizes, key=lambda entry: entry.size_v)
-        laws = [(entry.size_v / driver.span, OffsetLaw.from_ends(entry.m_minus, entry.m_plus)) for entry in entries]
-        return OffsetSurface(tuple(laws))
-    if offset.points is not None:
-        points = [(point.offset_v, point.apparent_nm, point.size_v or 0.0) for point in offset.points]
-        if offset.points[0].size_v is not None:
-            return surface_of(points, size, driver)
-        p = [driver.p(volts) for volts, _, _ in points]
-        return OffsetSurface.everywhere(OffsetLaw.fit(p, [apparent for _, apparent, _ in points]))
-    if offset.m_minus is not None and offset.m_plus is not None:
-        return OffsetSurface.everywhere(OffsetLaw.from_ends(offset.m_minus, offset.m_plus))
-    return OffsetSurface.everywhere(OffsetLaw(offset.alpha or 0.0, offset.beta or 0.0))
-
-
-def dynamics_of(resonance: Resonance, folder: Path) -> Response:
-    """The dynamics of a scanner file in ``folder``. Raises ``Unphysical``."""
-    if resonance.response is None:
-        assert resonance.frequency_hz is not None
-        assert resonance.quality is not None
-        return SecondOrder(resonance.frequency_hz, resonance.quality, resonance.delay_s)
-    from tablegen.compensation.response_file import read_response  # here: few scanners have one
-
-    return read_response(folder / resonance.response)
+def _line_at(hysteresis: Hysteresis, request: LineRequest, v: float) -> LineShape | None:
+    problems = Problems()
+    shape = models.line_of(hysteresis, replace(request, v=v), ModelProblems.without_files(request.axis, problems))
+    return None if problems.found else shape

@@ -3,13 +3,13 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from tablegen.base.figures import at_least
+from tablegen.base.input_errors import Unphysical
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.compensation.line import LineShape
 from tablegen.config.schema import BandLimit
-from tablegen.figures import at_least
-from tablegen.problems import Unphysical
-from tablegen.waveform.allowed_error import AllowedError
-from tablegen.waveform.gentle_fit import Straightness, Unreachable, fewest_harmonics, least_percent
+from tablegen.waveform.error_allowance import AllowedError
+from tablegen.waveform.minimum_acceleration import Straightness, Unreachable, fewest_harmonics, least_percent
 from tablegen.waveform.refined import RefinedShape
 from tablegen.waveform.series import FourierSeries
 

@@ -8,11 +8,11 @@ from math import ceil, copysign, floor
 
 import numpy as np
 
+from tablegen.base.figures import at_least, at_most
+from tablegen.base.input_errors import Problems, Unphysical
 from tablegen.config.hardware import AxisAmplifier, AxisDac
 from tablegen.config.load import Setup
 from tablegen.config.schema import FastAxis
-from tablegen.driver import Driver
-from tablegen.figures import at_least, at_most
 from tablegen.fixedpoint.converter import Converter, code_limits
 from tablegen.fixedpoint.interpolation import guard_bits
 from tablegen.fixedpoint.output import GAIN_BITS
@@ -20,10 +20,11 @@ from tablegen.fixedpoint.shaping import Shaping
 from tablegen.fixedpoint.spline import SPLINE_UNIT
 from tablegen.fixedpoint.table_shape import MOST_LENGTH, TableShape
 from tablegen.numerics.arrays import Floats
+from tablegen.numerics.driver import Driver
 from tablegen.planning.allowed_error import MOST_HARMONICS, chosen_by_build
-from tablegen.planning.drive import Drive, outside_driver
+from tablegen.planning.drive import Drive
+from tablegen.planning.laws import outside_driver
 from tablegen.planning.table_maker import StoredWave, TableMaker
-from tablegen.problems import Problems, Unphysical
 from tablegen.waveform.series import FourierSeries
 
 DEFAULT_HARMONICS = 32

@@ -3,34 +3,27 @@
 from fractions import Fraction
 from typing import Literal
 
-import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
-from tablegen.compensation.dynamics import capped_inverse
-from tablegen.compensation.hold import hold_inverse
+from tablegen.base.input_errors import Problems
 from tablegen.config.load import Setup
-from tablegen.config.schema import DEFAULT_FORMATS, BandLimit, FastAxis, Limits, SlowAxis
+from tablegen.config.schema import DEFAULT_FORMATS, BandLimit, Limits
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.schedule import Schedule
-from tablegen.figures import at_least
-from tablegen.fixedpoint.converter import Converter, make_output
-from tablegen.fixedpoint.phase import RationalPhase
+from tablegen.fixedpoint.converter import Converter
 from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.synthesis import FourierWords
 from tablegen.numerics.arrays import Floats, Ints
-from tablegen.planning.allowed_error import chosen_by_build
-from tablegen.planning.band_limit import band_limited, gently_limited
-from tablegen.planning.drive import Drive, compensate
+from tablegen.planning.axis_table import make_table
+from tablegen.planning.drive import Drive, make_drive
 from tablegen.planning.feasibility import DEFAULT_HARMONICS, Feasibility
-from tablegen.planning.refinement_layer import learnt_layer
+from tablegen.planning.harmonic_choice import HarmonicChoice
 from tablegen.planning.settling import settle_lines
-from tablegen.planning.shaping_choice import chosen_shaping
-from tablegen.planning.table_choice import TableChoice, asked_of, choose, possible_shapes, written_shape
-from tablegen.planning.table_maker import TableMaker
-from tablegen.planning.timing import make_schedule
-from tablegen.problems import Problems
-from tablegen.waveform.allowed_error import AllowedError
+from tablegen.planning.table_choice import TableChoice
+from tablegen.planning.timing import AxisTiming, make_schedule
+from tablegen.planning.voltages import axis_voltages
+from tablegen.planning.waveforms import make_waveforms
 from tablegen.waveform.series import FourierSeries
 
 
@@ -129,10 +122,9 @@ def make_plan(setup: Setup) -> Plan:
     problems = Problems()
     schedule = make_schedule(setup, problems)
     if schedule is None:
-        # The rest is examined at the rates asked for, so that its problems are reported in the same run.
         line_rate = setup.scan.timing.line_rate_hz
-        compensate(setup, "x", line_rate, lambda _: DEFAULT_HARMONICS, problems)
-        compensate(setup, "y", line_rate / setup.scan.timing.lines, lambda _: DEFAULT_HARMONICS, problems)
+        _examine(setup, "x", line_rate, problems)
+        _examine(setup, "y", line_rate / setup.scan.timing.lines, problems)
         problems.stop_if_any()
         raise AssertionError("a schedule fails with a problem")  # pragma: no cover
     x = _line_plan(setup, "x", schedule, problems)
@@ -156,132 +148,49 @@ def make_plan(setup: Setup) -> Plan:
 
 
 def _line_plan(setup: Setup, axis: Literal["x", "y"], schedule: Schedule, problems: Problems) -> LinePlan | None:
-    scan: FastAxis = getattr(setup.scan, axis)
-    file = setup.scan_file
-    rate = schedule.line_rate if axis == "x" else schedule.frame_rate
-    requested = schedule.requested_hz if axis == "x" else schedule.requested_hz / schedule.lines
-    hold = schedule.ticks if isinstance(scan, SlowAxis) and scan.motion == "step" else 1
-    period = (schedule.ticks if axis == "x" else schedule.frame_ticks) // hold
-
+    """Plan one axis: clock, voltages, harmonics, shape, waveform, table; None where ``problems`` grew."""
     before = len(problems.found)
+    timing = AxisTiming.of(setup, axis, schedule)
     feasible = Feasibility(setup, axis, problems)
-    harmonics = feasible.harmonics(rate, period)
-    feasible.check_table(period)
-    limit, most = scan.band_limit, feasible.most_harmonics(period)
-    key = f"{axis}.band_limit.{'harmonics' if limit.max_scaling_error_percent is None else 'max_scaling_error_percent'}"
-    learnt = 1 if scan.refinement is None else len(scan.refinement.a)
-    choice = None
-    if chosen_by_build(limit):
-        from tablegen.planning.enough_harmonics import EnoughHarmonics, plain_line, straightness  # as in ``_gentle``
+    choice = HarmonicChoice(setup, axis, timing.rate, timing.period, feasible, problems)
+    feasible.check_table(timing.period)
 
-        choice = EnoughHarmonics(limit, harmonics, min(learnt, most), most)
-
-    def for_straight_line(allowed: AllowedError | None) -> int:
-        with problems.at(file, key):
-            if choice is not None and allowed is not None:
-                return choice.of(straightness(plain_line(scan.turn), limit), allowed)
-        return harmonics
-
-    drive = compensate(setup, axis, float(rate), for_straight_line, problems)
+    voltages = axis_voltages(setup, axis, float(timing.rate), problems)
+    if voltages is None:
+        return None
+    straight = choice.for_straight_line(voltages.allowed)
+    drive = make_drive(setup, axis, float(timing.rate), voltages, straight, problems)
     if drive is None or len(problems.found) > before:
         return None
-    harmonics = drive.harmonics
-    if choice is not None and drive.allowed is not None and drive.shape.waveform is None:
-        with problems.at(file, key):
-            harmonics = choice.of(straightness(drive.shape, limit), drive.allowed)
-
-    layer = learnt_layer(setup, axis, drive, float(rate), harmonics, problems)
-    if len(problems.found) > before:
+    harmonics = choice.for_drive(drive, straight)
+    waveforms = make_waveforms(setup, axis, timing, drive, choice, harmonics, problems)
+    if waveforms is None:
         return None
-    target, kept = None, None
-    with problems.at(file, key):
-        if drive.resting:
-            target = FourierSeries(0.5, np.zeros(1), np.zeros(1))
-        elif drive.allowed is None:
-            target = band_limited(drive.shape, limit, harmonics, layer)
-        else:
-            target, kept = _gentle(drive, limit, harmonics, layer, most, float(rate))
-    if target is None:
+    table = make_table(setup, axis, timing, drive, waveforms.series, feasible, problems)
+    if table is None or len(problems.found) > before:
         return None
-    at_piezo: FourierSeries = target
-    held: tuple[int, ...] = ()
-    if drive.response is not None:
-        with problems.at(setup.scanner_file, f"{axis}.resonance.response"):
-            at_piezo, held = _through_inverse(target, drive, float(rate))
-    series = at_piezo.times(*hold_inverse(harmonics, period, steps=hold > 1))
-
-    hardware = setup.hardware(axis)
-    converter = Converter.of(hardware.dac, hardware.amplifier)
-    park_v = drive.v_offset if scan.park_v is None else scan.park_v
-    shaping = chosen_shaping(setup, axis, drive, problems)
-    maker = TableMaker(
-        series=series,
-        amplitude=0.5 * drive.v_amplitude / converter.v_per_code,
-        offset=converter.code(drive.v_offset),
-        phase=RationalPhase(period),
-        hold=hold,
-        output=make_output(hardware.dac, converter, drive.driver, park_v, shaping),
-    )
-    feasible.check_words(maker.as_asked)
-    feasible.check_range(drive, converter, *maker.as_asked.reach, shaping)
-    shape, asked = written_shape(scan.table, period), asked_of(scan.table, setup.scan.limits, shaping.order > 0)
-    if asked is not None and len(problems.found) == before:
-        from tablegen.planning.table_search import TableSearch  # here: most tables are written
-
-        with problems.at(file, f"{axis}.table.{'mode' if scan.table.max_error_lsb is None else 'max_error_lsb'}"):
-            possible = possible_shapes(scan.table, period, harmonics)
-            shapes = feasible.fitting(possible, drive, converter, maker)
-            shape = choose(TableSearch(maker), shapes, asked.max_error_lsb)
-    stored = maker.stored(shape)
-    if shape.mode == "cubic" and len(problems.found) == before:
-        feasible.check_words(stored)
-        feasible.check_gain(maker.gain(shape)[0])
-    max_step = feasible.max_step(drive, converter, stored, float(rate), period, shape, shaping)
-    if len(problems.found) > before:
-        return None
-    table = maker.limited(max_step).made(shape)
     return LinePlan(
         axis=axis,
-        rate=rate,
-        requested_hz=requested,
+        rate=timing.rate,
+        requested_hz=timing.requested_hz,
         drive=drive,
-        converter=converter,
-        band_limit=scan.band_limit,
-        target=target,
-        drive_series=at_piezo,
-        series=series,
-        held_harmonics=held,
+        converter=table.converter,
+        band_limit=getattr(setup.scan, axis).band_limit,
+        target=waveforms.target,
+        drive_series=waveforms.drive_series,
+        series=waveforms.series,
+        held_harmonics=waveforms.held_harmonics,
         scale=table.scale,
         fourier=table.fourier,
         program=table.program,
-        layer=layer,
-        kept_percent=kept,
-        asked_table=asked,
+        layer=waveforms.layer,
+        kept_percent=waveforms.kept_percent,
+        asked_table=table.asked,
     )
 
 
-def _gentle(
-    drive: Drive, limit: BandLimit, harmonics: int, layer: FourierSeries | None, most: int, rate_hz: float
-) -> tuple[FourierSeries, float | None]:
-    """Least acceleration at the allowed error. Raises ``Unphysical`` with what would fit."""
-    from tablegen.planning.enough_harmonics import straightness, with_remedies  # here: most lines do without the search
-    from tablegen.waveform.gentle_fit import Unreachable
-
-    assert drive.allowed is not None
-    try:
-        return gently_limited(drive.shape, limit, harmonics, layer, drive.allowed)
-    except Unreachable as reason:
-
-        def named(n: int) -> str:
-            return f"{n} harmonics" if limit.cutoff_hz is None else f"cutoff_hz = {at_least(n * rate_hz, 6)}"
-
-        straight = straightness(drive.shape, limit, layer)
-        raise with_remedies(reason, straight, drive.allowed.percent, harmonics, most, named) from None
-
-
-def _through_inverse(target: FourierSeries, drive: Drive, rate_hz: float) -> tuple[FourierSeries, tuple[int, ...]]:
-    """Each harmonic divided by the response at its frequency, with the boost limited."""
-    assert drive.response is not None
-    n = np.arange(1.0, target.harmonics + 1.0)
-    real, imaginary, held = capped_inverse(drive.response, n * rate_hz, drive.max_boost_db)
-    return target.times(real, imaginary), tuple(int(h) for h in n[held])
+def _examine(setup: Setup, axis: str, rate_hz: float, problems: Problems) -> None:
+    """Examine one axis at the rate asked for, where there is no schedule: its problems are reported in the same run."""
+    voltages = axis_voltages(setup, axis, rate_hz, problems)
+    if voltages is not None:
+        make_drive(setup, axis, rate_hz, voltages, DEFAULT_HARMONICS, problems)

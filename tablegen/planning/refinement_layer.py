@@ -7,12 +7,12 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from tablegen.base.input_errors import Problems
 from tablegen.compensation.dynamics import Measured
 from tablegen.config.load import Setup
 from tablegen.config.scanner import ScannerAxis
 from tablegen.config.schema import FastAxis, Refinement
 from tablegen.planning.drive import Drive
-from tablegen.problems import Problems
 from tablegen.waveform.series import FourierSeries
 
 # How far a scan may be from the one at which a layer was learnt: docs/refine.md has what it is worth at the edges.

@@ -2,11 +2,11 @@
 
 from msgspec import Struct
 
+from tablegen.base.input_errors import Problems
 from tablegen.compensation.transient import OFFSET_CHANGE
 from tablegen.config.load import Setup
 from tablegen.device.schedule import Schedule
 from tablegen.planning.drive import Drive
-from tablegen.problems import Problems
 
 MOST_LINES = 255  # that a device counts
 _SHOWN_NM = 0.005

@@ -8,13 +8,13 @@ from itertools import pairwise
 
 import numpy as np
 
+from tablegen.base.input_errors import Problems
 from tablegen.compensation.dynamics import Response
 from tablegen.config.load import Setup
 from tablegen.fixedpoint.shaping import MAXIMUM_ZERO, OFF, ZERO_BITS, Shaping
 from tablegen.numerics.arrays import Floats, tree_sum
 from tablegen.numerics.turns import cosine
 from tablegen.planning.drive import Drive
-from tablegen.problems import Problems
 
 _NAMED = {"off": OFF, "first": Shaping(1), "second": Shaping(2)}
 _CANDIDATES = (Shaping(1), Shaping(2), *(Shaping(3, zero) for zero in range(MAXIMUM_ZERO + 1)))

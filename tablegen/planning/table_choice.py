@@ -4,12 +4,12 @@ from typing import TYPE_CHECKING, cast
 
 from msgspec import Struct
 
+from tablegen.base.figures import at_least
+from tablegen.base.input_errors import Unphysical
 from tablegen.config.schema import DEFAULT_BITS, Limits, Table
-from tablegen.figures import at_least
 from tablegen.fixedpoint.program import Mode
 from tablegen.fixedpoint.table_shape import LEAST_BITS, LEAST_LENGTH, MODES, MOST_BITS, MOST_LENGTH, TableShape
 from tablegen.planning.feasibility import DEFAULT_LENGTH
-from tablegen.problems import Unphysical
 
 if TYPE_CHECKING:
     from tablegen.planning.table_search import TableSearch

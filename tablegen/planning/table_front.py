@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from tablegen.base.input_errors import Problems
 from tablegen.config.load import Setup
 from tablegen.config.schema import FastAxis, Table
 from tablegen.fixedpoint.table_shape import TableShape
@@ -10,7 +11,6 @@ from tablegen.planning.line_plan import LinePlan
 from tablegen.planning.other_table import maker_of, shape_of
 from tablegen.planning.table_choice import allowed_lsb, choose, possible_shapes
 from tablegen.planning.table_search import TableSearch
-from tablegen.problems import Problems
 
 _TIMES = 8.0  # an error that is so many times what is asked is of no use
 

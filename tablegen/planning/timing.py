@@ -6,14 +6,16 @@ All of it is decided in exact fractions: a window edge at 0.1 of the line is 1/1
 from fractions import Fraction
 from math import ceil, floor, gcd
 
+from msgspec import Struct
+
+from tablegen.base.figures import at_least, at_most
+from tablegen.base.input_errors import Problems
 from tablegen.config.frame import exact, lines_inside
 from tablegen.config.load import Setup
-from tablegen.config.schema import FastAxis, Timing
+from tablegen.config.schema import FastAxis, SlowAxis, Timing
 from tablegen.device.schedule import MAXIMUM_LINE_TICKS, Schedule, Window
-from tablegen.figures import at_least, at_most
 from tablegen.fixedpoint.phase import MAXIMUM_TICKS
 from tablegen.planning.windows import line_windows
-from tablegen.problems import Problems
 
 
 def make_schedule(setup: Setup, problems: Problems) -> Schedule | None:
@@ -147,3 +149,24 @@ def _longer_line(timing: Timing, rate: Fraction, ticks: int, needed: int) -> str
 def _width(axis: FastAxis) -> Fraction:
     low, high = axis.band_limit.window
     return exact(high) - exact(low)
+
+
+class AxisTiming(Struct, frozen=True):
+    """The clock of one axis: its rate in Hz as asked for and as it is, and how its waveform is advanced.
+
+    A period of the waveform has ``period`` advances of ``hold`` ticks each: 1, or a line for a slow axis in steps.
+    """
+
+    rate: Fraction
+    requested_hz: float
+    period: int
+    hold: int
+
+    @classmethod
+    def of(cls, setup: Setup, axis: str, schedule: Schedule) -> "AxisTiming":
+        """Return the clock of "x", a period a line, or "y", a period a frame."""
+        scan: FastAxis = getattr(setup.scan, axis)
+        hold = schedule.ticks if isinstance(scan, SlowAxis) and scan.motion == "step" else 1
+        if axis == "x":
+            return cls(schedule.line_rate, schedule.requested_hz, schedule.ticks // hold, hold)
+        return cls(schedule.frame_rate, schedule.requested_hz / schedule.lines, schedule.frame_ticks // hold, hold)

@@ -2,13 +2,13 @@
 
 from collections.abc import Sequence
 
-from tablegen.calibration.table import Source
+from tablegen.base.data_files import Source
 from tablegen.refinement.image_round import ImageRound, MismatchRound
-from tablegen.refinement.round import Round, TraceRound
+from tablegen.refinement.round import Round, TraceRound, worst_scaling
 
 
-def provenance(found: Round, sources: Sequence[Source]) -> str:
-    """The line of the comment that says what a round rests on; no date."""
+def provenance(found: Round, sources: Sequence[Source], stopped: bool = False) -> str:
+    """The line of the comment that says what a round rests on, or why the layer before it was kept; no date."""
     lesson = found.lesson
     said = []
     for source in sources:
@@ -24,7 +24,10 @@ def provenance(found: Round, sources: Sequence[Source]) -> str:
         [
             *said,
             f"residual {lesson.before.rms_percent:.3g} % rms",
-            f"harmonics to {lesson.harmonics}",
-            f"gain {found.bound.gain:g}",
+            *(
+                [f"scaling error {worst_scaling(lesson):.3g} %, larger than before: the layer before it was kept"]
+                if stopped
+                else [f"harmonics to {lesson.harmonics}", f"gain {found.bound.gain:g}"]
+            ),
         ]
     )

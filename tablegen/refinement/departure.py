@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tablegen.base.input_errors import Unphysical
 from tablegen.certificate.line_errors import CHORD
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan
-from tablegen.problems import Unphysical
 from tablegen.refinement.measured import LineMeasurement
 
 _WINDOW_POINTS = 801  # points over the window of a direction

@@ -6,9 +6,9 @@ from math import pi
 
 import numpy as np
 
-from tablegen.calibration.trace import correlation_length
+from tablegen.base.input_errors import Unphysical
+from tablegen.fitting.correlation import correlation_length
 from tablegen.numerics.arrays import Floats
-from tablegen.problems import Unphysical
 from tablegen.waveform.series import FourierSeries
 
 _CHUNK_SAMPLES = 1 << 12  # samples that are worked out at a time

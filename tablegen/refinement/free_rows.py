@@ -15,9 +15,9 @@ from math import pi
 
 import numpy as np
 
-from tablegen.calibration.periodic import Complexes, Geometry
+from tablegen.base.input_errors import Unphysical
+from tablegen.images.periodic_model import Complexes, Geometry
 from tablegen.numerics.arrays import Floats, Ints
-from tablegen.problems import Unphysical
 
 _MAX_STEPS = 25
 _HALVINGS = 6

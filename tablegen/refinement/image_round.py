@@ -6,19 +6,19 @@ from typing import Literal
 
 import numpy as np
 
-from tablegen.calibration.estimate import Estimate, LineSize
-from tablegen.calibration.image_checks import check_size
-from tablegen.calibration.image_scale import size_of_line
-from tablegen.calibration.image_sizes import KnownSample
+from tablegen.base.input_errors import Unphysical
+from tablegen.base.warnings import Remark, spoils
+from tablegen.calibration.laws.image_sizes import KnownSample
 from tablegen.config.load import Setup
-from tablegen.findings import Remark, spoils
+from tablegen.fitting.estimate import Estimate, LineSize
+from tablegen.images.line_length import size_of_line
+from tablegen.images.pair_checks import check_size
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, Plan, make_plan
-from tablegen.problems import Unphysical
 from tablegen.refinement.lattice_line import ImageOptions, LatticeLine, lattice_line
 from tablegen.refinement.learning import Lesson, learn
 from tablegen.refinement.registration import SweepMismatch, mismatch
-from tablegen.refinement.round import Options, Round, allowed, finished, why_worse, with_lesson
+from tablegen.refinement.round import Options, Round, allowed, finished, stop, why_worse, with_lesson
 from tablegen.refinement.slow_line import slow_line
 from tablegen.refinement.window_line import WindowLine, averaged
 
@@ -82,6 +82,7 @@ def refine_images(
         refinement=refinement,
         setup=changed,
         worse=why_worse(setup, axis, lesson),
+        **stop(setup, line, lesson),
         remarks=(*_size_remarks(plan, size), *_remarks(line, frames, lesson)),
         frames=frames,
         measured=measured,
@@ -247,6 +248,7 @@ def refine_mismatch(
         refinement=refinement,
         setup=changed,
         worse=why_worse(setup, axis, lesson, "mismatch"),
+        **stop(setup, plan.x, lesson, "mismatch"),
         remarks=tuple(remarks),
         frames=frames,
         measured=measured,

@@ -5,12 +5,12 @@ from functools import partial
 
 import numpy as np
 
-from tablegen.calibration.image_checks import ALIASING_HINT, check_periods
-from tablegen.calibration.image_model import prepared
-from tablegen.calibration.periodic import FitState, Geometry, PeriodicModel
+from tablegen.base.input_errors import Unphysical
+from tablegen.images.model_start import prepared
+from tablegen.images.pair_checks import ALIASING_HINT, check_periods
+from tablegen.images.periodic_model import FitState, Geometry, PeriodicModel
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import Plan
-from tablegen.problems import Unphysical
 from tablegen.refinement.departure import asked_position
 from tablegen.refinement.free_rows import ColumnModes, FreeRows, FreeRowsFit
 from tablegen.refinement.lattice_start import START_DEGREE, LatticeStart, lattice_start

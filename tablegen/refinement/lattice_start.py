@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tablegen.calibration.image_model import described, row_order
-from tablegen.calibration.periodic import BASES, LAG, FitState, Geometry, PeriodicModel
-from tablegen.calibration.spots import Bend, bend_of, column_phase, row_polynomial, strongest
+from tablegen.base.input_errors import Unphysical
 from tablegen.compensation.hysteresis import BranchShape
+from tablegen.images.model_start import described, row_order
+from tablegen.images.periodic_model import BASES, LAG, FitState, Geometry, PeriodicModel
+from tablegen.images.spots import Bend, bend_of, column_phase, row_polynomial, strongest
 from tablegen.numerics.arrays import Floats, Ints
-from tablegen.problems import Unphysical
 from tablegen.refinement.free_rows import ColumnModes, FreeRowsState
 
 _MIN_TRACKED_PERIODS = 8.0  # periods in the line; with fewer a straight line is near enough to begin with

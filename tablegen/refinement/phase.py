@@ -7,10 +7,10 @@ from math import ceil, pi
 
 import numpy as np
 
-from tablegen.calibration.least_squares import solve
+from tablegen.base.input_errors import Unphysical
+from tablegen.fitting.least_squares import solve
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan
-from tablegen.problems import Unphysical
 from tablegen.waveform.series import FourierSeries
 
 MIN_SAMPLES_PER_PERIOD = 40  # samples per period

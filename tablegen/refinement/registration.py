@@ -11,13 +11,13 @@ from functools import partial
 import numpy as np
 from scipy.ndimage import gaussian_filter, map_coordinates, spline_filter
 
-from tablegen.calibration.image_checks import check_mirrored
-from tablegen.calibration.image_model import prepared
-from tablegen.calibration.periodic import Geometry
-from tablegen.calibration.trace import correlation_length
+from tablegen.base.input_errors import Unphysical
+from tablegen.fitting.correlation import correlation_length
+from tablegen.images.model_start import prepared
+from tablegen.images.pair_checks import check_mirrored
+from tablegen.images.periodic_model import Geometry
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import Plan
-from tablegen.problems import Unphysical
 from tablegen.refinement.departure import asked_position
 from tablegen.refinement.lattice_line import ImageOptions, column_modes
 from tablegen.refinement.window_line import WindowLine

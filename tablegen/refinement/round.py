@@ -7,19 +7,23 @@ import msgspec
 import numpy as np
 from msgspec.structs import replace
 
+from tablegen.base.input_errors import Unphysical
+from tablegen.base.warnings import Remark, spoils
+from tablegen.calibration.spans import check_spans
+from tablegen.certificate.line_errors import CHORD
 from tablegen.config.load import Setup
 from tablegen.config.schema import Refinement
-from tablegen.findings import Remark, spoils
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, make_plan
 from tablegen.planning.refinement_layer import model_digest
-from tablegen.problems import Unphysical
 from tablegen.refinement.bound import Bound, bound
 from tablegen.refinement.displacement import Displacement, fit_displacement
 from tablegen.refinement.learning import DEFAULT_GAIN, DEFAULT_HARMONICS, Lesson, learn
 from tablegen.refinement.phase import Phase, phase_by_drive, phase_by_trigger
 
 _FINISHED_RATIO = 0.9  # share of the residual that a round would leave; above it the rest is noise
+_CHORD_NOISES = 4.0  # of the largest and the least chord together: the rms noise of one, of some twenty in a window
+_MOST_SCALING = 1e4  # percent that a scan file can hold
 _SIZE_NOTE_LIMIT = 0.01  # share of the line; a larger size error gets a remark
 
 
@@ -37,7 +41,11 @@ class Options:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Round:
-    """What a measurement says. ``worse`` is why it must not be learnt from, if so; ``setup`` has the new layer."""
+    """What a measurement says. ``worse`` is why it must not be learnt from, if so; ``setup`` has the new layer.
+
+    ``stopped`` is why no further layer is to be played although the residual did not grow, if so: the scaling error
+    rose; ``best`` is the layer of the round before, which had less, None where that had none.
+    """
 
     line: LinePlan
     bound: Bound
@@ -46,6 +54,8 @@ class Round:
     setup: Setup
     worse: str
     remarks: tuple[Remark, ...]
+    stopped: str = ""
+    best: Refinement | None = None
 
     @property
     def recorded(self) -> str:
@@ -80,6 +90,7 @@ def refine(
     Without a drive time 0 is a line start, of y a frame start. Raises ``Rejected`` where the scan, or the scan with the
     new layer, cannot be planned, and ``Unphysical`` for a trace that is not of this scan or that bounds forbid.
     """
+    check_spans(time_s, displacement_nm, drive_v)
     line: LinePlan = getattr(make_plan(setup), axis)
     limits = allowed(line, options)
     if drive_v is None:
@@ -98,6 +109,7 @@ def refine(
         refinement=refinement,
         setup=changed,
         worse=why_worse(setup, axis, lesson),
+        **stop(setup, line, lesson),
         remarks=_remarks(line, measured, lesson, phase, time_s),
         phase=phase,
         displacement=measured,
@@ -132,6 +144,9 @@ def _refinement(setup: Setup, line: LinePlan, lesson: Lesson) -> Refinement:
         directions=line.band_limit.directions,
         model=model_digest(setup, line.axis, line.drive),
         before_percent=float(f"{lesson.before.rms_percent:.3g}"),
+        before_scaling_percent=float(f"{min(worst_scaling(lesson), _MOST_SCALING):.3g}"),
+        previous_a=None if line.layer is None else line.layer.a.tolist(),
+        previous_b=None if line.layer is None else line.layer.b.tolist(),
     )
 
 
@@ -162,6 +177,11 @@ def why_worse(setup: Setup, axis: str, lesson: Lesson, before_of: BeforeOf | Non
     Only measurements of the same are compared.
     """
     played: Refinement | None = getattr(setup.scan, axis).refinement
+    if played is not None and played.best:
+        return (
+            f"[{axis}.refinement] is the best of its rounds: the one after it had a larger scaling error. Remove it to "
+            "begin again, or learn from this trace all the same with --force"
+        )
     if played is None or played.before_percent is None or played.before_of != before_of:
         return ""
     before, now = played.before_percent, lesson.before.rms_percent
@@ -172,6 +192,33 @@ def why_worse(setup: Setup, axis: str, lesson: Lesson, before_of: BeforeOf | Non
         f"or the scanner has changed. Remove [{axis}.refinement] and begin again with a smaller --gain or fewer "
         f"--harmonics, or learn from this trace all the same with --force"
     )
+
+
+def stop(setup: Setup, line: LinePlan, lesson: Lesson, before_of: BeforeOf | None = None) -> dict[str, Any]:
+    """Fields of a round where the scaling error rose with the layer that was played; empty where it did not.
+
+    What the noise of the measurement and the converter's rounding do to chords is no rise.
+    """
+    played: Refinement | None = getattr(setup.scan, line.axis).refinement
+    if played is None or played.before_scaling_percent is None or played.before_of != before_of:
+        return {}
+    before, now = played.before_scaling_percent, worst_scaling(lesson)
+    rounding = 200.0 / (CHORD * abs(line.codes_per_unit))
+    if now <= float(np.hypot(1.05 * before, np.hypot(_CHORD_NOISES * lesson.chord_noise_percent, rounding))):
+        return {}
+    rose = f"the scaling error rose from {before:.3g} % to {now:.3g} % since the last round"
+    if played.previous_a is None or played.previous_b is None:
+        without = f"{rose}, which had no layer: remove [{line.axis}.refinement]"
+        return {"stopped": f"{without}, or learn from this trace all the same with --force"}
+    best = msgspec.structs.replace(
+        played, a=played.previous_a, b=played.previous_b, previous_a=None, previous_b=None, best=True
+    )
+    return {"stopped": f"{rose}: the layer of that round is the best, and is kept", "best": best}
+
+
+def worst_scaling(lesson: Lesson) -> float:
+    """The measured scaling error of the worse direction, percent, peak to peak."""
+    return max(lesson.before.scaling_percent.values())
 
 
 def _remarks(

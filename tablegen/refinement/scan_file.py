@@ -8,10 +8,11 @@ from typing import Any
 import tomlkit
 from tomlkit.items import Array, InlineTable, Table
 
-from tablegen.problems import Problem, Rejected
-from tablegen.toml import parse_toml
+from tablegen.base.input_errors import Problem, Rejected
+from tablegen.base.toml import parse_toml
 
 KEY = "refinement"
+COEFFICIENTS = ("a", "b", "previous_a", "previous_b")
 _COEFFICIENTS_PER_ROW = 6
 _ROUND_MARK = re.compile(r"# refine (\d+): ")
 
@@ -76,7 +77,7 @@ def _update(table: Any, values: Mapping[str, Any]) -> None:
         table.pop(key)
     for key, value in values.items():
         before: Any = table.item(key) if isinstance(table, Table) and key in table else None
-        table[key] = _rows(value) if key in ("a", "b") and isinstance(table, Table) else value
+        table[key] = _rows(value) if key in COEFFICIENTS and isinstance(table, Table) else value
         if before is not None and before.trivia.comment:
             table.item(key).trivia.comment_ws = before.trivia.comment_ws
 

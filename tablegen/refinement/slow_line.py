@@ -5,10 +5,10 @@ from functools import partial
 
 import numpy as np
 
-from tablegen.calibration.trace import correlation_length
+from tablegen.base.input_errors import Unphysical
+from tablegen.fitting.correlation import correlation_length
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import Plan
-from tablegen.problems import Unphysical
 from tablegen.refinement.departure import asked_position
 from tablegen.refinement.lattice_line import LatticeLine
 from tablegen.refinement.window_line import WindowLine, error_modes

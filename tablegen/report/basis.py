@@ -7,12 +7,12 @@ from typing import Any
 
 import msgspec
 
+from tablegen.base.input_errors import Document, shortened
+from tablegen.base.reading import CONFIGURATION, read_text
+from tablegen.base.warnings import Tone
 from tablegen.compensation.models.operator import OperatorLine
 from tablegen.config.load import Setup
-from tablegen.findings import Tone
 from tablegen.planning.line_plan import LinePlan
-from tablegen.problems import Document, shortened
-from tablegen.reading import CONFIGURATION, read_text
 from tablegen.report.blocks import Grid, Paragraph, Section, TableCell, row
 from tablegen.report.subject import PlannedScan
 

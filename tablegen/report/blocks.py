@@ -3,8 +3,8 @@
 from dataclasses import dataclass, field
 from typing import Literal
 
-from tablegen.findings import Tone
-from tablegen.report.chart import Chart
+from tablegen.base.warnings import Tone
+from tablegen.charts.chart import Chart
 
 
 @dataclass(frozen=True)

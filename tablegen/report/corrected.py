@@ -4,11 +4,11 @@ from typing import Literal
 
 import numpy as np
 
+from tablegen.charts.chart import Arrows, Chart, DrawnCurve, Mark, Raster
+from tablegen.charts.picture_file import PlottedCharts
 from tablegen.correction.agreement import levelled
 from tablegen.correction.straight import ScanPicture, StraightScan
 from tablegen.numerics.arrays import Floats, Ints
-from tablegen.report.chart import Arrows, Chart, DrawnCurve, Mark, Raster
-from tablegen.report.picture import PlottedCharts
 
 _ARROWS = 12  # along and across
 _MOST_PIXELS = 256  # of a picture, along and across: more are not seen, and a file would have them all

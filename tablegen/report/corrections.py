@@ -2,13 +2,13 @@
 
 import numpy as np
 
+from tablegen.charts.chart import POSITION, Band, Chart, DrawnCurve, Mark
 from tablegen.compensation import models
 from tablegen.manifest.fields import ManifestAxis
 from tablegen.planning.line_plan import LinePlan
 from tablegen.report.blocks import Charts, Grid, Section, TableCell, row
-from tablegen.report.chart import POSITION, Band, Chart, DrawnCurve, Mark
+from tablegen.report.number_text import hertz
 from tablegen.report.subject import Subject
-from tablegen.report.words import hertz
 
 _HEAD = ("", "equation", "factor", "after it")
 

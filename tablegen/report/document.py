@@ -9,10 +9,10 @@ from typing import Any
 
 from markupsafe import Markup
 
+from tablegen.charts.svg import svg, swatch
 from tablegen.report.blocks import Section, TableCell
+from tablegen.report.number_text import coded, visible
 from tablegen.report.ranking import Finding
-from tablegen.report.svg import svg, swatch
-from tablegen.report.words import coded, visible
 
 
 def document(

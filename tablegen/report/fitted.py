@@ -6,17 +6,17 @@ from typing import Literal
 
 import numpy as np
 
-from tablegen.calibration.branch import AmplitudeFit
-from tablegen.calibration.doubts import doubts
-from tablegen.calibration.estimate import Curve, Estimate, Fit
-from tablegen.calibration.fit_findings import fit_findings
-from tablegen.calibration.hysteresis import HysteresisFit
+from tablegen.base.data_files import Source
+from tablegen.calibration.fit_checks import doubts
+from tablegen.calibration.fit_warnings import fit_findings
+from tablegen.calibration.laws.hysteresis import HysteresisFit
 from tablegen.calibration.summary import change, parameters
-from tablegen.calibration.table import Source
+from tablegen.charts.chart import Chart, DrawnCurve, Mark
+from tablegen.charts.picture_file import PlottedCharts
+from tablegen.fitting.estimate import Curve, Estimate, Fit
+from tablegen.fitting.measured_branch import AmplitudeFit
 from tablegen.report.blocks import Block, Charts, Grid, Paragraph, Section, TableCell, row
-from tablegen.report.chart import Chart, DrawnCurve, Mark
 from tablegen.report.document import document
-from tablegen.report.picture import PlottedCharts
 from tablegen.report.ranking import Finding
 from tablegen.version import __version__
 

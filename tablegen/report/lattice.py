@@ -2,12 +2,12 @@
 
 import numpy as np
 
+from tablegen.charts.png import data_address, grey_png
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan
 from tablegen.planning.windows import pixel_places
 from tablegen.report.blocks import PagePicture, Paragraph, Pictures, Section
 from tablegen.report.playing import PlayedAxis
-from tablegen.report.png import data_address, grey_png
 from tablegen.report.subject import PlannedScan
 from tablegen.virtual.simulation import AxisRun
 

@@ -5,13 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from tablegen.calibration.operator.advice import NextTrace, expected_rms
-from tablegen.calibration.operator.errors import WINDOW
 from tablegen.calibration.operator.fit import OperatorFit
+from tablegen.calibration.operator.loop_errors import WINDOW
 from tablegen.calibration.operator.periodic_line import PeriodicLine
+from tablegen.charts.chart import POSITION, Chart, DrawnCurve, Mark, Raster, Role
+from tablegen.charts.picture_file import PlottedCharts
 from tablegen.compensation.models.operator import CENTRE_REACH, STROKE_REACH
-from tablegen.driver import Driver
-from tablegen.report.chart import POSITION, Chart, DrawnCurve, Mark, Raster, Role
-from tablegen.report.picture import PlottedCharts
+from tablegen.numerics.driver import Driver
 
 _GRID = 121  # points of the map, each way
 _SIDES: tuple[Role, Role] = ("forward", "backward")

@@ -2,18 +2,18 @@
 
 from collections.abc import Callable
 
+from tablegen.charts.chart import Chart
 from tablegen.report.asked import asked, files, verification
 from tablegen.report.basis import basis
 from tablegen.report.blocks import Charts, Section, TableCell
-from tablegen.report.chart import Chart
 from tablegen.report.corrections import corrections
 from tablegen.report.document import document
-from tablegen.report.errors import errors
 from tablegen.report.lattice import lattice
 from tablegen.report.lines import lines
 from tablegen.report.playing import played_axes
 from tablegen.report.promises import certificate
 from tablegen.report.ranking import Finding, ranked
+from tablegen.report.scan_errors import errors
 from tablegen.report.spectrum import quantisation, spectrum
 from tablegen.report.subject import Subject
 from tablegen.report.usable import usable

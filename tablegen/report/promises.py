@@ -6,8 +6,8 @@ from tablegen.certificate.excess import LARGEST_PERCENT
 from tablegen.config.schema import Limits
 from tablegen.manifest.fields import ManifestAxis, ManifestCertificate, ManifestFigure, ManifestShaped
 from tablegen.report.blocks import Grid, Paragraph, Section, TableCell, row
+from tablegen.report.number_text import figure
 from tablegen.report.subject import PlannedScan, Subject
-from tablegen.report.words import figure
 
 _HEAD = ("", "figure", "limit", "")
 

@@ -3,12 +3,12 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-from tablegen.certificate.scan_findings import expected_mismatch, note_findings
-from tablegen.findings import Finding, worst_first
+from tablegen.base.input_errors import Problem
+from tablegen.base.warnings import Finding, worst_first
+from tablegen.certificate.scan_notes import expected_mismatch, note_findings
 from tablegen.manifest.fields import ManifestCertificate
-from tablegen.problems import Problem
-from tablegen.report.record import VerifyRecord
 from tablegen.report.subject import Subject
+from tablegen.report.verify_record import VerifyRecord
 
 _CHORD = 0.05  # of the line: a scaling error over it is a place that is wrong by so much of it
 

@@ -2,10 +2,10 @@
 
 from collections.abc import Sequence
 
+from tablegen.charts.chart import POSITION, Chart, DrawnCurve, Mark, Role
+from tablegen.charts.picture_file import PlottedCharts
 from tablegen.compensation import models
-from tablegen.report.chart import POSITION, Chart, DrawnCurve, Mark, Role
-from tablegen.report.errors import SIDES, inside
-from tablegen.report.picture import PlottedCharts
+from tablegen.report.scan_errors import SIDES, inside
 from tablegen.virtual.own_run import OwnRun
 from tablegen.virtual.report import LABEL, SimulationStage
 from tablegen.virtual.simulation import AxisRun, Run

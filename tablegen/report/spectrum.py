@@ -4,13 +4,13 @@ from itertools import pairwise
 
 import numpy as np
 
+from tablegen.charts.chart import Band, Chart, DrawnCurve, Mark
 from tablegen.fixedpoint.program import Program
 from tablegen.manifest.fields import ManifestAxis
 from tablegen.numerics.arrays import Floats, Ints
 from tablegen.report.blocks import Charts, Paragraph, Section
-from tablegen.report.chart import Band, Chart, DrawnCurve, Mark
+from tablegen.report.number_text import hertz
 from tablegen.report.subject import Subject, series_of
-from tablegen.report.words import hertz
 
 _FLOOR_DB = -160.0
 _MOST_SPECTRUM_TICKS = 1 << 18  # of a period whose codes are transformed

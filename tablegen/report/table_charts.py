@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from tablegen.charts.chart import Chart, DrawnCurve, Mark, Role
+from tablegen.charts.picture_file import PlottedCharts
 from tablegen.fixedpoint.program import Mode
 from tablegen.fixedpoint.table_shape import MODES
-from tablegen.report.chart import Chart, DrawnCurve, Mark, Role
-from tablegen.report.picture import PlottedCharts
 from tablegen.report.table_rows import AxisTables
 
 _ROLES: dict[Mode, Role] = {"direct": "before", "interpolated": "limit", "cubic": "other"}

@@ -4,14 +4,14 @@ from fractions import Fraction
 
 import numpy as np
 
+from tablegen.charts.chart import Chart, DrawnCurve, Mark
 from tablegen.compensation.models.operator import OperatorLine
 from tablegen.compensation.offset import OffsetLaw
 from tablegen.compensation.offset_sizes import OffsetSurface
 from tablegen.numerics.arrays import Floats
-from tablegen.planning.drive import offset_surface
+from tablegen.planning.laws import offset_surface
 from tablegen.planning.line_plan import LinePlan
 from tablegen.report.blocks import Charts, Paragraph, Section
-from tablegen.report.chart import Chart, DrawnCurve, Mark
 from tablegen.report.subject import PlannedScan
 
 _OFFSETS = 101

@@ -7,9 +7,11 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from tablegen.base.installation import records
+from tablegen.base.reading import file_sha256
+from tablegen.base.resources import PACKAGE
 from tablegen.config.load import Setup
 from tablegen.emit.depfile import deciding_files
-from tablegen.reading import file_sha256
 
 
 class Inputs:
@@ -38,8 +40,7 @@ class Inputs:
 
 
 def _tool_digest(formats: tuple[str, ...]) -> str:
-    whole = hashlib.sha256()
-    for path in deciding_files(formats):
-        whole.update(path.name.encode() + b"\0")
-        whole.update(file_sha256(path).encode() if path.exists() else b"")
-    return whole.hexdigest()
+    """The digest of the files that make these formats: the same wherever, and however, tablegen is installed."""
+    installed = set(records(PACKAGE.parent))  # which differs between two installations of one version
+    paths = [path for path in deciding_files(formats) if path not in installed and path.exists()]
+    return hashlib.sha256("\n".join(sorted(f"{file_sha256(path)} {path.name}" for path in paths)).encode()).hexdigest()

@@ -1,19 +1,20 @@
 """One program of a library: built, certified, and written into its folder, in a worker."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from tablegen.api.build import Build, build
+from tablegen.base.interruption import ENDINGS, held
+from tablegen.base.reading import holds
 from tablegen.config.load import Setup
+from tablegen.config.names import of_the_runtime
 from tablegen.emit.render import plan_content
-from tablegen.emit.write import outdated_files, write_files
-from tablegen.interruption import ENDINGS, held
+from tablegen.emit.write import leftover_files, outdated_files, write_files
 from tablegen.library.entry import Entry, entry_file, make_entry
-from tablegen.library.whole import RECORD
-from tablegen.manifest.format import read_json
-from tablegen.reading import holds
+from tablegen.manifest.format import RECORD, read_json
+from tablegen.sweep.written_records import WrittenRecords
 
 
 @dataclass(frozen=True)
@@ -32,10 +33,16 @@ class Job:
 
 @dataclass(frozen=True)
 class Made:
-    """What became of it; ``different`` are the files that were written, or with ``only_check`` would be."""
+    """What became of it; ``different`` are the files that were written, or with ``only_check`` would be.
+
+    With ``only_check``, ``leftovers`` are files that no sweep makes or removes, and ``memories`` the memory files that
+    stand on no disk, by name.
+    """
 
     entry: Entry
     different: list[str]
+    leftovers: list[str] = field(default_factory=list)
+    memories: dict[str, bytes] = field(default_factory=dict)
 
 
 class Doubtful(Exception):
@@ -61,18 +68,28 @@ def make(job: Job) -> Made:
     runtime = built.runtime
     files = {name: text for name, text in built.files.items() if name not in runtime}
     entry = _entry(job, built, files)
-    record = entry_file(entry)
+    files[RECORD] = entry_file(entry)
     if job.only_check:
-        return Made(entry, [name for name, text in files.items() if not holds(job.folder / name, text)])
+        return _compared(job, entry, files)
     with held(*ENDINGS) as came:
-        changed = write_files(job.folder, {RECORD: record, **files}, lambda: _outdated(job.folder, files))
+        changed = write_files(job.folder, files, lambda: outdated_files(job.folder, files))
+        WrittenRecords().note(files[RECORD])
     if came:
         raise KeyboardInterrupt
     return Made(entry, changed)
 
 
-def _outdated(folder: Path, files: dict[str, bytes]) -> list[str]:
-    return outdated_files(folder, {*files, RECORD})
+def _compared(job: Job, entry: Entry, files: dict[str, bytes]) -> Made:
+    """Hold the folder of a program against what a sweep would write and remove, as ``build --check`` does."""
+    different = [name for name, text in files.items() if not holds(job.folder / name, text)]
+    memories = {name: files[name] for name in different if name.endswith(".mem")}
+    outdated = outdated_files(job.folder, files)
+    try:
+        present = {path.name for path in job.folder.iterdir() if of_the_runtime(path.name)}
+    except OSError:
+        present = set()
+    leftovers = {*present, *leftover_files(job.folder, files)} - {*files, *outdated}
+    return Made(entry, [*different, *outdated], sorted(leftovers), memories)
 
 
 def _entry(job: Job, built: Build, files: dict[str, bytes]) -> Entry:

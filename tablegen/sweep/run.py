@@ -1,25 +1,28 @@
 """A sweep: which programs are up to date, what becomes of the others, and the index of those that are there."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
 from tablegen.api.build import BrokenLimit
-from tablegen.api.workers import results
+from tablegen.base.input_errors import Problem, Rejected
+from tablegen.base.interruption import ENDINGS, held
+from tablegen.base.reading import BUILD_FILE, file_sha256, holds, read_bytes
+from tablegen.base.workers import results
+from tablegen.config.names import of_the_runtime
 from tablegen.config.schema import DEFAULT_FORMATS
 from tablegen.config.variants import Variant
 from tablegen.emit.formats import UnknownFormat
-from tablegen.emit.write import CannotWrite, write_files
-from tablegen.interruption import ENDINGS, held
-from tablegen.library.entry import Entry, changed_files, is_whole, read_entry
-from tablegen.library.index import listed_files, make_index
-from tablegen.library.whole import INDEX, RECORD
-from tablegen.problems import Problem, Rejected
-from tablegen.reading import file_sha256, holds
+from tablegen.emit.write import CannotWrite, names_of_build, write_files
+from tablegen.library.entry import Entry, changed_files, is_whole, parse_entry, read_record
+from tablegen.library.index import is_indexed, listed_files, make_index
+from tablegen.manifest.format import INDEX, MANIFEST, RECORD
+from tablegen.manifest.read import NotABuild, StoredBuild, read_build
 from tablegen.sweep.inputs import Inputs
 from tablegen.sweep.job import Doubtful, Job, Made, make
+from tablegen.sweep.written_records import WrittenRecords
 
 Kind = Literal["wrong input", "limit", "error"]
 
@@ -51,6 +54,8 @@ class ScanLibrary:
     notes: list[str] = field(default_factory=list)
     removed: list[str] = field(default_factory=list)
     """Programs of an earlier sweep that nobody asked for now."""
+    memories: dict[tuple[str, str], bytes] = field(default_factory=dict)
+    """With ``only_check``: memory files that stand on no disk, by program and name."""
 
     @property
     def done(self) -> int:
@@ -64,25 +69,32 @@ class ScanLibrary:
 
 
 def state(
-    sweep: ScanLibrary, variant: Variant, formats: Sequence[str] | None, inputs: Inputs
+    sweep: ScanLibrary, variant: Variant, formats: Sequence[str] | None, inputs: Inputs, written: WrittenRecords
 ) -> Entry | tuple[Any, str]:
     """The entry of a program that is up to date; otherwise the setup to build, and the digest of its inputs.
 
-    Raises ``Rejected``.
+    Its record has to be one that a sweep of this user has written, whatever else stands in the directory. Raises
+    ``Rejected``.
     """
+    setup, digest = _inputs(variant, formats, inputs)
+    folder = sweep.folder / variant.name
+    record = read_record(folder)
+    entry = parse_entry(record, folder)
+    if entry is None or record is None or entry.library != sweep.library or entry.inputs != digest:
+        return setup, digest
+    return entry if record in written and is_whole(folder, entry) else (setup, digest)
+
+
+def _inputs(variant: Variant, formats: Sequence[str] | None, inputs: Inputs) -> tuple[Any, str]:
+    """The setup of a scan, and the digest of its inputs. Raises ``Rejected``."""
     setup = variant.setup
     wanted = list(formats or setup.scan.emit.formats or DEFAULT_FORMATS)
     try:
-        digest = inputs.digest(setup, variant.values, wanted)
+        return setup, inputs.digest(setup, variant.values, wanted)
     except UnknownFormat as error:
         raise Rejected([Problem("formats", 0, "", str(error))]) from None
     except OSError:
         return setup, ""  # the build says what is wrong
-    folder = sweep.folder / variant.name
-    entry = read_entry(folder)
-    if entry is not None and entry.inputs == digest and is_whole(folder, entry):
-        return entry
-    return setup, digest
 
 
 def run(
@@ -96,17 +108,21 @@ def run(
 ) -> None:
     """Build what is missing or has changed, and write the index. ``progress`` is told how many of all are done.
 
-    Raises ``CannotWrite`` where the directory cannot be written. Whatever ends it, programs that were built stay,
-    and no index: it exists only where all programs that it lists are as it says.
+    With ``only_check`` every program is made again and compared, whatever the directory says of itself. Raises
+    ``CannotWrite`` where the directory cannot be written. Whatever ends it, programs that were built stay, and no
+    index: it exists only where all programs that it lists are as it says.
     """
     pending: list[Variant] = []
     before = listed_files(sweep.folder)
-    inputs = Inputs()
+    inputs, written = Inputs(), WrittenRecords()
 
     def tasks() -> Iterator[tuple[Job]]:
         for variant in sweep.variants:
             try:
-                found = state(sweep, variant, formats, inputs)
+                if only_check:
+                    found: Entry | tuple[Any, str] = _inputs(variant, formats, inputs)
+                else:
+                    found = state(sweep, variant, formats, inputs, written)
             except Rejected as rejected:
                 sweep.failed.append(Failed(variant, "wrong input", list(map(str, rejected.problems))))
                 continue
@@ -127,6 +143,7 @@ def run(
         _note(sweep, pending[number], found, only_check)
         progress(sweep.done, len(sweep.variants))
     _finish(sweep, before, only_check)
+    written.prune()
 
 
 def _current(sweep: ScanLibrary, variant: Variant, entry: Entry, strict: bool) -> None:
@@ -142,9 +159,11 @@ def _note(sweep: ScanLibrary, variant: Variant, found: "Made | Exception", only_
     match found:
         case Made():
             sweep.entries[variant.name] = found.entry
-            (sweep.built if found.different or not only_check else sweep.current).append(variant.name)
+            (sweep.built if found.different else sweep.current).append(variant.name)
             if only_check:
                 sweep.different += [f"{variant.name}/{name}" for name in found.different]
+                _note_leftovers(sweep, [f"{variant.name}/{name}" for name in found.leftovers], only_check)
+                sweep.memories |= {(variant.name, name): text for name, text in found.memories.items()}
         case CannotWrite():
             raise found
         case Doubtful():
@@ -156,6 +175,13 @@ def _note(sweep: ScanLibrary, variant: Variant, found: "Made | Exception", only_
             sweep.failed.append(Failed(variant, "error", [f"{type(found).__name__}: {found}"]))
 
 
+def _note_leftovers(sweep: ScanLibrary, names: Sequence[str], only_check: bool) -> None:
+    """Say what no sweep makes and none removes, and what a compiler that is given a pattern would take in."""
+    sweep.notes += [f"{sweep.folder / name}: is not of this library; remove it" for name in names]
+    if only_check:
+        sweep.different += names
+
+
 def _finish(sweep: ScanLibrary, before: dict[str, str], only_check: bool) -> None:
     """Write the index and the runtime, and remove what an earlier sweep has left; or say what would be."""
     order = {variant.name: number for number, variant in enumerate(sweep.variants)}
@@ -165,15 +191,23 @@ def _finish(sweep: ScanLibrary, before: dict[str, str], only_check: bool) -> Non
     failed = [
         {"name": one.variant.name, "settings": one.variant.settings, "reasons": one.reasons} for one in sweep.failed
     ]
-    index = make_index(sweep.library, entries, failed, formats, sweep.folder)
+
+    def content(program: str, name: str) -> bytes:
+        made = sweep.memories.get((program, name))
+        return read_bytes(sweep.folder / program / name, BUILD_FILE) if made is None else made
+
+    index = make_index(sweep.library, entries, failed, formats, content)
     sweep.notes += index.notes
     outdated = [name for name, digest in before.items() if name not in index.files]
     outdated = [name for name in outdated if _digest(sweep.folder / name) == before[name]]
+    dropped, others = _dropped(sweep)
     if only_check:
         sweep.different += [name for name, text in index.files.items() if not holds(sweep.folder / name, text)]
-        sweep.different += [*outdated, *(f"{entry.name}/{RECORD}" for entry in _dropped(sweep))]
+        sweep.different += [*outdated, *(f"{entry.name}/{RECORD}" for entry in dropped)]
+    _note_leftovers(sweep, [*others, *_unlisted(sweep, {*index.files, *outdated})], only_check)
+    if only_check:
         return
-    for entry in _dropped(sweep):
+    for entry in dropped:
         _remove_program(sweep, entry)
     with held(*ENDINGS) as came:
         write_files(sweep.folder, index.files, outdated)
@@ -188,25 +222,59 @@ def _remove_index(folder: Path, listed: dict[str, str]) -> None:
             (folder / name).unlink()
 
 
-def _dropped(sweep: ScanLibrary) -> list[Entry]:
-    """Programs of this library in its directory that are not among the scans."""
+def _dropped(sweep: ScanLibrary) -> tuple[list[Entry], list[str]]:
+    """Programs in the directory that are not among the scans: those of this library, and folders of all others.
+
+    Folders without a build are passed over.
+    """
     wanted = {variant.name for variant in sweep.variants}
     try:
         folders = sorted(path for path in sweep.folder.iterdir() if path.name not in wanted and path.is_dir())
     except OSError:
+        return [], []
+    dropped, others = [], []
+    for path in folders:
+        entry, stored = parse_entry(read_record(path), path), _stored(path)
+        if entry is not None and _is_of(sweep, path, entry, stored):
+            dropped.append(entry)
+        elif stored is not None or (path / RECORD).is_file():
+            others.append(path.name)
+    return dropped, others
+
+
+def _is_of(sweep: ScanLibrary, folder: Path, entry: Entry, stored: StoredBuild | None) -> bool:
+    """Whether a sweep of this library has made a folder: its manifest is one of ours, of the plan that the record has.
+
+    A link is followed nowhere: what it leads to is not in the directory.
+    """
+    if stored is None or entry.library != sweep.library or folder.is_symlink():
+        return False
+    return stored.own_hash == stored.manifest.hash == entry.hash and stored.manifest.name == entry.name
+
+
+def _stored(folder: Path) -> StoredBuild | None:
+    try:
+        return read_build(folder)
+    except NotABuild:
+        return None
+
+
+def _unlisted(sweep: ScanLibrary, files: Collection[str]) -> list[str]:
+    """Files that are called as those of this library's index or of the runtime are, and are none of these files."""
+    try:
+        present = sorted(path.name for path in sweep.folder.iterdir() if path.is_file() and path.name not in files)
+    except OSError:
         return []
-    found = [(path.name, read_entry(path)) for path in folders]
-    return [
-        entry for name, entry in found if entry is not None and entry.library == sweep.library and entry.name == name
-    ]
+    alike = (name for name in present if name.startswith(f"{sweep.library}_library") or of_the_runtime(name))
+    return [name for name in alike if is_indexed(name)]
 
 
 def _remove_program(sweep: ScanLibrary, entry: Entry) -> None:
     folder = sweep.folder / entry.name
     edited = changed_files(folder, entry)
-    for name in [*(name for name in entry.files if name not in edited), RECORD]:
-        if name == Path(name).name:
-            (folder / name).unlink(missing_ok=True)
+    own = {MANIFEST, *names_of_build(entry.name, entry.files)}
+    for name in [*(name for name in entry.files if name in own and name not in edited), RECORD]:
+        (folder / name).unlink(missing_ok=True)
     try:
         folder.rmdir()
     except OSError:

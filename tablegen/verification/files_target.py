@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tablegen.manifest.read import StoredBuild
-from tablegen.verification.build import Outcome, PlayJob
+from tablegen.verification.build_report import Outcome, PlayJob
 
 
 @dataclass(frozen=True)

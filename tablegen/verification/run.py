@@ -8,7 +8,7 @@ from typing import Literal
 
 from tablegen.library.whole import whole_build
 from tablegen.manifest.read import read_build
-from tablegen.verification.build import Report, Target, verify_build
+from tablegen.verification.build_report import Report, Target, verify_build
 from tablegen.verification.files_target import FilesTarget
 
 TargetName = Literal["verilog", "c", "cortex-m", "files"]
@@ -25,13 +25,16 @@ def verify(
     ticks: int | None = None,
     seed: int = 1,
     keep: str | Path | None = None,
+    other_version: bool = False,
     progress: Callable[[str | Callable[[], str]], None] = lambda _: None,
 ) -> Report:
     """Hold a build's files, and what its own sequencer plays, against its manifest.
 
     ``target`` is "verilog" where the build has it, else "c", else "files", which plays nothing; "cortex-m" plays the C
     on an emulator. ``axis`` and ``fourier`` say how the Verilog is placed. ``keep`` is a directory to play in, which is
-    kept. What the directory of the build holds is compiled and run. The report's ``failures`` are empty if all is well.
+    kept. A build of another version of tablegen fails unless ``other_version``: then only what is played can tell
+    whether its runtime is right. What the directory of the build holds is compiled and run. The report's ``failures``
+    are empty if all is well.
 
     Raises ``NotABuild`` where there is no build, ``ToolMissing`` without a simulator or compiler, ``OSError`` where
     nothing can be written. A program of a library is played with the runtime of the library.
@@ -39,7 +42,8 @@ def verify(
     folder = Path(folder)
     chosen, most_ticks = _target(folder, target or default_target(folder), simulator, axis, fourier, ticks is None)
     with _work_folder(None if keep is None else Path(keep)) as work, whole_build(folder) as whole:
-        return verify_build(whole, work, chosen, most_ticks if ticks is None else ticks, seed, progress)
+        most = most_ticks if ticks is None else ticks
+        return verify_build(whole, work, chosen, most, seed, progress, other_version=other_version)
 
 
 def default_target(folder: Path) -> TargetName:
@@ -50,7 +54,7 @@ def default_target(folder: Path) -> TargetName:
 
 def rendering_clocks(folder: Path, axis: Literal["pipelined", "blocks", "serial"]) -> int:
     """Clocks in which the Verilog of a build renders its tables once. Raises ``NotABuild``."""
-    from tablegen.verification.placement import Placement
+    from tablegen.verification.play.placement import Placement
 
     stored, placement = read_build(folder), Placement(axis, fourier=True)
     tables = [
@@ -72,11 +76,11 @@ def _target(
     if name == "files":
         return FilesTarget(), DEFAULT_TICKS[name]
     if name != "verilog":
-        from tablegen.verification.c_target import CTarget
+        from tablegen.verification.c.target import CTarget
 
         return CTarget(name, fourier), DEFAULT_TICKS[name]
-    from tablegen.verification.placement import Placement
-    from tablegen.verification.verilog_target import VerilogTarget
+    from tablegen.verification.play.placement import Placement
+    from tablegen.verification.verilog.target import VerilogTarget
 
     placement = Placement(axis, fourier)
     apart = simulator == "icarus" and axis == "pipelined" and not fourier and as_usual

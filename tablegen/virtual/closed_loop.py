@@ -11,7 +11,7 @@ from tablegen.config.scanner import ScannerAxis
 from tablegen.config.schema import BandLimit
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import make_plan
-from tablegen.virtual.laboratory import OFFSETS
+from tablegen.virtual.calibration_day import OFFSETS
 from tablegen.virtual.scanner import VirtualScanner
 from tablegen.virtual.simulation import AxisRun, run_line
 

@@ -7,6 +7,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from tablegen.base.input_errors import Rejected, Unphysical
 from tablegen.compensation import models
 from tablegen.compensation.model import Hysteresis
 from tablegen.compensation.models.operator import OperatorModel
@@ -14,7 +15,6 @@ from tablegen.compensation.operator.operator import MeasuredLine
 from tablegen.config.load import Setup
 from tablegen.config.scanner import ScannerAxis
 from tablegen.planning.line_plan import LinePlan, make_plan
-from tablegen.problems import Rejected, Unphysical
 from tablegen.virtual.own_scanner import OwnAxis, operator_line
 from tablegen.virtual.simulation import AxisRun, run_on_each, with_model
 

@@ -13,8 +13,8 @@ from tablegen.compensation.models.operator import OperatorLine
 from tablegen.compensation.operator.field import Field, Lengths, covariance
 from tablegen.compensation.operator.operator import Operator
 from tablegen.compensation.operator.settled import settled
-from tablegen.driver import Driver
 from tablegen.numerics.arrays import Floats
+from tablegen.numerics.driver import Driver
 from tablegen.planning.line_plan import LinePlan
 
 # Departures at two places are alike within this much of stroke and of centre, shares of v_max.

@@ -9,11 +9,11 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from msgspec import Meta, Struct
 
+from tablegen.base.input_errors import Document, Problems
+from tablegen.base.quantities import Hertz, Name, PositiveVolts
+from tablegen.base.toml import read_toml
 from tablegen.config.decode import decode
 from tablegen.numerics.arrays import Floats, FloatsLike
-from tablegen.problems import Document, Problems
-from tablegen.quantities import Hertz, Name, PositiveVolts
-from tablegen.toml import read_toml
 from tablegen.virtual.duhem import Duhem, Lag
 from tablegen.virtual.preisach import Preisach
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tablegen.findings import Finding, worst_first
+from tablegen.base.warnings import Finding, worst_first
 from tablegen.virtual.line_error import BranchError, ideal_triangle
 from tablegen.virtual.parameters import Truth
 from tablegen.virtual.simulation import AxisRun, Run

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from tablegen.config.scanner import Scanner, ScannerAxis
-from tablegen.driver import Driver
 from tablegen.numerics.arrays import Floats
+from tablegen.numerics.driver import Driver
 from tablegen.virtual.line_error import ideal_triangle
 from tablegen.virtual.scanner import VirtualAxis, VirtualScanner
 

@@ -11,8 +11,8 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from tablegen.driver import Driver
 from tablegen.numerics.arrays import Floats, FloatsLike
+from tablegen.numerics.driver import Driver
 from tablegen.virtual import parameters
 from tablegen.virtual.creep import logarithmic_creep
 from tablegen.virtual.modes import Modes, delayed, low_pass, second_order, side_by_side

@@ -17,10 +17,10 @@ from math import tau
 
 import numpy as np
 
+from tablegen.base.input_errors import Unphysical
 from tablegen.numerics.arrays import Floats, freeze, tree_sum, tree_sum_down
 from tablegen.numerics.linear import Cholesky
 from tablegen.numerics.turns import cosine, sine_and_cosine
-from tablegen.problems import Unphysical
 from tablegen.waveform.refined import WaveformShape
 from tablegen.waveform.series import FourierSeries
 

@@ -14,7 +14,7 @@ from editing import edited, write_pair
 from libraries import BASE, write_library
 
 import tablegen
-from tablegen.api.workers import SHARE, WorkerDied, default_jobs, results
+from tablegen.base.workers import SHARE, WorkerDied, default_jobs, results
 
 SIZES = (150.0, 5000.0, 200.0, 250.0)
 

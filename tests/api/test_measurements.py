@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -132,6 +133,57 @@ def test_a_round_is_that_of_the_command(lab: Path, laboratory: tablegen.Laborato
     built = tablegen.build(of_arrays.setup)
     assert built.plan.x.layer is not None
     assert f"{found.before_percent:.3g} % rms" in repr(found)
+
+
+def test_refining_stops_where_the_scaling_error_rises_and_keeps_the_best_layer(
+    lab: Path, laboratory: tablegen.Laboratory
+) -> None:
+    scan = lab / "annexin_200nm.toml"
+    first = tablegen.refine(scan, laboratory.running_trace(scan, "x"), axis="x")
+    first.write()
+    text = scan.read_text("utf-8")
+    said = tomllib.loads(text)["x"]["refinement"]
+    assert said["before_scaling_percent"] == pytest.approx(
+        max(first.round.lesson.before.scaling_percent.values()), 0.01
+    )
+    assert "previous_a" not in said, "no layer was played before"
+    trace = laboratory.running_trace(scan, "x")
+    second = tablegen.refine(scan, trace, axis="x")
+    assert second.stopped == ""
+    second.write()
+    assert tomllib.loads(scan.read_text("utf-8"))["x"]["refinement"]["previous_a"] == said["a"]
+
+    # The same trace beside a round that had less of it: without a layer, then with one.
+    better = text.replace(f"before_scaling_percent = {said['before_scaling_percent']}", "before_scaling_percent = 0.01")
+    scan.write_text(better, "utf-8")
+    without = tablegen.refine(scan, trace, axis="x")
+    assert "the scaling error rose from 0.01 % to" in without.refused
+    assert "which had no layer: remove [x.refinement]" in without.refused
+    best = [1e-4, 2e-4]
+    scan.write_text(
+        better.replace("before_scaling", f"previous_a = {best}\nprevious_b = {best}\nbefore_scaling"), "utf-8"
+    )
+    stopped = tablegen.refine(scan, trace, axis="x")
+    assert stopped.refused == ""
+    assert stopped.stopped.endswith("the layer of that round is the best, and is kept")
+    assert "stopped: the scaling error rose" in repr(stopped)
+    played = tablegen.build(stopped.setup).plan.x.layer
+    assert played is not None
+    assert played.a.tolist() == best
+    forced = stopped.content(force=True)
+    command = run("refine", scan, csv(lab / "trace.csv", trace), "--axis", "x", "--json", "--write")
+    assert command.status == 0, command.err
+    assert "the scaling error rose from 0.01 % to" in command.err
+    assert "x.refinement written, with the best layer; build and upload" in command.err
+    kept = tomllib.loads(scan.read_text("utf-8"))["x"]["refinement"]
+    assert (kept["a"], kept["b"], kept["best"]) == (best, best, True)
+    assert "larger than before: the layer before it was kept" in scan.read_text("utf-8")
+    assert tomllib.loads(forced.decode())["x"]["refinement"]["a"] == second.round.lesson.layer.a.tolist()
+
+    again = tablegen.refine(scan, laboratory.running_trace(scan, "x"), axis="x")
+    assert "is the best of its rounds" in again.refused
+    again.write(force=True)
+    assert "best" not in tomllib.loads(scan.read_text("utf-8"))["x"]["refinement"]
 
 
 def test_a_round_from_the_trace_before_is_refused(lab: Path, laboratory: tablegen.Laboratory) -> None:

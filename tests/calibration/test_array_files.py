@@ -11,9 +11,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from tablegen.calibration.columns import DISPLACEMENT, DRIVE, FREQUENCY, GAIN, PHASE, TIME
-from tablegen.calibration.table import read_table
-from tablegen.problems import Rejected
+from tablegen.base.input_errors import Rejected
+from tablegen.calibration.tables.columns import DISPLACEMENT, DRIVE, FREQUENCY, GAIN, PHASE, TIME
+from tablegen.calibration.tables.table import read_table
 
 TIMES = np.arange(50) * 1e-3
 MOVED = np.linspace(-3.0, 4.0, 50)

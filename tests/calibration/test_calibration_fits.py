@@ -7,14 +7,14 @@ import pytest
 from calibrating import CASES, DRIVES, FREQUENCIES, OFFSETS, RESPONSE, V_MAX, actual, apparent, distances, trials
 from sets import LONG_TEST
 
-from tablegen.calibration.estimate import Estimate
-from tablegen.calibration.frequency import fit_frequency
-from tablegen.calibration.offset import fit_offset
-from tablegen.calibration.resonance import fit_resonance
-from tablegen.calibration.size import fit_size
+from tablegen.base.input_errors import Unphysical
+from tablegen.calibration.laws.frequency import fit_frequency
+from tablegen.calibration.laws.offset import fit_offset
+from tablegen.calibration.laws.resonance import fit_resonance
+from tablegen.calibration.laws.size import fit_size
 from tablegen.compensation.offset import OffsetLaw
 from tablegen.compensation.size import SizeLaw
-from tablegen.problems import Unphysical
+from tablegen.fitting.estimate import Estimate
 
 FAST = {"offset": 400, "size": 100, "hysteresis": 50, "images": 10, "frequency": 300, "resonance": 50}
 COVERED = 0.9545  # by two standard errors, as they are defined

@@ -7,15 +7,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from replacing import replace
 
-from tablegen.calibration.branch import AmplitudeFit, MeasuredBranch
-from tablegen.calibration.estimate import Estimate
-from tablegen.calibration.growth import Growth, fit_growth
-from tablegen.calibration.hysteresis import Trace, TurnFit, fit_hysteresis
-from tablegen.calibration.points import measured_points
-from tablegen.calibration.trace import TraceFit, correlation_length, fit_trace
-from tablegen.calibration.triangle import find_triangle
+from tablegen.base.input_errors import Unphysical
+from tablegen.calibration.laws.hysteresis import Trace, TurnFit, fit_hysteresis
+from tablegen.calibration.laws.points import measured_points
+from tablegen.calibration.laws.trace import TraceFit, fit_trace
+from tablegen.calibration.laws.triangle import find_triangle
 from tablegen.compensation.hysteresis import BranchShape
-from tablegen.problems import Unphysical
+from tablegen.fitting.correlation import correlation_length
+from tablegen.fitting.estimate import Estimate
+from tablegen.fitting.growth import Growth, fit_growth
+from tablegen.fitting.measured_branch import AmplitudeFit, MeasuredBranch
 
 FULL = (0.037, 0.37), (0.080, 0.48)  # beta and u_peak of the scanner's branches at full scale
 

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tablegen.calibration.doubts import doubts
-from tablegen.calibration.offset import fit_offset
-from tablegen.calibration.offset_sizes import OffsetSizesFit, fit_offset_sizes
+from tablegen.calibration.fit_checks import doubts
+from tablegen.calibration.laws.offset import fit_offset
+from tablegen.calibration.laws.offset_sizes import OffsetSizesFit, fit_offset_sizes
 from tablegen.compensation.offset import OffsetLaw, normalised_offset
 from tablegen.compensation.size import SizeLaw
 from tablegen.numerics.arrays import Floats

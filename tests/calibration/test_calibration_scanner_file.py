@@ -10,11 +10,13 @@ from editing import SCANNER
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tablegen.base.data_files import Source
+from tablegen.base.input_errors import Rejected
+from tablegen.base.toml import parse_toml
 from tablegen.calibration import summary
-from tablegen.calibration.offset import fit_offset
-from tablegen.calibration.scanner_file import Change, new_file, updated
-from tablegen.calibration.table import Source
-from tablegen.problems import Rejected
+from tablegen.calibration.laws.offset import fit_offset
+from tablegen.calibration.scanner_file import Change, new_file, updated, with_own_hysteresis
+from tablegen.config.like import inherited
 
 HASH = "0123456789abcdef"
 BRANCH = {"beta_max": 0.04, "rho": 3.0, "u_peak": 0.4}
@@ -58,6 +60,54 @@ def test_a_second_calibration_replaces_the_comment_of_the_first() -> None:
     assert len(second.splitlines()) == len(first.splitlines())
     assert "7 points" in second
     assert "5 points" not in second
+
+
+OPERATOR = Change("hysteresis", {"model": "operator", "file": "x.toml"})
+LIKE = """name = "s"
+v_max = 100.0
+
+[x.size]
+k_nm_per_v = 10.0
+{x}
+[y]
+like = "x"
+{y}"""
+TABLE = """
+[x.hysteresis]
+model = "sinusoidal"
+
+[[x.hysteresis.branches]]
+turn = 0.5
+forward = { beta_max = 0.04, rho = 3.0 }
+backward = { beta_max = 0.05, rho = 2.0 }
+"""
+OF_Y = """
+[[y.hysteresis.branches]]        # of frames that fly back
+turn = 0.95
+forward = { beta_max = 0.04, rho = 3.0 }
+backward = { beta_max = 0.04, rho = 3.0 }
+"""
+
+
+@pytest.mark.parametrize(
+    ("x", "y"), [(TABLE, ""), (TABLE, OF_Y), ("", ""), (TABLE, '\n[y.hysteresis]\nmodel = "triangle"\n')]
+)
+def test_y_keeps_the_hysteresis_that_it_shares_when_x_gets_an_operator(x: str, y: str) -> None:
+    text = LIKE.format(x=x, y=y)
+    before = inherited(*parse_toml(text, "s.toml"))[0]["y"].get("hysteresis", {"model": "triangle"})
+    new = updated(with_own_hysteresis(text, "s.toml"), "s.toml", "x", OPERATOR)
+    assert with_own_hysteresis(new, "s.toml") == new
+    values = inherited(*parse_toml(new, "s.toml"))[0]
+    assert values["y"]["hysteresis"] == before
+    assert values["x"]["hysteresis"]["model"] == "operator"
+    assert new.count("# of frames that fly back") == y.count("#"), "a comment stays where it was, and once"
+    shared = inherited(*parse_toml(updated(text, "s.toml", "x", OPERATOR), "s.toml"))[0]["y"]["hysteresis"]
+    assert (shared["model"] == "operator") == ("model" not in y), "negative control: y takes the operator of x"
+
+
+@pytest.mark.parametrize("text", [SCANNER, "y = 3\n", '[y]\nlike = "x"\nhysteresis = 3\n[x]\n'])
+def test_a_file_without_a_shared_hysteresis_stays_as_it_is(text: str) -> None:
+    assert with_own_hysteresis(text, "s.toml") == text
 
 
 def test_every_comment_survives_every_calibration() -> None:

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tablegen.calibration.columns import APPARENT, FREQUENCY, GAIN, OFFSET, PHASE, TIME, Column
-from tablegen.calibration.table import MeasuredTable, read_table
-from tablegen.problems import Rejected
+from tablegen.base.input_errors import Rejected
+from tablegen.calibration.tables.columns import APPARENT, FREQUENCY, GAIN, OFFSET, PHASE, TIME, Column
+from tablegen.calibration.tables.table import MeasuredTable, read_table
 
 
 def read(folder: Path, content: str | bytes, *needed: Column, optional: tuple[Column, ...] = ()) -> MeasuredTable:

@@ -15,15 +15,15 @@ from calibrating import (
 )
 from replacing import replace
 
-from tablegen.calibration.branch import MeasuredBranch
-from tablegen.calibration.doubts import doubts
-from tablegen.calibration.estimate import Estimate, Fit
-from tablegen.calibration.frequency import fit_frequency
-from tablegen.calibration.growth import Growth, fit_growth
-from tablegen.calibration.hysteresis import HysteresisFit, Trace, fit_hysteresis
-from tablegen.calibration.offset import fit_offset
-from tablegen.calibration.resonance import fit_resonance
-from tablegen.calibration.size import fit_size
+from tablegen.calibration.fit_checks import doubts
+from tablegen.calibration.laws.frequency import fit_frequency
+from tablegen.calibration.laws.hysteresis import HysteresisFit, Trace, fit_hysteresis
+from tablegen.calibration.laws.offset import fit_offset
+from tablegen.calibration.laws.resonance import fit_resonance
+from tablegen.calibration.laws.size import fit_size
+from tablegen.fitting.estimate import Estimate, Fit
+from tablegen.fitting.growth import Growth, fit_growth
+from tablegen.fitting.measured_branch import MeasuredBranch
 
 
 def traces(noise: float, *forward: float) -> list[Trace]:

@@ -11,15 +11,15 @@ from msgspec import structs
 from operator_files import operator_file, write_operator_scan
 from replacing import replace
 
-from tablegen.calibration.hysteresis import fit_hysteresis
-from tablegen.calibration.offset import fit_offset
+from tablegen.base.input_errors import Rejected, Unphysical
+from tablegen.calibration.laws.hysteresis import fit_hysteresis
+from tablegen.calibration.laws.offset import fit_offset
+from tablegen.calibration.laws.size import fit_size
 from tablegen.calibration.operator.periodic_line import periodic_line
-from tablegen.calibration.size import fit_size
 from tablegen.compensation.operator.file import operator_text, read_operator
 from tablegen.config.load import load, load_scanner
-from tablegen.driver import Driver
+from tablegen.numerics.driver import Driver
 from tablegen.planning.line_plan import make_plan
-from tablegen.problems import Rejected, Unphysical
 
 BOTH = Driver(0.5 * V_MAX, -0.5 * V_MAX)  # the same 100 V, about 0 V
 BY = 0.5 * V_MAX

@@ -5,7 +5,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from tablegen.calibration.image_checks import (
+from tablegen.base.input_errors import Unphysical
+from tablegen.images.pair_checks import (
     check_heights,
     check_mirrored,
     check_pair,
@@ -13,7 +14,6 @@ from tablegen.calibration.image_checks import (
     check_size,
 )
 from tablegen.numerics.arrays import Floats
-from tablegen.problems import Unphysical
 
 
 def bars(periods: float = 9.5, columns: int = 128, rows: int = 64, noise: float = 0.0) -> Floats:

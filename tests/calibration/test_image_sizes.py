@@ -10,13 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from replacing import replace
 
-from tablegen.calibration.estimate import Estimate
-from tablegen.calibration.image_line import fit_line
-from tablegen.calibration.image_scale import Cell, Grating
-from tablegen.calibration.image_sizes import KnownSample, SampleImage, Taking, sizes_of
-from tablegen.calibration.least_squares import Solution, solve, with_errors
+from tablegen.base.input_errors import Unphysical
+from tablegen.calibration.laws.image_sizes import KnownSample, SampleImage, Taking, sizes_of
+from tablegen.fitting.estimate import Estimate
+from tablegen.fitting.least_squares import Solution, solve, with_errors
+from tablegen.images.fast_axis_line import fit_line
+from tablegen.images.line_length import Cell, Grating
 from tablegen.numerics.arrays import Floats
-from tablegen.problems import Unphysical
 
 pytestmark = pytest.mark.common
 

@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from image_writers import ascii_of, gwy, npy, png
 from PIL import Image as Pillow
 
-from tablegen.calibration.image_files import read_image
-from tablegen.calibration.image_formats.gwyddion import data_fields
+from tablegen.base.input_errors import Rejected
+from tablegen.images.files import read_image
+from tablegen.images.formats.gwyddion import data_fields
 from tablegen.numerics.arrays import Floats
-from tablegen.problems import Rejected
 
 HEIGHTS = np.random.default_rng(1).uniform(-5.0, 5.0, (40, 48))
 STEPS = np.round((HEIGHTS + 5.0) * 6000.0)  # what 16 bits hold

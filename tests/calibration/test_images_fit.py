@@ -7,11 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from replacing import replace
 
-from tablegen.calibration.estimate import Estimate
-from tablegen.calibration.image_fit import ImageFit, fit_pair
-from tablegen.calibration.images import Pair, fit_images
+from tablegen.base.input_errors import Unphysical
+from tablegen.calibration.laws.images import Pair, fit_images
+from tablegen.fitting.estimate import Estimate
+from tablegen.images.pair_fit import ImageFit, fit_pair
 from tablegen.numerics.arrays import Floats
-from tablegen.problems import Unphysical
 
 pytestmark = pytest.mark.common
 

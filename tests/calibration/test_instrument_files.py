@@ -16,14 +16,14 @@ from image_writers import gwy, npy
 from instrument_files import asd, ibw, jpk, spm, sxm
 from mutating import damaged
 
-from tablegen.calibration.image_files import ScanImage, channels_of, read_channels, read_image, read_pair
-from tablegen.calibration.image_formats.asd import asd_channels
-from tablegen.calibration.image_formats.channel import Channel, split_direction
-from tablegen.calibration.image_formats.igor import ibw_channels
-from tablegen.calibration.image_formats.jpk import jpk_channels
-from tablegen.calibration.image_formats.nanonis import sxm_channels
-from tablegen.calibration.image_formats.nanoscope import spm_channels
-from tablegen.problems import Rejected
+from tablegen.base.input_errors import Rejected
+from tablegen.images.files import ScanImage, channels_of, read_channels, read_image, read_pair
+from tablegen.images.formats.asd import asd_channels
+from tablegen.images.formats.channel import Channel, split_direction
+from tablegen.images.formats.igor import ibw_channels
+from tablegen.images.formats.jpk import jpk_channels
+from tablegen.images.formats.nanonis import sxm_channels
+from tablegen.images.formats.nanoscope import spm_channels
 
 T, R, P, Q = np.random.default_rng(1).uniform(-20.0, 20.0, (4, 40, 48))  # nm
 NOTE = {"ScanSize": "5e-07", "FastScanSize": "5e-07", "SlowScanSize": "2.5e-07", "ScanRate": "2.5", "ScanDown": "0"}

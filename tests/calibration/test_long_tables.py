@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tablegen.calibration import table
-from tablegen.calibration.columns import DRIVE, FREQUENCY, GAIN, TIME, Column
-from tablegen.calibration.csv_blocks import plain_rows
-from tablegen.problems import Rejected
+from tablegen.base.input_errors import Rejected
+from tablegen.calibration.tables import table
+from tablegen.calibration.tables.columns import DRIVE, FREQUENCY, GAIN, TIME, Column
+from tablegen.calibration.tables.csv_blocks import plain_rows
 
 ROWS = 60_000  # some blocks
 HEADER = "time_ms,comment,drive_v\n"

@@ -8,11 +8,11 @@ import pytest
 from foreign_plants import SIX, V_MAX, BoucWen, Core, ForeignPlant, ManyPlays, record
 from replacing import replace
 
-from tablegen.calibration.hysteresis import Trace
+from tablegen.base.input_errors import Unphysical
+from tablegen.calibration.laws.hysteresis import Trace
 from tablegen.calibration.operator.delay import fit_delay
 from tablegen.calibration.operator.periodic_line import PeriodicLine, periodic_line
 from tablegen.compensation.dynamics import SecondOrder
-from tablegen.problems import Unphysical
 
 
 class Modes:

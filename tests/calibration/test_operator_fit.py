@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from foreign_plants import SIX, TEN, BoucWen, ForeignPlant, JilesAtherton, ManyPlays, record, triangle
 
-from tablegen.calibration.hysteresis import Trace
-from tablegen.calibration.operator.errors import compare
+from tablegen.base.input_errors import Unphysical
+from tablegen.calibration.laws.hysteresis import Trace
 from tablegen.calibration.operator.fit import OperatorFit, fit_operator
+from tablegen.calibration.operator.loop_errors import compare
 from tablegen.calibration.operator.nonnegative import nonnegative
 from tablegen.calibration.operator.periodic_line import PeriodicLine, periodic_line
 from tablegen.compensation.operator.plays import envelopes
 from tablegen.numerics.arrays import Floats
-from tablegen.problems import Unphysical
 
 pytestmark = pytest.mark.common
 

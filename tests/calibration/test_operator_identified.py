@@ -9,13 +9,13 @@ from foreign_plants import SIX, V_MAX, Floats, ForeignPlant, ManyPlays, record, 
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from tablegen.calibration.columns import DISPLACEMENT, DRIVE, TIME, TRACE
-from tablegen.calibration.hysteresis import Trace
-from tablegen.calibration.operator.errors import compare
+from tablegen.calibration.laws.hysteresis import Trace
 from tablegen.calibration.operator.fit import OperatorFit, fit_operator
+from tablegen.calibration.operator.loop_errors import compare
 from tablegen.calibration.operator.periodic_line import PeriodicLine, periodic_line
-from tablegen.calibration.table import read_table
-from tablegen.calibration.traces import split_traces
+from tablegen.calibration.tables.columns import DISPLACEMENT, DRIVE, TIME, TRACE
+from tablegen.calibration.tables.table import read_table
+from tablegen.calibration.tables.traces import split_traces
 
 PLANT = ForeignPlant(ManyPlays())
 STROKES = (0.1, 0.35, 0.65, 0.95)

@@ -7,12 +7,12 @@ import pytest
 from foreign_plants import V_MAX, BoucWen, ForeignPlant, record
 from replacing import replace
 
-from tablegen.calibration.hysteresis import Trace
+from tablegen.base.input_errors import Unphysical
+from tablegen.calibration.laws.hysteresis import Trace
 from tablegen.calibration.operator import periodic_line as periodic_line_module
 from tablegen.calibration.operator.fit import fit_operator
 from tablegen.calibration.operator.periodic_line import periodic_line
 from tablegen.calibration.operator.units import check_size
-from tablegen.problems import Unphysical
 
 PLANT = ForeignPlant(BoucWen())
 GOOD = tuple(

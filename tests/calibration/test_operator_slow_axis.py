@@ -10,11 +10,11 @@ from editing import SCAN, SCANNER, edited
 from foreign_plants import BoucWen, ForeignPlant, ManyPlays, record
 from replacing import replace
 
-from tablegen.calibration.hysteresis import Trace
+from tablegen.calibration.laws.hysteresis import Trace
 from tablegen.calibration.operator.creep_fit import creep_of_fields
+from tablegen.calibration.operator.file_of_fit import operator_file
 from tablegen.calibration.operator.fit import OperatorFit, _creep_of, fit_operator
 from tablegen.calibration.operator.periodic_line import PeriodicLine, periodic_line
-from tablegen.calibration.operator.record import operator_file
 from tablegen.compensation.operator.creep import NO_CREEP, LogarithmicCreep
 from tablegen.compensation.operator.plays import NO_PLAYS
 from tablegen.config.load import load

@@ -29,10 +29,10 @@ from tablegen.manifest.fields import ManifestAxis, ManifestBranch
 from tablegen.manifest.read import read_build
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, Plan, make_plan
-from tablegen.verification.expectations import wrong_expectations
-from tablegen.verification.scaling import ModelBranch
+from tablegen.verification.checks.expectations import wrong_expectations
+from tablegen.verification.checks.scaling import ModelBranch
+from tablegen.virtual.calibration_day import calibrate
 from tablegen.virtual.closed_loop import SHARP, play_x, with_scan
-from tablegen.virtual.laboratory import calibrate
 from tablegen.virtual.parameters import load_truth
 from tablegen.virtual.scanner import VirtualScanner
 from tablegen.waveform.series import FourierSeries

@@ -7,10 +7,10 @@ import pytest
 from editing import SCAN, SCANNER, edited, write_pair
 from foreign_plants import SIX, BoucWen, ForeignPlant, ManyPlays, record, triangle
 
-from tablegen.calibration.hysteresis import Trace
+from tablegen.calibration.laws.hysteresis import Trace
+from tablegen.calibration.operator.file_of_fit import operator_file
 from tablegen.calibration.operator.fit import fit_operator
 from tablegen.calibration.operator.periodic_line import periodic_line
-from tablegen.calibration.operator.record import operator_file
 from tablegen.certificate.certificate import certify
 from tablegen.config.load import load
 from tablegen.numerics.arrays import Floats

@@ -8,13 +8,13 @@ import pytest
 from building import Variant, build, write_variant
 from replacing import replace
 
+from tablegen.base.input_errors import Document, Unphysical
 from tablegen.certificate.certificate import Certificate, broken_limits, certify
 from tablegen.certificate.line_errors import EmittedPeriod
 from tablegen.certificate.shaped_periods import Changes, passed
 from tablegen.certificate.summary import certificate_lines
 from tablegen.config.load import load
 from tablegen.planning.line_plan import Plan, make_plan
-from tablegen.problems import Document, Unphysical
 
 SMALL = {"x.size_nm": 20.0, "y.size_nm": 20.0, "timing.lines": 8}
 RESONANCE = {"frequency_hz": 1000.0, "quality": 10.0}

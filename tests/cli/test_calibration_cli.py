@@ -14,10 +14,10 @@ from building import REPOSITORY
 from calibrating import AMPLITUDES, CASES, DRIVES, FREQUENCIES, OFFSETS, RESPONSE, Scanner, actual, apparent, trials
 from editing import SCANNER, Outcome, run, write_pair
 
-from tablegen.calibration.estimate import Estimate
-from tablegen.cli.calibration_text import figures
+from tablegen.cli.calibrate.text import figures
 from tablegen.compensation.offset import OffsetLaw
 from tablegen.compensation.size import SizeLaw
+from tablegen.fitting.estimate import Estimate
 
 NOISE = 1.0 + 0.002 * np.random.default_rng(11).standard_normal(100)
 

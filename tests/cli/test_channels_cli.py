@@ -114,7 +114,7 @@ def test_a_damaged_file_and_a_missing_library(lab: Path, monkeypatch: pytest.Mon
     outcome = run("channels", "a.sxm", "b.sxm")
     assert (outcome.status, outcome.out) == (2, "")
     assert outcome.err.startswith("b.sxm: ends in the middle of its images (2 images of 128 x 96 pixels")
-    monkeypatch.setattr("tablegen.cli.common._installed", lambda module: module != "tifffile")
+    monkeypatch.setattr("tablegen.cli.shared.common._installed", lambda module: module != "tifffile")
     outcome = run("channels", "a.jpk")
     assert outcome.status == 6
     assert outcome.err == "tifffile is missing; install it with: pip install 'piezo-tablegen[images]'\n"

@@ -604,12 +604,12 @@ def test_an_interruption_while_writing_waits_for_the_last_file(scan: Path, event
 
 WAITING = """
 import signal, sys
-import tablegen.api.build
+import tablegen.certificate.certified_scan
 def wait(*_):
     print("planning", flush=True)
     while True:
         signal.pause()
-tablegen.api.build.make_plan = wait
+tablegen.certificate.certified_scan.make_plan = wait
 from tablegen.cli import main
 main()
 """

@@ -13,7 +13,7 @@ from editing import Outcome, run
 from image_writers import gwy
 from PIL import Image as Pillow
 
-from tablegen.calibration.image_files import read_channels
+from tablegen.images.files import read_channels
 from tablegen.numerics.arrays import Floats
 
 DRIVE = ("--scanner", "scanner.toml", "--size-v", "90", "--offset-v", "50", "--rate-hz", "100")

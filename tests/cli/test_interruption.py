@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from tablegen.interruption import deliver, held
+from tablegen.base.interruption import deliver, held
 
 
 @pytest.fixture

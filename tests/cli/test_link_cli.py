@@ -13,7 +13,7 @@ from editing import run
 from link_programs import INFO
 from replacing import replace
 
-from tablegen.cli.bar import Bar
+from tablegen.cli.shared.progress_bar import Bar
 from tablegen.link.frames import FrameReader
 from tablegen.link.messages import DeviceInfo, Feature, Reason, Request
 from tablegen.link.prepare import PreparedScan

@@ -7,9 +7,9 @@ import threading
 import pytest
 from limits import PATIENCE_S
 
-from tablegen.cli import progress as module
-from tablegen.cli.bar import Bar
-from tablegen.cli.progress import Progress
+from tablegen.cli.shared import progress as module
+from tablegen.cli.shared.progress import Progress
+from tablegen.cli.shared.progress_bar import Bar
 
 
 class Screen(io.StringIO):

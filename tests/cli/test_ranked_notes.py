@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from plotting_lab import write_csv
 from replacing import replace
 
-from tablegen.calibration.hysteresis import Trace, fit_hysteresis
-from tablegen.findings import Finding, Remark, as_printed, of_remarks, worst_first
+from tablegen.base.warnings import Finding, Remark, as_printed, of_remarks, worst_first
+from tablegen.calibration.laws.hysteresis import Trace, fit_hysteresis
 
 WEIGHTS = ("limit", "spoils", "expect", "note")
 FINDINGS = st.lists(

@@ -12,7 +12,7 @@ from editing import SCAN, edited, run, write_pair
 from gwyfile.objects import GwyContainer, GwyDataField
 from pseudo_terminal import on_pseudo_terminal
 
-from tablegen.cli.terminal import GuardedStream, erase, guard_streams, redraw, tell, visible
+from tablegen.cli.shared.terminal import GuardedStream, erase, guard_streams, redraw, tell, visible
 
 EVIL = "\x1b]0;owned\x07\x1b[31m\r\x9b2J\u202e\x7f"
 SHOWN = "\\u001b]0;owned\\u0007\\u001b[31m\\u000d\\u009b2J\\u202e\\u007f"

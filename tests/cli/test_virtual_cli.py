@@ -12,8 +12,8 @@ import pytest
 from editing import SCAN, SCANNER, edited, run, write_pair
 from operator_files import operator_file, write_operator_scan
 
-from tablegen.cli.exit_status import ExitStatus
-from tablegen.problems import Rejected
+from tablegen.base.input_errors import Rejected
+from tablegen.cli.shared.exit_status import ExitStatus
 from tablegen.virtual.parameters import load_truth
 
 TRUTH, DUHEM = (

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tablegen.base.input_errors import Unphysical
 from tablegen.compensation.dynamics import Measured, SecondOrder, capped_inverse
 from tablegen.compensation.response_file import read_response
-from tablegen.problems import Unphysical
 
 
 def test_second_order_with_delay_is_inverted() -> None:

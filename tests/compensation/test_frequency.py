@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tablegen.base.input_errors import Unphysical
 from tablegen.compensation.frequency import frequency_gain
-from tablegen.problems import Unphysical
 
 
 def test_three_percent_a_decade() -> None:

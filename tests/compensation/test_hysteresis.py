@@ -7,9 +7,9 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from tablegen.base.input_errors import Unphysical
 from tablegen.compensation.hysteresis import HIGHEST_PEAK, LOWEST_PEAK, BranchShape, beta_at
 from tablegen.compensation.line import LineShape
-from tablegen.problems import Unphysical
 
 betas = st.floats(1e-4, 0.12)
 peaks = st.floats(0.25, 0.85)

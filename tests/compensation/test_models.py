@@ -13,6 +13,7 @@ from building import HELPERS
 from editing import SCAN, SCANNER, edited, run
 
 import tablegen
+from tablegen.base.input_errors import Rejected, Unphysical
 from tablegen.compensation import models
 from tablegen.compensation.line import AppliedBranch, LineShape, Sweep, WholeLine
 from tablegen.compensation.models.harmonic import HarmonicModel
@@ -23,7 +24,6 @@ from tablegen.config.load import load
 from tablegen.manifest.read import read_build
 from tablegen.planning.line_plan import make_plan
 from tablegen.planning.refinement_layer import model_digest
-from tablegen.problems import Rejected, Unphysical
 from tablegen.virtual.simulation import models_of, with_model
 from tablegen.waveform.closed_form import fourier_series
 from tablegen.waveform.series import FourierSeries
@@ -73,13 +73,13 @@ def test_names_stand_with_the_models() -> None:
 
 # What says the equations once more does so on purpose; what is compared are operators, in files of their own.
 OTHER_NAMES = {
-    *("verification/scaling.py", "compensation/models/__init__.py"),
+    *("verification/checks/scaling.py", "compensation/models/__init__.py"),
     *("comparison/side.py", "comparison/operators.py"),
 }
 # Bouc-Wen's equation has a gamma of its own, which is none of (17).
 ANOTHER_GAMMA = {
     *("compensation/operator/bouc_wen.py", "compensation/operator/file.py"),
-    *("calibration/operator/bouc_wen_fit.py", "calibration/operator/record.py"),
+    *("calibration/operator/bouc_wen_fit.py", "calibration/operator/file_of_fit.py"),
 }
 
 
@@ -95,7 +95,7 @@ def test_names_and_parameters_of_models_stand_in_no_other_module() -> None:
                 if called in {"xi", "xi_gamma"} or (called == "gamma" and where not in ANOTHER_GAMMA):
                     parameters.add(where)
     assert names == OTHER_NAMES | {f"compensation/models/{name}.py" for name in models.names()}
-    assert parameters == {"compensation/hysteresis.py", "verification/scaling.py"}
+    assert parameters == {"compensation/hysteresis.py", "verification/checks/scaling.py"}
 
 
 def test_a_foreign_model_makes_a_line_that_is_straight_on_it(pair: Path) -> None:
@@ -232,3 +232,46 @@ def test_the_sweeps_of_a_waveform() -> None:
     error, speed = line.followed("forward", inside, series, line.value(0.5 * inside), line.slope(0.5 * inside))
     assert np.max(np.abs(error)) == 0.0
     assert np.max(np.abs(speed - 1.0)) == 0.0
+
+
+# What fails in the package of a model
+
+
+def broken(pair: Path, name: str, body: str) -> None:
+    """Another module of the package, whose model has one method that is as given."""
+    source = (HELPERS / "play_model.py").read_text("utf-8")
+    subclass = f'\n\nclass Broken(Play, frozen=True, tag="play"):\n    {body}\n'
+    (pair.parent / "packages" / f"{name}.py").write_text(source + subclass, "utf-8")
+    about = pair.parent / "packages" / "tablegen_play-1.0.dist-info"
+    (about / "entry_points.txt").write_text(f"[{models.GROUP}]\nplay = {name}:Broken\n", "utf-8")
+    models.get.cache_clear()
+
+
+@pytest.mark.parametrize(
+    ("body", "why"),
+    [
+        ("def line(self, wanted): return 1 / 0", "'play' of tablegen-play failed: ZeroDivisionError: division by zero"),
+        ("def line(self, wanted): raise SystemExit", "'play' of tablegen-play failed: SystemExit"),
+        ("def line(self, wanted): return 3", "'play' of tablegen-play: line() returned an object of type int"),
+        ("def line(self, wanted): return None", "'play' of tablegen-play: line() returned None, and no problem"),
+        ("def faults(self): return 1 / 0", "a plug-in of tablegen-play failed: ZeroDivisionError: division by zero"),
+        ("def files(self): raise SystemExit", "a plug-in of tablegen-play failed: SystemExit"),
+        ("def described(self, line): raise KeyError('x')", "a plug-in of tablegen-play failed: KeyError: 'x'"),
+    ],
+)
+def test_a_model_that_fails_is_told_with_its_package(pair: Path, body: str, why: str) -> None:
+    broken(pair, f"broken_{abs(hash(body))}", body)
+    outcome = run("build", pair / "scan.toml", "-o", pair / "out", explains=True)
+    assert outcome.status == 2, outcome.err
+    assert why in outcome.err
+    assert not (pair / "out").exists()
+
+
+@pytest.mark.parametrize("source", ["raise SystemExit(0)", "import sys; sys.exit('so long')"])
+def test_a_package_that_exits_as_it_is_loaded_is_told(pair: Path, source: str) -> None:
+    name = f"leaving_{abs(hash(source))}"
+    broken(pair, name, "")
+    (pair.parent / "packages" / f"{name}.py").write_text(source, "utf-8")
+    outcome = run("build", pair / "scan.toml", "-o", pair / "out")
+    assert outcome.status == 2
+    assert "x.hysteresis.model: 'play' of tablegen-play cannot be loaded: SystemExit: " in outcome.err

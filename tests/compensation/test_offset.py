@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tablegen.base.input_errors import Unphysical
 from tablegen.compensation.offset import OffsetLaw, normalised_offset
-from tablegen.problems import Unphysical
 
 laws = st.builds(OffsetLaw, st.floats(-0.3, 0.3), st.floats(-0.3, 0.3))
 

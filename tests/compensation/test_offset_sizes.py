@@ -10,8 +10,9 @@ from foreign_plants import ForeignPlant, ManyPlays, triangle
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tablegen.calibration.size import fit_size
-from tablegen.compensation.line import WantedLine
+from tablegen.base.input_errors import Rejected
+from tablegen.calibration.laws.size import fit_size
+from tablegen.compensation.line import LineRequest
 from tablegen.compensation.models.harmonic import HarmonicModel
 from tablegen.compensation.offset import OffsetLaw
 from tablegen.compensation.offset_sizes import OffsetSurface, law_of_sizes, surface_of
@@ -19,7 +20,6 @@ from tablegen.compensation.size import SizeLaw
 from tablegen.config.load import load
 from tablegen.planning.drive import Drive
 from tablegen.planning.line_plan import make_plan
-from tablegen.problems import Rejected
 
 ends = st.tuples(st.floats(0.8, 1.0), st.floats(1.0, 1.4))
 SIZES = "x.offset.sizes = [{ size_v = 40, m_minus = 0.9, m_plus = 1.3 }, { size_v = 10, m_minus = 0.94, m_plus = 1.2 }]"
@@ -73,9 +73,9 @@ def test_a_build_takes_m_at_its_size(tmp_path: Path) -> None:
 
 def test_models_see_m_of_small_scans(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The operator knows by itself how the sensitivity depends on the size: ``factor_at`` is that of the smallest."""
-    seen: list[WantedLine] = []
+    seen: list[LineRequest] = []
     line = HarmonicModel.line
-    monkeypatch.setattr(HarmonicModel, "line", lambda self, wanted: seen.append(wanted) or line(self, wanted))
+    monkeypatch.setattr(HarmonicModel, "line", lambda self, *asked: seen.append(asked[0]) or line(self, *asked))
     drive = drive_of(tmp_path, *WITHOUT, SIZES)
     assert seen[0].factor_at(0.6) == OffsetLaw.from_ends(0.94, 1.2).factor(2.0 * 60.0 / 100.0 - 1.0) != drive.m
     assert seen[0].v_amplitude == pytest.approx(drive.v_amplitude, rel=1e-12)

@@ -12,12 +12,12 @@ from msgspec.structs import replace as replace_table
 from operator_files import operator_file
 from replacing import replace
 
+from tablegen.base.input_errors import Rejected
 from tablegen.compensation.operator.bouc_wen import POWER_BITS, BoucWen
 from tablegen.compensation.operator.family import Family
 from tablegen.compensation.operator.file import BoucWenTable, operator_text, read_operator
 from tablegen.compensation.operator.plays import NO_PLAYS, Plays, bent
 from tablegen.numerics.arrays import Floats
-from tablegen.problems import Rejected
 
 N = 83 / 64
 LOOP = {"depth_nm": 500.0, "n": N, "beta": 4.0, "gamma": -1.5, "asymmetry": 0.25, "bend": [0.0, 0.0]}

@@ -13,10 +13,10 @@ from replacing import replace
 from stepped_plants import Followed, bouc_wen_played, followed, plays_played
 from test_operator_waveform import THRESHOLDS, WEIGHTS, operator
 
-from tablegen.calibration.hysteresis import Trace
+from tablegen.calibration.laws.hysteresis import Trace
+from tablegen.calibration.operator.file_of_fit import operator_file
 from tablegen.calibration.operator.fit import OperatorFit, fit_operator
 from tablegen.calibration.operator.periodic_line import periodic_line
-from tablegen.calibration.operator.record import operator_file
 from tablegen.compensation.operator.creep import LogarithmicCreep
 from tablegen.compensation.operator.operator import Operator
 from tablegen.compensation.operator.plays import FIXED_BENDS, envelopes

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from replacing import replace
 
+from tablegen.base.input_errors import Unphysical
 from tablegen.compensation.dynamics import SecondOrder
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.compensation.line import LineShape
@@ -14,7 +15,6 @@ from tablegen.compensation.operator.operator import Operator
 from tablegen.compensation.operator.plays import FIXED_BENDS, Plays, envelopes
 from tablegen.compensation.operator.scan_line import Wanted, find_waveform
 from tablegen.numerics.arrays import Floats
-from tablegen.problems import Unphysical
 from tablegen.waveform.series import FourierSeries
 from tablegen.waveform.window_fit import fit_window
 

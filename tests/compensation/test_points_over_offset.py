@@ -8,12 +8,12 @@ from editing import SCAN, SCANNER, edited, write_pair
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tablegen.base.input_errors import Rejected, Unphysical
 from tablegen.compensation.branch import Branch, ResidualLaw
 from tablegen.compensation.points import OFFSET_REACH, HysteresisPoint
 from tablegen.config.load import load
 from tablegen.planning.drive import Drive
 from tablegen.planning.line_plan import make_plan
-from tablegen.problems import Rejected, Unphysical
 
 V_MAX = 100.0
 SETS = {30.0: ((20.0, 0.02, 0.4), (50.0, 0.05, 0.5)), 60.0: ((20.0, 0.04, 0.45), (50.0, 0.06, 0.55))}

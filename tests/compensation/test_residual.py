@@ -8,12 +8,12 @@ from editing import SCAN, SCANNER, edited, write_pair
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tablegen.base.input_errors import Rejected, Unphysical
 from tablegen.compensation.branch import Branch, ResidualLaw
 from tablegen.compensation.hysteresis import beta_at
 from tablegen.compensation.points import SIZE_REACH, HysteresisPoint
 from tablegen.config.load import load
 from tablegen.planning.line_plan import make_plan
-from tablegen.problems import Rejected, Unphysical
 
 V_MAX = 120.0
 rows = st.lists(

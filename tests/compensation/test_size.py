@@ -4,8 +4,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from tablegen.base.input_errors import Unphysical
 from tablegen.compensation.size import SizeLaw
-from tablegen.problems import Unphysical
 
 laws = st.builds(
     SizeLaw.calibrated,

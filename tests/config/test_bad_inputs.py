@@ -12,9 +12,9 @@ from editing import SCAN, SCANNER, edited, run, write_pair
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tablegen.base.input_errors import Rejected
 from tablegen.config.load import load
 from tablegen.planning.line_plan import make_plan
-from tablegen.problems import Rejected
 
 REMOVED_RESONANCE = ("- x.resonance.frequency_hz", "- x.resonance.quality", "- x.resonance.delay_s")
 

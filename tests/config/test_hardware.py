@@ -12,12 +12,12 @@ from editing import EXAMPLES, run
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tablegen.base.input_errors import Rejected
 from tablegen.certificate.certificate import certify
 from tablegen.config.hardware import AxisAmplifier, AxisDac, Place
 from tablegen.config.load import Setup, from_values, load, load_scanner
 from tablegen.emit.render import render
 from tablegen.planning.line_plan import make_plan
-from tablegen.problems import Rejected
 
 SCAN, SCANNER = EXAMPLES / "annexin_200nm.toml", EXAMPLES / "scanner.toml"
 DAC = {"bits": 16, "v_min": -5.0, "v_max": 5.0, "update_rate_hz": 500e3}

@@ -13,8 +13,8 @@ import pytest
 from building import run
 from sets import by_tool
 
+from tablegen.base.resources import c_link, c_runtime, verilog_runtime
 from tablegen.config.names import of_the_runtime, why_not_a_name
-from tablegen.resources import c_link, c_runtime, verilog_runtime
 
 C = """
 auto break case char const continue default do double else enum extern float for goto if inline int long register

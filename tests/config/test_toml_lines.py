@@ -16,8 +16,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tablegen.problems import Rejected
-from tablegen.toml import read_toml
+from tablegen.base.input_errors import Rejected
+from tablegen.base.toml import read_toml
 
 Path_ = tuple[str | int, ...]
 

@@ -12,11 +12,11 @@ from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 import tablegen
+from tablegen.base.input_errors import Problems
+from tablegen.base.toml import parse_toml
 from tablegen.config.load import from_values
 from tablegen.device.schedule import Schedule
 from tablegen.planning.timing import make_schedule
-from tablegen.problems import Problems
-from tablegen.toml import parse_toml
 
 K = 20.0  # nm/V, of a piezo whose size is proportional to its voltage
 BETA, U_PEAK = 0.06, 0.45  # of the hysteresis, at every size

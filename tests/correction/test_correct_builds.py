@@ -7,10 +7,10 @@ import pytest
 from correcting import LATTICE, LAWS, Off, axes, off, save_pair
 from editing import SCAN, edited, run
 
+from tablegen.base.input_errors import Unphysical
 from tablegen.config.load import load
 from tablegen.correction.job import Choice, OldScan, by_scan_file, read_scan
 from tablegen.planning.line_plan import make_plan
-from tablegen.problems import Unphysical
 from tablegen.virtual.imaging import Conditions, FrameImages, running_frame
 
 EDITS = ("x.size_nm = 700", "y.size_nm = 700", "timing.pixels = 96", "timing.lines = 100", "timing.line_rate_hz = 100")

@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tablegen.base.input_errors import Unphysical
 from tablegen.correction.agreement import agreement, difference
 from tablegen.correction.distortion import Distortion, Resampler, Sweep1D
 from tablegen.correction.residual_lattice import residual_lattice
 from tablegen.numerics.arrays import Floats
-from tablegen.problems import Unphysical
 from tablegen.virtual.imaging import grating, hexagonal
 
 ROWS, COLUMNS = 48, 64

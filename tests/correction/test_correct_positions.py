@@ -8,10 +8,10 @@ from correcting import LATTICE, LAWS, OFFSET_V, PLANTS, RATE_HZ, V, off, old_fra
 from replacing import replace
 from sets import common
 
+from tablegen.base.input_errors import Unphysical
 from tablegen.correction.distortion import Resampler
 from tablegen.correction.job import Choice, Images, OldAxis, OldScan, by_fit, by_scanner, read_scan
 from tablegen.correction.straight import StraightScan
-from tablegen.problems import Unphysical
 from tablegen.virtual.imaging import FrameImages, grating
 
 REACH_PERCENT = 0.3

@@ -14,8 +14,8 @@ from tablegen.device.played_lines import LineTicks
 from tablegen.device.sequencer import Sequencer
 from tablegen.device.slew import guarded
 from tablegen.numerics.arrays import Ints
-from tablegen.verification.bench import SequencerShape
-from tablegen.verification.stream import Script, StoredState
+from tablegen.verification.play.sequencer_shape import SequencerShape
+from tablegen.verification.play.stream import Script, StoredState
 
 KINDS: tuple[Kind, ...] = ("tame", "wild", "smooth", "held")
 SHAPES = [SequencerShape(16, 1, 4, 16, 1, 3, 16), SequencerShape(8, 0, 8, 12, 1, 3, 16)]

@@ -12,9 +12,9 @@ from correcting import Off, axes
 from correcting import off as off_the_truth
 from editing import run
 
-from tablegen.calibration.image_files import read_channels
-from tablegen.cli.correct import correct
+from tablegen.cli.images.correct import correct
 from tablegen.correction.job import Choice, OldAxis, OldScan, by_fit, by_scanner, read_scan
+from tablegen.images.files import read_channels
 from tablegen.virtual.imaging import Conditions, FrameImages, hexagonal, triangle_frame
 
 PAGE = (REPOSITORY / "docs" / "correct.md").read_text("utf-8")
@@ -85,9 +85,8 @@ def test_the_example_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     part = section("An example to run")
     code, in_python = re.findall(r"```python\n(.*?)```", part, re.DOTALL)
     exec(compile(code, "docs/correct.md", "exec"), {})
-    (tmp_path / "old.toml").write_text(
-        'name = "old"\nv_max = 100.0\n[x.size]\nk_nm_per_v = 12.0\n[y.size]\nk_nm_per_v = 12.0\n'
-    )
+    (old,) = re.findall(r"<!-- file: old.toml -->\n```toml\n(.*?)```", part, re.DOTALL)
+    (tmp_path / "old.toml").write_text(old, "utf-8")
     commands = re.findall(r"^\$ tablegen (.*)$", part, re.MULTILINE)
     assert len(commands) == 4
     for command in commands:

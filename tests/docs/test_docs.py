@@ -11,13 +11,13 @@ from click.testing import CliRunner
 from editing import SCAN, edited, run, write_pair
 from scaling import SECTION_8, worst
 
+from tablegen.base.input_errors import Rejected
 from tablegen.certificate.certificate import certify
 from tablegen.cli import cli
 from tablegen.config.load import load
 from tablegen.config.schema import BandLimit
 from tablegen.planning.band_limit import band_limited
 from tablegen.planning.line_plan import make_plan
-from tablegen.problems import Rejected
 
 README = (REPOSITORY / "README.md").read_text(encoding="utf-8")
 BUILDING = (REPOSITORY / "docs" / "building.md").read_text(encoding="utf-8")

@@ -10,7 +10,7 @@ from variants import plan_of
 
 from tablegen.certificate.certificate import certify
 from tablegen.certificate.optimum import least_acceleration
-from tablegen.waveform.gentle_fit import Straightness, gentlest, least_percent
+from tablegen.waveform.minimum_acceleration import Straightness, gentlest, least_percent
 from tablegen.waveform.window_fit import fit_window
 
 PAGE = (REPOSITORY / "docs" / "waveform.md").read_text("utf-8")

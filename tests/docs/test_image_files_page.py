@@ -13,9 +13,9 @@ from calibrating import Scanner, grating
 from editing import run, write_pair
 from instrument_files import asd, ibw, sxm
 
-from tablegen.calibration.image_files import _READERS, MODULES
-from tablegen.calibration.image_formats import channel, igor, nanonis, nanoscope
-from tablegen.calibration.image_formats.tiff import _MAX_TAGS
+from tablegen.images.files import _READERS, MODULES
+from tablegen.images.formats import channel, igor, nanonis, nanoscope
+from tablegen.images.formats.tiff import _MAX_TAGS
 
 PAGE = (REPOSITORY / "docs" / "image_files.md").read_text("utf-8")
 WORDS = " ".join(PAGE.split())

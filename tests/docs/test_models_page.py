@@ -5,7 +5,7 @@ import re
 import msgspec.inspect as types
 from building import HELPERS, REPOSITORY
 
-from tablegen.cli.calibrate import calibrate
+from tablegen.cli.calibrate.group import calibrate
 from tablegen.compensation import models
 from tablegen.compensation.model import Hysteresis
 

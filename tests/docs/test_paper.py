@@ -2,28 +2,24 @@
 
 import re
 import struct
-import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import make_paper
 import numpy as np
 import pytest
 from building import REPOSITORY
 from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.image import imread
+from paper import figure_3, figure_5_growth, figure_5_laws, figure_6, laws, measured, page
+from paper.rows import Printed, Row, Source, about, between, exact, exactly, faults, limits
 from replacing import replace
 
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.compensation.size import SizeLaw
 from tablegen.numerics.arrays import Floats
-
-sys.path.append(str(REPOSITORY / "docs"))
-
-import make_paper
-from paper import figure_3, figure_5_growth, figure_5_laws, figure_6, laws, measured, page
-from paper.rows import Printed, Row, Source, about, between, exact, exactly, faults, limits
 
 pytestmark = pytest.mark.common
 

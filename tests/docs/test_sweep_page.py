@@ -9,7 +9,7 @@ import pytest
 from building import REPOSITORY, run_clean
 from editing import SCAN, SCANNER, edited, run
 
-from tablegen.cli.exit_status import ExitStatus
+from tablegen.cli.shared.exit_status import ExitStatus
 from tablegen.config.settings import parse_setting
 from tablegen.config.variants import variants
 

@@ -7,7 +7,7 @@ from building import REPOSITORY
 from click.testing import CliRunner
 
 from tablegen.cli import cli
-from tablegen.cli.exit_status import ExitStatus
+from tablegen.cli.shared.exit_status import ExitStatus
 
 PAGE = (REPOSITORY / "docs" / "troubleshooting.md").read_text("utf-8")
 SOURCES = {path: path.read_text("utf-8") for path in sorted((REPOSITORY / "tablegen").rglob("*.py"))}

@@ -11,9 +11,9 @@ from editing import SCAN, SCANNER, edited, run, write_pair
 from installing import python
 
 from tablegen.api import build as module
+from tablegen.base.resources import resource_folder
 from tablegen.config.schema import DEFAULT_FORMATS
-from tablegen.emit.depfile import deciding_files, depfile
-from tablegen.resources import resource_folder
+from tablegen.emit.depfile import deciding_files, depfile, why_unsafe
 
 # What a file may have in its name and make can take.
 NAMES = [
@@ -28,6 +28,17 @@ NAMES = [
     "a:b",
     "d/a~b",
     "ä,b",
+    "a!(b){c}@d+e]f",
+    "$(x) b",
+    "-b",
+    ".b",
+    "(b",
+    "export x",
+]
+# What none can have: what make would run or take for a pattern or an assignment, and what Ninja cannot read.
+UNSAFE = [
+    *(f"a{character}b" for character in "\"%&'*;<=>?[^`|\n\t\r\v\x01\x7f"),
+    *("a\\#b", "a\\$b", "a\\:b", "a\\", "a:", "a ", "a(b)", "~b", ".PHONY", ".SILENT", ".c", ".c.o"),
 ]
 # Builds a scan, and prints what of the file system and of the package it has read.
 WATCHED = """
@@ -80,11 +91,12 @@ def makes(folder: Path, target: str, prerequisite: str) -> bool:
     return "made" in done.stdout
 
 
-@pytest.mark.parametrize("name", [*NAMES, "a'b\"c"])  # Ninja knows no escape for quotes
+@pytest.mark.parametrize("name", NAMES)
 def test_make_reads_every_name_as_it_is(tmp_path: Path, name: str) -> None:
     """A target is made again when its prerequisite is newer, and when that is gone, and at no other time."""
     (tmp_path / "d").mkdir()
-    for target, prerequisite in (("out", name), (name, "in")):
+    assert why_unsafe(name) is None
+    for target, prerequisite in (("out", name), *([] if name.startswith(".") else [(name, "in")])):
         file = tmp_path / prerequisite
         file.touch()
         assert [makes(tmp_path, target, prerequisite) for _ in range(2)] == [True, False]
@@ -108,6 +120,18 @@ def test_ninja_reads_every_name_as_it_is(tmp_path: Path) -> None:
     listed = run_tool(["ninja", "-t", "deps", "out"], tmp_path).stdout.splitlines()
     assert [line.removeprefix("    ") for line in listed[1:] if line] == NAMES
     assert "no work to do" in run_tool(["ninja"], tmp_path).stdout
+
+
+@pytest.mark.parametrize("name", UNSAFE)
+def test_a_name_that_make_or_ninja_reads_otherwise_is_unsafe(name: str) -> None:
+    assert why_unsafe(name) is not None
+
+
+def test_make_would_run_what_stands_in_an_unsafe_name(tmp_path: Path) -> None:
+    """The negative control: of a name with a semicolon, the rest is a recipe."""
+    (tmp_path / "Makefile").write_bytes(depfile("out", [Path("a;echo>run;b")]).split(b"\n\n")[0] + b"\na:\n")
+    run_tool(["make"], tmp_path, {**os.environ, "MAKEFLAGS": ""})
+    assert (tmp_path / "run").exists()
 
 
 # What stands in it
@@ -189,7 +213,6 @@ def test_what_builds_do_not_read_is_not_named() -> None:
         "__pycache__",
     }
     assert not others & folders
-    assert "read.py" not in {path.name for path in deciding_files(DEFAULT_FORMATS) if path.parent.name == "manifest"}
     assert resource_folder("firmware_templates") / "c" / "tables.h.j2" in deciding_files(DEFAULT_FORMATS)
 
 
@@ -278,17 +301,42 @@ def test_a_file_that_is_no_depfile_is_kept(scan: Path) -> None:
     assert not (scan.parent / "out").exists()
 
 
-@pytest.mark.parametrize("blank", ["\n", "\t"])
-def test_a_path_that_no_depfile_can_name_is_refused_before_anything_is_written(tmp_path: Path, blank: str) -> None:
-    (tmp_path / f"a{blank}b").mkdir()
-    scan = write_pair(tmp_path / f"a{blank}b")
+@pytest.mark.parametrize("name", ["a\nb", "a\tb", "R&D"])
+def test_a_path_that_no_depfile_can_name_is_refused_before_anything_is_written(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).mkdir()
+    scan = write_pair(tmp_path / name)
     outcome = run("build", scan, "-o", tmp_path / "out", "--depfile", tmp_path / "build.d")
     assert outcome.status == 2
-    assert outcome.messages == [
-        f"{str(scan)!r}: a dependency file cannot contain a path with a line end or a tab; rename it"
-    ]
-    assert sorted(path.name for path in tmp_path.iterdir()) == [f"a{blank}b"]
+    why = f"has {name[1]!r}, which make or Ninja does not take for a part of a name; rename it"
+    assert f"{str(scan)!r}: {why}" in outcome.messages
+    assert sorted(path.name for path in tmp_path.iterdir()) == [name]
     assert run("build", scan, "-o", tmp_path / "out").status == 0
+
+
+@pytest.mark.parametrize("key", ["scanner", "x.resonance.response"])
+def test_an_unsafe_name_is_refused_at_the_line_that_has_it(tmp_path: Path, key: str) -> None:
+    name = "a;touch run;b"
+    scan = write_pair(tmp_path)
+    scanner = tmp_path / "scanner.toml"
+    if key == "scanner":
+        scanner.rename(tmp_path / name)
+        scan.write_text(edited(SCAN, f"scanner = '{name}'"), "utf-8")
+    else:
+        (tmp_path / name).write_text("hz,gain,phase_deg\n1,1,0\n40e3,1.2,-5\n90e3,1.1,-90\n", "ascii")
+        scanner.write_text(edited(SCANNER, "- [x.resonance]", f"+ [x.resonance]\nresponse = '{name}'"), "utf-8")
+    document = scan if key == "scanner" else scanner
+    lines = document.read_text("utf-8").splitlines()
+    line = next(number for number, text in enumerate(lines, 1) if name in text)
+    outcome = run("build", scan, "-o", tmp_path / "out", "--depfile", tmp_path / "build.d")
+    why = "has ';', which make or Ninja does not take for a part of a name; rename it"
+    assert (outcome.status, outcome.messages) == (2, [f"{document}:{line}: {key}: {str(tmp_path / name)!r} {why}"])
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_unsafe_target_is_refused(scan: Path) -> None:
+    outcome = run("build", scan, "-o", scan.parent / "out", "--depfile", scan.parent / "d", "--depfile-target", "a=b")
+    assert outcome.status == 2
+    assert outcome.messages == ["'a=b': has '=', which make or Ninja does not take for a part of a name; rename it"]
 
 
 @pytest.mark.parametrize(

@@ -136,13 +136,35 @@ def test_a_damaged_manifest_lists_nothing(built: Path, content: str) -> None:
     assert (built / "a.h").exists()
 
 
+@pytest.mark.parametrize("kind", ["of another program", "claims a hash", "edited", "lists what no build has"])
+def test_a_foreign_manifest_removes_nothing(built: Path, kind: str) -> None:
+    """Only what a manifest of ours says, whose hash is that of its plan, and of it only names that a build can have."""
+    for name in ("main.c", f"{NAME}_mine.h"):
+        (built / name).write_text("mine\n", "ascii")
+    digest = sha256(b"mine\n").hexdigest()
+    own = json.loads((built / "manifest.json").read_bytes())
+    files = {"main.c": digest} if kind == "lists what no build has" else {"main.c": digest, f"{NAME}_mine.h": digest}
+    manifest: dict[str, Any] = {"name": "a page of the web", "files": files}
+    if kind == "claims a hash":
+        manifest |= {"tablegen": own["tablegen"], "hash": own["hash"], "axes": {}}
+    elif kind == "edited":
+        manifest = own | {"files": own["files"] | files}
+        manifest["axes"]["x"]["table"]["words"][3] += 1
+    elif kind == "lists what no build has":
+        manifest = own | {"files": own["files"] | files}
+    (built / "manifest.json").write_text(json.dumps(manifest), "ascii")
+    assert run("build", built.parent / "scan.toml", "-o", built, "-q").status == 0
+    assert (built / "main.c").exists()
+    assert (built / f"{NAME}_mine.h").exists()
+
+
 def test_a_link_is_removed_and_not_what_it_leads_to(built: Path) -> None:
     content = b"precious\n"
     (built.parent / "precious.h").write_bytes(content)
-    (built / "old.h").symlink_to(built.parent / "precious.h")
-    edit_manifest(built, **{"old.h": sha256(content).hexdigest()})
+    (built / f"{NAME}_old.h").symlink_to(built.parent / "precious.h")
+    edit_manifest(built, **{f"{NAME}_old.h": sha256(content).hexdigest()})
     assert run("build", built.parent / "scan.toml", "-o", built).status == 0
-    assert not (built / "old.h").is_symlink()
+    assert not (built / f"{NAME}_old.h").is_symlink()
     assert (built.parent / "precious.h").read_bytes() == content
 
 
@@ -150,8 +172,8 @@ def test_the_input_is_never_removed(tmp_path: Path) -> None:
     """A manifest of somebody else lists the scan and its scanner, with their digests, beside a file of its own."""
     scan = write_pair(tmp_path)
     assert run("build", scan, "-o", tmp_path, "-q").status == 0
-    (tmp_path / "old.mem").write_text("00", "ascii")
-    names = (scan.name, "scanner.toml", "old.mem")
+    (tmp_path / "annexin_200nm_old.mem").write_text("00", "ascii")
+    names = (scan.name, "scanner.toml", "annexin_200nm_old.mem")
     edit_manifest(tmp_path, **{name: sha256((tmp_path / name).read_bytes()).hexdigest() for name in names})
     assert run("build", scan, "-o", tmp_path, "-q").status == 0
     assert [(tmp_path / name).exists() for name in names] == [True, True, False]

@@ -9,9 +9,9 @@ import pytest
 from editing import EXAMPLES
 
 import tablegen
+from tablegen.base.resources import resource_folder
 from tablegen.emit import template_cache, templates
 from tablegen.emit.template_cache import TemplateCache
-from tablegen.resources import resource_folder
 
 EXAMPLE = EXAMPLES / "annexin_200nm.toml"
 SHOUT = compile("def root(context, *_):\n    yield 'not ours'\nblocks = {}\ndebug_info = ''\nname = 'c'", "x", "exec")

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from limits import PATIENCE_S
 
-from tablegen.emit import directory_lock
-from tablegen.emit.directory_lock import locked
+from tablegen.base import directory_lock
+from tablegen.base.directory_lock import locked
 from tablegen.emit.write import CannotWrite, NoPlace, write_files
 
 FILES = {"a.h": b"one", "a.c": b"two", "manifest.json": b"three"}

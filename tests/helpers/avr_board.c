@@ -1,9 +1,10 @@
-/* An Arduino in simavr with a converter MCP4922 on SPI: mega|uno FIRMWARE END, where END is the end of its static memory.
+/* An Arduino in simavr with a converter MCP4922 on SPI: mega|uno FIRMWARE END, where END is the end of its static
+ * memory.
  *
  * Commands are lines "CYCLES BYTES"; so many cycles are played, in which the bytes (hexadecimal, or "-") arrive at UART
  * 0 at 115200 baud. The answer is "SENT WORDS LOST FREE": what the UART sent; what both channels put out each time that
- * LDAC fell, 8 digits; how many bytes waited longer than the UART can hold two more; the fewest bytes that the stack left
- * free. */
+ * LDAC fell, 8 digits; how many bytes waited longer than the UART can hold two more; the fewest bytes that the stack
+ * left free. */
 #include <simavr/avr_ioport.h>
 #include <simavr/avr_uart.h>
 #include <simavr/sim_avr.h>

@@ -5,6 +5,7 @@ variants keep the example's name, so that one player in C and one in Verilog ser
 """
 
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -15,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from listed_tools import BASE, PROGRAMS, programs_of, why_missing
 from replacing import replace
 
 from tablegen.certificate.certificate import Certificate, certify
@@ -31,23 +33,6 @@ HELPERS = REPOSITORY / "tests" / "helpers"
 BENCHES = REPOSITORY / "hdl_tests" / "benches"
 EXAMPLE = REPOSITORY / "examples" / "annexin_200nm.toml"
 NAME = "annexin_200nm"
-# Debian's packages of tools that are not called as these are.
-PACKAGES = {
-    "arm-none-eabi-gcc": "gcc-arm-none-eabi",
-    "arm-none-eabi-g++": "gcc-arm-none-eabi",
-    "avr-gcc": "gcc-avr",
-    "avr-g++": "gcc-avr",
-    "clang++": "clang",
-    "gcov": "gcc",
-    "mips-linux-gnu-gcc": "gcc-mips-linux-gnu",
-    "ninja": "ninja-build",
-    "node": "nodejs",
-    "srec_cat": "srecord",
-    "nm": "binutils",
-    "qemu-mips": "qemu-user",
-    "vvp": "iverilog",
-    "yosys-smtbmc": "yosys",
-}
 REMOVED = object()  # as a value: the key is taken out
 
 Changes = Mapping[str, object]
@@ -307,10 +292,11 @@ def fourier_words(axis: Mapping[str, Any]) -> list[int]:
 
 
 def tool(name: str) -> str:
-    """The path of a tool; one that is not installed fails the test by its name, with what installs it."""
-    found = shutil.which(name)
-    assert found is not None, f"{name} is not installed; `.ci/system-packages {PACKAGES.get(name, name)}` installs it"
-    return found
+    """The path of a tool; one that is not installed, or not listed, fails the test by its name with the remedy."""
+    path = shutil.which(name)
+    assert path is not None, why_missing(name)
+    assert os.sep in name or name in BASE | programs_of(PROGRAMS), f"{name} is of no package of listed_tools.PROGRAMS"
+    return path
 
 
 def run(

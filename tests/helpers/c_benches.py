@@ -11,10 +11,10 @@ from kept_objects import objects
 from limits import PATIENCE_S
 from stream_laws import steps_are_limited
 
-from tablegen.resources import c_runtime
-from tablegen.verification.bench import SequencerShape
-from tablegen.verification.c_bench import CUBIC, OWN_SOURCES, CBench, CPlayed, defines, macros, script_words, sine_of
-from tablegen.verification.stream import Script, compare
+from tablegen.base.resources import c_runtime
+from tablegen.verification.c.bench import CUBIC, OWN_SOURCES, CBench, CPlayed, defines, macros, script_words, sine_of
+from tablegen.verification.play.sequencer_shape import SequencerShape
+from tablegen.verification.play.stream import Script, compare
 
 SANITIZED = ("-std=c99", "-O1", "-g", "-fsanitize=undefined,address", "-fno-sanitize-recover=all")
 COMPILERS = ("gcc", "clang")

@@ -15,7 +15,7 @@ from tablegen.device.schedule import Window as Lines
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.phase import RationalPhase
 from tablegen.fixedpoint.program import Program
-from tablegen.verification.bench import SequencerShape
+from tablegen.verification.play.sequencer_shape import SequencerShape
 
 SHAPE = SequencerShape(16, 1, 4, 16, 1, 3, 16)
 

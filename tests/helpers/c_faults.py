@@ -6,7 +6,7 @@ from pathlib import Path
 
 import mutants
 
-from tablegen.resources import c_runtime
+from tablegen.base.resources import c_runtime
 
 
 @dataclass(frozen=True)

@@ -1,14 +1,14 @@
 /* The memory order of the sequencer as ThreadSanitizer sees it.
  *
- * The words that two threads share are volatile, and the compiler tells of each access to one by a call (`distinguish-volatile`).
- * The fences, DAC_RELEASE() and DAC_ACQUIRE(), are calls to this file. From both it tells the sanitizer what the fences of C11
- * would order, and no more: an access to a bank or a table that is ordered by no pair of fences is reported as a race, also where
- * this processor would have kept the order by itself.
+ * The words that two threads share are volatile, and the compiler tells of each access to one by a call
+ * (`distinguish-volatile`). The fences, DAC_RELEASE() and DAC_ACQUIRE(), are calls to this file. From both it tells the
+ * sanitizer what the fences of C11 would order, and no more: an access to a bank or a table that is ordered by no pair
+ * of fences is reported as a race, also where this processor would have kept the order by itself.
  *
  * Requests in the queue are checked as well, though they are volatile: fence_check() names them.
  *
- * A release makes a token. A thread that writes a shared word puts its latest token on it; a thread that reads the word and then
- * acquires has what came before that token. This file is compiled without the sanitizer.
+ * A release makes a token. A thread that writes a shared word puts its latest token on it; a thread that reads the word
+ * and then acquires has what came before that token. This file is compiled without the sanitizer.
  */
 #include <stdint.h>
 

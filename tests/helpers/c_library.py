@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from building import run_clean
 
+from tablegen.base.resources import c_runtime
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.sequencer import Fault, Sequencer, Tick
 from tablegen.fixedpoint.output import Output
@@ -17,8 +18,7 @@ from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.spline import WORDS_BEHIND
 from tablegen.link.messages import CUBIC
 from tablegen.numerics.arrays import Ints
-from tablegen.resources import c_runtime
-from tablegen.verification.stream import FLAGS
+from tablegen.verification.play.stream import FLAGS
 
 HERE = Path(__file__).parent
 PROBE = HERE / "c_probe.c"

@@ -32,12 +32,12 @@ from kept_objects import objects
 from limits import ENDED, limit, program_within
 from mutants import Verdict
 
-from tablegen.resources import c_runtime
-from tablegen.verification.bench import SequencerShape
-from tablegen.verification.c_bench import OWN_SOURCES, CPlayed, defines, macros
-from tablegen.verification.c_play import run
+from tablegen.base.resources import c_runtime
+from tablegen.verification.c.bench import OWN_SOURCES, CPlayed, defines, macros
+from tablegen.verification.c.play import run
 from tablegen.verification.failures import SimulationFailed
-from tablegen.verification.stream import Script, compare
+from tablegen.verification.play.sequencer_shape import SequencerShape
+from tablegen.verification.play.stream import Script, compare
 
 HERE = Path(__file__).parent
 OPTIONS = ("-std=c99", "-O1", "-DDAC_WAIT=0")  # as many runs as can be

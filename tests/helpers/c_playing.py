@@ -12,7 +12,7 @@ from replacing import replace
 
 from tablegen.device.schedule import Window as Lines
 from tablegen.fixedpoint.synthesis import sine_periods, synthesize
-from tablegen.verification.bench import SequencerShape
+from tablegen.verification.play.sequencer_shape import SequencerShape
 
 CODINGS = [
     (16, 16, "twos-complement", "right"), (12, 16, "offset-binary", "left"), (12, 16, "twos-complement", "left"),

@@ -1,4 +1,5 @@
-/* What the tests cannot reach of the C sequencer from outside: sizes, many steps in one call, positions and runs of an axis. */
+/* What the tests cannot reach of the C sequencer from outside: sizes, many steps in one call, positions and runs of an
+ * axis. */
 #include "dac_axis.h"
 
 size_t probe_size(unsigned which)

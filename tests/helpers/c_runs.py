@@ -16,7 +16,7 @@ from tablegen.device.schedule import Window as Lines
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.phase import RationalPhase
 from tablegen.fixedpoint.program import Program
-from tablegen.verification.bench import SequencerShape
+from tablegen.verification.play.sequencer_shape import SequencerShape
 
 WHOLE = 1 << 96  # of a position
 RUN_TICKS = 256

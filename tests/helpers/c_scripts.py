@@ -20,8 +20,8 @@ from tablegen.fixedpoint.phase import RationalPhase
 from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.shaping import MAXIMUM_ZERO, Shaping
 from tablegen.numerics.arrays import Ints
-from tablegen.verification.bench import SequencerShape
-from tablegen.verification.stream import Script
+from tablegen.verification.play.sequencer_shape import SequencerShape
+from tablegen.verification.play.stream import Script
 
 LEAST_INDEX_BITS = 3  # of an interpolated table in C; the Verilog has tables of 4 words as well
 

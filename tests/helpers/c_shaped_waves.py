@@ -6,8 +6,8 @@ from replacing import replace
 from stream_scripts import play
 
 from tablegen.fixedpoint.shaping import MAXIMUM_ZERO, Shaping
-from tablegen.verification.bench import SequencerShape
-from tablegen.verification.stream import Script
+from tablegen.verification.play.sequencer_shape import SequencerShape
+from tablegen.verification.play.stream import Script
 
 WAVES = {
     "bits_12": SequencerShape(12, 1, 8, 16, 1, 8, 16),

@@ -1,9 +1,9 @@
 /* A producer and a consumer on two threads: every line that is played has to be of one program.
  *
- * Program n plays the code n and nothing else, on both axes, in lines of a length of its own; its tables are written anew for each
- * load, into the set of tables that dac_sequencer_idle() names. The producer loads, commits, withdraws, arms, triggers and
- * parks at random; the consumer steps and fills at random. Arguments: programs, seed. Exit status 1 if a line was mixed. Printed
- * are swaps, lines, withdrawals that came in time, and such that came late.
+ * Program n plays the code n and nothing else, on both axes, in lines of a length of its own; its tables are written
+ * anew for each load, into the set of tables that dac_sequencer_idle() names. The producer loads, commits, withdraws,
+ * arms, triggers and parks at random; the consumer steps and fills at random. Arguments: programs, seed. Exit status 1
+ * if a line was mixed. Printed are swaps, lines, withdrawals that came in time, and such that came late.
  */
 #include <pthread.h>
 #include <stdio.h>
@@ -34,8 +34,8 @@ static unsigned dice(unsigned *state, unsigned sides)
 /* The words of program n are n, and of unit gain: 16-bit words map to 16-bit codes around the middle. */
 static dac_axis_program axis(dac_word *table, unsigned n, uint32_t period)
 {
-    const dac_axis_program p = {table, LENGTH, DAC_TABLE_STORAGE_BITS, 16, 3, period, 1, 1 << 16, (int64_t)32768 << 20, 20, 0, 65535, 0, 65535, 16, 16,
-                                false, false};
+    const dac_axis_program p = {table, LENGTH, DAC_TABLE_STORAGE_BITS, 16, 3, period, 1, 1 << 16,
+                                (int64_t)32768 << 20, 20, 0, 65535, 0, 65535, 16, 16, false, false};
     for (unsigned i = 0; i <= LENGTH; i++)
         table[i] = (dac_word)((int)n - 32768);
     return p;
@@ -69,7 +69,8 @@ static void request(bool (*what)(dac_sequencer *))
 }
 
 /* Until it has stopped: a line that is started again on the next tick would look as if it were cut off. Orders nothing
- * under ThreadSanitizer; otherwise the calls are counted from where the request has left the processor's store buffer. */
+ * under ThreadSanitizer; otherwise the calls are counted from where the request has left the processor's store buffer.
+ */
 static void stop(bool (*how)(dac_sequencer *))
 {
     request(how);

@@ -8,7 +8,7 @@ from subprocess import CompletedProcess, run
 from building import run_clean
 from limits import within
 
-from tablegen.resources import c_runtime
+from tablegen.base.resources import c_runtime
 
 _PLAY_S = 300  # of CPU time; it takes five
 HERE = Path(__file__).parent

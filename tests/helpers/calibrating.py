@@ -11,15 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from tablegen.calibration.estimate import Estimate
-from tablegen.calibration.frequency import fit_frequency
-from tablegen.calibration.hysteresis import HysteresisFit, Trace, fit_hysteresis
-from tablegen.calibration.image_scale import Cell, Grating
-from tablegen.calibration.image_sizes import ImageSizes, KnownSample, SampleImage, Taking, sizes_of
-from tablegen.calibration.images import Pair, fit_images
-from tablegen.calibration.offset import fit_offset
-from tablegen.calibration.resonance import fit_resonance
-from tablegen.calibration.size import fit_size
+from tablegen.calibration.laws.frequency import fit_frequency
+from tablegen.calibration.laws.hysteresis import HysteresisFit, Trace, fit_hysteresis
+from tablegen.calibration.laws.image_sizes import ImageSizes, KnownSample, SampleImage, Taking, sizes_of
+from tablegen.calibration.laws.images import Pair, fit_images
+from tablegen.calibration.laws.offset import fit_offset
+from tablegen.calibration.laws.resonance import fit_resonance
+from tablegen.calibration.laws.size import fit_size
+from tablegen.fitting.estimate import Estimate
+from tablegen.images.line_length import Cell, Grating
 from tablegen.numerics.arrays import Floats
 
 NOISE = 0.002  # rms, of the issue

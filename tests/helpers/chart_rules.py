@@ -5,10 +5,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from unittest.mock import patch
 
-from tablegen.cli.text_plot import mark_of, text_plot
-from tablegen.report import drawing, svg
-from tablegen.report.chart import Chart, DrawnCurve
-from tablegen.report.looks import look_of, spot_of
+from tablegen.charts import drawing, svg
+from tablegen.charts.chart import Chart, DrawnCurve
+from tablegen.charts.style import look_of, spot_of
+from tablegen.charts.text import mark_of, text_plot
 
 WITH_UNIT = re.compile(r"\S.* \[[^\[\]]+\]$")
 DIRECTIONS = ("forward", "backward")

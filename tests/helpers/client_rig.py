@@ -21,7 +21,7 @@ from replacing import replace
 from tablegen.link.device import Device
 from tablegen.link.frames import Frame, FrameReader
 from tablegen.link.messages import AxisLimits, AxisShape, DeviceInfo, Feature, Request
-from tablegen.link.model import ModelDevice
+from tablegen.link.model_device import ModelDevice
 from tablegen.link.players import LinePlayer
 from tablegen.link.prepare import LEFT_ALIGNED, TWOS_COMPLEMENT, PreparedScan
 

@@ -10,10 +10,10 @@ from calibrating import branch, grown, inverse
 from foreign_plants import SIX, BoucWen, ForeignPlant, ManyPlays, record
 from scipy.ndimage import map_coordinates
 
-from tablegen.calibration.hysteresis import Trace
+from tablegen.calibration.laws.hysteresis import Trace
+from tablegen.calibration.operator.file_of_fit import operator_file
 from tablegen.calibration.operator.fit import OperatorFit, fit_operator
 from tablegen.calibration.operator.periodic_line import periodic_line
-from tablegen.calibration.operator.record import operator_file
 from tablegen.compensation.dynamics import SecondOrder
 from tablegen.correction.distortion import Distortion
 from tablegen.numerics.arrays import Floats

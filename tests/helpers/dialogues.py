@@ -6,9 +6,9 @@ from typing import Any, Protocol
 
 from tablegen.device.dual_program import DualProgram
 from tablegen.link.frames import FrameReader
-from tablegen.link.image import take_apart
 from tablegen.link.messages import DeviceInfo
 from tablegen.link.model_bank import program_of
+from tablegen.link.program_image import take_apart
 
 GOLDEN: dict[str, Any] = json.loads(Path(__file__).with_name("golden_dialogues.json").read_text("utf-8"))
 START_TICKS = 200

@@ -5,9 +5,10 @@ import re
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NoReturn
 from unittest.mock import patch
 
-from tablegen.cli import _run
+from tablegen.cli import _run, _unexpected
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 SCAN = (EXAMPLES / "annexin_200nm.toml").read_text(encoding="utf-8")
@@ -72,12 +73,23 @@ class Outcome:
         return self.err.splitlines()
 
 
-def run(*arguments: str | Path) -> Outcome:
-    """Run the command line in this process; an exception that it does not handle is the test's."""
+def run(*arguments: str | Path, explains: bool = False) -> Outcome:
+    """Run the command line in this process; an exception that no command expects is the test's, unless it ``explains``.
+
+    With ``explains`` the handler at the top turns it into a message and a status, as it does for users.
+    """
     out, err = _stream(), _stream()
-    with patch.multiple(sys, stdout=out, stderr=err, argv=["tablegen", *map(str, arguments)]):
+    handler = _unexpected if explains else _raised
+    with (
+        patch.multiple(sys, stdout=out, stderr=err, argv=["tablegen", *map(str, arguments)]),
+        patch("tablegen.cli._unexpected", handler),
+    ):
         status = _run()
     return Outcome(status, *(stream.buffer.getvalue().decode("utf-8") for stream in (out, err)))
+
+
+def _raised(error: BaseException) -> NoReturn:
+    raise error
 
 
 class _Stream(io.TextIOWrapper):

@@ -13,7 +13,7 @@ import unicorn
 from numpy.random import Generator
 from unicorn import arm_const
 
-from tablegen.verification.elf import read_executable
+from tablegen.verification.c.elf import read_executable
 
 _FLASH_SIZE = _RAM_SIZE = 1 << 22
 _RAM, _DEVICES, _PRIVATE = 0x20000000, 0x40000000, 0xE000E000

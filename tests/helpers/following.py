@@ -9,7 +9,7 @@ from tablegen.device.dual_program import DualProgram
 from tablegen.device.sequencer import Sequencer, Tick
 from tablegen.fixedpoint.program import Program
 from tablegen.planning.line_plan import Plan
-from tablegen.verification.stream import FLAGS
+from tablegen.verification.play.stream import FLAGS
 
 
 class Differs(AssertionError):

@@ -16,7 +16,7 @@ from tablegen.device.dual_program import DualProgram
 from tablegen.device.played_lines import LineTicks, play_line
 from tablegen.device.sequencer import Sequencer, Tick
 from tablegen.numerics.arrays import Ints
-from tablegen.verification.stream import FLAGS
+from tablegen.verification.play.stream import FLAGS
 
 _BIT = {name: 1 << bit for bit, name in enumerate(FLAGS)}
 _RECORD = np.dtype([("x", "<u4"), ("y", "<u4"), ("markers", "u1")])

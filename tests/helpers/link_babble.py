@@ -7,7 +7,7 @@ from types import TracebackType
 
 from limits import PATIENCE_S
 
-from tablegen.link.model import ModelDevice
+from tablegen.link.model_device import ModelDevice
 
 NOISE = bytes(Random(1).randrange(256) for _ in range(4096))
 TEXT = b"adc: 2048 counts, no frame among them " * 100  # without a 0x00, as a console writes

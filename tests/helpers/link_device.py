@@ -20,12 +20,12 @@ from building import REPOSITORY
 from c_library import OPTIONS, Converter, Library, compile_library, converter_of
 from link_talk import IDENTITY, Talk, derived_nonce
 
+from tablegen.base.resources import c_link, c_runtime
 from tablegen.device.dual_program import DualProgram
 from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.synthesis import sine_periods
-from tablegen.link.image import make_image
 from tablegen.link.messages import AxisLimits
-from tablegen.resources import c_link, c_runtime
+from tablegen.link.program_image import make_image
 
 HERE = Path(__file__).parent
 LINES = REPOSITORY / "examples" / "firmware" / "cortex_m"

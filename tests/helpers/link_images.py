@@ -10,10 +10,10 @@ from replacing import replace
 
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS, SCAN_WORDS
-from tablegen.link.image import PROGRAM_BYTES, ProgramImage, make_image
 from tablegen.link.messages import AxisLimits
+from tablegen.link.program_image import PROGRAM_BYTES, ProgramImage, make_image
 from tablegen.numerics.arrays import Ints
-from tablegen.verification.bench import SequencerShape
+from tablegen.verification.play.sequencer_shape import SequencerShape
 
 SCAN_PLACES = [SCAN_WORDS.index(name) for name in SCAN_WORDS]
 AXIS_PLACES = [

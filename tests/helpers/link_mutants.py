@@ -18,7 +18,7 @@ from c_library import PROBE
 from limits import ENDED, limit
 from link_device import HERE, LINES
 
-from tablegen.resources import c_link, c_runtime
+from tablegen.base.resources import c_link, c_runtime
 
 TRY_S = 120  # of CPU time; what does not hang takes ten
 _FORK = get_context("fork")  # nothing is imported again

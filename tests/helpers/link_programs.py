@@ -13,8 +13,8 @@ from tablegen.fixedpoint.output import UNIT_GAIN_BITS, Output
 from tablegen.fixedpoint.phase import RationalPhase
 from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.synthesis import FourierWords, synthesize
-from tablegen.link.image import ProgramImage, make_image
 from tablegen.link.messages import AxisLimits, AxisShape, DeviceInfo, Feature
+from tablegen.link.program_image import ProgramImage, make_image
 
 BITS = 16  # of words and codes
 UPDATE_RATE_HZ = 20000

@@ -13,7 +13,6 @@ from programs import random_dual
 
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS
 from tablegen.link.frames import Frame, FrameReader
-from tablegen.link.image import ProgramImage
 from tablegen.link.messages import (
     SPLINE_DEGREE,
     VERSION,
@@ -23,9 +22,10 @@ from tablegen.link.messages import (
     Refusal,
     Request,
 )
-from tablegen.link.model import ModelDevice
+from tablegen.link.model_device import ModelDevice
 from tablegen.link.players import SequencerPlayer
-from tablegen.verification.bench import SequencerShape
+from tablegen.link.program_image import ProgramImage
+from tablegen.verification.play.sequencer_shape import SequencerShape
 
 HARMONICS = 4
 KEY = bytes(range(32))

@@ -10,8 +10,8 @@ from limits import ENDED, within
 from link_device import HERE, LINES, HostDevice
 from link_random import KEY, Dialogue
 
-from tablegen.resources import c_link, c_runtime
-from tablegen.verification.bench import SequencerShape
+from tablegen.base.resources import c_link, c_runtime
+from tablegen.verification.play.sequencer_shape import SequencerShape
 
 _REPLAY_S = 240  # of CPU time; in an emulator it takes ten
 STEPS = 200

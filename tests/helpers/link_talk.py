@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from tablegen.link.frames import Frame, FrameReader
-from tablegen.link.image import ProgramImage
 from tablegen.link.messages import ANSWER, REFUSAL, VERSION, Refusal, Request
-from tablegen.link.model import tag
+from tablegen.link.model_device import tag
+from tablegen.link.program_image import ProgramImage
 
 SESSION = 0x1BADCAFE
 

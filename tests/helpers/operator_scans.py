@@ -6,10 +6,10 @@ import numpy as np
 from editing import SCAN, SCANNER, edited, write_pair
 from foreign_plants import SIX, V_MAX, Floats, ForeignPlant, record
 
-from tablegen.calibration.hysteresis import Trace
+from tablegen.calibration.laws.hysteresis import Trace
+from tablegen.calibration.operator.file_of_fit import operator_file
 from tablegen.calibration.operator.fit import OperatorFit, fit_operator
 from tablegen.calibration.operator.periodic_line import periodic_line
-from tablegen.calibration.operator.record import operator_file
 from tablegen.config.load import Setup, load
 from tablegen.virtual.experiments import sensor_trace
 from tablegen.virtual.scanner import VirtualAxis

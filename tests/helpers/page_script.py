@@ -68,11 +68,14 @@ def _dialogue(text: str) -> list[Shown]:
     return found
 
 
-def run_page(page: Path, folder: Path) -> list[str]:
-    """Run a page in a folder beside the examples; what differs from the page, a line each."""
+def run_page(page: Path, folder: Path, before: str = "") -> list[str]:
+    """Run a page in a folder beside the examples, after the commands ``before`` it; what differs from it, a line each.
+
+    They make what a reader of the page has already: the files of ``tablegen init``, a build.
+    """
     (folder / "examples").symlink_to(REPOSITORY / "examples")
     script = script_of(page.read_text("utf-8"))
-    text, outputs = ["set -e\n"], []
+    text, outputs = [f"set -e\n{before}\n"], []
     for number, step in enumerate(script.steps):
         if isinstance(step, str):
             text.append(f"{step}\n")

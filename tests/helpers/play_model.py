@@ -7,11 +7,12 @@ from typing import Annotated, ClassVar
 import numpy as np
 from msgspec import Meta
 
-from tablegen.compensation.line import WantedLine, WholeLine
+from tablegen.base.input_errors import Unphysical
+from tablegen.base.quantities import FileName
+from tablegen.base.reading import RESPONSE, read_text
+from tablegen.compensation.line import LineRequest, WholeLine
 from tablegen.compensation.model import Hysteresis
-from tablegen.problems import Unphysical
-from tablegen.quantities import FileName
-from tablegen.reading import RESPONSE, read_text
+from tablegen.compensation.model_problems import ModelProblems
 from tablegen.waveform.series import FourierSeries
 from tablegen.waveform.window_fit import fit_window
 
@@ -57,15 +58,15 @@ class Play(Hysteresis, frozen=True, tag="play"):
     def files(self):
         return (self.operator,)
 
-    def line(self, wanted: WantedLine):
-        with wanted.at("operator"):
+    def line(self, request: LineRequest, problems: ModelProblems):
+        with problems.at("operator"):
             try:
-                play = float(json.loads(read_text(wanted.folder / self.operator, RESPONSE))["play"])
+                play = float(json.loads(read_text(request.folder / self.operator, RESPONSE))["play"])
             except (OSError, ValueError, KeyError) as error:
                 raise Unphysical(f"{self.operator} cannot be read: {error!r}") from None
             straight = FourierSeries(0.5, np.zeros(1), np.zeros(1))
-            series = fit_window(Learning(wanted.turn, 0.0, straight), wanted.harmonics, wanted.window, wanted.both)
+            series = fit_window(Learning(request.turn, 0.0, straight), request.harmonics, request.window, request.both)
             for _ in range(ROUNDS):
-                learning = Learning(wanted.turn, play, series)
-                series = fit_window(learning, wanted.harmonics, wanted.window, wanted.both)
-            return PlayLine.of(series, wanted.turn, play=play)
+                learning = Learning(request.turn, play, series)
+                series = fit_window(learning, request.harmonics, request.window, request.both)
+            return PlayLine.of(series, request.turn, play=play)

@@ -19,8 +19,8 @@ from tablegen.refinement.departure import Departure, departure
 from tablegen.refinement.displacement import Displacement
 from tablegen.refinement.image_round import refine_images, refine_mismatch
 from tablegen.refinement.round import Options, Round, refine
+from tablegen.virtual.calibration_day import calibrate
 from tablegen.virtual.imaging import Conditions, Surface, grating, hexagonal, rough, running_frame
-from tablegen.virtual.laboratory import calibrate
 from tablegen.virtual.parameters import load_truth
 from tablegen.virtual.running import running_trace
 from tablegen.virtual.scanner import VirtualAxis, VirtualScanner

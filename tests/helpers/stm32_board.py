@@ -11,7 +11,7 @@ from typing import Any
 import unicorn
 from unicorn import arm_const
 
-from tablegen.verification.elf import read_executable
+from tablegen.verification.c.elf import read_executable
 
 CYCLES = 1.5  # of the processor, an instruction, with the wait states of its flash
 _CORE_HZ, _TIMER_HZ, _UART_HZ = 168_000_000, 84_000_000, 42_000_000

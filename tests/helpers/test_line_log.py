@@ -14,7 +14,7 @@ from tablegen.device.dual_program import DualProgram
 from tablegen.device.sequencer import Tick
 from tablegen.link.messages import DeviceState
 from tablegen.link.players import LinePlayer, SequencerPlayer
-from tablegen.verification.stream import FLAGS
+from tablegen.verification.play.stream import FLAGS
 
 _PROGRAMS = {scan.digest: scan.program for scan in (make_scan(seed, ticks=40, lines=5) for seed in range(1, 6))}
 _BOOT = make_scan(0, ticks=40, lines=5).program

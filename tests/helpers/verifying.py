@@ -162,9 +162,12 @@ def command(*arguments: str | Path, **environment: str) -> subprocess.CompletedP
 
 def command_without(packages: Sequence[str], *arguments: str | Path) -> subprocess.CompletedProcess[str]:
     """The same where these packages are not installed."""
-    missing = dict.fromkeys(packages)
-    code = f"import sys; sys.modules.update({missing}); from tablegen.cli import main; main()"
-    return _command(["-c", code], arguments, {})
+    return command_after(f"import sys; sys.modules.update({dict.fromkeys(packages)})", *arguments)
+
+
+def command_after(statements: str, *arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    """The same in a process that has run some Python before."""
+    return _command(["-c", f"{statements}; from tablegen.cli import main; main()"], arguments, {})
 
 
 def _command(

@@ -15,7 +15,7 @@ from tablegen.link.device import Device
 from tablegen.link.errors import LinkError, LinkLost, OutOfTime
 from tablegen.link.frames import FrameReader
 from tablegen.link.messages import ANSWER, REFUSAL, Request, Upload
-from tablegen.link.model import ModelDevice
+from tablegen.link.model_device import ModelDevice
 from tablegen.link.outcome import UploadState, out_of_time
 from tablegen.link.upload import Uploader
 

@@ -15,13 +15,13 @@ from link_faults import KINDS, MIXED, Chances
 from link_line import Line
 from link_programs import INFO, SmallScan, make_scan
 
+from tablegen.base.resources import c_link, c_runtime
 from tablegen.link.device import Device
 from tablegen.link.errors import LinkError, Refused
 from tablegen.link.exchange import Exchange
 from tablegen.link.messages import Request
-from tablegen.link.model import ModelDevice
+from tablegen.link.model_device import ModelDevice
 from tablegen.link.players import LinePlayer
-from tablegen.resources import c_link, c_runtime
 
 pytestmark = pytest.mark.common
 

@@ -11,11 +11,11 @@ from link_programs import INFO, make_scan
 from tablegen.link import acceptance, model_bank
 from tablegen.link.acceptance import Finding
 from tablegen.link.frames import Frame, FrameReader
-from tablegen.link.image import ProgramImage
 from tablegen.link.messages import DeviceInfo, DeviceStatus, Reason, Refusal, Request, Upload
-from tablegen.link.model import ModelDevice
 from tablegen.link.model_bank import Bank
+from tablegen.link.model_device import ModelDevice
 from tablegen.link.players import LinePlayer, SequencerPlayer
+from tablegen.link.program_image import ProgramImage
 
 Players = type[LinePlayer] | type[SequencerPlayer]
 

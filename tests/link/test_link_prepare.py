@@ -10,12 +10,12 @@ from replacing import replace
 
 from tablegen.config.load import load
 from tablegen.link.acceptance import first_objection
-from tablegen.link.difference import differences
 from tablegen.link.errors import Unsuitable
-from tablegen.link.image import make_image, take_apart
 from tablegen.link.messages import AxisLimits, AxisShape, DeviceInfo, Feature, Reason
 from tablegen.link.prepare import LEFT_ALIGNED, TWOS_COMPLEMENT, PreparedScan, check, harmonics_of
-from tablegen.link.reasons import explain, refused
+from tablegen.link.program_image import make_image, take_apart
+from tablegen.link.refusal_reasons import explain, refused
+from tablegen.link.word_difference import differences
 from tablegen.manifest.read import NotABuild
 from tablegen.planning.line_plan import make_plan
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from tablegen import reading
-from tablegen.reading import Kind, file_sha256, holds, other_than_file, read_bytes, read_text, size_shown
+from tablegen.base import reading
+from tablegen.base.reading import Kind, file_sha256, holds, other_than_file, read_bytes, read_text, size_shown
 
 SMALL = Kind("a small file", 3000)
 

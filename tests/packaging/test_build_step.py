@@ -15,12 +15,13 @@ from pathlib import Path
 
 import pytest
 from building import EXAMPLE, NAME, REPOSITORY, run
+from building import tool as find_tool
 from editing import SCANNER, edited
 from installing import write_command
 from sets import common
 
 from tablegen import __version__
-from tablegen.resources import c_link, c_runtime
+from tablegen.base.resources import c_link, c_runtime
 
 pytestmark = pytest.mark.common
 
@@ -95,7 +96,7 @@ class Project:
     def configure(self, *arguments: str) -> subprocess.CompletedProcess[str]:
         """Let CMake write the makefiles."""
         if self.tool == "Ninja":
-            assert shutil.which("ninja"), "ninja is not installed; `.ci/system-packages ninja-build` installs it"
+            find_tool("ninja")
         return self.call("cmake", "-G", self.tool, "-S", ".", "-B", "build", *arguments)
 
     def build(self, *arguments: str) -> Made:

@@ -11,7 +11,7 @@ import pytest
 from building import REPOSITORY
 
 from tablegen import __version__
-from tablegen.installation import PROJECT, install_advice
+from tablegen.base.installation import PROJECT, install_advice
 
 METADATA = tomllib.loads((REPOSITORY / "pyproject.toml").read_text("utf-8"))["project"]
 COMMAND = "tablegen.cli:main"
@@ -36,7 +36,7 @@ def distribution(folder: Path, name: str, version: str = __version__, command: s
 
 def advice(*folders: Path) -> str:
     """What an interpreter without any installed package advises, from the source tree and folders of packages."""
-    code = "from tablegen.installation import install_advice; print(install_advice('calibrate'))"
+    code = "from tablegen.base.installation import install_advice; print(install_advice('calibrate'))"
     path = os.pathsep.join(map(str, (*folders, REPOSITORY)))
     done = subprocess.run(
         [sys.executable, "-S", "-P", "-c", code],
@@ -75,7 +75,7 @@ def test_a_source_tree_that_is_not_installed_has_advice() -> None:
 
 def test_no_other_place_spells_the_advice() -> None:
     spelt = {name for name, text in read("tablegen/**/*").items() if re.search(r"pip3? install", text)}
-    assert spelt == {"tablegen/installation.py"}
+    assert spelt == {"tablegen/base/installation.py"}
 
 
 def test_extras_that_are_asked_for_exist() -> None:
@@ -113,9 +113,8 @@ def test_extras_of_extras_are_of_this_distribution() -> None:
 
 
 def test_what_answers_at_once_loads_no_metadata() -> None:
-    code = (
-        "import sys, tablegen.cli, tablegen.link.device, tablegen.resources; print('importlib.metadata' in sys.modules)"
-    )
+    code = "import sys, tablegen.cli, tablegen.link.device, tablegen.base.resources"
+    code += "\nprint('importlib.metadata' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "False\n"
 
 

@@ -9,7 +9,7 @@ from editing import run
 from installing import python
 
 from tablegen import __version__
-from tablegen.resources import c_runtime, verilog_runtime
+from tablegen.base.resources import c_runtime, verilog_runtime
 
 OPTIONS = ("make", "cmake", "runtime-c", "runtime-verilog")
 HOLDS = {

@@ -10,7 +10,7 @@ from manifest_integers import played_codes
 
 from tablegen.certificate.certificate import certify
 from tablegen.certificate.summary import summary
-from tablegen.verification.placement import Placement
+from tablegen.verification.play.placement import Placement
 
 CUBIC = {
     "x.table": {"mode": "cubic", "length": 128, "bits": 14},

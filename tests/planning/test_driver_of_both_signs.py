@@ -16,12 +16,12 @@ from editing import EXAMPLES, run
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tablegen.base.input_errors import Rejected, Unphysical
 from tablegen.compensation.offset import OffsetLaw
 from tablegen.config.load import Setup, from_values, load
 from tablegen.correction.settled_scan import AxisScan, ScannerModel, triangle
-from tablegen.driver import Driver
+from tablegen.numerics.driver import Driver
 from tablegen.planning.line_plan import make_plan
-from tablegen.problems import Rejected, Unphysical
 from tablegen.report.subject import PlannedScan
 from tablegen.report.usable import largest_sizes
 from tablegen.virtual.parameters import load_truth

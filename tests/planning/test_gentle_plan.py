@@ -10,6 +10,7 @@ from operator_files import operator_file, write_operator_scan
 from variants import plan_of, setup_of
 from verifying import edit_manifest, make_right
 
+from tablegen.base.input_errors import Rejected
 from tablegen.certificate.certificate import certify
 from tablegen.certificate.line_errors import CHORD
 from tablegen.certificate.optimum import with_optimum
@@ -17,7 +18,6 @@ from tablegen.config.load import load
 from tablegen.manifest.read import read_build
 from tablegen.planning import allowed_error
 from tablegen.planning.line_plan import LinePlan, Plan, make_plan
-from tablegen.problems import Rejected
 
 E = "x.band_limit.max_scaling_error_percent"
 H = "x.band_limit.harmonics"

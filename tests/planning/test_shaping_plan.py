@@ -9,12 +9,12 @@ from building import Variant, write_variant
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tablegen.base.input_errors import Rejected
 from tablegen.compensation.dynamics import Measured, SecondOrder
 from tablegen.config.load import load
 from tablegen.fixedpoint.shaping import OFF, Shaping
 from tablegen.planning.line_plan import Plan, make_plan
 from tablegen.planning.shaping_choice import best_shaping
-from tablegen.problems import Rejected
 
 RESONANCE = {"frequency_hz": 1000.0, "quality": 10.0}
 FULL = {"x.size.k_nm_per_v": 10.0}

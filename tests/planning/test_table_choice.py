@@ -9,6 +9,7 @@ from editing import SCAN, edited, write_pair
 from replacing import replace
 from variants import plan_of, setup_of
 
+from tablegen.base.input_errors import Rejected
 from tablegen.certificate.certificate import certify
 from tablegen.certificate.line_errors import EmittedPeriod
 from tablegen.config.load import load
@@ -23,7 +24,6 @@ from tablegen.planning.emitted_error import AskedCodes
 from tablegen.planning.line_plan import LinePlan, Plan, make_plan
 from tablegen.planning.other_table import maker_of, shape_of, with_table
 from tablegen.planning.table_search import TableSearch
-from tablegen.problems import Rejected
 
 AUTO = {"x.table.mode": '"auto"', "x.table.length": "", "x.table.bits": ""}
 FEW = {"x.band_limit.harmonics": "3", "limits.max_scaling_error_percent": ""}

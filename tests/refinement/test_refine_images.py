@@ -20,8 +20,8 @@ from refining import (
 )
 from replacing import replace
 
+from tablegen.base.input_errors import Unphysical
 from tablegen.config.load import Setup
-from tablegen.problems import Unphysical
 from tablegen.refinement.departure import Departure
 from tablegen.refinement.image_round import refine_images, refine_mismatch
 from tablegen.refinement.lattice_line import ImageOptions
@@ -148,11 +148,21 @@ def test_a_mismatch_is_not_compared_with_a_line(setup: Setup, lattice: Pair) -> 
     assert "the residual grew" in refine_mismatch(tiny, "x", [lattice], Options()).worse
     assert refine_images(tiny, "x", [lattice], Options()).worse == ""
 
+    layer = {"before_scaling_percent": 1e-4, "previous_a": [1e-4], "previous_b": [0.0]}
+    for before_of, refining in (("mismatch", refine_mismatch), (None, refine_images)):
+        better = replace(first.setup, scan=_with_before(first.setup, 100.0, before_of=before_of, **layer))
+        found = refining(better, "x", [lattice], Options())
+        assert "the scaling error rose from 0.0001 % to" in found.stopped
+        assert found.best is not None
+        assert (found.best.a, found.best.best, found.best.before_of) == ([1e-4], True, before_of)
+        other = refine_images if refining is refine_mismatch else refine_mismatch
+        assert other(better, "x", [lattice], Options()).stopped == "", "they are not compared with each other"
 
-def _with_before(setup: Setup, percent: float) -> object:
+
+def _with_before(setup: Setup, percent: float, **values: object) -> object:
     import msgspec
 
-    layer = msgspec.structs.replace(setup.scan.x.refinement, before_percent=percent)
+    layer = msgspec.structs.replace(setup.scan.x.refinement, before_percent=percent, **values)
     return msgspec.structs.replace(setup.scan, x=msgspec.structs.replace(setup.scan.x, refinement=layer))
 
 

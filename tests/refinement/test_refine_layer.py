@@ -9,6 +9,7 @@ from editing import SCAN, SCANNER, edited, run, write_pair
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tablegen.base.input_errors import Rejected
 from tablegen.certificate.certificate import certify
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.compensation.line import LineShape
@@ -21,7 +22,6 @@ from tablegen.manifest.read import read_build
 from tablegen.planning.band_limit import band_limited
 from tablegen.planning.line_plan import Plan, make_plan
 from tablegen.planning.refinement_layer import model_digest
-from tablegen.problems import Rejected
 from tablegen.virtual.played import intended, played
 from tablegen.waveform.series import FourierSeries
 

@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from refining import scan_text
 from replacing import replace
 
+from tablegen.base.input_errors import Unphysical
 from tablegen.compensation.dynamics import SecondOrder
 from tablegen.config.load import load
 from tablegen.planning.band_limit import band_limited
 from tablegen.planning.line_plan import LinePlan, make_plan
-from tablegen.problems import Unphysical
 from tablegen.refinement.bound import MAX_ERROR_LEFT, bound, left_of_error, plausible_ratios
 from tablegen.refinement.displacement import Displacement
 from tablegen.refinement.learning import learn

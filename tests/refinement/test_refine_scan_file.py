@@ -9,7 +9,7 @@ from editing import SCAN
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tablegen.problems import Rejected
+from tablegen.base.input_errors import Rejected
 from tablegen.refinement.scan_file import with_layer
 
 VALUES: dict[str, Any] = {

@@ -10,9 +10,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from refining import scan_text
 
+from tablegen.base.input_errors import Unphysical
 from tablegen.config.load import load
 from tablegen.planning.line_plan import LinePlan, make_plan
-from tablegen.problems import Unphysical
 from tablegen.refinement import phase
 from tablegen.refinement.displacement import fit_displacement
 from tablegen.refinement.phase import phase_by_drive, phase_by_trigger

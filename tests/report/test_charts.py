@@ -3,6 +3,7 @@
 import os
 import re
 from collections.abc import Iterator
+from importlib import resources
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -15,9 +16,10 @@ from plotting_lab import PLOTTING, REPORTING, make_lab
 from replacing import replace
 from sets import quick
 
+from tablegen.charts import style
+from tablegen.charts.chart import Band, Chart, DrawnCurve, Mark, Raster
+from tablegen.charts.picture_file import picture
 from tablegen.cli import cli
-from tablegen.report.chart import Band, Chart, DrawnCurve, Mark, Raster
-from tablegen.report.picture import picture
 
 
 @pytest.fixture(scope="module")
@@ -104,19 +106,16 @@ def test_faults_of_a_chart_are_found(changed: dict[str, object], fault: str) -> 
 
 def test_the_page_and_files_have_the_same_colours() -> None:
     """The light scheme of the style sheet."""
-    from tablegen.report import looks
-
-    style = (Path(looks.__file__).parent / "page.css").read_text("utf-8")
-    light = style.split("prefers-color-scheme")[0]
-    for role, look in looks.ROLES.items():
+    sheet = (resources.files("tablegen.report") / "page.css").read_text("utf-8")
+    light = sheet.split("prefers-color-scheme")[0]
+    for role, look in style.ROLES.items():
         assert f"--{role}:{look.stroke};" in light, role
 
 
 def test_directions_that_look_the_same_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    from tablegen.cli import text_plot
-    from tablegen.report import looks
+    from tablegen.charts import text as text_plot
 
-    monkeypatch.setitem(looks.ROLES, "backward", looks.ROLES["forward"])
+    monkeypatch.setitem(style.ROLES, "backward", style.ROLES["forward"])
     assert faults(GOOD) == ["both directions have one colour", "both directions have one line style"]
     monkeypatch.setitem(text_plot._MARKS, "backward", ">")
     assert faults(GOOD)[2:] == ["both directions have one mark"]

@@ -11,7 +11,7 @@ from editing import run
 from foreign_plants import SIX, ForeignPlant, ManyPlays, record
 from html_page import Page, well_formed
 
-from tablegen.calibration.estimate import Curve
+from tablegen.fitting.estimate import Curve
 from tablegen.report.fitted import drawn_curves
 
 NOISE = 1.0 + 0.002 * np.random.default_rng(11).standard_normal(100)

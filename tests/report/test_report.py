@@ -16,9 +16,9 @@ from html_page import Page, well_formed
 from operator_files import operator_file, write_operator_scan
 from sets import quick
 
+from tablegen.charts.png import grey_png
 from tablegen.report.page import charts_of, page, sections
-from tablegen.report.planned import planned_scan
-from tablegen.report.png import grey_png
+from tablegen.report.planned_scan import planned_scan
 from tablegen.report.subject import Subject
 
 

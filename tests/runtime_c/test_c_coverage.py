@@ -15,8 +15,8 @@ from c_mutants import scripts
 from c_scripts import IN_C, LONG, LONG_PERIODS, everything, long_periods, long_play, renderings
 from c_shaped_waves import WAVES, shaped_waves
 
-from tablegen.resources import c_runtime
-from tablegen.verification.bench import SequencerShape
+from tablegen.base.resources import c_runtime
+from tablegen.verification.play.sequencer_shape import SequencerShape
 
 pytestmark = pytest.mark.common
 

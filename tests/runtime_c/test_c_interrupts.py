@@ -11,13 +11,13 @@ from c_mutants import runtime_with
 from following import Differs, Follower
 from programs import random_dual
 
+from tablegen.base.resources import c_runtime
 from tablegen.device.dual_program import DualProgram
 from tablegen.device.sequencer import Sequencer
 from tablegen.fixedpoint.program import Program
-from tablegen.resources import c_runtime
-from tablegen.verification.bench import SequencerShape
-from tablegen.verification.emulate import TRAP, Processor, compile_bare
-from tablegen.verification.stream import pack
+from tablegen.verification.c.emulate import TRAP, Processor, compile_bare
+from tablegen.verification.play.sequencer_shape import SequencerShape
+from tablegen.verification.play.stream import pack
 
 pytestmark = pytest.mark.rest
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from building import run_clean
 
-from tablegen.resources import c_link, c_runtime
+from tablegen.base.resources import c_link, c_runtime
 
 EVERYTHING = [*c_runtime(), *c_link()]
 Graph = Mapping[str, set[str]]

@@ -13,7 +13,7 @@ from link_random import KEY, Dialogue
 from link_talk import Talk
 
 from tablegen.link.messages import DeviceInfo, DeviceStatus, Feature, Reason, Request
-from tablegen.verification.bench import SequencerShape
+from tablegen.verification.play.sequencer_shape import SequencerShape
 
 FRAMES: dict[str, Any] = json.loads((HELPERS / "golden_frames.json").read_text("utf-8"))
 SHAPES = {

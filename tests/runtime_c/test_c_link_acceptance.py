@@ -16,10 +16,10 @@ from replacing import replace
 from tablegen.device.dual_program import DualProgram
 from tablegen.link.acceptance import Playing, first_objection
 from tablegen.link.frames import Frame
-from tablegen.link.image import ProgramImage, make_image, take_apart
 from tablegen.link.messages import REFUSAL, AxisLimits, Reason, Refusal, Request
+from tablegen.link.program_image import ProgramImage, make_image, take_apart
 from tablegen.numerics.arrays import Ints
-from tablegen.verification.bench import SequencerShape
+from tablegen.verification.play.sequencer_shape import SequencerShape
 
 pytestmark = pytest.mark.common
 

@@ -12,7 +12,7 @@ from dialogues import dialogues
 from link_device import HostDevice
 from link_replay import compile_replay, random_replay, replay, replay_of
 
-from tablegen.resources import c_link
+from tablegen.base.resources import c_link
 
 pytestmark = pytest.mark.common
 

@@ -9,7 +9,7 @@ from building import run_clean
 from limits import within
 from link_mutants import MUTANTS, Mutant
 
-from tablegen.resources import c_link, c_runtime
+from tablegen.base.resources import c_link, c_runtime
 
 pytestmark = pytest.mark.rest
 

@@ -11,12 +11,12 @@ from building import REPOSITORY
 from link_images import random_image
 from link_talk import Talk
 
+from tablegen.base.resources import c_link, c_runtime
 from tablegen.link.frames import Frame
-from tablegen.link.image import ProgramImage
 from tablegen.link.messages import ANSWER, REFUSAL, DeviceInfo, DeviceStatus, Request
-from tablegen.resources import c_link, c_runtime
-from tablegen.verification.bench import SequencerShape
-from tablegen.verification.emulate import TRAP, Processor, compile_bare
+from tablegen.link.program_image import ProgramImage
+from tablegen.verification.c.emulate import TRAP, Processor, compile_bare
+from tablegen.verification.play.sequencer_shape import SequencerShape
 
 pytestmark = pytest.mark.rest
 

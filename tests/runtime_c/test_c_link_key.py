@@ -8,7 +8,7 @@ from link_talk import IDENTITY, Talk, derived_nonce, is_answer
 
 from tablegen.link.frames import FrameReader
 from tablegen.link.messages import DeviceState, DeviceStatus, Reason, Request
-from tablegen.link.model import CHALLENGE_MS, ModelDevice
+from tablegen.link.model_device import CHALLENGE_MS, ModelDevice
 
 SCAN = make_scan(1)
 

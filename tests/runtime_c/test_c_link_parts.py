@@ -17,7 +17,6 @@ from replacing import replace
 
 from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS
 from tablegen.link.frames import Frame
-from tablegen.link.image import PROGRAM_BYTES, ProgramImage, make_image
 from tablegen.link.messages import (
     ANSWER,
     REFUSAL,
@@ -31,7 +30,8 @@ from tablegen.link.messages import (
     Request,
     Upload,
 )
-from tablegen.verification.bench import SequencerShape
+from tablegen.link.program_image import PROGRAM_BYTES, ProgramImage, make_image
+from tablegen.verification.play.sequencer_shape import SequencerShape
 
 KEY = bytes(range(7, 31))
 SCANS = [make_scan(seed) for seed in range(3)]

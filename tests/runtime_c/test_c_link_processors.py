@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from link_replay import Replay, compile_replay, differs, random_replay
 
-from tablegen.verification.bench import SequencerShape
+from tablegen.verification.play.sequencer_shape import SequencerShape
 
 pytestmark = pytest.mark.rest
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from building import REPOSITORY, run, tool
 
-from tablegen.resources import c_link, c_runtime
+from tablegen.base.resources import c_link, c_runtime
 
 pytestmark = pytest.mark.rest
 

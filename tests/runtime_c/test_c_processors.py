@@ -20,11 +20,11 @@ from programs import random_dual
 from sets import long
 from stream_scripts import sweep
 
-from tablegen.verification.bench import SequencerShape
-from tablegen.verification.c_bench import OPTIONS, CBench, CPlayed, defines
-from tablegen.verification.emulate import CortexMBench, Processor, compile_bare
+from tablegen.verification.c.bench import OPTIONS, CBench, CPlayed, defines
+from tablegen.verification.c.emulate import CortexMBench, Processor, compile_bare
 from tablegen.verification.failures import SimulationFailed
-from tablegen.verification.stream import Script, compare
+from tablegen.verification.play.sequencer_shape import SequencerShape
+from tablegen.verification.play.stream import Script, compare
 
 pytestmark = pytest.mark.rest
 

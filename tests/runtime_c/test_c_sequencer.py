@@ -36,8 +36,8 @@ from stream_configurations import FEW, SWAPS, SWAPS_SLOW, random_swaps
 from stream_laws import follow_their_programs
 from stream_scripts import FAULTS, flag, in_any_order, occurrences
 
-from tablegen.verification.bench import SequencerShape
-from tablegen.verification.stream import FLAGS, Script
+from tablegen.verification.play.sequencer_shape import SequencerShape
+from tablegen.verification.play.stream import FLAGS, Script
 
 HARMONICS = 6
 

@@ -14,11 +14,11 @@ from c_shaped_waves import WAVES, shaped_waves
 from replacing import replace
 from sets import common
 
+from tablegen.base.resources import c_runtime
 from tablegen.device.dual_program import DualProgram
 from tablegen.fixedpoint.shaping import Shaping
-from tablegen.resources import c_runtime
-from tablegen.verification.bench import SequencerShape
-from tablegen.verification.stream import Script
+from tablegen.verification.play.sequencer_shape import SequencerShape
+from tablegen.verification.play.stream import Script
 
 SHORT = {
     "bits_16": SequencerShape(16, 1, 4, 16, 1, 3, 16),

@@ -13,9 +13,9 @@ from link_talk import Talk
 from replacing import replace
 
 from tablegen.link.messages import CUBIC, DeviceInfo, Reason
-from tablegen.verification.bench import SequencerShape
-from tablegen.verification.c_bench import CBench, defines
-from tablegen.verification.stream import compare
+from tablegen.verification.c.bench import CBench, defines
+from tablegen.verification.play.sequencer_shape import SequencerShape
+from tablegen.verification.play.stream import compare
 
 pytestmark = pytest.mark.common
 

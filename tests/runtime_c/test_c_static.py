@@ -9,7 +9,7 @@ import pytest
 from building import run, run_clean
 from sets import LONG_TEST, by_tool, in_pairs
 
-from tablegen.resources import c_link, c_runtime
+from tablegen.base.resources import c_link, c_runtime
 
 EVERYTHING = [*c_runtime(), *c_link()]
 SOURCES = [path for path in EVERYTHING if path.suffix == ".c"]

@@ -9,7 +9,7 @@ from c_devices import device_for, flat
 from c_library import OTHER_STORAGE, Library, compile_library
 from sets import by_tool
 
-from tablegen.resources import c_runtime
+from tablegen.base.resources import c_runtime
 
 UNIT = f"""#include "dac_sequencer.h"
 #include "{NAME}.h"

@@ -6,7 +6,7 @@ import pytest
 from c_threads import compile_threads, play
 from sets import by_tool
 
-from tablegen.resources import c_runtime
+from tablegen.base.resources import c_runtime
 
 PROGRAMS = 8_000
 

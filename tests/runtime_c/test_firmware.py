@@ -18,7 +18,7 @@ from qemu import Machine
 
 from tablegen.config.load import load
 from tablegen.planning.line_plan import Plan, make_plan
-from tablegen.verification.stream import FLAGS
+from tablegen.verification.play.stream import FLAGS
 
 pytestmark = pytest.mark.rest
 

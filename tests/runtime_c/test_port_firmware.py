@@ -29,7 +29,7 @@ from tablegen.config.load import load
 from tablegen.link.device import Device
 from tablegen.link.prepare import PreparedScan
 from tablegen.planning.line_plan import make_plan
-from tablegen.verification.elf import read_executable
+from tablegen.verification.c.elf import read_executable
 
 pytestmark = pytest.mark.rest
 

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tablegen.base.input_errors import Rejected
 from tablegen.config.settings import MOST_VALUES, Setting, parse_setting
 from tablegen.config.settings import given as check_together
-from tablegen.problems import Rejected
 
 
 @pytest.mark.parametrize(

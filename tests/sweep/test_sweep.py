@@ -7,6 +7,8 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
+from hashlib import sha256
 from pathlib import Path
 
 import pytest
@@ -15,7 +17,7 @@ from libraries import BASE, NAMES, write_library
 from limits import PATIENCE_S
 
 import tablegen
-from tablegen.cli.bar import Bar
+from tablegen.cli.shared.progress_bar import Bar
 
 
 def index_of(out: Path) -> dict[str, list[dict[str, object]]]:
@@ -214,8 +216,6 @@ def test_list_says_what_would_be_done_and_writes_nothing(library: Path) -> None:
 def test_check_finds_what_a_sweep_would_write(library: Path) -> None:
     assert sweep(library, "--check") == (0, "./out: 3 scans: 3 up to date\n", "")
     path, out = library / "scan.toml", library / "out"
-    (out / "narrow" / "program.json").unlink()  # not what it was made from, but what it is
-    assert sweep(library, "--check")[0] == 0
     path.write_text(path.read_text("utf-8").replace("size_nm = 400.0", "size_nm = 410.0"), "utf-8")
     (out / "lines_library.h").unlink()
     before = stamps(library)
@@ -226,6 +226,142 @@ def test_check_finds_what_a_sweep_would_write(library: Path) -> None:
     assert not any(name.startswith(("narrow", "even", "dac_")) for name in found)
     assert err == "./out is stale; run the same command without --check\n"
     assert stamps(library) == before
+
+
+def test_check_of_a_directory_that_is_missing(tmp_path: Path) -> None:
+    status, said, err = sweep(write_library(tmp_path).parent, "--check")
+    assert (status, err) == (1, "./out is stale; run the same command without --check\n")
+    assert "./out/broad/broad_x.mem: not up to date" in said
+    assert "./out/lines_library_fourier.mem: not up to date" in said
+    assert not (tmp_path / "out").exists()
+
+
+def rewrite(path: Path, **values: object) -> None:
+    """Change values of a JSON file; a dotted key leads into it."""
+    record = json.loads(path.read_text("ascii"))
+    for key, value in values.items():
+        *way, last = key.split("__")
+        place = record
+        for name in way:
+            place = place[name]
+        place[last] = value
+    path.write_text(json.dumps(record, indent=1) + "\n", "ascii")
+
+
+def change_word(folder: Path) -> None:
+    """Change a word of a table, and make right all that the directory says of it."""
+    memory, manifest = folder / f"{folder.name}_x.mem", folder / "manifest.json"
+    words = memory.read_text("ascii").splitlines()
+    words[5] = f"{int(words[5], 16) ^ 1:0{len(words[5])}x}"
+    memory.write_text("\n".join(words) + "\n", "ascii")
+    record = json.loads((folder / "program.json").read_text("ascii"))["files"]
+    listed = json.loads(manifest.read_text("ascii"))["files"]
+    listed[memory.name] = sha256(memory.read_bytes()).hexdigest()
+    rewrite(manifest, files=listed)
+    for name in (memory.name, manifest.name):
+        record[name] = sha256((folder / name).read_bytes()).hexdigest()
+    rewrite(folder / "program.json", files=record)
+
+
+# What somebody has done to a library, and what of it is not up to date.
+TAMPERINGS: dict[str, tuple[Callable[[Path], object], str]] = {
+    "word": (lambda out: change_word(out / "broad"), "broad/broad_x.mem"),
+    "name": (
+        lambda out: rewrite(out / "broad" / "program.json", name='broad", 0}}; int evil(void) { return 1; } //'),
+        "broad/program.json",
+    ),
+    "hash": (lambda out: rewrite(out / "broad" / "program.json", hash="0" * 64), "broad/program.json"),
+    "axes": (lambda out: rewrite(out / "broad" / "program.json", x__harmonics=3), "broad/program.json"),
+    "warnings": (lambda out: rewrite(out / "broad" / "program.json", warnings=["none"]), "broad/program.json"),
+    "record": (lambda out: (out / "broad" / "program.json").unlink(), "broad/program.json"),
+    "program": (lambda out: shutil.rmtree(out / "broad"), "broad/manifest.json"),
+    "index": (lambda out: rewrite(out / "library.json", programs=[]), "library.json"),
+    "index in C": (lambda out: (out / "lines_library.c").write_text("int x;\n", "ascii"), "lines_library.c"),
+    "memory": (lambda out: (out / "lines_library_tables.mem").write_text("0\n", "ascii"), "lines_library_tables.mem"),
+    "runtime": (lambda out: (out / "dac_axis.c").write_text("int x;\n", "ascii"), "dac_axis.c"),
+}
+
+
+@pytest.mark.parametrize("tampering", TAMPERINGS)
+def test_check_believes_nothing_that_the_directory_says_of_itself(library: Path, tampering: str) -> None:
+    """And the next sweep puts it right, though the digests of a word's files were made right too."""
+    before = {path: path.read_bytes() for path in (library / "out").rglob("*") if path.is_file()}
+    change, name = TAMPERINGS[tampering]
+    change(library / "out")
+    status, said, _ = sweep(library, "--check")
+    assert status == 1
+    assert f"./out/{name}: not up to date\n" in said
+    assert sweep(library)[0] == 0
+    assert {path: path.read_bytes() for path in (library / "out").rglob("*") if path.is_file()} == before
+
+
+@pytest.mark.parametrize("what", ["broad/dac_axis.c", "lines_library.vh", "dac_evil.c", "copied", "linked", "program"])
+def test_what_no_sweep_has_made_is_named_and_stays(library: Path, what: str) -> None:
+    """A compiler that is given ``out/*.c out/*/*.c`` takes it in; a folder is a program if it looks like one."""
+    out = library / "out"
+    if what == "lines_library.vh":  # which an index of C alone has not
+        assert sweep(library, "-f", "c")[0] == 0
+    options = ("-f", "c") if what == "lines_library.vh" else ()
+    if what in ("copied", "linked"):
+        shutil.copytree(out / "broad", library / "elsewhere" if what == "linked" else out / what)
+    if what == "linked":
+        rewrite(library / "elsewhere" / "program.json", name="linked")
+        (out / what).symlink_to(library / "elsewhere")
+    elif what == "program":
+        (out / what).mkdir()
+        (out / what / "program.json").write_text('{"name": "../../scan.toml"}', "ascii")
+    elif what != "copied":
+        (out / what).write_text("int x;\n", "ascii")
+    before = {path: path.read_bytes() for path in library.rglob("*") if path.is_file()}
+    status, said, err = sweep(library, "--check", *options)
+    assert status == 1
+    assert f"./out/{what}: not up to date\n" in said
+    assert f"note: ./out/{what}: is not of this library; remove it\n" in err
+    assert sweep(library, *options)[0] == 0
+    assert {path: path.read_bytes() for path in library.rglob("*") if path.is_file()} == before
+
+
+def test_a_library_of_somebody_else_is_made_again_and_not_written(
+    library: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without a cache nothing vouches for it; the same is said, and nothing but the index is put down again."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    before = stamps(library / "out")
+    assert sweep(library, "--list")[1].count(": to build") == 3
+    assert sweep(library) == (0, "./out: 3 scans: 3 up to date\n", "")
+    assert {name for name in rewritten(before, library / "out") if "library" not in name} == set()
+    assert sweep(library, "--list")[1].count(": up to date") == 3
+    before = stamps(library / "out")
+    assert sweep(library) == (0, "./out: 3 scans: 3 up to date\n", "")
+    assert stamps(library / "out") == before
+
+
+def test_an_index_of_somebody_else_removes_nothing(tmp_path: Path) -> None:
+    out = write_library(tmp_path).parent / "out"
+    out.mkdir()
+    for name in ("main.c", "my_library.h", "other_library.h"):
+        (out / name).write_text("mine\n", "ascii")
+    digest = sha256(b"mine\n").hexdigest()
+    files = dict.fromkeys(["main.c", "my_library.h", "../scan.toml", ".."], digest)
+    (out / "library.json").write_text(json.dumps({"name": "PubSub", "library": "my", "files": files}), "ascii")
+    assert sweep(tmp_path, "-f", "csv")[0] == 0
+    assert {"main.c", "my_library.h", "other_library.h"} <= {path.name for path in out.iterdir()}
+
+
+def test_a_program_whose_manifest_is_not_its_own_is_not_removed(library: Path) -> None:
+    """Its record lists a file of somebody else, or the manifest was edited."""
+    path, out = library / "scan.toml", library / "out"
+    text = path.read_text("utf-8")
+    path.write_text(text[: text.index('[[scans]]\nname = "broad"')], "utf-8")
+    (out / "broad" / "mine.txt").write_text("mine\n", "ascii")
+    record = json.loads((out / "broad" / "program.json").read_text("ascii"))["files"]
+    rewrite(out / "broad" / "program.json", files=record | {"mine.txt": sha256(b"mine\n").hexdigest()})
+    rewrite(out / "even" / "manifest.json", axes__x__output__gain_word=5)
+    status, said, err = sweep(library)
+    assert (status, said) == (0, "./out: 1 scan: 1 up to date\n")
+    assert [path.name for path in (out / "broad").iterdir()] == ["mine.txt"]
+    assert (out / "even" / "even.c").exists()
+    assert "note: ./out/even: is not of this library; remove it\n" in err
 
 
 def test_programs_that_one_runtime_cannot_play_have_no_index(tmp_path: Path) -> None:
@@ -239,6 +375,20 @@ def test_programs_that_one_runtime_cannot_play_have_no_index(tmp_path: Path) -> 
     ]
     assert not list((tmp_path / "out").glob("lines_library*"))
     assert len(index_of(tmp_path / "out")["programs"]) == 2
+
+
+@pytest.mark.parametrize("index", [True, False])
+@pytest.mark.parametrize("command", [["verify"], ["upload", "--port", "none"], ["report"]])
+def test_a_library_is_not_a_build_and_its_programs_are_named(library: Path, command: list[str], index: bool) -> None:
+    """One line, with something to do; also where a sweep was interrupted before its index."""
+    out = library / "out"
+    if not index:
+        (out / "library.json").unlink()
+    done = run(*command, out)
+    assert (done.status, done.out) == (2, "")
+    assert done.err == (
+        f"{out}: is a library of `tablegen sweep`, not a build; name one of its programs, for example {out}/broad\n"
+    )
 
 
 @pytest.mark.common
@@ -296,7 +446,7 @@ def test_progress_has_a_fraction() -> None:
     bar._shows = True
     shown: list[str] = []
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("tablegen.cli.bar.redraw", shown.append)
+        patch.setattr("tablegen.cli.shared.progress_bar.redraw", shown.append)
         bar(0, 40)
         bar(10, 40)
     assert "[......" in shown[0]

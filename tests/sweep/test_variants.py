@@ -7,9 +7,9 @@ from editing import run, write_pair
 from libraries import BASE, NAMES, write_library
 
 from tablegen.api.many import variants
+from tablegen.base.input_errors import Rejected
 from tablegen.config.load import load
 from tablegen.config.names import why_not_a_name
-from tablegen.problems import Rejected
 
 
 def test_every_combination_with_the_last_setting_fastest(tmp_path: Path) -> None:

@@ -9,8 +9,9 @@ import pytest
 from building import NAME, Build
 from editing import run
 
-from tablegen.verification import c_objects, c_play
-from tablegen.verification.c_objects import Objects, maker
+from tablegen.verification.c import objects as c_objects
+from tablegen.verification.c import play as c_play
+from tablegen.verification.c.objects import Objects, maker
 
 
 @pytest.fixture(autouse=True)

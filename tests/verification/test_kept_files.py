@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from tablegen.verification import kept_files
-from tablegen.verification.kept_files import KeptFiles
+from tablegen.base import file_cache as kept_files
+from tablegen.base.file_cache import KeptFiles
 
 MODELS = KeptFiles("models", 20)
 KEY, OTHER = "1" * 64, "2" * 64

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from tablegen.verification import model_cache
-from tablegen.verification.model_cache import model_key
+from tablegen.verification.verilog import model_cache
+from tablegen.verification.verilog.model_cache import model_key
 
 
 @pytest.fixture

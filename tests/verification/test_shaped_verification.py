@@ -21,8 +21,8 @@ from tablegen.fixedpoint.phase import RationalPhase
 from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.shaping import MAXIMUM_ZERO, Shaping
 from tablegen.manifest.read import NotABuild, read_build
-from tablegen.verification.certificate_checks import check_certificates
-from tablegen.verification.shaped import shaped_codes
+from tablegen.verification.checks.certificate_checks import check_certificates
+from tablegen.verification.checks.shaped import shaped_codes
 
 SECOND_ORDER = {"frequency_hz": 1000.0, "quality": 10.0}
 SHORT = {"timing.lines": 8, "x.size_nm": 20.0, "y.size_nm": 20.0}
@@ -174,7 +174,7 @@ def test_a_sequencer_that_shapes_otherwise_is_found(
     assert count >= 1
     path.write_text(text, "ascii")
     make_right(tmp_path / "out", version="0.2.0")
-    outcome = run("verify", tmp_path / "out", *target)
+    outcome = run("verify", tmp_path / "out", "--other-version", *target)
     assert {("x", "integer model"), ("x", "shaped codes")} <= failed(outcome)
 
 

@@ -7,6 +7,7 @@ the tests of the sequencer in ``hdl_tests/``.
 import json
 import re
 import signal
+import sys
 from hashlib import sha256
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from verifying import (
     check_first_difference,
     check_interruption,
     command,
+    command_after,
     command_without,
     differing,
     edit,
@@ -383,12 +385,31 @@ def test_a_damaged_manifest_is_wrong_input(folder: Path, path: tuple[str | int, 
     assert why in outcome.err
 
 
-@pytest.mark.common
-def test_a_build_of_another_version_is_noted(folder: Path) -> None:
+def test_a_build_of_another_version_fails_unless_that_is_asked_for(folder: Path) -> None:
+    """Nothing of its runtime is compared, so that nothing but the play can vouch for it."""
     edit_manifest(folder, "tablegen", value="0.0.7")
-    outcome = verify(folder)
-    assert outcome.status == 0
-    assert "note: built by tablegen 0.0.7, verified by " in outcome.out
+    outcome = verify(folder, "--target", "files")
+    assert (outcome.status, failed(outcome)) == (5, {INSTALLED})
+    assert f"files: built by tablegen 0.0.7, and this is {__version__}: its runtime cannot be compared" in outcome.err
+    assert "--other-version" in outcome.err
+    assert "note: built by" not in outcome.out
+    outcome = verify(folder, "--target", "files", "--other-version")
+    assert (outcome.status, outcome.err) == (0, "")
+    assert f"note: built by tablegen 0.0.7, verified by {__version__}: its runtime was not compared" in outcome.out
+
+
+def test_the_option_hides_nothing_of_a_build_of_this_version(folder: Path) -> None:
+    edit(folder / "dac_slew.v", "endmodule", "endmodule // and more")
+    outcome = verify(folder, "--target", "files", "--other-version")
+    assert failed(outcome) == {("files", "SHA-256 in the manifest"), INSTALLED}
+
+
+@pytest.mark.common
+def test_a_build_of_another_version_is_played(folder: Path) -> None:
+    edit_manifest(folder, "tablegen", value="0.0.7")
+    outcome = verify(folder, "--other-version")
+    assert (outcome.status, outcome.err) == (0, "")
+    assert set(verdicts(outcome).values()) == {"ok"}
 
 
 @pytest.mark.common
@@ -445,7 +466,7 @@ def test_what_is_simulated_is_kept_on_request(short: Build, tmp_path: Path) -> N
 @pytest.mark.common
 def test_memories_are_what_a_build_writes(short: Build) -> None:
     """The reader of memory files against their writer, signed words included."""
-    from tablegen.verification.directory import memory_words
+    from tablegen.verification.checks.directory import memory_words
 
     words = short.plan.x.program.words
     read = memory_words(short.folder / f"{NAME}_x.mem", len(words))
@@ -468,6 +489,19 @@ def test_missing_cocotb_is_status_6_with_its_remedy(short: Build) -> None:
     done = command_without(["cocotb_tools"], short.folder)
     assert (done.returncode, done.stdout) == (6, "")
     assert done.stderr == "cocotb is not installed: pip install 'piezo-tablegen[hdl]'\n"
+
+
+@pytest.mark.parametrize("simulator", quick(["icarus"], ["icarus", "verilator"]))
+def test_a_python_without_its_shared_library_is_status_6_with_its_remedy(short: Build, simulator: str) -> None:
+    """As Debian's own is; cocotb loads it into the simulator."""
+    absent = "import find_libpython; find_libpython.find_libpython = lambda: None"
+    done = command_after(absent, short.folder, "--sim", simulator)
+    version = "{}.{}".format(*sys.version_info)
+    assert (done.returncode, done.stdout) == (6, "")
+    assert done.stderr == (
+        f"the shared library of Python {version} is not installed: apt-get install libpython{version}, "
+        "or a Python built with --enable-shared\n"
+    )
 
 
 @pytest.mark.common

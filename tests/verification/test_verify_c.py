@@ -40,17 +40,17 @@ from tablegen.fixedpoint.output import Output
 from tablegen.fixedpoint.program import Program
 from tablegen.fixedpoint.shaping import Shaping
 from tablegen.manifest.read import StoredBuild, read_build
-from tablegen.verification.bench import SequencerShape
-from tablegen.verification.c_bench import CBench, script_words
-from tablegen.verification.c_program import c_program
-from tablegen.verification.capture import make_capture
-from tablegen.verification.checks import check_states
-from tablegen.verification.converter_words import codes_of, packed
+from tablegen.verification.c.bench import CBench, script_words
+from tablegen.verification.c.program import c_program
+from tablegen.verification.checks.played_checks import check_states
 from tablegen.verification.failures import SimulationFailed
-from tablegen.verification.placement import Placement
-from tablegen.verification.session import make_session
-from tablegen.verification.stream import Script, read_states
-from tablegen.verification.variation import variation
+from tablegen.verification.play.capture import make_capture
+from tablegen.verification.play.converter_words import codes_of, packed
+from tablegen.verification.play.placement import Placement
+from tablegen.verification.play.sequencer_shape import SequencerShape
+from tablegen.verification.play.session import make_session
+from tablegen.verification.play.stream import Script, read_states
+from tablegen.verification.play.variation import variation
 from tablegen.version import __version__
 
 CAPITAL = NAME.upper()
@@ -625,6 +625,16 @@ def test_a_missing_compiler_is_status_6_with_its_remedy(short: Build, compiler: 
     assert done.stderr == f"{compiler.split(' ')[0]} is not installed: apt-get install gcc, or set CC\n"
 
 
+def test_a_compiler_without_a_c_library_is_status_6_with_its_remedy(short: Build, tmp_path: Path) -> None:
+    """As Debian's gcc is where recommended packages are left out."""
+    compiler = tmp_path / "bare-cc"
+    compiler.write_text("#!/bin/sh\necho 'fatal error: stdint.h: No such file or directory' >&2\nexit 1\n", "ascii")
+    compiler.chmod(0o755)
+    done = command(short.folder, "--target", "c", CC=str(compiler))
+    assert (done.returncode, done.stdout) == (6, "")
+    assert done.stderr == f"{compiler} finds no headers of the C library: apt-get install libc6-dev\n"
+
+
 @pytest.mark.common
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
 def test_the_compiler_and_its_options_are_the_environments(short: Build, compiler: str) -> None:
@@ -644,7 +654,7 @@ def test_options_that_cannot_be_read_are_a_failed_check(short: Build) -> None:
     assert "program: CFLAGS cannot be read: No closing quotation" in done.stderr
 
 
-@pytest.mark.common
+@pytest.mark.rest
 def test_those_options_are_not_for_a_cortex_m4(short: Build) -> None:
     done = command(short.folder, "--target", "cortex-m", CFLAGS="-fsanitize=address")
     assert (done.returncode, done.stderr) == (0, "")

@@ -17,7 +17,7 @@ from verifying import edit_manifest, make_right
 
 from tablegen.certificate.certificate import certify
 from tablegen.certificate.summary import summary
-from tablegen.cli.exit_status import ExitStatus
+from tablegen.cli.shared.exit_status import ExitStatus
 from tablegen.config.load import load
 from tablegen.planning.line_plan import make_plan
 

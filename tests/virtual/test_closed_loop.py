@@ -11,18 +11,18 @@ import msgspec
 import numpy as np
 import pytest
 from building import EXAMPLE, REPOSITORY
+from paper.other_plants import same_numbers, uniform_density
 from replacing import replace
 
-from tablegen.calibration.hysteresis import HysteresisFit
-from tablegen.calibration.offset_sizes import OffsetSizesFit
+from tablegen.calibration.laws.hysteresis import HysteresisFit
+from tablegen.calibration.laws.offset_sizes import OffsetSizesFit
 from tablegen.config.load import Setup, load
 from tablegen.config.scanner import Offset
-from tablegen.virtual import laboratory
+from tablegen.virtual import calibration_day as laboratory
+from tablegen.virtual.calibration_day import OFFSET_SIZES, OFFSETS, Calibration, calibrate
 from tablegen.virtual.closed_loop import SHARP, SHARP_RATE_HZ, play_x, size_map, uncorrected, with_scan
 from tablegen.virtual.experiments import sensor_trace
-from tablegen.virtual.laboratory import OFFSET_SIZES, OFFSETS, Calibration, calibrate
 from tablegen.virtual.line_error import about_window_line, line_error
-from tablegen.virtual.other_plants import same_numbers, uniform_density
 from tablegen.virtual.parameters import Truth, load_truth
 from tablegen.virtual.scanner import VirtualAxis, VirtualScanner
 from tablegen.virtual.simulation import with_model

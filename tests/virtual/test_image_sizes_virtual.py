@@ -7,18 +7,18 @@ import pytest
 from foreign_plants import BoucWen, ForeignPlant, ManyPlays
 from replacing import replace
 
-from tablegen.calibration.image_line import fit_line
-from tablegen.calibration.image_scale import Cell, Grating, size_of_line
-from tablegen.calibration.image_sizes import KnownSample, SampleImage, Taking
+from tablegen.base.input_errors import Unphysical
+from tablegen.calibration.laws.image_sizes import KnownSample, SampleImage, Taking
 from tablegen.calibration.operator.fit import fit_operator
 from tablegen.calibration.operator.imaged_line import imaged_line
 from tablegen.calibration.operator.periodic_line import PHASES, PeriodicLine
 from tablegen.config.load import load
+from tablegen.images.fast_axis_line import fit_line
+from tablegen.images.line_length import Cell, Grating, size_of_line
 from tablegen.numerics.arrays import Floats
-from tablegen.problems import Unphysical
+from tablegen.virtual.calibration_day import calibrate
 from tablegen.virtual.closed_loop import size_map, with_scan
 from tablegen.virtual.imaging import grating, hexagonal, image_pair
-from tablegen.virtual.laboratory import calibrate
 from tablegen.virtual.line_error import ideal_triangle
 from tablegen.virtual.parameters import load_truth
 from tablegen.virtual.scanner import VirtualScanner

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from tablegen.calibration.branch import AmplitudeFit
-from tablegen.calibration.image_fit import fit_pair
-from tablegen.calibration.trace import fit_trace
+from tablegen.calibration.laws.trace import fit_trace
 from tablegen.compensation.hysteresis import BranchShape
 from tablegen.compensation.line import LineShape
+from tablegen.fitting.measured_branch import AmplitudeFit
+from tablegen.images.pair_fit import fit_pair
 from tablegen.numerics.arrays import Floats
 from tablegen.virtual.experiments import sensor_trace
 from tablegen.virtual.imaging import grating, hexagonal, image_pair

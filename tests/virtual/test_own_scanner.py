@@ -7,13 +7,13 @@ import pytest
 from operator_files import REVERSIBLE, STROKES, THRESHOLDS, WEIGHTS, operator_file, write_operator_scan
 from replacing import replace
 
+from tablegen.base.input_errors import Unphysical
 from tablegen.compensation.dynamics import SecondOrder
 from tablegen.compensation.operator.file import read_operator
 from tablegen.compensation.operator.operator import Operator
 from tablegen.config.load import load
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, make_plan
-from tablegen.problems import Unphysical
 from tablegen.virtual.modes import second_order
 from tablegen.virtual.own_run import errors_on, measured, simulate_own
 from tablegen.virtual.own_scanner import OwnAxis, departing

@@ -7,7 +7,7 @@ import pytest
 from editing import SCAN, SCANNER, edited, write_pair
 
 from tablegen.config.load import Setup, load
-from tablegen.virtual.laboratory import calibrate
+from tablegen.virtual.calibration_day import calibrate
 from tablegen.virtual.parameters import BUILT_IN, load_truth
 from tablegen.virtual.scaling import scaled_to
 from tablegen.virtual.scanner import VirtualAxis, VirtualScanner

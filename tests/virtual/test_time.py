@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from replacing import replace
 
 from tablegen.config.load import Setup
-from tablegen.driver import Driver
+from tablegen.numerics.driver import Driver
 from tablegen.planning import line_plan
 from tablegen.planning.line_plan import Plan, make_plan
 from tablegen.planning.windows import retrace_mismatch

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from paper.identify import X_TARGETS, Y_TARGETS
+from paper.identify_duhem import identify_duhem
 from scipy.integrate import solve_ivp
 from scipy.interpolate import BPoly
 
 from tablegen.numerics.arrays import Floats
 from tablegen.virtual.duhem import POINTS, Duhem, Lag, Lags
-from tablegen.virtual.identify import X_TARGETS, Y_TARGETS
-from tablegen.virtual.identify_duhem import identify_duhem
 from tablegen.virtual.parameters import load_truth
 
 DRIVE = st.integers(0, 64).map(lambda n: n / 64)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tablegen.driver import Driver
+from tablegen.numerics.driver import Driver
 from tablegen.virtual.experiments import apparent_sizes, frequency_response, triangle_size
 from tablegen.virtual.line_error import ideal_triangle
 from tablegen.virtual.modes import Modes, delayed, low_pass, second_order, side_by_side

@@ -5,6 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from building import REPOSITORY
+from paper.identify import X_TARGETS, Y_TARGETS, Targets, identify
+from paper.printed_numbers import table
 from variants import plan_of, setup_of
 
 from tablegen.compensation.hysteresis import BranchShape, beta_at
@@ -12,9 +14,7 @@ from tablegen.compensation.line import LineShape
 from tablegen.device.played_lines import play_line
 from tablegen.numerics.arrays import Floats
 from tablegen.virtual.experiments import actual_sizes, apparent_sizes, frequency_response, sensor_trace, triangle_size
-from tablegen.virtual.identify import X_TARGETS, Y_TARGETS, Targets, identify
 from tablegen.virtual.line_error import LineError, ideal_triangle, line_error
-from tablegen.virtual.paper import table
 from tablegen.virtual.parameters import load_truth
 from tablegen.virtual.played import played
 from tablegen.virtual.preisach import Preisach

@@ -6,10 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scaling import SECTION_8, scaling_error, worst
 
+from tablegen.base.input_errors import Unphysical
 from tablegen.compensation.line import LineShape
 from tablegen.config.schema import BandLimit
 from tablegen.planning.band_limit import band_limited
-from tablegen.problems import Unphysical
 from tablegen.waveform import window_fit
 from tablegen.waveform.closed_form import fourier_series
 from tablegen.waveform.sampler import Sampler

@@ -6,12 +6,12 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scaling import SECTION_8, scaling_error
 
+from tablegen.base.input_errors import Unphysical
 from tablegen.certificate.optimum import least_acceleration
 from tablegen.compensation.line import LineShape
-from tablegen.problems import Unphysical
-from tablegen.waveform import gentle_fit
-from tablegen.waveform.gentle_fit import Straightness, Unreachable, fewest_harmonics, gentlest, least_percent
+from tablegen.waveform import minimum_acceleration as gentle_fit
 from tablegen.waveform.harmonic_rows import HarmonicRows, series_of, unknowns
+from tablegen.waveform.minimum_acceleration import Straightness, Unreachable, fewest_harmonics, gentlest, least_percent
 from tablegen.waveform.sampler import Sampler
 from tablegen.waveform.series import FourierSeries
 from tablegen.waveform.window_fit import fit_window

@@ -7,7 +7,8 @@
 
 static dac_link link;
 
-/* Not initialised, so that it survives a reset, but no power cycle: for hosts that want to know of a reset, not for the key. */
+/* Not initialised, so that it survives a reset, but no power cycle: for hosts that want to know of a reset, not for the
+ * key. */
 static uint32_t boots __attribute__((section(".noinit")));
 
 bool control_start(void)

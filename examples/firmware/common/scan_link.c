@@ -43,7 +43,8 @@ static int32_t x_fourier[2 * HARMONICS + 1], y_fourier[2 * HARMONICS + 1];
 static uint8_t hash[32];
 #ifdef LINK_KEY
 static const uint8_t key[] = {LINK_KEY};
-static const char device[] = LINK_DEVICE; /* no other instrument with this key has it; on hardware better a serial number */
+/* No other instrument with this key has it; on hardware better a serial number. */
+static const char device[] = LINK_DEVICE;
 typedef char link_device_has_4_to_32_characters[sizeof device - 1 >= 4 && sizeof device - 1 <= 32 ? 1 : -1];
 #endif
 

@@ -1,5 +1,5 @@
-/* Instead of converters: text for each line that was played, "GGGGGGGG LLLLLLLL TTTTTTTT CCCCCCCC MM FF" in hexadecimal:
- * the program's number, the line of the frame, ticks, CRC-32 of all of them (lines.h), markers, faults. */
+/* Instead of converters: text for each line that was played, "GGGGGGGG LLLLLLLL TTTTTTTT CCCCCCCC MM FF" in
+ * hexadecimal: the program's number, the line of the frame, ticks, CRC-32 of all of them (lines.h), markers, faults. */
 #include "board.h"
 #include "dac.h"
 #include "lines.h"

@@ -1,10 +1,11 @@
 /* Random numbers and time for the key of the link.
  *
- * WHERE THE NUMBERS COME FROM. The boards of QEMU have no generator. Here they are those of the machine that runs QEMU, from its
- * /dev/urandom, by semihosting (`make run` switches it on): calls of a debugger, as in Arm's "Semihosting for AArch32 and AArch64".
- * On hardware write random_bytes() anew, for a generator that its manual calls fit for keys: RNG of an STM32, TRNG of an RP2350 or an
- * nRF52. Neither a clock nor memory at power-up nor a converter's noise is one: who can foresee the numbers, or have them again, needs
- * no key. Without a generator keep a boot count in non-volatile memory instead (`boot_persists` in dac_link.h).
+ * WHERE THE NUMBERS COME FROM. The boards of QEMU have no generator. Here they are those of the machine that runs QEMU,
+ * from its /dev/urandom, by semihosting (`make run` switches it on): calls of a debugger, as in Arm's "Semihosting for
+ * AArch32 and AArch64". On hardware write random_bytes() anew, for a generator that its manual calls fit for keys: RNG
+ * of an STM32, TRNG of an RP2350 or an nRF52. Neither a clock nor memory at power-up nor a converter's noise is one:
+ * who can foresee the numbers, or have them again, needs no key. Without a generator keep a boot count in non-volatile
+ * memory instead (`boot_persists` in dac_link.h).
  */
 #include "random.h"
 

@@ -112,8 +112,9 @@ static void start_machine(unsigned machine, uint32_t data, uint32_t clock)
     PIO0_INSTR(machine) = 0x1000;                   /* jmp 0 side 0b10 */
 }
 
-/* Core 1: the consumer. The queues hold 8 samples of an axis, which last while the next 4 are computed, however long each
- * takes. The machines start on the same cycle, so that x and y leave together; after an underrun they start again. */
+/* Core 1: the consumer. The queues hold 8 samples of an axis, which last while the next 4 are computed, however long
+ * each takes. The machines start on the same cycle, so that x and y leave together; after an underrun they start again.
+ */
 static void core1_main(void)
 {
     static dac_output codes[2 * TICKS];

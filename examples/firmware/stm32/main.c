@@ -26,8 +26,8 @@ static union {
     dac_output codes[4 * HALF]; /* x, y, x, y.. */
     uint32_t words[2 * HALF];   /* the same for DMA: aligned words, x in the lower half */
 } buffer;
-/* In RAM that DMA reaches (not CCM), and behind no cache. With a cache, as in STM32F7 and H7, put it and the buffer above
- * where the MPU says that nothing is cached. */
+/* In RAM that DMA reaches (not CCM), and behind no cache. With a cache, as in STM32F7 and H7, put it and the buffer
+ * above where the MPU says that nothing is cached. */
 static volatile uint8_t received[RECEIVED];
 
 void dma_interrupt(void);
@@ -132,8 +132,9 @@ void receive_interrupt(void)
 
 void idle_interrupt(void)
 {
-    /* Reading SR and then DR clears the flag. DMA has taken what was in DR before the pause. Should a byte come just now,
-     * and this read be quicker than DMA, that byte is lost: the frame fails its CRC, and the host sends it again. */
+    /* Reading SR and then DR clears the flag. DMA has taken what was in DR before the pause. Should a byte come just
+     * now, and this read be quicker than DMA, that byte is lost: the frame fails its CRC, and the host sends it again.
+     */
     if ((USART3_SR & USART_IDLE) != 0)
         (void)USART3_DR;
     take_received();

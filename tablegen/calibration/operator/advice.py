@@ -8,8 +8,8 @@ import numpy as np
 from tablegen.calibration.operator.fit import OperatorFit
 from tablegen.calibration.operator.periodic_line import PeriodicLine
 from tablegen.compensation.operator.field import covariance
-from tablegen.driver import Driver
 from tablegen.numerics.arrays import Floats
+from tablegen.numerics.driver import Driver
 
 _STROKES = np.arange(0.1, 1.0, 0.05)
 _CENTRES = np.arange(0.1, 0.91, 0.05)

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tablegen.calibration.estimate import Estimate
+from tablegen.base.input_errors import Unphysical
 from tablegen.calibration.operator.branches import DEGREE, left_of
 from tablegen.calibration.operator.periodic_line import PHASES, PeriodicLine
 from tablegen.compensation.dynamics import Response
@@ -18,7 +18,7 @@ from tablegen.compensation.operator.creep import LogarithmicCreep
 from tablegen.compensation.operator.family import Family
 from tablegen.compensation.operator.field import Lengths, covariance
 from tablegen.compensation.operator.plays import NO_PLAYS
-from tablegen.problems import Unphysical
+from tablegen.fitting.estimate import Estimate
 
 _MOST = 0.02  # of the shortest period: larger delays are not looked for
 _COARSE, _FINE = 0.002, 0.0004  # steps of it

@@ -7,11 +7,12 @@ from itertools import combinations, product
 import numpy as np
 from msgspec import structs
 
+from tablegen.base.input_errors import Unphysical
 from tablegen.calibration.operator.bouc_wen_fit import BoucWenProblem
 from tablegen.calibration.operator.branches import Left, left_of
 from tablegen.calibration.operator.creep_fit import creep_of_fields
-from tablegen.calibration.operator.errors import WORST, LineErrors, compare
 from tablegen.calibration.operator.family import CreepOf, FamilyProblem, groups_of
+from tablegen.calibration.operator.loop_errors import WORST, LineErrors, compare
 from tablegen.calibration.operator.periodic_line import PeriodicLine
 from tablegen.calibration.operator.plays_fit import PlaysProblem
 from tablegen.calibration.operator.shrinkage import shrunk
@@ -23,7 +24,6 @@ from tablegen.compensation.operator.field import Field, Lengths, through
 from tablegen.compensation.operator.operator import MeasuredLine, Operator
 from tablegen.compensation.operator.plays import NO_PLAYS
 from tablegen.numerics.arrays import Floats
-from tablegen.problems import Unphysical
 
 STROKE_LENGTHS = (0.4, 0.8, 1.5, 3.0)
 CENTRE_LENGTHS = (0.5, 1.0, 2.0)

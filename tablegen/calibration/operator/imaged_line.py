@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from tablegen.calibration.estimate import LineSize
-from tablegen.calibration.image_line import fit_line
-from tablegen.calibration.image_scale import size_of_line
-from tablegen.calibration.image_sizes import KnownSample, SampleImage, Taking
+from tablegen.base.input_errors import Unphysical
+from tablegen.calibration.laws.image_sizes import KnownSample, SampleImage, Taking
 from tablegen.calibration.operator.periodic_line import PHASES, PeriodicLine
-from tablegen.driver import Driver
-from tablegen.problems import Unphysical
+from tablegen.fitting.estimate import LineSize
+from tablegen.images.fast_axis_line import fit_line
+from tablegen.images.line_length import size_of_line
+from tablegen.numerics.driver import Driver
 
 _SPANNED = (0.05, 0.95)  # of each sweep: the rest is extrapolated, to 0.4 % of the line on the plants of the tests
 

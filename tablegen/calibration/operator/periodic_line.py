@@ -4,13 +4,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tablegen.calibration.hysteresis import Trace
+from tablegen.base.input_errors import Unphysical
+from tablegen.calibration.laws.hysteresis import Trace
 from tablegen.calibration.operator.plausible import check_record, check_repeats
 from tablegen.compensation.dynamics import Response
 from tablegen.compensation.operator.creep import LogarithmicCreep
-from tablegen.driver import Driver
 from tablegen.numerics.arrays import Bools, Floats
-from tablegen.problems import Unphysical
+from tablegen.numerics.driver import Driver
 
 PHASES = 1024  # of the grid
 _MIN_SAMPLES = 40  # samples a period

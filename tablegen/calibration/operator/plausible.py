@@ -2,9 +2,10 @@
 
 import numpy as np
 
-from tablegen.calibration.hysteresis import Trace
+from tablegen.base.input_errors import Unphysical
+from tablegen.calibration.laws.hysteresis import Trace
+from tablegen.calibration.spans import check_spans
 from tablegen.numerics.arrays import Floats
-from tablegen.problems import Unphysical
 
 _MOST_AT_REST = 0.04  # of a record at its largest or least value: coarse steps of a sine's turn are 0.03
 _FEW = 4  # samples at a turn that may be the same, where there are few of a period
@@ -19,6 +20,7 @@ def check_record(trace: Trace) -> None:
         missing = np.flatnonzero(~np.isfinite(values))
         if len(missing):
             raise Unphysical(f"the {name} of sample {missing[0] + 1} is {values[missing[0]]:g}; leave such samples out")
+    check_spans(trace.time_s, trace.displacement_nm, trace.drive_v)
     for name, values in columns[1:]:
         span = float(np.ptp(values)) if len(values) else 0.0
         if not span > 0.0:

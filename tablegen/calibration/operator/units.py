@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from tablegen.base.input_errors import Unphysical
 from tablegen.calibration.operator.periodic_line import PeriodicLine
-from tablegen.problems import Unphysical
 
 _LEAST_STROKE = 0.05  # of v_max: that of the largest trace
 _MOST_RATIO = 3.0  # of the sensitivities of two traces, or of a trace and the scanner file

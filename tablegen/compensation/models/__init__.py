@@ -8,7 +8,11 @@ from functools import cache
 from importlib import import_module
 from pathlib import Path
 
+from tablegen.base.input_errors import Rejected, Unphysical
+from tablegen.base.plugins import PluginFailed, distribution, guarded
+from tablegen.compensation.line import LineRequest, LineShape
 from tablegen.compensation.model import Hysteresis
+from tablegen.compensation.model_problems import ModelProblems
 
 GROUP = "tablegen.models"
 DEFAULT = "harmonic"  # of a table that names none
@@ -42,18 +46,44 @@ def get(name: str) -> type[Hysteresis]:
     return found
 
 
+def line_of(table: Hysteresis, request: LineRequest, problems: ModelProblems) -> LineShape | None:
+    """Return the line that a model makes; None where ``problems`` grew.
+
+    Raises ``PluginFailed`` where the model of another distribution fails, or returns anything else.
+    """
+    if type(table).__module__.startswith(f"{__name__}."):
+        return table.line(request, problems)
+    name = table.model()
+    home = _home(name, type(table).__module__)
+    with guarded(name, home, "failed", Rejected, Unphysical):
+        line: object = table.line(request, problems)
+    if line is not None and not isinstance(line, LineShape):
+        raise PluginFailed(f"{name!r} of {home}: line() returned an object of type {type(line).__name__}, no LineShape")
+    if line is None and not problems.count:
+        raise PluginFailed(f"{name!r} of {home}: line() returned None, and no problem that says why")
+    return line
+
+
+@cache
+def _home(name: str, module: str) -> str:
+    try:
+        return _of_others(name)[1]
+    except UnknownModel:  # a class that was made in this process
+        return module
+
+
 def _of_others(name: str) -> tuple[object, str]:
     """What the one entry point of a name leads to, and its package."""
     from importlib.metadata import entry_points  # a good part of what a build costs, and seldom needed
 
     entries = list(entry_points(group=GROUP, name=name))
-    homes = sorted(entry.dist.name if entry.dist is not None else entry.value for entry in entries)
+    homes = sorted(map(distribution, entries))
     if not entries:
         raise UnknownModel(f"{name!r} is not one of {', '.join(map(repr, names()))}")
     if len(entries) > 1:
         raise UnknownModel(f"{name!r} is a model of {' and '.join(homes)}; uninstall all of them but one")
     try:
-        return entries[0].load(), homes[0]
-    except Exception as error:
-        why = f"{type(error).__name__}: {error}"
-        raise UnknownModel(f"{name!r} of {homes[0]} cannot be loaded: {why}") from error
+        with guarded(name, homes[0], "cannot be loaded"):
+            return entries[0].load(), homes[0]
+    except PluginFailed as failure:
+        raise UnknownModel(*failure.args) from failure.__cause__

@@ -8,25 +8,26 @@ from typing import Annotated, ClassVar
 import numpy as np
 from msgspec import Meta, structs
 
+from tablegen.base.figures import shown_path
+from tablegen.base.input_errors import Rejected, Unphysical
+from tablegen.base.quantities import FileName
 from tablegen.compensation.branches import WithBranches
 from tablegen.compensation.dynamics import capped_inverse
 from tablegen.compensation.expectation import Expectation, Figure
 from tablegen.compensation.hysteresis import BranchShape
-from tablegen.compensation.line import LineShape, WantedLine, WholeLine
+from tablegen.compensation.line import LineRequest, LineShape, WholeLine
+from tablegen.compensation.model_problems import ModelProblems
 from tablegen.compensation.operator.creep import LogarithmicCreep
 from tablegen.compensation.operator.file import read_operator
-from tablegen.compensation.operator.gentle_line import Gentle, gentlest_waveform
 from tablegen.compensation.operator.loop import Loop
-from tablegen.compensation.operator.operator import Operator
+from tablegen.compensation.operator.minimum_acceleration_line import Gentle, gentlest_waveform
+from tablegen.compensation.operator.operator import SMALL_STROKE, Operator
 from tablegen.compensation.operator.scan_line import Expected, Found, Wanted, find_waveform
 from tablegen.compensation.operator.transient import after_offset, after_size
 from tablegen.compensation.operator.uncertainty import departures, of_formulas, of_places
 from tablegen.compensation.transient import Transient
-from tablegen.driver import Driver
-from tablegen.figures import shown_path
 from tablegen.numerics.arrays import Floats
-from tablegen.problems import Rejected, Unphysical
-from tablegen.quantities import FileName
+from tablegen.numerics.driver import Driver
 from tablegen.waveform.series import FourierSeries
 from tablegen.waveform.window_fit import fit_window
 
@@ -118,69 +119,76 @@ class OperatorModel(WithBranches, frozen=True, kw_only=True, tag="operator"):
         """The operator's."""
         return (self.file,)
 
-    def line(self, wanted: WantedLine) -> LineShape | None:
-        """Learnt on the operator, from a straight line on."""
-        operator = self._read(wanted)
-        if operator is None:
-            return None
-        with wanted.at("file"):
-            return _line(operator, wanted)
+    def line(self, request: LineRequest, problems: ModelProblems) -> LineShape | None:
+        """Learn the waveform on the operator, from a straight line on."""
+        operator = self._read(request, problems)
+        if operator is None or not request.size_nm > 0.0 or not 0.0 <= request.v_share <= 1.0:
+            return None  # a size or an offset that was refused, and no line to look for
+        with problems.at("file"):
+            _check_sense(operator, request)
+            return _line(operator, request, problems)
         return None
 
-    def loop(self, wanted: WantedLine, low: float, high: float) -> tuple[Loop, LogarithmicCreep] | None:
-        """That of the operator, of the size that it gives."""
-        operator = self._read(wanted)
+    def loop(
+        self, request: LineRequest, low: float, high: float, problems: ModelProblems
+    ) -> tuple[Loop, LogarithmicCreep] | None:
+        """Return the loop of the operator, of the size that it gives."""
+        operator = self._read(request, problems)
         if operator is None:
             return None
-        with wanted.at("file"):
-            _check_reach(operator, high - low, 0.5 * (low + high), wanted.driver)
-            here, factor = _at(operator, wanted)
-            return here.loop(low, high, factor, wanted.v_share), here.creep
+        with problems.at("file"):
+            _check_sense(operator, request)
+            _check_reach(operator, high - low, 0.5 * (low + high), request.driver)
+            here, factor = _at(operator, request)
+            return here.loop(low, high, factor, request.v_share), here.creep
         return None
 
-    def _read(self, wanted: WantedLine) -> Operator | None:
-        """The file's; None where ``wanted.problems`` grew."""
-        path, before = wanted.folder / self.file, len(wanted.problems.found)
+    def _read(self, request: LineRequest, problems: ModelProblems) -> Operator | None:
+        """Read the operator of the file; None where it does not serve, with the reason in ``problems``."""
+        path, before = request.folder / self.file, problems.count
         try:
             operator, file = read_operator(path, shown_path(path))
         except Rejected as rejected:
-            wanted.problems.found.extend(rejected.problems)
+            problems.extend(rejected.problems)
             return None
-        if file.axis != wanted.axis:
-            wanted.problem("file", f"{self.file} is the operator of {file.axis}")
+        if file.axis != request.axis:
+            why = f"{self.file} is the operator of {file.axis}; [{request.axis}.hysteresis] needs a model of its own"
+            problems.add("file", why)
         for key in ("v_max", "v_min"):
-            its, ours = getattr(file, key), getattr(wanted.driver, key)
-            if abs(its - ours) > 1e-6 * wanted.driver.span:
-                wanted.problem("file", f"{self.file} was identified with {key} = {its:g} V, not {ours:g} V")
-        return operator if len(wanted.problems.found) == before else None
+            its, ours = getattr(file, key), getattr(request.driver, key)
+            if abs(its - ours) > 1e-6 * request.driver.span:
+                problems.add("file", f"{self.file} was identified with {key} = {its:g} V, not {ours:g} V")
+        return operator if problems.count == before else None
 
     def described(self, line: LineShape) -> str:
         """Its file."""
         return f"{self.model()} {Path(self.file).name}"
 
 
-def _at(operator: Operator, wanted: WantedLine) -> tuple[Operator, float]:
+def _at(operator: Operator, request: LineRequest) -> tuple[Operator, float]:
     """The operator at this rate, and the factor of its loops at this offset."""
-    factor = wanted.factor_at(wanted.v_share) / wanted.factor_at(operator.centre)
-    operator = replace(operator, creep=operator.creep.down_to(wanted.rate_hz))
-    if wanted.rate_gain is not None:  # (23) says what the rate does to the size; creep then only bends the line
+    factor = request.factor_at(request.v_share) / request.factor_at(operator.centre)
+    operator = replace(operator, creep=operator.creep.down_to(request.rate_hz))
+    if request.rate_gain is not None:  # (23) says what the rate does to the size; creep then only bends the line
         reference = operator.creep.reference_hz
-        factor *= wanted.rate_gain(wanted.rate_hz) / wanted.rate_gain(reference)
-        operator = replace(operator, creep=structs.replace(operator.creep, reference_hz=wanted.rate_hz))
+        factor *= request.rate_gain(request.rate_hz) / request.rate_gain(reference)
+        operator = replace(operator, creep=structs.replace(operator.creep, reference_hz=request.rate_hz))
     return operator, factor
 
 
-def _line(operator: Operator, wanted: WantedLine) -> OperatorLine | None:
-    centre = wanted.v_share
-    operator, factor = _at(operator, wanted)
-    at_offset = wanted.factor_at(centre)
+def _line(operator: Operator, request: LineRequest, problems: ModelProblems) -> OperatorLine | None:
+    centre = request.v_share
+    operator, factor = _at(operator, request)
+    at_offset = request.factor_at(centre)
 
     def with_mean(mean: float) -> float:
-        return wanted.factor_at(mean) / at_offset
+        return request.factor_at(mean) / at_offset
 
-    line = Wanted(wanted.size_nm, wanted.turn, wanted.window, wanted.both, wanted.rate_hz, centre, factor, with_mean)
-    response, boost = wanted.response, wanted.max_boost_db
-    n = np.arange(1.0, wanted.harmonics + 1.0) * wanted.rate_hz
+    line = Wanted(
+        request.size_nm, request.turn, request.window, request.both, request.rate_hz, centre, factor, with_mean
+    )
+    response, boost = request.response, request.max_boost_db
+    n = np.arange(1.0, request.harmonics + 1.0) * request.rate_hz
 
     def through(series: FourierSeries) -> FourierSeries:
         return series
@@ -197,28 +205,32 @@ def _line(operator: Operator, wanted: WantedLine) -> OperatorLine | None:
         def through(series: FourierSeries) -> FourierSeries:
             return series.times(real, imaginary)
 
-    straight = LineShape(wanted.turn, BranchShape(), BranchShape())
-    start = fit_window(straight, wanted.harmonics, wanted.window, wanted.both)
+    straight = LineShape(request.turn, BranchShape(), BranchShape())
+    start = fit_window(straight, request.harmonics, request.window, request.both)
     found = find_waveform(operator, line, start, through, None if response is None else dynamics)
     gentle: Gentle | None = None
-    if wanted.allowed is not None:
+    if request.allowed is not None:
         try:
             gentle = gentlest_waveform(
-                operator, line, found, wanted.allowed.percent, through, None if response is None else dynamics
+                operator, line, found, request.allowed.percent, through, None if response is None else dynamics
             )
             found = gentle.found
         except Unphysical as reason:
-            if wanted.allowed.firm:
-                wanted.problems.add(
-                    wanted.scan_file, f"{wanted.axis}.band_limit.max_scaling_error_percent", str(reason)
-                )
+            if request.allowed.firm:
+                problems.add_to_scan("band_limit.max_scaling_error_percent", str(reason))
                 return None
     factor *= with_mean(found.mean)
     between = _BEND_UNKNOWN * found.grown
-    _check_reach(operator, found.stroke, found.centre, wanted.driver)
+    _check_reach(operator, found.stroke, found.centre, request.driver)
+    if not request.v_amplitude > 0.0:
+        raise Unphysical(
+            f"the operator makes {request.size_nm:.6g} nm with {found.stroke * request.driver.span:.4g} V, and "
+            f"[{request.axis}.size] refuses them: the two contradict each other; calibrate `size` again, or lower the "
+            "size"
+        )
     late = replace(operator, creep=operator.creep.down_to(_SLOWEST_HZ))  # for all that a few frames may last
     # w = 0 and 1 are the ends of the laws' amplitude everywhere else.
-    scale = found.v_amplitude * wanted.driver.span / wanted.v_amplitude
+    scale = found.v_amplitude * request.driver.span / request.v_amplitude
 
     def scaled(series: FourierSeries) -> FourierSeries:
         return FourierSeries(0.5 + scale * (series.a0 - 0.5), scale * series.a, scale * series.b)
@@ -226,21 +238,33 @@ def _line(operator: Operator, wanted: WantedLine) -> OperatorLine | None:
     series = scaled(found.series)
     return OperatorLine.of(
         series,
-        wanted.turn,
+        request.turn,
         expected=found.expected,
-        uncertainty=_uncertainty(operator, wanted, found),
+        uncertainty=_uncertainty(operator, request, found),
         distance=operator.distance(found.stroke, found.centre),
         operator=operator,
         factor=factor,
         between=between,
-        kept=None if gentle is None or wanted.allowed is None else wanted.allowed.percent,
+        kept=None if gentle is None or request.allowed is None else request.allowed.percent,
         learnt=None if gentle is None else scaled(gentle.learnt),
         beside=None if gentle is None else gentle.beside_percent,
         after=(
-            after_offset(late, found.stroke, found.centre, factor, wanted.turn, 1.0 / wanted.rate_hz),
-            after_size(late, found.stroke, found.centre, factor, wanted.turn, 1.0 / wanted.rate_hz),
+            after_offset(late, found.stroke, found.centre, factor, request.turn, 1.0 / request.rate_hz),
+            after_size(late, found.stroke, found.centre, factor, request.turn, 1.0 / request.rate_hz),
         ),
     )
+
+
+def _check_sense(operator: Operator, request: LineRequest) -> None:
+    """Refuse an operator that stands still or runs backwards at small drives, which its size is referred to."""
+    for centre in (operator.centre, request.v_share):
+        extent = operator.family.extent(SMALL_STROKE, centre)
+        if not extent > 0.0:
+            driver = request.driver
+            raise Unphysical(
+                f"at {driver.volts(centre):.4g} V it moves by {extent:.4g} nm for {SMALL_STROKE * driver.span:.4g} V, "
+                "and no piezo stands still or runs backwards; calibrate it again"
+            )
 
 
 def _check_reach(operator: Operator, stroke: float, centre: float, driver: Driver) -> None:
@@ -261,7 +285,7 @@ def _check_reach(operator: Operator, stroke: float, centre: float, driver: Drive
         )
 
 
-def _uncertainty(operator: Operator, wanted: WantedLine, found: Found) -> Expected:
+def _uncertainty(operator: Operator, request: LineRequest, found: Found) -> Expected:
     """What may be wrong beside the waveform: departures of the piezo from the operator, and of the size some more.
 
     The shape of a stroke is that at other offsets, but for the family's part. The size goes by (1) from the nearest
@@ -273,19 +297,19 @@ def _uncertainty(operator: Operator, wanted: WantedLine, found: Found) -> Expect
     away = min(abs(line.centre - found.centre) for line in lines)
     others = of_places(operator.residual.at(found.stroke, found.centre), away)
     rms, scaling, mismatch = (sqrt(a * a + b * b) for a, b in zip((rms, scaling, mismatch), others, strict=True))
-    here = wanted.factor_at(found.mean)
-    offset = min(abs(here / wanted.factor_at(line.centre) - 1.0) for line in lines)
-    rate = min(abs(_rate_change(operator, wanted, line.rate_hz)) for line in lines)
+    here = request.factor_at(found.mean)
+    offset = min(abs(here / request.factor_at(line.centre) - 1.0) for line in lines)
+    rate = min(abs(_rate_change(operator, request, line.rate_hz)) for line in lines)
     by = of_formulas((offset, rate))
     size = sqrt(size * size + by * by + (100.0 * _BEND_UNKNOWN * found.grown) ** 2)
     return Expected((rms, rms), (scaling, scaling), mismatch, size)
 
 
-def _rate_change(operator: Operator, wanted: WantedLine, rate_hz: float) -> float:
+def _rate_change(operator: Operator, request: LineRequest, rate_hz: float) -> float:
     """By which share lines are larger at a rate than at that of the scan."""
-    if wanted.rate_gain is not None:
-        return wanted.rate_gain(wanted.rate_hz) / wanted.rate_gain(rate_hz) - 1.0
-    both = np.array([rate_hz, wanted.rate_hz])
+    if request.rate_gain is not None:
+        return request.rate_gain(request.rate_hz) / request.rate_gain(rate_hz) - 1.0
+    both = np.array([rate_hz, request.rate_hz])
     real, imaginary = operator.creep.response(both)
     there, here = np.sqrt(real * real + imaginary * imaginary).tolist()
     return float(there / here) - 1.0

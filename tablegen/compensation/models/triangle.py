@@ -4,7 +4,8 @@ from typing import ClassVar
 
 from tablegen.compensation.branches import WithBranches
 from tablegen.compensation.hysteresis import BranchShape
-from tablegen.compensation.line import AppliedBranch, LineShape, WantedLine
+from tablegen.compensation.line import AppliedBranch, LineRequest, LineShape
+from tablegen.compensation.model_problems import ModelProblems
 
 
 class TriangleModel(WithBranches, frozen=True, tag="triangle"):
@@ -14,10 +15,10 @@ class TriangleModel(WithBranches, frozen=True, tag="triangle"):
     order: ClassVar[int] = 0
     compensates: ClassVar[bool] = False
 
-    def line(self, wanted: WantedLine) -> LineShape:
+    def line(self, request: LineRequest, problems: ModelProblems) -> LineShape:
         """A straight line each way."""
         straight, none = BranchShape(), AppliedBranch(0.0, 0.5)
-        return LineShape(wanted.turn, straight, straight, (none, none))
+        return LineShape(request.turn, straight, straight, (none, none))
 
     def described(self, line: LineShape) -> str:
         """In words."""

@@ -9,14 +9,14 @@ from typing import Annotated, Literal
 import numpy as np
 from msgspec import Meta, Struct, ValidationError, convert
 
+from tablegen.base.input_errors import Problem, Problems, Rejected
+from tablegen.base.toml import read_toml
 from tablegen.compensation.operator.bouc_wen import BoucWen
 from tablegen.compensation.operator.creep import LogarithmicCreep
 from tablegen.compensation.operator.family import Family
 from tablegen.compensation.operator.field import Lengths, through
 from tablegen.compensation.operator.operator import MeasuredLine, Operator
 from tablegen.compensation.operator.plays import BENDS, Plays
-from tablegen.problems import Problem, Problems, Rejected
-from tablegen.toml import read_toml
 
 VERSION = 1
 _Number = Annotated[float, Meta(ge=-1e9, le=1e9)]

@@ -6,12 +6,12 @@ from functools import lru_cache
 import numpy as np
 from msgspec.structs import replace
 
+from tablegen.base.input_errors import Unphysical
 from tablegen.compensation.operator.creep import LogarithmicCreep
 from tablegen.compensation.operator.family import Family
 from tablegen.compensation.operator.field import Field
 from tablegen.compensation.operator.loop import POINTS, Loop
 from tablegen.numerics.arrays import Floats
-from tablegen.problems import Unphysical
 
 SMALL_STROKE = 0.1  # of v_max: the size of the scans from which m of (1) is taken to come
 _END_POINTS = 48  # of a branch at either end

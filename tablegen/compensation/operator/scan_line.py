@@ -11,12 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tablegen.base.input_errors import Unphysical
 from tablegen.compensation.operator.loop import POINTS, Loop
 from tablegen.compensation.operator.operator import Operator
 from tablegen.numerics.arrays import Bools, Floats, tree_sum
 from tablegen.numerics.linear import Cholesky
 from tablegen.numerics.turns import sine_and_cosine
-from tablegen.problems import Unphysical
 from tablegen.waveform.series import FourierSeries
 
 CHORD = 0.05  # of the line, for scaling errors
@@ -102,12 +102,14 @@ def find_waveform(
     series, amplitude = start, learner.first_amplitude()
     before: Floats | None = None
     for turn in range(1, _ROUNDS + 1):
+        due = amplitude
         if turn <= _FIRST_ROUNDS:  # the amplitude is not known yet, and what cannot be played teaches nothing
             amplitude = min(amplitude, learner.most_amplitude(series))
         played = learner.play(series, amplitude)
         line = learner.line_of(played.position)
         inside = played.position[learner.imaged] - line[1]
-        if before is not None and float(np.max(np.abs(inside - before))) < _CONVERGED * wanted.size_nm:
+        settled = before is not None and float(np.max(np.abs(inside - before))) < _CONVERGED * wanted.size_nm
+        if settled and amplitude == due:  # a line that is held at the ends of the driver settles at another size
             at = 0.5 * (played.loop.low + played.loop.high)
             expected = learner.expected(played.position)
             stroke, mean = played.loop.high - played.loop.low, played.mean

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tablegen.base.input_errors import Unphysical
 from tablegen.compensation.operator.loop import POINTS, Loop
 from tablegen.compensation.operator.operator import SMALL_STROKE, Operator
 from tablegen.compensation.transient import OFFSET_CHANGE, SIZE_CHANGE, Late, Transient
 from tablegen.numerics.arrays import tree_sum
 from tablegen.numerics.elementary import exp
-from tablegen.problems import Unphysical
 
 _POINTS = 65  # of the first sweep
 _MANY_PERIODS = 1e3  # a time constant as long as that knows the mean of a line alone

@@ -4,12 +4,16 @@ A package of somebody else adds one as an entry point of the group ``tablegen.fo
 object an instance of ``tablegen.emit.format.Format``.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tablegen.base.input_errors import Unphysical
+from tablegen.base.plugins import PluginFailed, distribution, guarded
+from tablegen.emit.content import Content
 from tablegen.emit.format import Format
 
 if TYPE_CHECKING:
@@ -20,6 +24,10 @@ GROUP = "tablegen.formats"
 
 class UnknownFormat(ValueError):
     """There is no format of this name, or it cannot be used; the message says what there is, or why."""
+
+
+class FormatFailed(UnknownFormat, PluginFailed):
+    """A format of another distribution failed, or gave something that cannot be written."""
 
 
 def names() -> list[str]:
@@ -43,9 +51,57 @@ def get(name: str) -> Format:
         raise UnknownFormat(f"{name!r} is not a format; formats are {', '.join(names())}")
     if not isinstance(found, Format) or found.name != name:
         raise UnknownFormat(
-            f"{name!r} of {_package(_others()[name][0])} is no tablegen.emit.format.Format of that name"
+            f"{name!r} of {distribution(_others()[name][0])} is no tablegen.emit.format.Format of that name"
         )
+    for attribute in ("purpose", "file_names"):
+        if not isinstance(getattr(found, attribute, None), str):
+            raise UnknownFormat(f"{name!r} of {distribution(_others()[name][0])}: its {attribute} is not a text")
     return found
+
+
+def files_of(one: Format, content: Content) -> dict[str, bytes]:
+    """Render the files of a format by name, without its runtime.
+
+    Raises ``Unphysical`` for a build that it cannot hold, ``FormatFailed`` where a format of another distribution fails
+    or returns anything but names with bytes.
+    """
+    if one.name in _own():
+        return one.files(content)
+    with failing_as_format(one):
+        files: object = one.files(content)
+    if not isinstance(files, Mapping):
+        raise FormatFailed(f"{_described(one)}: files() returned {_kind(files)}; a dict of names and bytes is needed")
+    for name, text in files.items():
+        if not isinstance(name, str) or not isinstance(text, bytes):
+            wrong = f"the name {name!r}" if not isinstance(name, str) else f"{_kind(text)} for {name!r}"
+            raise FormatFailed(f"{_described(one)}: files() returned {wrong}; names are text, and contents bytes")
+    return dict(files)
+
+
+@contextmanager
+def failing_as_format(one: Format) -> Iterator[None]:
+    """Turn what a format of another distribution raises inside into ``FormatFailed``; that of an own one is a fault."""
+    if one.name in _own():
+        yield
+        return
+    try:
+        with guarded(one.name, _home(one), "failed", Unphysical, UnknownFormat):
+            yield
+    except PluginFailed as failure:
+        raise FormatFailed(*failure.args) from failure.__cause__
+
+
+def _described(one: Format) -> str:
+    return f"{one.name!r} of {_home(one)}"
+
+
+def _home(one: Format) -> str:
+    entries = _others().get(one.name)
+    return distribution(entries[0]) if entries else type(one).__module__
+
+
+def _kind(value: object) -> str:
+    return f"an object of type {type(value).__name__}"
 
 
 def chosen(wanted: Iterable[str]) -> list[Format]:
@@ -75,14 +131,10 @@ def _loaded(name: str, entries: "list[EntryPoint]") -> object:
     """What the one entry point of a name leads to."""
     entry, *more = entries
     if more:
-        packages = " and ".join(sorted(map(_package, entries)))
+        packages = " and ".join(sorted(map(distribution, entries)))
         raise UnknownFormat(f"{name!r} is a format of {packages}; uninstall all of them but one")
     try:
-        return entry.load()
-    except Exception as error:
-        why = f"{type(error).__name__}: {error}"
-        raise UnknownFormat(f"{name!r} of {_package(entry)} cannot be loaded: {why}") from error
-
-
-def _package(entry: "EntryPoint") -> str:
-    return entry.dist.name if entry.dist is not None else entry.value
+        with guarded(name, distribution(entry), "cannot be loaded"):
+            return entry.load()
+    except PluginFailed as failure:
+        raise FormatFailed(*failure.args) from failure.__cause__

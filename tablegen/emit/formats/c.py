@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from tablegen.base.reading import BUILD_FILE, read_text
+from tablegen.base.resources import c_link, c_runtime, resource_folder
 from tablegen.emit.constants import (
     axis_constants,
     scan_constants,
@@ -23,8 +25,6 @@ from tablegen.fixedpoint.rounding import signed_limits
 from tablegen.fixedpoint.spline import WORDS_BEHIND
 from tablegen.fixedpoint.synthesis import sine_periods
 from tablegen.numerics.arrays import Ints
-from tablegen.reading import BUILD_FILE, read_text
-from tablegen.resources import c_link, c_runtime, resource_folder
 
 # Patterns of what is checked are compiled when it is: a build needs none.
 _NUMBER = r"(?:U?INT(?:32|64)_C)?\(?(-?\d{1,40})\)?"

@@ -4,14 +4,14 @@ import re
 from pathlib import Path
 from typing import Any
 
+from tablegen.base.reading import BUILD_FILE, read_text
+from tablegen.base.resources import resource_folder, verilog_runtime
 from tablegen.device.widths import least_widths
 from tablegen.emit.constants import axis_constants, scan_constants, sequence_constants, shaping_constants
 from tablegen.emit.content import AxisContent, Content
 from tablegen.emit.format import Comparison, Format, differing
 from tablegen.emit.memory import memory_files
 from tablegen.emit.templates import comment_safe, template
-from tablegen.reading import BUILD_FILE, read_text
-from tablegen.resources import resource_folder, verilog_runtime
 
 # Patterns of what is checked are compiled when it is: a build needs none.
 _LOCALPARAM = r"(?m)^localparam\s[^=]*?(\w+)\s*=\s*(.*?)\s*;"

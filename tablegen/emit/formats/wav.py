@@ -4,11 +4,11 @@ import struct
 
 import numpy as np
 
+from tablegen.base.input_errors import Unphysical
 from tablegen.emit.content import AxisContent, Content
 from tablegen.emit.format import Format
 from tablegen.emit.waveforms import require_period
 from tablegen.numerics.arrays import Ints
-from tablegen.problems import Unphysical
 
 _PCM = 1
 _CHANNELS = 2

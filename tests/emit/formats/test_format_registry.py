@@ -8,11 +8,11 @@ import pytest
 from building import NAME
 from editing import SCAN, edited, run, write_pair
 
+from tablegen.base.resources import resource_folder
 from tablegen.emit import formats
 from tablegen.emit.depfile import deciding_files
 from tablegen.emit.format import Format
 from tablegen.emit.formats import UnknownFormat, chosen, get, names, own_names
-from tablegen.resources import resource_folder
 
 WORKING = """
 from tablegen.emit.format import Format
@@ -300,7 +300,7 @@ def test_a_format_of_others_may_bring_the_sequencer_itself(tmp_path: Path, monke
     bringing = (
         WORKING.replace("FILE", "'scan.count'")
         + """
-from tablegen.resources import c_runtime
+from tablegen.base.resources import c_runtime
 type(FORMAT).runtime = lambda self: c_runtime()
 """
     )
@@ -312,3 +312,111 @@ type(FORMAT).runtime = lambda self: c_runtime()
 def test_a_format_needs_no_more_than_three_words_and_files() -> None:
     """What a subclass has to have is what docs/formats.md says."""
     assert Format.__abstractmethods__ == {"files"}
+
+
+# What fails in another package
+
+FAILING = """
+from tablegen.emit.format import Format
+
+class Words(Format):
+    name = "words"
+    purpose = "how many words"
+    file_names = "NAME.count"
+
+    def files(self, content):
+        BODY
+
+FORMAT = Words()
+"""
+
+
+@pytest.mark.parametrize(
+    ("body", "why"),
+    [
+        ("return {'scan.count': '2048'}", "files() returned an object of type str for 'scan.count'; names are text"),
+        ("return {'scan.count': bytearray(3)}", "files() returned an object of type bytearray for 'scan.count'"),
+        ("return {3: b''}", "files() returned the name 3; names are text, and contents bytes"),
+        ("return [('scan.count', b'')]", "files() returned an object of type list; a dict of names and bytes"),
+        ("return None", "files() returned an object of type NoneType"),
+        ("return 1 / 0", " failed: ZeroDivisionError: division by zero"),
+        ("raise SystemExit", " failed: SystemExit"),
+        ("raise SystemExit(0)", " failed: SystemExit: 0"),
+        ("raise SystemExit('so long')", " failed: SystemExit: so long"),
+        ("raise MemoryError", " failed: MemoryError"),
+        ("raise OSError(28, 'No space left on device', '/tmp/x')", " failed: OSError: "),
+        ("raise GeneratorExit", " failed: GeneratorExit"),
+        ("return self.files(content)", " failed: RecursionError: maximum recursion depth exceeded"),
+        ("raise UnicodeDecodeError('ascii', b'\\xff', 0, 1, 'ordinal')", " failed: UnicodeDecodeError: "),
+        ("raise ValueError('a\\x1b[2Jb')", " failed: ValueError: a\\x1b[2Jb"),
+    ],
+)
+def test_one_that_fails_is_told_with_its_package(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, body: str, why: str
+) -> None:
+    package = f"failing_{abs(hash(body))}"
+    provide(tmp_path, monkeypatch, package, f"words = {package}:FORMAT", FAILING.replace("BODY", body))
+    outcome = run("build", write_pair(tmp_path), "-o", tmp_path / "out", "-f", "words")
+    assert outcome.status == 2
+    (told,) = outcome.messages
+    assert told.startswith(f"formats: 'words' of {package}")
+    assert why in told
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    "source", ["raise SystemExit", "raise SystemExit(0)", "import sys; sys.exit('so long')", "raise GeneratorExit"]
+)
+def test_one_that_exits_as_it_is_loaded_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, source: str) -> None:
+    """It would end the build with its own status, 0 for one, and nothing would be written."""
+    package = f"leaving_{abs(hash(source))}"
+    provide(tmp_path, monkeypatch, package, f"broken = {package}:FORMAT", source)
+    outcome = run("build", write_pair(tmp_path), "-o", tmp_path / "out", "-f", "broken")
+    assert outcome.status == 2
+    assert f"'broken' of {package} cannot be loaded: " in outcome.err
+    listed = run("formats")
+    assert (listed.status, f"cannot be used: 'broken' of {package} cannot be loaded" in listed.err) == (0, True)
+
+
+def test_an_interruption_stays_one_and_says_where(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    source = FAILING.replace("BODY", "raise KeyboardInterrupt")
+    provide(tmp_path, monkeypatch, "interrupted_1", "words = interrupted_1:FORMAT", source)
+    outcome = run("build", write_pair(tmp_path), "-o", tmp_path / "out", "-f", "words")
+    kept = f"{tmp_path / 'out'} was left as it was\n"
+    assert (outcome.status, outcome.err) == (130, f"interrupted in 'words' of interrupted_1; {kept}")
+    provide(tmp_path, monkeypatch, "interrupted_2", "other = interrupted_2:FORMAT", "raise KeyboardInterrupt")
+    outcome = run("build", tmp_path / "scan.toml", "-o", tmp_path / "out", "-f", "other")
+    assert (outcome.status, outcome.err) == (130, f"interrupted in 'other' of interrupted_2; {kept}")
+    assert run("formats").err.lstrip() == "interrupted in 'other' of interrupted_2\n"
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("more", "why"),
+    [
+        ("type(FORMAT).runtime = lambda self: ['dac.h']", " failed: AttributeError: 'str' object has no attribute"),
+        ("type(FORMAT).runtime = lambda self: 1 / 0", " failed: ZeroDivisionError"),
+        ("type(FORMAT).purpose = 3", ": its purpose is not a text"),
+        ("del type(FORMAT).file_names", ": its file_names is not a text"),
+    ],
+)
+def test_one_whose_other_parts_fail_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, more: str, why: str
+) -> None:
+    package = f"partly_{abs(hash(more))}"
+    source = WORKING.replace("FILE", "'scan.count'") + "\n" + more
+    provide(tmp_path, monkeypatch, package, f"words = {package}:FORMAT", source)
+    outcome = run("build", write_pair(tmp_path), "-o", tmp_path / "out", "-f", "words", explains=True)
+    assert outcome.status == 2
+    assert f"'words' of {package}{why}" in outcome.err
+
+
+def test_a_check_that_fails_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("TABLEGEN_TRACEBACK")
+    source = WORKING.replace("FILE", "'scan.count'") + "\ntype(FORMAT).check = lambda self, folder, content: 1 / 0"
+    provide(tmp_path, monkeypatch, "unchecked", "words = unchecked:FORMAT", source)
+    assert run("build", write_pair(tmp_path), "-o", tmp_path / "out", "-f", "words").status == 0
+    outcome = run("verify", "--target", "files", tmp_path / "out", explains=True)
+    assert outcome.status == 2
+    assert "a plug-in of unchecked failed: ZeroDivisionError: division by zero\n" in outcome.err
+    assert "report it to the authors of unchecked" in outcome.err

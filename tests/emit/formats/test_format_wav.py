@@ -13,10 +13,10 @@ from manifest_integers import played_codes
 from replacing import replace
 from sets import quick
 
+from tablegen.base.input_errors import Unphysical
 from tablegen.emit.formats.wav import FORMAT
 from tablegen.emit.stored import stored_content
 from tablegen.manifest.read import read_build
-from tablegen.problems import Unphysical
 
 
 @pytest.fixture(scope="module", params=quick(FEW, BUILDS))

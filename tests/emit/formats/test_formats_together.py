@@ -12,12 +12,12 @@ from replacing import replace
 from sets import quick
 from verifying import verdicts
 
+from tablegen.base.input_errors import Unphysical
 from tablegen.emit.format import Format
 from tablegen.emit.formats import get, own_names
 from tablegen.emit.stored import stored_content
 from tablegen.emit.waveforms import MOST_TICKS
 from tablegen.manifest.read import read_build
-from tablegen.problems import Unphysical
 
 OF_SAMPLES = ("csv", "npz", "pwl", "wav")
 

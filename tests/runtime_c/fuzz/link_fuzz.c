@@ -5,7 +5,8 @@
  *     0x40 + type, n       a well-formed frame of this type with n bytes of payload, of the next number
  *     0x50 + type, n       the same with the number of the last one
  *     0x60, n              n bytes as they are
- *     0x61, n              an upload of a good image with changes (place, difference) in n bytes; table or Fourier words
+ *     0x61, n              an upload of a good image with changes (place, difference) in n bytes; table or Fourier
+ *                          words
  *     0x62                 its COMMIT
  *     0x63, n              n times the main loop, and no more for the bytes that follow
  *     0x64                 the interlock changes
@@ -84,7 +85,8 @@ static void put_axis(uint8_t *page, uint32_t period, uint32_t harmonics)
 {
     const uint64_t whole = UINT64_C(1) << 32, offset = UINT64_C(30000) << 20;
     const uint32_t words[] = {(uint32_t)(whole / period), (uint32_t)(whole % period), period, 40000,
-                              (uint32_t)(offset & 0x3FFFF), (uint32_t)(offset >> 18), 2000, 58000, 8000, 20000, harmonics};
+                              (uint32_t)(offset & 0x3FFFF), (uint32_t)(offset >> 18), 2000, 58000, 8000, 20000,
+                              harmonics};
     put_words(page, words, sizeof words / sizeof words[0]);
 }
 

@@ -1,0 +1,45 @@
+"""What ``import tablegen`` offers: the one list of public names, in the order in which they are used."""
+
+from tablegen.api.build import (
+    load as load,
+    plan as plan,
+    certify as certify,
+    build as build,
+)
+from tablegen.api.many import (
+    variants as variants,
+    build_many as build_many,
+)
+from tablegen.manifest.read import read_build as read_build
+from tablegen.verification.run import verify as verify
+from tablegen.api.calibrate import calibrate as calibrate
+from tablegen.api.refine import refine as refine
+from tablegen.api.correct import correct as correct
+from tablegen.api.laboratory import Laboratory as Laboratory
+from tablegen.link.device import Device as Device
+from tablegen.config.load import Setup as Setup
+from tablegen.planning.line_plan import Plan as Plan
+from tablegen.certificate.certificate import Certificate as Certificate
+from tablegen.api.build import Build as Build
+from tablegen.api.samples import Samples as Samples
+from tablegen.config.variants import Variant as Variant
+from tablegen.api.many import BuildOutcome as BuildOutcome
+from tablegen.api.calibrate import Calibrated as Calibrated
+from tablegen.api.refine import RefinedScan as RefinedScan
+from tablegen.api.correct import Corrected as Corrected
+from tablegen.manifest.read import StoredBuild as StoredBuild
+from tablegen.link.prepare import PreparedScan as PreparedScan
+from tablegen.verification.build_report import Report as Report
+from tablegen.emit.format import Format as Format
+from tablegen.emit.content import Content as Content
+from tablegen.base.input_errors import (
+    Rejected as Rejected,
+    Problem as Problem,
+    Unphysical as Unphysical,
+)
+from tablegen.api.build import BrokenLimit as BrokenLimit
+from tablegen.emit.write import CannotWrite as CannotWrite
+from tablegen.manifest.read import NotABuild as NotABuild
+from tablegen.verification.failures import ToolMissing as ToolMissing
+from tablegen.link.errors import LinkError as LinkError
+from tablegen.version import __version__ as __version__

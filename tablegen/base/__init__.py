@@ -1,0 +1,1 @@
+"""Foundations: input errors, warnings, bounded reading, TOML with lines, locks, workers."""

@@ -1,0 +1,136 @@
+"""The one way in which files that others wrote are read: regular files only, and no more of them than their kind has.
+
+A pipe would be waited for, a device may never end, and a file may be of any size: none of these stops or fills a
+machine. What cannot be read is an ``OSError`` whose ``strerror`` says why.
+"""
+
+import errno
+import os
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
+from hashlib import sha256
+from pathlib import Path
+from typing import NamedTuple
+
+from tablegen.base.user_cache import is_private
+
+_CHUNK_BYTES = 1 << 20
+_OPENING = os.O_RDONLY | sum(getattr(os, flag, 0) for flag in ("O_NONBLOCK", "O_NOCTTY", "O_CLOEXEC", "O_BINARY"))
+
+
+class Kind(NamedTuple):
+    """A kind of file: what messages call it, and the most bytes that are read of one."""
+
+    what: str
+    most_bytes: int
+
+
+# docs/inputs.md has this table.
+CONFIGURATION = Kind("a scan, scanner or operator file", 1 << 20)
+RESPONSE = Kind("a measured response", 16 << 20)
+MEASUREMENT = Kind("a file of measurements", 512 << 20)
+IMAGE = Kind("an image", 256 << 20)
+MANIFEST = Kind("a manifest", 8 << 20)
+BUILD_FILE = Kind("a file of a build", 512 << 20)
+RECORD = Kind("a record of verify", 16 << 20)
+KEY = Kind("a key file", 4 << 10)
+KINDS = (CONFIGURATION, RESPONSE, MEASUREMENT, IMAGE, MANIFEST, BUILD_FILE, RECORD, KEY)
+
+_OTHERS = (
+    (stat.S_ISDIR, "a directory"),
+    (stat.S_ISFIFO, "a pipe"),
+    (stat.S_ISSOCK, "a socket"),
+    (stat.S_ISCHR, "a device"),
+    (stat.S_ISBLK, "a device"),
+)
+
+
+def other_than_file(path: str | os.PathLike[str]) -> str | None:
+    """What stands at a path, such as "a pipe", if that is no regular file; None for a file, and for nothing."""
+    try:
+        mode = os.stat(path).st_mode
+    except (OSError, ValueError):
+        return None
+    return _other(mode)
+
+
+def read_bytes(path: str | os.PathLike[str], kind: Kind) -> bytes:
+    """The whole of a file. Raises ``OSError`` where it cannot be read, is no regular file, or too large."""
+    return b"".join(chunks_of(path, kind))
+
+
+def read_private_bytes(path: str | os.PathLike[str], kind: Kind) -> bytes:
+    """The whole of a file of the user's own that nobody else can write. Raises ``OSError`` for every other one too."""
+    return b"".join(chunks_of(path, kind, private=True))
+
+
+def read_text(path: str | os.PathLike[str], kind: Kind, encoding: str = "utf-8", errors: str = "strict") -> str:
+    """The same as text."""
+    return read_bytes(path, kind).decode(encoding, errors)
+
+
+def file_sha256(path: str | os.PathLike[str], kind: Kind = BUILD_FILE) -> str:
+    """The digest of a file, in hexadecimal digits, of which no more than a part is held at a time."""
+    digest = sha256()
+    for chunk in chunks_of(path, kind):
+        digest.update(chunk)
+    return digest.hexdigest()
+
+
+def holds(path: Path, content: bytes) -> bool:
+    """Whether a regular file has just this content; False for everything else, and for what cannot be read."""
+    try:
+        return read_bytes(path, Kind("", len(content))) == content
+    except (OSError, ValueError):
+        return False
+
+
+def size_shown(count: int) -> str:
+    """A limit as documents and messages have it."""
+    return f"{count >> 20} MiB" if count >= 1 << 20 else f"{count >> 10} KiB"
+
+
+def chunks_of(path: str | os.PathLike[str], kind: Kind, private: bool = False) -> Iterator[bytes]:
+    """The bytes of a file, a part at a time; what ``read_bytes`` refuses is refused before the first part of it."""
+    count = 0
+    with _opened(path) as (handle, status):
+        if private and not is_private(status):
+            raise PermissionError(errno.EPERM, "others can write it, or it is another user's")
+        size = status.st_size
+        while count <= kind.most_bytes >= size:
+            chunk = os.read(handle, min(_CHUNK_BYTES, kind.most_bytes + 1 - count))
+            if not chunk:
+                return
+            count += len(chunk)
+            yield chunk
+    raise OSError(errno.EFBIG, f"above {size_shown(kind.most_bytes)}, which is the most that {kind.what} may have")
+
+
+@contextmanager
+def _opened(path: str | os.PathLike[str]) -> Iterator[tuple[int, os.stat_result]]:
+    try:
+        _require_file(os.stat(path).st_mode)  # first of all: to open some devices is to do something
+        handle = os.open(os.fspath(path), _OPENING)
+    except ValueError:
+        raise OSError(errno.EINVAL, "no file can have such a name") from None
+    try:
+        status = os.fstat(handle)
+        _require_file(status.st_mode)
+        yield handle, status
+    finally:
+        os.close(handle)
+
+
+def _require_file(mode: int) -> None:
+    other = _other(mode)
+    if other == "a directory":
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+    if other is not None:
+        raise OSError(errno.EINVAL, f"{other}, where a regular file is needed")
+
+
+def _other(mode: int) -> str | None:
+    if stat.S_ISREG(mode):
+        return None
+    return next((name for is_one, name in _OTHERS if is_one(mode)), "something else")

@@ -1,0 +1,41 @@
+"""Folders of files that ship inside the package."""
+
+import os
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from typing import Literal
+
+PACKAGE = Path(__file__).parent.parent
+_C_LINK = "dac_link"
+
+
+def resource_folder(name: Literal["examples", "firmware_templates"]) -> Path:
+    """Where the example files, or the templates and the runtime, are installed."""
+    return Path(str(import_module(f"tablegen.{name}").__file__)).parent
+
+
+def verilog_runtime() -> list[Path]:
+    """The Verilog sequencer and its link, one module a file, in order of name; every build copies them."""
+    return list(_runtime("verilog", ".v"))
+
+
+def c_runtime() -> list[Path]:
+    """The C sequencer, headers and sources, in order of name; every build copies it."""
+    return [path for path in _runtime("c", ".c", ".h") if not path.name.startswith(_C_LINK)]
+
+
+def c_link() -> list[Path]:
+    """The device's end of the serial link in C, which needs the sequencer; every build copies it too."""
+    return [path for path in _runtime("c", ".c", ".h") if path.name.startswith(_C_LINK)]
+
+
+def own_runtime_folders() -> tuple[Path, ...]:
+    """Where all of these files stand."""
+    return tuple(resource_folder("firmware_templates") / language for language in ("c", "verilog"))
+
+
+@cache
+def _runtime(language: str, *endings: str) -> tuple[Path, ...]:
+    folder = resource_folder("firmware_templates") / language
+    return tuple(folder / name for name in sorted(os.listdir(folder)) if name.endswith(endings))

@@ -1,0 +1,24 @@
+"""What to know of a fit before it is used, the worst first: what makes it meaningless, outliers, remarks."""
+
+from collections.abc import Sequence
+
+from tablegen.base.warnings import Finding, of_remarks, worst_first
+from tablegen.calibration.fit_checks import doubts
+from tablegen.fitting.estimate import Fit
+
+
+def fit_findings(fit: Fit, places: Sequence[str], points: bool = False) -> list[Finding]:
+    """``places`` are files and lines of the outliers, ``points`` what would be written."""
+    part = "image" if fit.images else "row"
+    found = [Finding("limit", 0.0, text, "\u2717 means nothing", "warning") for text in doubts(fit, points)]
+    found += [
+        Finding(
+            "spoils",
+            abs(float(fit.residual_percent[row])) if row < len(fit.residual_percent) else 0.0,
+            f"{place}: far from the other points, but used. Remove the {part} if the measurement was wrong",
+            "! outlier",
+            "outlier",
+        )
+        for row, place in zip(fit.outliers, places, strict=True)
+    ]
+    return worst_first([*found, *of_remarks(fit.remarks)])

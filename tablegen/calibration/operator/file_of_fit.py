@@ -1,0 +1,79 @@
+"""An operator fit as the file that the scanner file names."""
+
+from collections.abc import Sequence
+
+from tablegen.calibration.operator.fit import OperatorFit
+from tablegen.compensation.operator.bouc_wen import NO_BOUC_WEN
+from tablegen.compensation.operator.file import (
+    VERSION,
+    BoucWenTable,
+    CreepTable,
+    LengthsTable,
+    LineTable,
+    OperatorFile,
+    PlaysTable,
+    operator_text,
+)
+from tablegen.numerics.driver import Driver
+
+_HEAD = (
+    "An operator of the piezo, written by tablegen calibrate operator; docs/operator.md says what the numbers are.",
+    "Strokes, centres and thresholds are shares of v_max, weights nm.",
+)
+
+
+def operator_file(fit: OperatorFit, axis: str, driver: Driver | float, sources: Sequence[str] = ()) -> bytes:
+    """The file's bytes; ``sources`` says where the traces came from, a line each."""
+    operator, creep, lengths = fit.operator, fit.operator.creep, fit.operator.residual.lengths
+    plays, loop = operator.family.plays, operator.family.bouc_wen or NO_BOUC_WEN
+    lines = []
+    for i, line in enumerate(operator.lines):
+        row = fit.rows[i]
+        half = len(row) // 2
+        rms, scaling, mismatch, size = line.left_out
+        lines.append(
+            LineTable(
+                name=line.name,
+                stroke=line.stroke,
+                centre=line.centre,
+                rate_hz=line.rate_hz,
+                size=float(fit.sizes[i]),
+                rising=row[:half].tolist(),
+                falling=row[half:].tolist(),
+                rms_percent=rms,
+                scaling_percent=scaling,
+                mismatch_percent=mismatch,
+                size_percent=size,
+                in_fit_percent=list(line.in_fit),
+            )
+        )
+    file = OperatorFile(
+        version=VERSION,
+        axis="x" if axis == "x" else "y",
+        v_max=Driver.of(driver).v_max,
+        v_min=Driver.of(driver).v_min,
+        centre=operator.centre,
+        creep=CreepTable(
+            loss_per_decade=creep.loss_per_decade,
+            fastest_s=creep.fastest_s,
+            slowest_s=creep.slowest_s,
+            reference_hz=creep.reference_hz,
+        ),
+        plays=PlaysTable(
+            thresholds=plays.thresholds.tolist(),
+            weights=plays.weights.tolist(),
+            bends=plays.bends.tolist(),
+            reversible=plays.reversible.tolist(),
+        ),
+        bouc_wen=BoucWenTable(
+            depth_nm=loop.depth,
+            n=loop.n,
+            beta=loop.beta,
+            gamma=loop.gamma,
+            asymmetry=loop.asymmetry,
+            bend=list(loop.bend),
+        ),
+        lengths=LengthsTable(stroke=lengths.stroke, centre=lengths.centre, noise=lengths.noise),
+        lines=lines,
+    )
+    return operator_text(file, [*_HEAD, *sources]).encode("utf-8")

@@ -1,0 +1,1 @@
+"""Read files of measurements: columns with units, and every input error at its line and column."""

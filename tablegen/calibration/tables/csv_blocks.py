@@ -1,0 +1,70 @@
+"""Long CSV files a block at a time: plain numbers by numpy's parser, and nothing else, so that lines keep numbers."""
+
+import io
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tablegen.base.reading import Kind, chunks_of
+from tablegen.numerics.arrays import Floats
+
+_NUMBERS = b"0123456789+-.eE \n"
+_MAX_LINE = 1 << 20  # characters; a longer line is left to whoever says so
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """Whole lines of a file; ``line`` is the number of the first one, from 1. The last block may lack its newline."""
+
+    line: int
+    content: bytes
+
+
+def blocks_of(path: Path, kind: Kind) -> Iterator[Block]:
+    """The lines of a file, some of them at a time. Raises ``OSError``."""
+    line = 1
+    parts: list[bytes] = []
+    for chunk in chunks_of(path, kind):
+        cut = chunk.rfind(b"\n") + 1
+        if cut:
+            content = b"".join([*parts, chunk[:cut]])
+            yield Block(line, content)
+            line += _count(content)
+            parts = []
+        parts.append(chunk[cut:])
+    rest = b"".join(parts)
+    if rest:
+        yield Block(line, rest)
+
+
+def plain_rows(content: bytes, separator: str, width: int) -> Floats | None:
+    """Numbers of shape (lines, width), where every line is a row of plain numbers; None where any is something else.
+
+    Between other separators than commas a comma is a decimal one, if all are.
+    """
+    mark = separator.encode("ascii")
+    content = content.replace(b"\r\n", b"\n")
+    if mark != b"," and b"," in content:
+        if b"." in content:
+            return None
+        content = content.replace(b",", b".")
+    if not content or content.translate(None, _NUMBERS + mark):
+        return None
+    if not content.endswith(b"\n"):
+        content += b"\n"
+    ends = np.flatnonzero(np.frombuffer(content, np.uint8) == ord("\n"))
+    if int(np.max(np.diff(ends, prepend=-1))) > _MAX_LINE:
+        return None
+    try:
+        text = io.StringIO(content.decode("ascii"))
+        rows: Floats = np.loadtxt(text, dtype=np.float64, comments=None, delimiter=separator, ndmin=2)
+    except ValueError:
+        return None
+    return rows if rows.shape == (len(ends), width) and bool(np.all(np.isfinite(rows))) else None
+
+
+def _count(content: bytes) -> int:
+    """Lines, as Unix, Windows and old Macintosh end them."""
+    return content.count(b"\n") + content.count(b"\r") - content.count(b"\r\n")

@@ -1,0 +1,268 @@
+"""Files of measurements: columns with units in their names; every fault at its line and column."""
+
+import hashlib
+from array import array
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+
+import numpy as np
+
+from tablegen.base.data_files import Source, file_content, file_text, lines_of, require_file, unreadable
+from tablegen.base.figures import shown_path
+from tablegen.base.input_errors import Problem, Rejected
+from tablegen.base.reading import MEASUREMENT
+from tablegen.calibration.tables.array_files import columns_of, is_array_file, numbers_of
+from tablegen.calibration.tables.columns import Column, Conversion, Times
+from tablegen.calibration.tables.csv_blocks import Block, blocks_of, plain_rows
+from tablegen.numerics.arrays import Floats, Ints
+
+_MAX_PROBLEMS = 20
+_MAX_CELLS_SHOWN = 12
+
+
+@dataclass(frozen=True)
+class MeasuredTable:
+    """Columns of numbers in the units of the fits, by name, and the line on which each row stands.
+
+    The lines of numpy's files are their rows, from 1.
+    """
+
+    file: str
+    source: Source
+    columns: dict[str, Floats]
+    lines: Ints
+
+    def __len__(self) -> int:
+        return len(self.lines)
+
+    def __contains__(self, column: Column) -> bool:
+        return column.name in self.columns
+
+    def __getitem__(self, column: Column) -> Floats:
+        return self.columns[column.name]
+
+
+def read_table(path: Path, needed: Sequence[Column], optional: Sequence[Column] = ()) -> MeasuredTable:
+    """Read the columns that are needed, and the optional ones that are there; others are passed over.
+
+    ``.npz`` and ``.npy`` are numpy's, with an array or a field a column; everything else is CSV with a header.
+
+    Commas, semicolons or tabs separate, whichever the header has; with the latter two a decimal comma is understood.
+    Lines that are blank or begin with # count for nothing. Raises ``Rejected`` with file, line and column.
+    """
+    name = shown_path(path)
+    wanted = [*needed, *optional]
+    if is_array_file(path):
+        return _array_table(path, name, wanted, needed)
+    digest = hashlib.sha256()
+    reader: _Reader | None = None
+    header_line = 0
+    for block in _blocks(path, name):
+        digest.update(block.content)
+        if reader is None:
+            rows = _rows(file_text(block.content, name, block.line), name, block.line)
+            header_line, header = next(rows, (0, ""))
+            if header_line:
+                separator = next((mark for mark in (";", "\t") if mark in header), ",")
+                cells = _cells(header, separator)
+                reader = _Reader(name, separator, len(cells), _places(name, header_line, cells, wanted, needed))
+                reader.add_rows(rows)
+        elif not reader.full:
+            reader.add(block)
+    if reader is None:
+        raise Rejected([Problem(name, 0, "", f"is empty; a header with {_list(needed)} is needed")])
+    columns, lines = reader.columns()
+    if not len(lines):
+        raise Rejected([Problem(name, header_line, "", "no numbers follow the header")])
+    return MeasuredTable(name, Source(path.name, digest.hexdigest()[:16]), columns, lines)
+
+
+def _array_table(path: Path, name: str, wanted: Sequence[Column], needed: Sequence[Column]) -> MeasuredTable:
+    content = file_content(path, name)
+    source = Source(path.name, hashlib.sha256(content).hexdigest()[:16])
+    arrays = columns_of(content, name)
+    del content  # an archive has it a second time
+    places = _places(name, 0, list(arrays), wanted, needed)
+    written = [numbers_of(list(arrays.values())[place[0]], name, place[3]) for place in places]
+    if len({len(column) for column in written}) > 1:
+        lengths = ", ".join(f"{place[3]} {len(column)}" for place, column in zip(places, written, strict=True))
+        raise Rejected([Problem(name, 0, "", f"its columns have different numbers of rows: {lengths}")])
+    if not written or not len(written[0]):
+        raise Rejected([Problem(name, 0, "", "has no numbers")])
+    reader = _Reader(name, ",", len(places), places)
+    columns = {place[1].name: reader.values(column, place) for place, column in zip(places, written, strict=True)}
+    reader.refuse()
+    lines = np.arange(1, len(written[0]) + 1, dtype=np.int64)
+    return MeasuredTable(name, source, columns, lines)
+
+
+_Place = tuple[int, Column, Conversion, str]  # where it stands, what it is, how it converts, how it is spelt
+
+
+class _Reader:
+    """Rows of text to columns of numbers; notes what is wrong and goes on."""
+
+    def __init__(self, name: str, separator: str, width: int, places: list[_Place]) -> None:
+        self.problems: list[Problem] = []
+        self._name, self._separator, self._width, self._places = name, separator, width, places
+        self._values = [array("d") for _ in places]
+        self._lines = array("q")
+
+    @property
+    def full(self) -> bool:
+        """Whether there are more faults than are told."""
+        return len(self.problems) > _MAX_PROBLEMS
+
+    def add(self, block: Block) -> None:
+        """All lines of a block: at once where they are plain numbers in their ranges, otherwise one by one."""
+        rows = plain_rows(block.content, self._separator, self._width)
+        found = [] if rows is None else [_converted(rows[:, place[0]], place) for place in self._places]
+        values = [each for each in found if each is not None]
+        if rows is None or len(values) < len(self._places):
+            self.add_rows(_rows(file_text(block.content, self._name, block.line), self._name, block.line))
+            return
+        for known, each in zip(self._values, values, strict=True):
+            known.frombytes(each.tobytes())
+        self._lines.frombytes(np.arange(block.line, block.line + len(rows), dtype=np.int64).tobytes())
+
+    def add_rows(self, rows: Iterator[tuple[int, str]]) -> None:
+        """Lines one by one, until there are too many faults."""
+        for line, text in rows:
+            for known, value in zip(self._values, self.row(line, text), strict=False):
+                known.append(value)
+            self._lines.append(line)
+            if self.full:
+                return
+
+    def values(self, written: Floats, place: _Place) -> Floats:
+        """A column of numbers in the unit of the fits: at once if all are in range, otherwise one by one."""
+        found = _converted(written, place)
+        if found is None:
+            found = np.zeros(len(written))
+            for row, value in enumerate(written.tolist()):
+                found[row] = self._number(row + 1, repr(value), *place[1:])
+                if self.full:
+                    break
+        return found
+
+    def refuse(self) -> None:
+        """Raise ``Rejected`` with all that was wrong, if anything was."""
+        if self.problems:
+            found = self.problems[:_MAX_PROBLEMS]
+            if self.full:
+                found.append(Problem(self._name, found[-1].line, "", "more faults follow; stopped"))
+            raise Rejected(found)
+
+    def columns(self) -> tuple[dict[str, Floats], Ints]:
+        """By name, and the line of every row. Raises ``Rejected`` with all that was wrong."""
+        self.refuse()
+        values = (np.frombuffer(known, dtype=np.float64) for known in self._values)
+        columns = {place[1].name: each for place, each in zip(self._places, values, strict=True)}
+        return columns, np.frombuffer(self._lines, dtype=np.int64)
+
+    def row(self, line: int, text: str) -> list[float]:
+        """The numbers of one row."""
+        cells = _cells(text, self._separator)
+        if len(cells) != self._width:
+            why = f"{len(cells)} fields where the header has {self._width}"
+            self.problems.append(Problem(self._name, line, "", why))
+            return []
+        return [self._number(line, cells[at], column, convert, spelt) for at, column, convert, spelt in self._places]
+
+    def _number(self, line: int, cell: str, column: Column, convert: Conversion, spelt: str) -> float:
+        plain = cell
+        if self._separator != "," and cell.count(",") == 1 and "." not in cell:
+            plain = cell.replace(",", ".")
+        try:
+            if "_" in plain:  # Python would take 1_000
+                raise ValueError
+            written = float(plain)
+        except ValueError:
+            why = f"{cell[:40]!r} is not a number" if cell else "is empty"
+            self.problems.append(Problem(self._name, line, spelt, why))
+            return 0.0
+        if not isfinite(written):
+            self.problems.append(Problem(self._name, line, spelt, f"{cell[:40]} is not finite"))
+            return 0.0
+        try:
+            value = convert(written)
+        except OverflowError:
+            value = column.below
+        if not column.above < value < column.below:
+            least = 0.0 if column.above > 0.0 >= value else column.above
+            side = f"above {least:g}" if value <= column.above else f"below {column.below:g}"
+            self.problems.append(Problem(self._name, line, spelt, f"{cell[:40]} is not {side} ({column.name})"))
+        return value
+
+
+def _converted(written: Floats, place: _Place) -> Floats | None:
+    """A column in the unit of the fits; None where that is no plain factor, or a value is out of its range."""
+    _, column, convert, _ = place
+    if not isinstance(convert, Times):
+        return None
+    found: Floats = written * convert.factor
+    return found if bool(np.all((column.above < found) & (found < column.below))) else None
+
+
+def _places(
+    name: str, line: int, header: list[str], wanted: Sequence[Column], needed: Sequence[Column]
+) -> list[_Place]:
+    header = [cell.lower() for cell in header]
+    if header and all(_is_number(cell) for cell in header):
+        why = f"the first line has numbers; a header with {_list(needed)} has to stand above them"
+        raise Rejected([Problem(name, line, "", why)])
+    places: list[_Place] = []
+    problems: list[Problem] = []
+    for column in wanted:
+        spelt = {column.spelt(unit): convert for unit, convert in column.units.items()}
+        found = [(at, cell) for at, cell in enumerate(header) if cell in spelt]
+        if len(found) > 1:
+            both = " and ".join(cell for _, cell in found[:2])
+            problems.append(Problem(name, line, found[1][1], f"the header has both {both}; keep one of them"))
+        elif found:
+            at, cell = found[0]
+            places.append((at, column, spelt[cell], cell))
+        elif column in needed:
+            others = [cell for cell in spelt if cell != column.name]
+            shown = ", ".join(cell[:40] for cell in header[:_MAX_CELLS_SHOWN])
+            shown += ", ..." if len(header) > _MAX_CELLS_SHOWN else ""
+            instead = f" (or {', '.join(others)})" if others else ""
+            why = f"missing{instead}; the header has {shown}"
+            problems.append(Problem(name, line, column.name, why))
+    if problems:
+        raise Rejected(problems)
+    return places
+
+
+def _blocks(path: Path, name: str) -> Iterator[Block]:
+    """Raises ``Rejected``."""
+    require_file(path, name)
+    try:
+        yield from blocks_of(path, MEASUREMENT)
+    except OSError as error:
+        raise unreadable(name, error) from None
+
+
+def _rows(text: str, name: str, first: int) -> Iterator[tuple[int, str]]:
+    """What counts, with line numbers."""
+    lines = lines_of(text, name, first)
+    return ((n, line) for n, line in lines if line.strip(" \t;,") and not line.lstrip().startswith("#"))
+
+
+def _cells(line: str, separator: str) -> list[str]:
+    cells = (cell.strip() for cell in line.split(separator))
+    return [cell[1:-1].strip() if len(cell) >= 2 and cell[0] == cell[-1] == '"' else cell for cell in cells]
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell.replace(",", "."))
+    except ValueError:
+        return False
+    return True
+
+
+def _list(columns: Sequence[Column]) -> str:
+    return ", ".join(column.name for column in columns)

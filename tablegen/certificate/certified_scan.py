@@ -1,0 +1,53 @@
+"""The one pipeline from a setup to a certified plan: plan, certify, compare with the limits of the scan file."""
+
+from collections.abc import Callable
+from functools import partial
+
+from msgspec import Struct
+
+from tablegen.base.input_errors import Problem
+from tablegen.certificate.certificate import Certificate, broken_limits, certify
+from tablegen.certificate.scan_warnings import limit_advice
+from tablegen.config.load import Setup
+from tablegen.planning.line_plan import Plan, make_plan
+
+
+class CertifiedScan(Struct, frozen=True, eq=False):
+    """A setup, its plan, the certificate of each axis ("x", "y"), and the limits of the scan file that are exceeded."""
+
+    setup: Setup
+    plan: Plan
+    certificates: dict[str, Certificate]
+    broken: tuple[Problem, ...]
+
+
+def certify_scan(
+    setup: Setup, progress: Callable[[str], object] = lambda _: None, *, remedies: bool = True
+) -> CertifiedScan:
+    """Plan and certify a scan.
+
+    Parameters
+    ----------
+    setup
+        A validated scan with its scanner.
+    progress
+        Called with each stage, in words.
+    remedies
+        Plan and measure remedies for a limit that is exceeded, and name them in its problem.
+
+    Raises
+    ------
+    Rejected
+        With every contradiction between the scan, the scanner and the hardware.
+    """
+    progress("shaping the waveforms")
+    plan = make_plan(setup)
+    progress("measuring every tick of a line and a frame")
+    certificates = certify(plan)
+    advise = partial(limit_advice, setup, plan, certificates) if remedies else _no_advice
+    broken = broken_limits(plan, certificates, setup.scan_file, advise, setup.hardware_problem)
+    return CertifiedScan(setup, plan, certificates, tuple(broken))
+
+
+def _no_advice(_axis: str) -> str:
+    return ""

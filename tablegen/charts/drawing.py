@@ -1,0 +1,296 @@
+"""A chart as lines, words and areas at their places: the one drawing that pages, SVG, PNG and PDF show.
+
+Places are in pixels from the upper left. What is ``Inside`` a chart has places of its own, and is cut at its edges.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from math import log10
+from textwrap import wrap
+from typing import Literal
+
+import numpy as np
+
+from tablegen.charts.chart import Band, Chart, DrawnCurve, Mark, Raster, runs, ticks
+from tablegen.charts.style import palette, shaded
+from tablegen.numerics.arrays import Floats
+
+WIDTH, HEIGHT = 536, 290
+PICTURE_HEIGHT = 430  # of charts whose axes have one scale, as images have
+_LEFT, _RIGHT, _TOP, _BOTTOM = 70, 20, 16, 44
+_SCALE_ROOM, _SCALE_WIDTH = 78, 14  # of the scale of shades, on the right
+_FAR = 10_000.0  # nothing is drawn farther out than that
+_HEAD = 4.0  # of an arrow
+_ROW = 18  # of a legend
+_LETTER = 7.1  # about as wide as one is
+_TITLE_LETTERS = 50  # of a row
+
+
+@dataclass(frozen=True)
+class Box:
+    """A rectangle."""
+
+    style: str
+    x: float
+    y: float
+    width: float
+    height: float
+
+
+@dataclass(frozen=True)
+class Ruled:
+    """Straight lines, each from (x, y) to (x, y)."""
+
+    style: str
+    lines: tuple[tuple[float, float, float, float], ...]
+
+
+@dataclass(frozen=True)
+class Words:
+    """A text; ``upright`` is turned to read from below."""
+
+    style: str
+    x: float
+    y: float
+    text: str
+    anchor: Literal["start", "middle", "end"] = "start"
+    upright: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Trail:
+    """A curve in stretches of places; areas and stems reach to ``base``."""
+
+    curve: DrawnCurve
+    stretches: tuple[tuple[Floats, Floats], ...]
+    base: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Shades:
+    """An image of shades, (rows, columns), with its palette, (256, 3)."""
+
+    shades: np.typing.NDArray[np.uint8]
+    palette: np.typing.NDArray[np.uint8]
+    x: float
+    y: float
+    width: float
+    height: float
+
+
+@dataclass(frozen=True)
+class Together:
+    """Parts that belong together."""
+
+    style: str
+    parts: "tuple[Part, ...]"
+
+
+@dataclass(frozen=True)
+class Inside:
+    """Parts within the frame of a chart."""
+
+    x: float
+    y: float
+    width: float
+    height: float
+    parts: "tuple[Part, ...]"
+
+
+@dataclass(frozen=True)
+class Moved:
+    """A whole drawing at another place."""
+
+    x: float
+    y: float
+    parts: "tuple[Part, ...]"
+
+
+Part = Box | Ruled | Words | Trail | Shades | Together | Inside | Moved
+
+
+class _Frame:
+    """Where the axes of a chart are, and from values to places within them."""
+
+    def __init__(self, chart: Chart, height: float) -> None:
+        self.x0, self.x1 = chart.x_limits
+        self.y0, self.y1 = chart.y_limits
+        self.log = chart.log_x
+        scale = chart.raster is not None and chart.raster.label
+        self.width = float(WIDTH - _LEFT - _RIGHT - (_SCALE_ROOM if scale else 0))
+        self.height = float(height - _TOP - _BOTTOM)
+        if chart.equal:
+            unit = min(self.width / abs(self.x1 - self.x0), self.height / abs(self.y1 - self.y0))
+            self.width, self.height = unit * abs(self.x1 - self.x0), unit * abs(self.y1 - self.y0)
+
+    def x(self, values: Floats | float) -> Floats:
+        """Horizontal."""
+        low, high, at = self.x0, self.x1, np.asarray(values, dtype=np.float64)
+        if self.log:
+            low, high, at = log10(low), log10(high), np.log10(np.maximum(at, 1e-300))
+        return np.clip((at - low) / (high - low) * self.width, -_FAR, _FAR)
+
+    def y(self, values: Floats | float) -> Floats:
+        """Vertical, downwards."""
+        share = (self.y1 - np.asarray(values, dtype=np.float64)) / (self.y1 - self.y0)
+        return np.clip(share * self.height, -_FAR, _FAR)
+
+
+def height_of(chart: Chart) -> int:
+    """Of its drawing."""
+    return PICTURE_HEIGHT if chart.equal else HEIGHT
+
+
+def drawing(chart: Chart) -> tuple[Part, ...]:
+    """The chart without its title and legend: axes, and what is in them. WIDTH by ``height_of`` pixels."""
+    frame = _Frame(chart, height_of(chart))
+    inner: list[Part] = []
+    if chart.raster is not None:
+        inner.append(_image(chart.raster, frame))
+    for band in chart.bands:
+        left, right = float(frame.x(band.low)), float(frame.x(band.high))
+        inner.append(Box("band", left, 0.0, right - left, frame.height))
+    for mark in chart.marks:
+        inner.append(Ruled("mark", (_line(mark, frame),)))
+    inner += [_trail(curve, frame) for curve in chart.curves]
+    if chart.arrows is not None:
+        inner.append(Ruled("arrow", tuple(_arrows(chart, frame))))
+    return (
+        Box("plot", _LEFT, _TOP, frame.width, frame.height),
+        Together("ticks", tuple(_ticks(chart, frame))),
+        Inside(_LEFT, _TOP, frame.width, frame.height, tuple(inner)),
+        Together("words", tuple(_mark_words(chart, frame))),
+        Words("label", _LEFT + frame.width / 2, _TOP + frame.height + 36, chart.x_label, "middle"),
+        Words("label", 20, _TOP + frame.height / 2, chart.y_label, "middle", upright=True),
+        *(_scale(chart.raster, frame) if chart.raster is not None and chart.raster.label else ()),
+    )
+
+
+def _ticks(chart: Chart, frame: _Frame) -> Iterator[Part]:
+    for value, text in ticks(min(chart.x_limits), max(chart.x_limits), log=chart.log_x):
+        x = _LEFT + float(frame.x(value))
+        yield Ruled("tick", ((x, _TOP, x, _TOP + frame.height),))
+        yield Words("tick", x, _TOP + frame.height + 16, text, "middle")
+    for value, text in ticks(min(chart.y_limits), max(chart.y_limits)):
+        y = _TOP + float(frame.y(value))
+        yield Ruled("tick", ((_LEFT, y, _LEFT + frame.width, y),))
+        yield Words("tick", _LEFT - 6, y + 4, text, "end")
+
+
+def _line(mark: Mark, frame: _Frame) -> tuple[float, float, float, float]:
+    if mark.of == "x":
+        x = float(frame.x(mark.at))
+        return x, 0.0, x, frame.height
+    y = float(frame.y(mark.at))
+    return 0.0, y, frame.width, y
+
+
+def _mark_words(chart: Chart, frame: _Frame) -> Iterator[Part]:
+    """The words of marks, each a row lower where the one before it is near."""
+    row, last = 0, -1e9
+    for mark in sorted((mark for mark in chart.marks if mark.of == "x"), key=lambda one: one.at):
+        x = float(frame.x(mark.at))
+        if not mark.name or not 0.0 <= x <= frame.width:
+            continue
+        row = row + 1 if x - last < _LETTER * len(mark.name) else 0
+        last, right = x, x > 0.6 * frame.width
+        place = _LEFT + x + (-4 if right else 4)
+        yield Words("word", place, _TOP + 13 + 13 * row, mark.name, "end" if right else "start")
+    for mark in (mark for mark in chart.marks if mark.of == "y" and mark.name):
+        yield Words("word", _LEFT + frame.width - 4, _TOP + float(frame.y(mark.at)) - 4, mark.name, "end")
+
+
+def _trail(curve: DrawnCurve, frame: _Frame) -> Trail:
+    base = frame.height if curve.kind == "stems" else float(np.clip(frame.y(0.0), 0.0, frame.height))
+    return Trail(curve, tuple((frame.x(x), frame.y(y)) for x, y in runs(curve)), base)
+
+
+def _image(raster: Raster, frame: _Frame) -> Shades:
+    (left, right), (below, above) = (
+        (float(scale(ends[0])), float(scale(ends[1]))) for scale, ends in ((frame.x, raster.x), (frame.y, raster.y))
+    )
+    return Shades(shaded(raster), palette(raster.shades), left, above, right - left, below - above)
+
+
+def _scale(raster: Raster, frame: _Frame) -> Iterator[Part]:
+    """The shades with their values, on the right."""
+    left = _LEFT + frame.width + 14
+    column = np.arange(254, -1, -1, dtype=np.uint8)[:, None]
+    yield Shades(column, palette(raster.shades), left, _TOP, _SCALE_WIDTH, frame.height)
+    yield Box("plot", left, _TOP, _SCALE_WIDTH, frame.height)
+    for value, text in ticks(raster.low, raster.high):
+        share = (raster.high - value) / ((raster.high - raster.low) or 1.0)
+        yield Words("tick", left + _SCALE_WIDTH + 5, _TOP + share * frame.height + 4, text)
+    yield Words("label", left + _SCALE_WIDTH + 58, _TOP + frame.height / 2, raster.label, "middle", upright=True)
+
+
+def _arrows(chart: Chart, frame: _Frame) -> Iterator[tuple[float, float, float, float]]:
+    """Shaft and two strokes of the head of each arrow."""
+    assert chart.arrows is not None
+    one = chart.arrows
+    x0, y0, x1, y1 = frame.x(one.x), frame.y(one.y), frame.x(one.x + one.dx), frame.y(one.y + one.dy)
+    for a, b, c, d in zip(x0.tolist(), y0.tolist(), x1.tolist(), y1.tolist(), strict=True):
+        yield a, b, c, d
+        length = float(np.hypot(c - a, d - b))
+        if length > 0.0:
+            along, across, head = (c - a) / length, (d - b) / length, min(_HEAD, 0.5 * length)
+            for side in (-1.0, 1.0):
+                yield c, d, c - head * (along + side * across), d - head * (across - side * along)
+
+
+def legend_rows(chart: Chart) -> list[list[tuple[float, DrawnCurve | Band]]]:
+    """The entries of a legend in rows, each with its place from the left."""
+    rows: list[list[tuple[float, DrawnCurve | Band]]] = []
+    bands = {band.name: band for band in chart.bands if band.name}
+    x = float(WIDTH)
+    entries: list[DrawnCurve | Band] = [*chart.needed_legend, *bands.values()]
+    for one in entries:
+        needs = 56.0 + _LETTER * len(one.name)
+        if x + needs > WIDTH - _LEFT - _RIGHT:
+            rows.append([])
+            x = 0.0
+        rows[-1].append((x, one))
+        x += needs
+    return rows
+
+
+def _title_rows(chart: Chart) -> list[str]:
+    """The title in as many rows as it takes."""
+    return wrap(chart.title, _TITLE_LETTERS) or [""]
+
+
+def _with_title(chart: Chart, titles: int, rows: int) -> tuple[Part, ...]:
+    """A chart below its title and a legend, which have room for some rows."""
+    parts: list[Part] = [Words("title", _LEFT, 20 + _ROW * at, text) for at, text in enumerate(_title_rows(chart))]
+    for number, entries in enumerate(legend_rows(chart)):
+        y = 20.0 + _ROW * (titles + number)
+        for x, one in entries:
+            left = _LEFT + x
+            parts += [_swatch(one, left, y), Words("legend", left + 38, y + 4, one.name)]
+    return (*parts, Moved(0, 8 + _ROW * (titles + rows), drawing(chart)))
+
+
+def _swatch(one: DrawnCurve | Band, left: float, y: float) -> Part:
+    """A piece of what a legend names."""
+    if isinstance(one, Band):
+        return Box("band", left, y - 7, 30, 14)
+    across = np.array([left + 15.0] if one.kind == "points" else [left, left + 30.0])
+    piece = one if one.kind == "points" else replace(one, kind="line")
+    return Trail(piece, ((across, np.full(len(across), y)),))
+
+
+def sheet(heading: str, charts: Sequence[Chart], columns: int) -> tuple[int, int, tuple[Part, ...]]:
+    """Width, height and parts of charts beside and below each other, with a heading over all unless it is empty."""
+    y = 0
+    parts: list[Part] = []
+    if heading:
+        parts.append(Words("heading", 20, 26, heading))
+        y = 40
+    columns = min(columns, len(charts))
+    for first in range(0, len(charts), columns):
+        row = charts[first : first + columns]
+        titles = max(len(_title_rows(chart)) for chart in row)
+        rows = max(len(legend_rows(chart)) for chart in row)
+        parts += [Moved(WIDTH * at, y, _with_title(chart, titles, rows)) for at, chart in enumerate(row)]
+        y += 8 + _ROW * (titles + rows) + max(map(height_of, row))
+    return WIDTH * columns, y, tuple(parts)

@@ -1,0 +1,1 @@
+"""The command ``tablegen calibrate``, one subcommand a file."""

@@ -1,0 +1,137 @@
+"""``tablegen calibrate size``: actual against set scan sizes, or images, to (6)-(12)."""
+
+from pathlib import Path
+from typing import Any, Literal
+
+import click
+
+from tablegen.cli.calibrate.options import optional_data
+from tablegen.cli.calibrate.run import Common, driver_of, finish, in_file, read_columns, shared_options
+from tablegen.cli.images.samples import (
+    CommandOfImages,
+    image_option,
+    read_sample_image,
+    refuse_sample,
+    sample_of,
+    sample_options,
+    taking_of,
+)
+from tablegen.cli.shared.common import fail
+from tablegen.cli.shared.exit_status import ExitStatus
+
+
+@click.command(cls=CommandOfImages, short_help="Fit k_nm_per_v, beta, v_threshold to actual scan sizes.")
+@shared_options
+@optional_data
+@image_option(
+    "VOLTS",
+    1,
+    "In place of DATA.CSV: scan voltage at the piezo in volts, peak to peak, and an image of a sample of known "
+    "constant, scanned with a triangle. Without RETRACE, the trace alone, or both if the file has them. Repeat the "
+    "option for each size.",
+)
+@sample_options
+@click.option(
+    "--k",
+    type=click.FloatRange(min=1e-6),
+    metavar="NM/V",
+    help="Linear constant of the controller that converted nominal_nm to volts, in nm/V.",
+)
+@click.option(
+    "--base-nm",
+    type=click.FloatRange(min=1e-6),
+    metavar="NM",
+    help="Base size in nm, at which k_nm_per_v applies.  [default: base_nm of the scanner file, or 200]",
+)
+@click.option(
+    "--threshold",
+    type=float,
+    metavar="V/V_MAX",
+    help="Fix v_threshold at this fraction of v_max.  [default: fitted; 0.5 if the data do not determine it]",
+)
+@click.option(
+    "--noise",
+    type=click.Choice(("relative", "absolute")),
+    default="relative",
+    show_default=True,
+    help="Error model of the sizes: relative to the size (images), or the same for all sizes (sensor).",
+)
+def size(
+    common: Common,
+    data: Path | None,
+    images: tuple[tuple[float, Path, Path], ...],
+    k: float | None,
+    base_nm: float | None,
+    threshold: float | None,
+    noise: Literal["relative", "absolute"],
+    **given: Any,
+) -> int:
+    """Fit k_nm_per_v, beta and v_threshold, equations (6)-(12), to actual scan sizes at several drives.
+
+    \b
+    Columns: drive_v (scan voltage at the piezo, peak to peak),
+             or nominal_nm (size set at the controller) with the option --k;
+    and      actual_nm (size measured by a sensor),
+             or apparent_nm and true_nm (a lattice in the image) with nominal_nm.
+
+    Or take trace and retrace of a lattice or a grating at several scan voltages, and give each with --image. The sizes
+    are fitted to all pixels, hysteresis included, with standard errors.
+
+    \b
+    Examples:
+      tablegen calibrate size --axis x sizes.csv --scanner scanner.toml --write
+      tablegen calibrate size --axis x --lattice-nm 17.7 --image 10 t1.npy r1.npy \\
+          --image 30 t2.npy r2.npy --image 90 t3.npy r3.npy --scanner scanner.toml --write
+    """
+    from tablegen.calibration.laws.size import fit_size
+    from tablegen.calibration.tables.columns import ACTUAL, APPARENT, DRIVE, NOMINAL, TRUE
+
+    if images:
+        if data is not None or k is not None or noise != "relative":
+            raise click.UsageError("DATA.CSV, --k and --noise are for sizes in a table, and --image for images")
+        return _of_images(common, images, base_nm, threshold, given)
+    if data is None:
+        raise click.UsageError("give DATA.CSV, or images with --image VOLTS TRACE [RETRACE]")
+    refuse_sample(given)
+    table = read_columns(data, [], [DRIVE, NOMINAL, ACTUAL, APPARENT, TRUE])
+    if DRIVE not in table and (NOMINAL not in table or k is None):
+        fail([f"{table.file}: drive_v is missing; or give nominal_nm, and --k NM/V"], ExitStatus.WRONG_INPUT)
+    if DRIVE in table and k is not None:
+        raise click.UsageError("--k is for nominal sizes; the file has drive_v")
+    if ACTUAL not in table and any(column not in table for column in (APPARENT, TRUE, NOMINAL)):
+        fail(
+            [f"{table.file}: actual_nm is missing; or give nominal_nm, apparent_nm and true_nm"], ExitStatus.WRONG_INPUT
+        )
+    actual = table[ACTUAL] if ACTUAL in table else table[NOMINAL] * table[TRUE] / table[APPARENT]
+    drive = table[DRIVE] if DRIVE in table else table[NOMINAL] / (k or 1.0)
+    driver = driver_of(common)
+    base = base_nm or in_file(common, "size", "base_nm") or 200.0
+    return finish(common, [table], lambda: fit_size(drive, actual, driver, base, threshold, noise))
+
+
+def _of_images(
+    common: Common,
+    images: tuple[tuple[float, Path, Path], ...],
+    base_nm: float | None,
+    threshold: float | None,
+    given: dict[str, Any],
+) -> int:
+    from dataclasses import replace
+
+    import numpy as np
+
+    from tablegen.calibration.laws.image_sizes import sizes_of
+    from tablegen.calibration.laws.size import SizeFit, fit_size
+
+    sample, taking = sample_of(given), taking_of(given)
+    read = [read_sample_image(volts, None, trace, retrace, given) for volts, trace, retrace in images]
+    driver = driver_of(common)
+    base = base_nm or in_file(common, "size", "base_nm") or 200.0
+    drive = np.array([image.v_scan for image, _ in read])
+
+    def fit() -> SizeFit:
+        found = sizes_of([image for image, _ in read], driver, sample, taking)
+        law = fit_size(drive, found.nm, driver, base, threshold, errors_nm=found.errors_nm, shared=found.shared)
+        return replace(law, images=found.images, remarks=found.remarks + law.remarks)
+
+    return finish(common, [one for _, files in read for one in files], fit)

@@ -1,0 +1,48 @@
+"""The table of a build for the terminal."""
+
+from tablegen.certificate.certificate import Certificate
+from tablegen.certificate.summary import expected_lines, rate
+from tablegen.planning.line_plan import Plan
+
+
+def certificate_table(plan: Plan, certificates: dict[str, Certificate]) -> list[str]:
+    """The certificate of both axes, a line an axis."""
+    schedule = plan.schedule
+    lines = [
+        f"{plan.name} on {plan.scanner!r}: {rate(schedule.line_rate)} lines of {schedule.ticks} ticks, "
+        f"{schedule.lines} lines a frame, {rate(schedule.frame_rate)} frames",
+        "",
+        "                      error [LSB]   scaling error in the window [%, peak to peak]",
+        "axis  drive [V p-p]    max    rms   direction  uncompensated  emitted  band limit  size   step/limit",
+    ]
+    for line in plan.lines:
+        certificate = certificates[line.axis]
+        for i, (side, error) in enumerate(certificate.scaling.items()):
+            start = f"{line.axis:<4}  {line.drive.v_amplitude:13.4f}  {certificate.max_error_lsb:5.3f}  "
+            start += f"{certificate.rms_error_lsb:5.3f}"
+            step = f"{certificate.largest_step}/{certificate.max_step}"
+            if i:
+                start, step = " " * len(start), ""
+            lines.append(
+                f"{start}   {side:<9}  {error.uncompensated:13.2f}  {error.total:7.3f}  {error.band_limit:10.4f}  "
+                f"{error.size:+.3f}  {step}".rstrip()
+            )
+        if line.drive.resting:
+            step = f"{certificate.largest_step}/{certificate.max_step}"
+            lines.append(
+                f"{line.axis:<4}  rests at {line.drive.v_offset:.6g} V, code {certificate.lowest_code}; {step}"
+            )
+    for line in plan.lines:
+        for side, moved in (certificates[line.axis].refinement or {}).items():
+            lines.append(
+                f"{line.axis:<4}  refinement, {side}: moves up to {moved.position:.3g} % of the line and takes away "
+                f"{moved.scaling:.3g} % of scaling error, peak to peak"
+            )
+        expected = certificates[line.axis].expected
+        if expected is not None and expected.basis == "traces":
+            told = expected_lines(expected)
+            lines += [
+                f"{line.axis if i == 0 else '':<4}  {'' if i else 'on the scanner':<14}  {text}"
+                for i, text in enumerate(told)
+            ]
+    return lines

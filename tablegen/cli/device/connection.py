@@ -1,0 +1,141 @@
+"""What the commands that talk to a device share: options, the way to it, and how its errors end a command."""
+
+import binascii
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from tablegen.base.reading import KEY, read_text
+from tablegen.cli.shared.common import fail, planned
+from tablegen.cli.shared.exit_status import ExitStatus
+
+if TYPE_CHECKING:
+    from tablegen.link.device import Device
+    from tablegen.link.prepare import PreparedScan
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+_KEY_BYTES = range(16, 33)
+_OF_OTHERS = 0o077  # what a group or others may do with a file
+
+baud_option = click.option(
+    "--baud",
+    type=click.IntRange(min=300, max=100_000_000),
+    default=115200,
+    show_default=True,
+    envvar="TABLEGEN_BAUD",
+    show_envvar=True,
+    metavar="RATE",
+    help="Baud rate of the serial line in bit/s. For socket:// it only sets timeouts.",
+)
+key_option = click.option(
+    "--key-file",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE",
+    help="File with the key of the device, 16 to 32 bytes in hexadecimal. Needed if the device has a key.",
+)
+source_argument = click.argument("source", type=click.Path(path_type=Path), metavar="SCAN.TOML|DIR")
+
+
+def port_option(required: bool = True) -> Callable[[Command], Command]:
+    """``--port``."""
+    return click.option(
+        "--port",
+        required=required,
+        envvar="TABLEGEN_PORT",
+        show_envvar=True,
+        metavar="URL",
+        help="Serial port or pyserial URL of the device: /dev/ttyUSB0, COM3, socket://host:port, rfc2217://host:port. "
+        "`tablegen ports` lists the serial ports of this machine.",
+    )
+
+
+def timeout_option(what: str) -> Callable[[Command], Command]:
+    """``--timeout``; ``what`` is bounded, and by how much if it is not given."""
+    return click.option("--timeout", type=click.FloatRange(min=0.1, max=1e6), metavar="S", help=what)
+
+
+@contextmanager
+def connected(port: str, baud: int, key_file: Path | None, goes_on: str = "as before") -> "Iterator[Device]":
+    """A device, until the end of the block; whatever goes wrong there ends the command with its status.
+
+    ``goes_on`` is how a device goes on of which nothing was asked before the command was interrupted.
+    """
+    key = None if key_file is None else _read_key(key_file)
+    from tablegen.link import errors
+    from tablegen.link.device import Device
+
+    # The first that fits.
+    statuses = (
+        (errors.SerialMissing, ExitStatus.TOOL_MISSING),
+        (errors.NoPort, ExitStatus.NO_PORT),
+        (errors.NoAnswer, ExitStatus.NO_ANSWER),
+        (errors.NotUnderstood, ExitStatus.INVALID_ANSWER),
+        (errors.Refused, ExitStatus.REFUSED),
+        (errors.Unsuitable, ExitStatus.REFUSED),
+        (errors.NotPlaying, ExitStatus.MISMATCH),
+        (errors.LinkError, ExitStatus.LINK_LOST),
+    )
+    known: Device | None = None
+    try:
+        with Device(port, baud=baud, key=key) as device:
+            known = device
+            yield device
+    except errors.LinkError as error:
+        fail([error], next(status for kind, status in statuses if isinstance(error, kind)))
+    except KeyboardInterrupt:
+        fail([f"interrupted; {_left_behind(known, goes_on)}"], ExitStatus.INTERRUPTED)
+
+
+def _left_behind(device: "Device | None", goes_on: str) -> str:
+    """What is known of a device when a command is interrupted."""
+    from tablegen.link.messages import Request
+
+    upload = None if device is None else device.upload_state
+    if upload is not None and upload.committed:
+        return "everything was sent, and the new scan may become active: see `tablegen status`"
+    if upload is not None and upload.confirmed:
+        return (
+            f"the device plays its old scan and keeps {upload.confirmed} of {upload.total} bytes: run the same command "
+            "to continue the upload"
+        )
+    acts = [] if device is None else [act.name for act in device.acts if act != Request.COMMIT]
+    if acts:
+        return f"the device may have carried out {' and '.join(dict.fromkeys(acts))}: see `tablegen status`"
+    return f"the device continues {goes_on}"
+
+
+def _read_key(path: Path) -> bytes:
+    try:
+        key = binascii.unhexlify("".join(read_text(path, KEY, "ascii").split()))
+        mode = path.stat().st_mode
+    except OSError as error:
+        fail([f"{path}: cannot be read: {error.strerror or error}"], ExitStatus.WRONG_INPUT)
+    except ValueError:  # also raised for text that is not ASCII
+        fail([f"{path}: the file must contain 32 to 64 hexadecimal digits and nothing else"], ExitStatus.WRONG_INPUT)
+    if len(key) not in _KEY_BYTES:
+        fail([f"{path}: the key has {len(key)} bytes; 16 to 32 are needed"], ExitStatus.WRONG_INPUT)
+    if os.name == "posix" and mode & _OF_OTHERS:
+        click.echo(
+            f"warning: {path}: others can read the key (mode {mode & 0o777:04o}): run `chmod 600 {path}`, and give "
+            "device and host a new key if somebody may have read this one",
+            err=True,
+        )
+    return key
+
+
+def read_scan(source: Path) -> "PreparedScan":
+    """The scan of a TOML file, or of a directory that ``tablegen build`` wrote."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    from tablegen.link.prepare import PreparedScan
+    from tablegen.manifest.read import NotABuild
+
+    if not source.is_dir():
+        return planned(source).prepared
+    try:
+        return PreparedScan.of_build(source)
+    except NotABuild as error:
+        fail([error], ExitStatus.WRONG_INPUT)

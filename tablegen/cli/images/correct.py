@@ -1,0 +1,317 @@
+"""``tablegen correct``: images that are already taken, put straight by the scanner file or by a fit to the image."""
+
+import json
+import os
+from collections.abc import Callable, Sequence
+from contextlib import nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from tablegen.cli.shared.common import fail, finite, require, written
+from tablegen.cli.shared.exit_status import ExitStatus
+from tablegen.cli.shared.plot import PlottingCommand, check_plot, plot_option, put_plot
+from tablegen.cli.shared.progress import Progress
+from tablegen.cli.shared.progress_bar import Bar
+
+if TYPE_CHECKING:
+    from tablegen.correction.job import Images
+    from tablegen.correction.straight import StraightScan
+
+F = TypeVar("F", bound=Callable[..., Any])
+_OUTPUTS = (".gwy", ".tif", ".tiff", ".npy", ".png")
+_POSITIVE = click.FloatRange(min=0.0, min_open=True)
+
+
+def _number(name: str, metavar: str, text: str, kind: Any = _POSITIVE, **more: Any) -> Callable[[F], F]:
+    return click.option(name, type=kind, callback=finite, metavar=metavar, help=text, **more)
+
+
+@click.command(
+    cls=PlottingCommand,
+    short_help="Put images that were already taken straight.",
+    epilog="""\b
+Examples:
+  tablegen correct old.gwy --scanner scanner.toml --size-v 90 --offset-v 50 --rate-hz 2
+  tablegen correct trace.npy retrace.npy --scanner scanner.toml --size-v 90 --rate-hz 2 -o straight.gwy
+  tablegen correct old.ibw --fit --lattice-nm 18.5 -o straight.tif --plot straight.png
+  tablegen correct *.ibw --each --scanner scanner.toml --size-v 90 --rate-hz 2 -o straight
+
+\b
+Exit status: 0 done, 2 wrong input, 4 cannot write, 6 a library is missing, 130 interrupted.""",
+)
+@click.argument("images", type=click.Path(path_type=Path), metavar="IMAGE [RETRACE]", nargs=-1, required=True)
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    metavar="FILE|DIRECTORY",
+    help="Corrected image: .gwy, .tif, .npy or .png. With --each or --pairs a directory. Without it none.",
+)
+@click.option("--scanner", type=click.Path(path_type=Path), metavar="FILE", help="Scanner file that knows the scanner.")
+@click.option(
+    "--scan",
+    type=click.Path(path_type=Path),
+    metavar="SCAN.TOML",
+    help="Scan file that the image was taken with, for its drive.",
+)
+@click.option("--fit", is_flag=True, help="Fit a periodic sample in the image; no scanner file is needed.")
+@_number("--pitch-nm", "NM", "With --fit: distance of the bars of the grating, for the size.")
+@_number("--lattice-nm", "NM", "With --fit: constant of a hexagonal or square lattice, for size, height and shear.")
+@_number("--size-v", "V", "Scan voltage of the fast axis at the piezo, peak to peak.")
+@_number("--size-nm", "NM", "Instead of --size-v: scan size by the size calibration of the scanner file.")
+@_number(
+    "--offset-v",
+    "V",
+    "Offset voltage of the fast axis.  [default: the middle of the driver's range]",
+    click.FloatRange(-1e5, 1e5),
+)
+@_number("--rate-hz", "HZ", "Line rate; forward and backward make one line.  [default: that of the file]")
+@click.option(
+    "--lines",
+    type=click.IntRange(1, 1 << 20),
+    metavar="N",
+    help="Lines in a period of the slow axis.  [default: by the rows, --slow-turn and --slow-window]",
+)
+@_number(
+    "--turn",
+    "FRACTION",
+    "Turn of the fast axis: forward fraction of the line.",
+    click.FloatRange(0.0, 1.0, min_open=True),
+    default=0.5,
+    show_default=True,
+)
+@click.option(
+    "--window",
+    type=(float, float),
+    default=(0.0, 1.0),
+    show_default=True,
+    metavar="LOW HIGH",
+    help="Part of each sweep that the columns span.",
+)
+@_number("--slow-size-v", "V", "Scan voltage of the slow axis.  [default: as the fast axis]")
+@_number("--slow-size-nm", "NM", "Instead of --slow-size-v: its size.")
+@_number(
+    "--slow-offset-v", "V", "Offset voltage of the slow axis.  [default: as the fast axis]", click.FloatRange(-1e5, 1e5)
+)
+@_number(
+    "--slow-turn",
+    "FRACTION",
+    "Turn of the slow axis; 0.5 scans up, then down.",
+    click.FloatRange(0.0, 1.0, min_open=True),
+    default=0.5,
+    show_default=True,
+)
+@click.option(
+    "--slow-window",
+    type=(float, float),
+    default=(0.0, 1.0),
+    show_default=True,
+    metavar="LOW HIGH",
+    help="Part of the slow sweep that the rows span.",
+)
+@click.option("--slow-back", is_flag=True, help="The rows are of the slow axis' way back.")
+@_number(
+    "--delay-pixels", "N", "Delay of the images relative to the drive in pixels.", float, default=0.0, show_default=True
+)
+@click.option(
+    "--channel",
+    metavar="NAME|N",
+    help="Channel that is judged and fitted; all are corrected.  [default: the height, if the file says which]",
+)
+@click.option("--retrace-channel", metavar="NAME|N", help="Its retrace.  [default: by the names of the channels]")
+@click.option(
+    "--retrace-mirrored",
+    is_flag=True,
+    help="The retrace is stored in order of time: its left pixel is the right end of the line.",
+)
+@click.option("--frame", type=click.IntRange(min=0), metavar="N", help="Frame of a movie, from 0.")
+@click.option("--each", is_flag=True, help="Correct each IMAGE by itself, into the directory -o.")
+@click.option(
+    "--pairs",
+    is_flag=True,
+    help="The images are a trace and a retrace by turns; correct each pair, into the directory -o.",
+)
+@click.option(
+    "--format",
+    "suffix",
+    type=click.Choice([suffix[1:] for suffix in _OUTPUTS]),
+    default="gwy",
+    show_default=True,
+    help="With --each or --pairs: format of the corrected images.",
+)
+@plot_option("before, after and what is left")
+@click.option("--force", is_flag=True, help="Replace files that are there.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")
+def correct(images: tuple[Path, ...], **options: Any) -> int:
+    """Put images that are already taken straight, in x and y: by the scanner file, or by a fit to the image itself.
+
+    All channels of the file are resampled once, onto a straight grid of as many pixels, with cubic splines. What was
+    not imaged is masked. The output keeps what was done, with the SHA-256 of the files.
+
+    \b
+    By a scanner file:  give how the image was taken: --size-v, --offset-v, --rate-hz; or --scan.
+    By a fit (--fit):   trace and retrace of a grating or a lattice, three periods or more in the
+                        line, better ten. A lattice gives both axes, a grating the fast one.
+
+    A file may have trace and retrace as channels; otherwise give both files. Their difference, before and after, tells
+    whether the correction is right; it is printed.
+    """
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    _check_usage(images, options)
+    several = options["each"] or options["pairs"]
+    suffix = f".{options['suffix']}" if several else (options["output"].suffix.lower() if options["output"] else None)
+    _require(images, suffix)
+    check_plot(options["plot"], options["as_json"])
+    jobs = _jobs(images, options)
+    targets = _targets(jobs, options, suffix)
+    records: list[dict[str, Any]] = []
+    refused: list[object] = []  # the others of a batch are corrected all the same
+    bar = Bar(unit="images") if several else None
+    for number, (trace, retrace) in enumerate(jobs):
+        if bar is not None:
+            bar(number, len(jobs))
+        try:
+            with nullcontext() if bar is not None else Progress() as progress:
+                if progress is not None:
+                    progress.now(f"correcting {trace.name}")
+                found, taken = _corrected(trace, retrace, options)
+            if bar is not None:
+                bar.hide()
+            records.append(_put(found, taken, targets[number], suffix, options))
+        except _Refused as reason:
+            refused += reason.lines
+    if bar is not None:
+        bar.close()
+    if options["as_json"] and records:
+        click.echo(json.dumps(records if several else records[0], indent=2, allow_nan=False))
+    if refused:
+        fail(refused, ExitStatus.WRONG_INPUT)
+    return ExitStatus.OK
+
+
+class _Refused(Exception):
+    """What is wrong with the input."""
+
+    def __init__(self, lines: Sequence[object]) -> None:
+        super().__init__()
+        self.lines = lines
+
+
+def _check_usage(images: tuple[Path, ...], options: dict[str, Any]) -> None:
+    several = options["each"] or options["pairs"]
+    wrong = None
+    if options["each"] and options["pairs"]:
+        wrong = "--each and --pairs: keep one of the two"
+    elif options["pairs"] and len(images) % 2:
+        wrong = f"--pairs: {len(images)} images are no pairs"
+    elif not several and len(images) > 2:
+        wrong = "more than two images: give --each, or --pairs for a trace and a retrace by turns"
+    elif several and options["output"] is None:
+        wrong = "--each and --pairs need a directory, -o DIRECTORY"
+    elif several and options["plot"] is not None:
+        wrong = "--plot is for one scan"
+    elif not options["fit"] and options["scanner"] is None and options["scan"] is None:
+        wrong = "give --scanner FILE, or --scan SCAN.TOML, or --fit for a periodic sample"
+    elif options["fit"] and (options["scanner"] is not None or options["scan"] is not None):
+        wrong = "--fit needs no scanner file; keep one of the two"
+    elif not options["fit"] and (options["pitch_nm"] or options["lattice_nm"]):
+        wrong = "--pitch-nm and --lattice-nm are for --fit"
+    elif options["pitch_nm"] and options["lattice_nm"]:
+        wrong = "--pitch-nm and --lattice-nm: keep one of the two"
+    for axis in ("", "slow_"):
+        if options[f"{axis}size_v"] and options[f"{axis}size_nm"]:
+            name = f"--{axis.replace('_', '-')}size"
+            wrong = f"{name}-v and {name}-nm: keep one of the two"
+    if options["output"] is not None and not several and options["output"].suffix.lower() not in _OUTPUTS:
+        wrong = f"-o {options['output']}: the name has to end in {', '.join(_OUTPUTS)}"
+    if options["plot"] in images:
+        wrong = f"--plot {options['plot']}: is an image to correct"
+    if wrong:
+        raise click.UsageError(wrong)
+
+
+def _require(images: Sequence[Path], suffix: str | None) -> None:
+    """The libraries of all files, or an end with advice."""
+    from tablegen.correction.output_files import MODULES as WRITERS
+    from tablegen.images.files import MODULES as READERS
+
+    needed = {READERS.get(path.suffix.lower()) for path in images} | {WRITERS.get(suffix or "")} | {"scipy"}
+    require(*sorted(filter(None, needed)), extra="images")
+
+
+def _jobs(images: tuple[Path, ...], options: dict[str, Any]) -> list[tuple[Path, Path | None]]:
+    if options["each"]:
+        return [(path, None) for path in images]
+    if options["pairs"]:
+        return list(zip(images[::2], images[1::2], strict=True))
+    return [(images[0], images[1] if len(images) == 2 else None)]
+
+
+def _targets(
+    jobs: Sequence[tuple[Path, Path | None]], options: dict[str, Any], suffix: str | None
+) -> list[tuple[Path, str] | None]:
+    """Folder and name without the ending of each output; None where nothing is written."""
+    output: Path | None = options["output"]
+    if output is None:
+        return [None] * len(jobs)
+    if not (options["each"] or options["pairs"]):
+        return [(output.parent, output.name[: -len(output.suffix)])]
+    names = [trace.stem for trace, _ in jobs]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        fail(
+            [f"{twice[0]}: two images of this name would be one file; correct them one by one"], ExitStatus.WRONG_INPUT
+        )
+    return [(output, name) for name in names]
+
+
+def _corrected(trace: Path, retrace: Path | None, options: dict[str, Any]) -> "tuple[StraightScan, Images]":
+    from tablegen.api.correct import choice_of, straight, taken_of
+    from tablegen.base.input_errors import Rejected, Unphysical
+    from tablegen.correction.job import read_scan
+
+    names = str(trace) if retrace is None else f"{trace}, {retrace}"
+    constants = options["pitch_nm"], options["lattice_nm"]
+    try:
+        choice, taken = choice_of(options), taken_of(options)
+        images = read_scan(trace, retrace, choice)
+        return straight(images, options["scanner"], options["scan"], taken, *constants), images
+    except Rejected as rejected:
+        raise _Refused(rejected.problems) from None
+    except Unphysical as reason:
+        raise _Refused([f"{names}: {reason}"]) from None
+    except OSError as error:
+        raise _Refused([f"{error.filename or names}: {error.strerror or error}"]) from None
+
+
+def _put(
+    found: "StraightScan", taken: "Images", target: tuple[Path, str] | None, suffix: str | None, options: dict[str, Any]
+) -> dict[str, Any]:
+    """Print, draw and write one scan; its record."""
+    from tablegen.cli.images.correct_text import correct_text
+    from tablegen.correction.output_files import files_of
+
+    files: dict[str, bytes] = {}
+    if target is not None:
+        assert suffix is not None
+        files = files_of(found, target[1], suffix)
+        sources = {(Path(options["scanner"] or ".")).resolve()}
+        for name in files:
+            path = target[0] / name
+            if path.exists() and not options["force"]:
+                raise _Refused([f"{path}: is there already; give --force to replace it"])
+            if path.resolve() in sources:
+                raise _Refused([f"{path}: is the scanner file"])
+    if not options["as_json"]:
+        click.echo("\n".join(correct_text(found, taken)))
+    if options["plot"] is not None:
+        from tablegen.report.corrected import correction_charts
+
+        put_plot(options["plot"], lambda: correction_charts(found, taken.first.file))
+    if target is not None:
+        written(target[0], files)
+        for name in files:
+            click.echo(f"{target[0] / name} written", err=options["as_json"])
+    return found.record

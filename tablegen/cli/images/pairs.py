@@ -1,0 +1,76 @@
+"""Trace and retrace images on the command line: two files, or one that has both."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from tablegen.cli.shared.common import fail, require
+from tablegen.cli.shared.exit_status import ExitStatus
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from tablegen.images.files import ScanImage
+
+_PAIR = "--pair"
+
+pair_option = click.option(
+    _PAIR,
+    "pairs",
+    type=(click.FloatRange(min=0.0, min_open=True), click.Path(path_type=Path), click.Path(path_type=Path)),
+    metavar="VOLTS TRACE RETRACE",
+    multiple=True,
+    required=True,
+    help="Scan voltage at the piezo in volts, peak to peak, and its two images. RETRACE is left out if the first file "
+    "has both. Repeat the option for each amplitude.",
+)
+channel_option = click.option(
+    "--channel",
+    metavar="NAME|N",
+    help="Data channel, for image files with several channels. `tablegen channels FILE` lists them. A name without "
+    "the direction, such as Height, finds trace and retrace.",
+)
+retrace_channel_option = click.option(
+    "--retrace-channel",
+    metavar="NAME|N",
+    help="Data channel of the retrace image.  [default: the retrace of --channel]",
+)
+frame_option = click.option(
+    "--frame", type=click.IntRange(min=0), metavar="N", help="Image of a movie, counted from 0; for .asd files."
+)
+
+
+class CommandOfPairs(click.Command):
+    """A command with ``--pair``, whose RETRACE may be left out where TRACE has both."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Name the file twice where it is named once."""
+        words: list[str] = []
+        for at, word in enumerate(args):
+            words.append(word)
+            if at >= 2 and args[at - 2] == _PAIR and (at + 1 == len(args) or args[at + 1].startswith("--")):
+                words.append(word)
+        return super().parse_args(ctx, words)
+
+
+def require_readers(paths: "Iterable[Path]") -> None:
+    """End the command where a library that reads one of these images is missing."""
+    from tablegen.images.files import MODULES
+
+    needed = {MODULES.get(path.suffix.lower()) for path in paths} - {None}
+    require(*sorted(filter(None, needed)), extra="images")
+
+
+def read_both(
+    trace: Path, retrace: Path, channel: str | None, retrace_channel: str | None, frame: int | None = None
+) -> "tuple[ScanImage, ScanImage]":
+    """Trace and retrace; what is wrong with them ends the command."""
+    from tablegen.base.input_errors import Rejected
+    from tablegen.images.files import read_pair
+
+    require_readers((trace, retrace))
+    try:
+        return read_pair(trace, retrace, channel, retrace_channel, frame)
+    except Rejected as rejected:
+        fail(rejected.problems, ExitStatus.WRONG_INPUT)

@@ -1,0 +1,213 @@
+"""``tablegen refine``: a trace or images of the running scan to a layer over the model, by iterative learning."""
+
+import json
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import click
+
+from tablegen.base.warnings import of_remarks, worst_first
+from tablegen.cli.images.refine_images import ImageArguments, image_options
+from tablegen.cli.images.samples import CommandOfRunningImages
+from tablegen.cli.shared.common import OutputFile, fail, finite, require, scan_argument, written
+from tablegen.cli.shared.exit_status import ExitStatus
+from tablegen.cli.shared.plot import check_plot, plot_option, put_plot
+from tablegen.cli.shared.progress import Progress
+
+if TYPE_CHECKING:
+    from tablegen.api.refine import RefinedScan
+    from tablegen.charts.picture_file import PlottedCharts
+    from tablegen.refinement.round import Options, Round
+
+
+@click.command(
+    cls=CommandOfRunningImages,
+    short_help="Correct remaining scan errors from a sensor trace or images.",
+    epilog="""\b
+Examples:
+  tablegen refine scan.toml trace.csv --axis x            print the errors; write nothing
+  tablegen refine scan.toml trace.csv --axis x --write    write the correction to scan.toml
+  tablegen refine scan.toml --images t.gwy r.gwy --axis x --write
+
+Exit status: 0 done, 2 wrong input, 4 cannot write, 6 a library is missing.""",
+)
+@scan_argument
+@click.argument("trace", type=click.Path(path_type=Path), metavar="[TRACE.CSV]", required=False)
+@click.option("--axis", type=click.Choice(("x", "y")), required=True, help="The axis that was measured.")
+@image_options
+@click.option("--write", is_flag=True, help="Write the correction to SCAN.TOML.")
+@click.option(
+    "--gain",
+    type=click.FloatRange(0.0, 2.0, min_open=True, max_open=True),
+    default=0.7,
+    show_default=True,
+    callback=finite,
+    metavar="GAIN",
+    help="Fraction of the measured error that this round corrects.",
+)
+@click.option(
+    "--harmonics",
+    type=click.IntRange(1, 512),
+    metavar="N",
+    help="Highest harmonic to correct.  [default: 16, or fewer if more might not converge]",
+)
+@click.option(
+    "--triggered",
+    is_flag=True,
+    help="The trace has no drive_v: its time 0 is a line start (x) or a frame start (y).",
+)
+@click.option(
+    "--period-s",
+    type=click.FloatRange(min=0.0, min_open=True),
+    callback=finite,
+    metavar="S",
+    help="With --triggered: period of a line (x) or frame (y) in seconds by the clock of the recorder.  [default: the "
+    "period of the scan]",
+)
+@click.option(
+    "--delay-s",
+    type=float,
+    default=0.0,
+    callback=finite,
+    show_default=True,
+    metavar="S",
+    help="Delay of the sensor relative to the drive in seconds.",
+)
+@click.option(
+    "--settle",
+    type=click.IntRange(min=0),
+    metavar="N",
+    help="Ignore the first N periods.  [default: 1 if the trace has three periods or more, otherwise 0]",
+)
+@click.option(
+    "--drift",
+    type=click.IntRange(0, 5),
+    metavar="N",
+    help="Order of the polynomial that describes drift.  [default: 0 to 3, more with more periods]",
+)
+@click.option(
+    "--force",
+    is_flag=True,
+    help="Use the trace even if its error is larger than before, or if it was used already: learn on from it.",
+)
+@plot_option("measured and predicted errors, and what was learnt,", by_default=True)
+@click.option("--report", type=OutputFile(), metavar="FILE", help="Write the round to FILE as an HTML page.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")
+def refine(
+    scan: Path,
+    trace: Path | None,
+    axis: Literal["x", "y"],
+    images: "ImageArguments",
+    write: bool,
+    gain: float,
+    harmonics: int | None,
+    triggered: bool,
+    period_s: float | None,
+    delay_s: float,
+    settle: int | None,
+    drift: int | None,
+    force: bool,
+    plot: Path | None,
+    no_plot: bool,
+    report: Path | None,
+    as_json: bool,
+) -> int:
+    """Correct the scan errors that the scanner model leaves, by iterative learning from the running scan.
+
+    \b
+    1. Record several periods of the running scan with a displacement sensor in TRACE.CSV.
+       Columns: time_s, displacement_nm, drive_v. A .npz of numpy has an array a column.
+       Or take trace and retrace of a grating or a lattice: --images.
+    2. Run this command with --write. It writes the correction to [AXIS.refinement] of SCAN.TOML.
+    3. Build, upload, and record again. Two or three rounds are usually enough.
+    """
+    of_traces = [
+        name
+        for name, given in (
+            ("--triggered", triggered),
+            ("--period-s", period_s),
+            ("--delay-s", delay_s),
+            ("--settle", settle is not None),
+            ("--drift", drift is not None),
+        )
+        if given
+    ]
+    images.check(trace, of_traces)
+    if period_s is not None and not triggered:
+        raise click.UsageError("--period-s is for --triggered; otherwise drive_v has the period")
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    require("scipy", "tomlkit", extra="calibrate")
+    check_plot(plot, as_json)
+    from tablegen.refinement.round import Options
+
+    options = Options(gain, harmonics, period_s, delay_s, settle, drift)
+    files = images.names if trace is None else str(trace)
+    with Progress() as progress:
+        progress.now("reading and learning")
+        refined = images.learn(scan, axis, options) if trace is None else _learn(scan, trace, axis, triggered, options)
+    found, sources = refined.round, list(refined.sources)
+    from tablegen.cli.images.refine_text import refine_record, refine_text
+
+    name = found.setup.scan.name
+    if as_json:
+        click.echo(json.dumps(refine_record(found, name, sources), indent=2, allow_nan=False))
+    else:
+        click.echo("\n".join(refine_text(found, name, sources)))
+    put_plot(plot, lambda: _charts(found), by_default=not (as_json or no_plot))
+    if not as_json:
+        for finding in worst_first(of_remarks(found.remarks)):
+            click.echo(finding.line)
+    refused = refined.refused
+    if report is not None:
+        from tablegen.report.learnt import round_page
+
+        written(report.parent, {report.name: round_page(found, name, sources, refined.earlier, refused)})
+    if refused and not force:
+        fail([f"{files}: {refused}"], ExitStatus.WRONG_INPUT)
+    if refined.stopped and not force:
+        click.echo(f"{files}: {refined.stopped}", err=True)
+    if write:
+        _write(scan, axis, refined, force, as_json)
+    return ExitStatus.OK
+
+
+def _learn(scan: Path, trace: Path, axis: Literal["x", "y"], triggered: bool, options: "Options") -> "RefinedScan":
+    """The round; what is wrong ends the command."""
+    from dataclasses import asdict
+
+    from tablegen.api.refine import refine as learn
+    from tablegen.base.input_errors import Rejected, Unphysical
+
+    try:
+        return learn(scan, trace, axis=axis, triggered=triggered, **asdict(options))
+    except Rejected as rejected:
+        fail(rejected.problems, ExitStatus.WRONG_INPUT)
+    except Unphysical as reason:
+        fail([f"{trace}: {reason}"], ExitStatus.WRONG_INPUT)
+    except OSError as error:
+        fail([f"{scan}: {error.strerror or error}"], ExitStatus.WRONG_INPUT)
+
+
+def _charts(found: "Round") -> "PlottedCharts":
+    from tablegen.report.learnt import round_charts
+
+    return round_charts(found, found.setup.scan.name)
+
+
+def _write(scan: Path, axis: str, refined: "RefinedScan", force: bool, quiet: bool) -> None:
+    from tablegen.base.input_errors import Rejected
+
+    try:
+        path = scan.resolve()
+        content = refined.content(force)
+    except Rejected as rejected:
+        fail(rejected.problems, ExitStatus.WRONG_INPUT)
+    if not content:
+        click.echo(f"{scan}: not changed", err=quiet)
+        return
+    written(path.parent, {path.name: content})
+    if refined.stopped and not force:
+        click.echo(f"{scan}: {axis}.refinement written, with the best layer; build and upload", err=quiet)
+    else:
+        click.echo(f"{scan}: {axis}.refinement written; build, upload and record again", err=quiet)

@@ -1,0 +1,165 @@
+"""A round of refinement for the terminal, and as plain data."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from tablegen.base.data_files import Source
+from tablegen.refinement.departure import Departure
+from tablegen.refinement.image_round import ImageRound, MismatchRound
+from tablegen.refinement.round import Round, TraceRound
+
+
+def refine_text(found: Round, name: str, sources: Sequence[Source]) -> list[str]:
+    """Lines of text."""
+    lesson = found.lesson
+    lines = [
+        f"{name}, {found.line.axis}: {_what(found, sources)}",
+        "",
+        "                        residual [% of the line]   scaling error",
+        "direction                    rms      largest      [% peak to peak]",
+    ]
+    for label, departure in (("measured", lesson.before), ("predicted", lesson.after)):
+        for side, (rms, largest) in departure.residual_percent.items():
+            scaling = departure.scaling_percent[side]
+            lines.append(f"{side:<9}  {label:<11}  {rms:8.4f}     {largest:8.4f}      {scaling:8.3f}")
+    lines += [
+        f"its noise{'':<14}{lesson.noise_percent:8.4f}{'':<20}{lesson.chord_noise_percent:8.3f} rms of a chord",
+        "",
+        *_size(found),
+        *_learnt(found),
+        *_bound(found),
+        "",
+    ]
+    return lines
+
+
+def _what(found: Round, sources: Sequence[Source]) -> str:
+    """What was measured."""
+    names = " and ".join(source.name for source in sources[:2]) + (" and others" if len(sources) > 2 else "")
+    return f"{found.recorded}{'' if isinstance(found, TraceRound) else ','} of {names}"
+
+
+def _size(found: Round) -> list[str]:
+    """The length of x's line by the constant of the sample."""
+    if not isinstance(found, ImageRound) or found.size is None:
+        return []
+    size, asked = found.size.nm, found.asked_nm
+    by = 100.0 * (size.value / asked - 1.0)
+    return [
+        f"size of x: {size.value:.5g} +- {size.standard_error:.2g} nm from turn to turn, asked {asked:.5g} nm: "
+        f"{by:+.3g} +- {100.0 * size.standard_error / asked:.2g} %"
+    ]
+
+
+def _learnt(found: Round) -> list[str]:
+    lesson = found.lesson
+    if not lesson.harmonics:
+        return ["learnt: nothing"]
+    change, layer = (100.0 * float(np.max(np.abs(s.on_grid(1024)))) for s in (lesson.change, lesson.layer))
+    return [
+        f"learnt: harmonics 1 to {lesson.harmonics} of {found.bound.used}, up to {change:.3g} % of the line; "
+        f"the layer is now up to {layer:.3g} %"
+    ]
+
+
+def _bound(found: Round) -> list[str]:
+    b = found.bound
+    lines = [
+        f"bound: at a gain of {b.gain:g} it converges while the scanner's response at harmonics 1 to {b.used} is below "
+        f"{b.largest_gain:.3g} times the modelled one, or off by less than {b.phase_deg:.3g} degrees, a delay of "
+        f"{1e6 * b.delay_s:.3g} us"
+    ]
+    if b.dynamics:
+        lines.append(
+            f"with the dynamics of the scanner file off by a quarter a round leaves {100.0 * b.left:.3g} % at worst; "
+            f"up to {b.harmonics} harmonics converge"
+        )
+    else:
+        lines.append("the scanner file has no dynamics: keep the resonance and the delay away from these harmonics")
+    return lines
+
+
+def refine_record(found: Round, name: str, sources: Sequence[Source]) -> dict[str, Any]:
+    """The same as plain data, for JSON."""
+    line, lesson, b = found.line, found.lesson, found.bound
+
+    def errors(departure: Departure) -> dict[str, Any]:
+        sides = departure.residual_percent
+        return {
+            "residual_rms_percent": departure.rms_percent,
+            **{
+                side: {
+                    "residual_rms_percent": rms,
+                    "residual_largest_percent": largest,
+                    "scaling_error_peak_to_peak_percent": departure.scaling_percent[side],
+                }
+                for side, (rms, largest) in sides.items()
+            },
+        }
+
+    return {
+        "scan": name,
+        "axis": line.axis,
+        **_measurement(found, sources),
+        "measured": errors(lesson.before),
+        "predicted": errors(lesson.after),
+        "harmonics": lesson.harmonics,
+        "bound": {
+            "gain": b.gain,
+            "harmonics": b.harmonics,
+            "used": b.used,
+            "left_of_error": b.left,
+            "largest_gain": b.largest_gain,
+            "phase_deg": b.phase_deg,
+            "delay_s": b.delay_s,
+            "dynamics_known": b.dynamics,
+        },
+        "layer": {"a": lesson.layer.a.tolist(), "b": lesson.layer.b.tolist()},
+        "worse": found.worse or None,
+        "stopped": found.stopped or None,
+        "remarks": list(found.remarks),
+    }
+
+
+def _measurement(found: Round, sources: Sequence[Source]) -> dict[str, Any]:
+    """What differs between a trace and images."""
+    plain = [{"name": source.name, "sha256": source.sha256} for source in sources]
+    line, lesson = found.line, found.lesson
+    if isinstance(found, TraceRound):
+        measured = found.displacement
+        return {
+            "source": plain[0],
+            "period_s": found.phase.period_s,
+            "periods": measured.periods,
+            "samples": measured.samples,
+            "left_out": measured.left_out,
+            "size_nm": abs(lesson.before.size_nm),
+            "asked_nm": line.drive.size_nm,
+            "noise": {"reading_nm": measured.noise_nm, "position_percent": lesson.noise_percent},
+            "drift_nm": measured.drift_nm,
+        }
+    if isinstance(found, ImageRound | MismatchRound):
+        geometry = found.frames[0].geometry
+        shared = {
+            "images": [{"trace": trace, "retrace": retrace} for trace, retrace in zip(*[iter(plain)] * 2, strict=True)],
+            "rows": geometry.rows,
+            "columns": geometry.columns,
+            "noise": {"position_percent": lesson.noise_percent},
+        }
+    if isinstance(found, MismatchRound):
+        return {**shared, "mismatch": True, "match": min(frame.match for frame in found.frames)}
+    if isinstance(found, ImageRound):
+        first = found.frames[0]
+        return {
+            **shared,
+            "mismatch": False,
+            "periods_of_the_sample": found.periods,
+            "waves": len(first.fit.state.q),
+            "periodic_share": min(first.fit.explained),
+            "asked_nm": found.asked_nm,
+            "size_nm": None if found.size is None else found.size.nm.value,
+            "size_standard_error_nm": None if found.size is None else found.size.nm.standard_error,
+        }
+    raise TypeError(type(found).__name__)

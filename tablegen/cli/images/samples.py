@@ -1,0 +1,206 @@
+"""Images of a sample of known constant on the command line: what the sample is, and how images were taken."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from tablegen.cli.calibrate.options import delay_pixels_option, mirrored_option, turn_option, window_option
+from tablegen.cli.images.pairs import channel_option, frame_option, require_readers, retrace_channel_option
+from tablegen.cli.shared.common import fail
+from tablegen.cli.shared.exit_status import ExitStatus
+from tablegen.cli.shared.plot import PlottingCommand
+
+if TYPE_CHECKING:
+    from tablegen.calibration.laws.image_sizes import KnownSample, SampleImage, Taking
+    from tablegen.images.files import ScanImage
+
+F = TypeVar("F", bound=Callable[..., Any])
+IMAGE_NAMES = ("--image", "--images")
+PAIR_NAME = "--pair"
+NO_RETRACE = Path()  # where RETRACE was left out
+_POSITIVE = click.FloatRange(min=0.0, min_open=True)
+
+
+def image_option(metavar: str, volts: int, text: str, names: tuple[str, ...] = IMAGE_NAMES) -> Callable[[F], F]:
+    """``--image`` with so many numbers before the files."""
+    kinds: tuple[Any, ...] = (_POSITIVE, float, _POSITIVE)[:volts]
+    files = click.Path(path_type=Path), click.Path(path_type=Path)
+    return click.option(
+        *names, "images", type=(*kinds, *files), metavar=f"{metavar} TRACE [RETRACE]", multiple=True, help=text
+    )
+
+
+class CommandOfImages(PlottingCommand):
+    """A command with options of voltages and two files, the second of which may be left out: (name, voltages)."""
+
+    images = (*((name, 1) for name in IMAGE_NAMES),)
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Say that there is no second file where none is named."""
+        words: list[str] = []
+        for at, word in enumerate(args):
+            words.append(word)
+            ends = at + 1 == len(args) or args[at + 1].startswith("--")
+            if ends and any(at > volts and args[at - volts - 1] == name for name, volts in self.images):
+                words.append(str(NO_RETRACE))
+        return super().parse_args(ctx, words)
+
+
+class CommandOfOperatorPairs(CommandOfImages):
+    """``--pair`` with a scan voltage, an offset and a rate before the files."""
+
+    images = ((PAIR_NAME, 3),)
+
+
+class CommandOfRunningImages(CommandOfImages):
+    """``--images`` without a voltage: the scan file has it."""
+
+    images = (("--images", 0),)
+
+
+class CommandOfOffsetImages(CommandOfImages):
+    """The same with a scan voltage and an offset before the files."""
+
+    images = (*((name, 2) for name in IMAGE_NAMES),)
+
+
+_CONSTANTS = [
+    click.option(
+        "--lattice-nm", type=_POSITIVE, metavar="NM", help="Lattice constant of the sample in the images, in nm."
+    ),
+    click.option(
+        "--lattice",
+        type=click.Choice(("hexagonal", "square")),
+        default="hexagonal",
+        show_default=True,
+        help="Kind of the lattice of --lattice-nm.",
+    ),
+    click.option(
+        "--cell",
+        type=(_POSITIVE, _POSITIVE, click.FloatRange(20.0, 160.0)),
+        metavar="A B GAMMA",
+        help="Any other lattice: the sides of its cell in nm, and the angle between them in degrees.",
+    ),
+    click.option(
+        "--pitch-nm",
+        type=_POSITIVE,
+        metavar="NM",
+        help="Pitch of a grating, in nm. With --lattice-nm, images may be of either.",
+    ),
+    click.option(
+        "--angle-deg",
+        type=(float, click.FloatRange(min=0.0)),
+        metavar="DEG ERROR",
+        help="Angle between the fast axis and the normal of a grating's bars, and its standard error, in degrees.  "
+        "[default: that of the rows]",
+    ),
+]
+
+
+def constant_options(command: F) -> F:
+    """Add what says of the sample alone; ``sample_of`` reads it."""
+    for option in reversed(_CONSTANTS):
+        command = option(command)
+    return command
+
+
+def sample_options(command: F) -> F:
+    """Add what says of the sample and of the images; ``sample_of`` and ``taking_of`` read it."""
+    options = [
+        *_CONSTANTS,
+        click.option(
+            "--aspect",
+            type=click.FloatRange(0.02, 50.0),
+            metavar="RATIO",
+            help="Height of the frame, of all rows, over the length of the line from turn to turn.  [default: that of "
+            "the file; square pixels if it says none]",
+        ),
+        mirrored_option,
+        window_option,
+        turn_option,
+        delay_pixels_option,
+        channel_option,
+        retrace_channel_option,
+        frame_option,
+    ]
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
+def sample_of(given: dict[str, Any]) -> "KnownSample":
+    """The sample of the options; none of them ends the command."""
+    from tablegen.calibration.laws.image_sizes import KnownSample
+    from tablegen.fitting.estimate import Estimate
+    from tablegen.images.line_length import Cell, Grating
+
+    constant, cell, pitch, angle = (given[name] for name in ("lattice_nm", "cell", "pitch_nm", "angle_deg"))
+    if constant is None and cell is None and pitch is None:
+        raise click.UsageError("images need the constant of their sample: --lattice-nm NM, --cell, or --pitch-nm NM")
+    if constant is not None and cell is not None:
+        raise click.UsageError("--lattice-nm and --cell are two lattices; give one")
+    if angle is not None and pitch is None:
+        raise click.UsageError("--angle-deg is for a grating, of --pitch-nm; a lattice shows its angle")
+    lattice = None
+    if cell is not None:
+        lattice = Cell(cell[0], cell[1], cell[2], "given")
+    elif constant is not None:
+        lattice = (Cell.square if given["lattice"] == "square" else Cell.hexagonal)(constant)
+    return KnownSample(lattice, None if pitch is None else Grating(pitch, None if angle is None else Estimate(*angle)))
+
+
+def refuse_sample(given: dict[str, Any]) -> None:
+    """End the command where options of images are given without images."""
+    for name in ("lattice_nm", "cell", "pitch_nm", "angle_deg", "aspect"):
+        if given[name] is not None:
+            raise click.UsageError(f"--{name.replace('_', '-')} is for images, of --image")
+
+
+def taking_of(given: dict[str, Any]) -> "Taking":
+    """How images were taken, by the options."""
+    from tablegen.calibration.laws.image_sizes import Taking
+
+    return Taking(given["turn"], given["window"], given["retrace_mirrored"], given["delay_pixels"], given["aspect"])
+
+
+def read_sample_image(
+    v_scan: float, v_offset: float | None, trace: Path, retrace: Path, given: dict[str, Any]
+) -> "tuple[SampleImage, list[ScanImage]]":
+    """An image, with its retrace where one is named, or in the same file; what is wrong with it ends the command."""
+    from tablegen.base.input_errors import Rejected
+    from tablegen.calibration.laws.image_sizes import SampleImage
+    from tablegen.images.files import read_image, read_pair
+
+    channel, retrace_channel, frame = (given[name] for name in ("channel", "retrace_channel", "frame"))
+    require_readers({trace} if retrace == NO_RETRACE else {trace, retrace})
+    try:
+        if retrace == NO_RETRACE and retrace_channel is None and not _has_retrace(trace, channel):
+            read = [read_image(trace, channel, "trace", frame)]
+        else:
+            second = None if retrace == NO_RETRACE else retrace
+            read = list(read_pair(trace, second, channel, retrace_channel, frame))
+    except Rejected as rejected:
+        fail(rejected.problems, ExitStatus.WRONG_INPUT)
+    first = read[0]
+    ratio = None
+    if first.width_nm and first.height_nm:
+        low, high = given["window"]
+        ratio = first.height_nm / (first.width_nm / (high - low))
+    name = " and ".join(dict.fromkeys(one.file for one in read))
+    heights = [one.heights for one in read]
+    return SampleImage(name, v_scan, v_offset, heights[0], heights[1] if len(read) > 1 else None, ratio), read
+
+
+def _has_retrace(path: Path, channel: str | None) -> bool:
+    """Whether a file has the retrace of the trace that would be read."""
+    from tablegen.base.input_errors import Rejected
+    from tablegen.images.files import channels_of
+    from tablegen.images.formats.channel import choose, partner
+
+    try:
+        channels = channels_of(path)
+        return partner(channels, choose(channels, channel, "trace")) is not None
+    except (Rejected, ValueError):
+        return False  # told where it is read

@@ -1,0 +1,177 @@
+"""What several commands share: the way from a path to a certified plan, and how its failures are told."""
+
+import importlib.util
+import os
+from math import isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import click
+
+from tablegen.base.installation import install_advice
+from tablegen.base.reading import other_than_file
+from tablegen.cli.shared.exit_status import ExitStatus
+from tablegen.cli.shared.progress import Progress
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from tablegen.api.build import Build
+
+scan_argument = click.argument("scan", type=click.Path(path_type=Path), metavar="SCAN.TOML")
+
+format_option = click.option(
+    "-f",
+    "--format",
+    "formats",
+    multiple=True,
+    metavar="NAME",
+    help="Output format; repeat the option for several formats. `tablegen formats` lists them.  [default: emit.formats "
+    "of the scan file, or c and verilog]",
+)
+
+
+class OutputFile(click.Path):
+    """A file to write: a new one, or one that is replaced; never a pipe, a device or a directory."""
+
+    def __init__(self) -> None:
+        super().__init__(path_type=Path)
+
+    def convert(self, value: Any, parameter: click.Parameter | None, context: click.Context | None) -> Path:
+        """The path; a usage error names what stands there."""
+        path = Path(os.fsdecode(super().convert(value, parameter, context)))
+        if other := other_than_file(path):
+            self.fail(f"'{path}' is {other}, where a file has to go.", parameter, context)
+        return path
+
+
+class OutputFolder(click.Path):
+    """A directory to write into: a new one, or one that is there."""
+
+    def __init__(self) -> None:
+        super().__init__(path_type=Path, file_okay=False)
+
+    def convert(self, value: Any, parameter: click.Parameter | None, context: click.Context | None) -> Path:
+        """The path; a usage error names what stands there."""
+        path = Path(os.fsdecode(super().convert(value, parameter, context)))
+        if (other := other_than_file(path)) not in (None, "a directory"):
+            self.fail(f"'{path}' is {other}, where a directory has to go.", parameter, context)
+        return path
+
+
+def finite(_context: click.Context, _option: click.Parameter, value: float | None) -> float | None:
+    """A callback of options: NaN is in every range of click's, and infinity in those that are open above."""
+    if value is not None and not isfinite(value):
+        raise click.BadParameter(f"{value} is not a finite number.")
+    return value
+
+
+def require(*modules: str, extra: str, otherwise: str = "") -> None:
+    """End the command where modules of an extra are not installed; ``otherwise`` says what does without them."""
+    missing = [module for module in modules if not _installed(module)]
+    if missing:
+        needs = " and ".join(missing)
+        fail([f"{needs} is missing; install it with: {install_advice(extra)}{otherwise}"], ExitStatus.TOOL_MISSING)
+
+
+def _installed(module: str) -> bool:
+    try:
+        return importlib.util.find_spec(module) is not None
+    except ValueError:  # it was imported in an unusual way, or kept from being
+        return False
+
+
+class Failure(click.ClickException):
+    """Lines for stderr and an exit status."""
+
+    def __init__(self, lines: "Sequence[object]", status: ExitStatus) -> None:
+        super().__init__("\n".join(map(str, lines)))
+        self.status = status
+
+    def show(self, file: object = None) -> None:
+        """Print the lines as they are, without a prefix, so that editors can parse ``file:line:``."""
+        click.echo(self.message, err=True)
+
+
+def fail(lines: "Sequence[object]", status: ExitStatus) -> NoReturn:
+    """End the command."""
+    raise Failure(lines, status)
+
+
+strict_option = click.option(
+    "--strict",
+    is_flag=True,
+    help="Treat warnings as errors: exit with status 3, and write nothing.",
+)
+
+
+def quiet_blas() -> None:
+    """Before numpy is imported: no linear algebra library is used, and its threads would only spin.
+
+    They are a good part of what importing numpy costs.
+    """
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+
+def planned(scan: Path, formats: "Sequence[str] | None" = None, strict: bool = False) -> "Build":
+    """Load, plan and certify a scan; every failure ends the command with its status.
+
+    Warnings go to stderr; with ``strict`` they end the command too.
+    """
+    quiet_blas()
+    from tablegen.api.build import BrokenLimit, build
+    from tablegen.base.input_errors import Rejected
+
+    try:
+        with Progress() as progress:
+            built = build(scan, formats=formats, progress=progress.now)
+            progress.now("looking for remedies")
+            warnings = built.warnings
+    except BrokenLimit as broken:
+        fail(broken.problems, ExitStatus.BROKEN_LIMIT)
+    except Rejected as rejected:
+        fail(rejected.problems, ExitStatus.WRONG_INPUT)
+    lines = [f"warning: {warning}" for warning in warnings]
+    if lines and strict:
+        fail(lines, ExitStatus.BROKEN_LIMIT)
+    for line in lines:
+        click.echo(line, err=True)
+    return built
+
+
+def rendered(built: "Build") -> "dict[str, bytes]":
+    """The files of a build; a scan that one of its formats cannot hold ends the command."""
+    from tablegen.base.input_errors import Rejected
+
+    try:
+        with Progress() as progress:
+            progress.now("writing the formats")
+            return built.files
+    except Rejected as rejected:
+        fail(rejected.problems, ExitStatus.WRONG_INPUT)
+
+
+def written(
+    folder: Path, files: "Mapping[str, bytes]", outdated: "Sequence[str] | Callable[[], Sequence[str]]" = ()
+) -> list[str]:
+    """Write files and return the names of those that changed; a failure or an interruption ends the command.
+
+    Files that are ``outdated`` are removed; a function is asked for them when no other build writes.
+
+    An interruption waits until all files are in place, so that none is left half renamed; a second one does not wait.
+    """
+    from tablegen.base.interruption import ENDINGS, held
+    from tablegen.emit.write import CannotWrite, NoPlace, write_files
+
+    try:
+        with held(*ENDINGS) as came:
+            names = write_files(folder, files, outdated)
+    except NoPlace as error:
+        fail([error], ExitStatus.WRONG_INPUT)
+    except CannotWrite as error:
+        fail([error], ExitStatus.CANNOT_WRITE)
+    except OSError as error:
+        fail([f"{folder}: {error.strerror or error}"], ExitStatus.CANNOT_WRITE)
+    if came:
+        fail([f"interrupted, after the files of {folder} had been written"], ExitStatus.INTERRUPTED)
+    return names

@@ -1,0 +1,36 @@
+"""What ``build --check`` prints: how a directory differs from what would be written."""
+
+from collections.abc import Mapping
+from difflib import unified_diff
+from pathlib import Path
+
+from tablegen.base.reading import BUILD_FILE, read_bytes
+
+_MAX_LINES = 12  # lines of each file: enough to see what changed, without whole tables
+_WIDTH = 120
+
+
+def differences(folder: Path, files: Mapping[str, bytes]) -> list[str]:
+    """A unified diff of every file that is missing or stale; empty where the directory is up to date."""
+    out: list[str] = []
+    for name, content in files.items():
+        path = folder / name
+        try:
+            old = read_bytes(path, BUILD_FILE)
+        except FileNotFoundError:
+            out.append(f"{path}: missing")
+            continue
+        except OSError as error:
+            out.append(f"{path}: cannot be read: {error.strerror or error}")
+            continue
+        if old == content:
+            continue
+        before = old.decode("utf-8", "replace").splitlines()
+        after = content.decode("utf-8", "replace").splitlines()
+        diff = list(unified_diff(before, after, str(path), f"{name} as it would be built", n=0, lineterm=""))
+        if not diff:
+            out.append(f"{path}: differs in line ends only")
+        out += [line if len(line) <= _WIDTH else line[: _WIDTH - 3] + "..." for line in diff[:_MAX_LINES]]
+        if len(diff) > _MAX_LINES:
+            out.append(f"... {len(diff) - _MAX_LINES} more lines of difference in {name}")
+    return out

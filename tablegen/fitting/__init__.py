@@ -1,0 +1,1 @@
+"""Fits that every calibration shares: estimates with standard errors, least squares, branches, growth, outliers."""

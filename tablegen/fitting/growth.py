@@ -1,0 +1,172 @@
+"""Growth of one branch's residual with the amplitude -> beta_max and rho, equation (22), and one u_peak."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import expm1, sqrt
+
+import numpy as np
+from scipy.special import chdtrc
+
+from tablegen.base.input_errors import Unphysical
+from tablegen.base.warnings import Remark, spoils
+from tablegen.compensation.models import UNCOMPENSATED
+from tablegen.fitting.estimate import Estimate
+from tablegen.fitting.least_squares import few_points, solve
+from tablegen.fitting.measured_branch import MeasuredBranch
+from tablegen.numerics.arrays import Floats
+
+_SIGNIFICANCE_LEVEL = 0.01
+_STRAIGHT_RHO = 1e-9  # below it (22) is a straight line to the last place
+_LARGEST_RHO, _OPEN_RHO = 60.0, 5.0  # beyond the first (22) is a step; a larger error than the second tells nothing
+_NOISE_LIMIT_ERRORS = 3.0  # standard errors of a residual that may be noise
+_CHI2_LIMIT = 4.0  # in chi squared, two standard errors
+_NO_HYSTERESIS = (
+    f'no hysteresis can be told from noise, and hence no u_peak; model = "{UNCOMPENSATED}" does, or average more'
+)
+_LEAST_BETA_ERROR = 1e-9  # least error of a measured beta: that of the fit's own arithmetic
+
+
+@dataclass(frozen=True)
+class Growth:
+    """One branch: beta_max (of the scan), rho and u_peak; remarks on what they rest on.
+
+    ``off_errors`` is by how many of their standard errors (22) misses the measured residuals, rms; ``off_share`` the
+    rms of what it misses as a fraction of the largest residual. Both are 0 for one amplitude.
+    """
+
+    beta_max: Estimate
+    rho: Estimate
+    u_peak: Estimate
+    remarks: tuple[Remark, ...]
+    off_errors: float = 0.0
+    off_share: float = 0.0
+
+    def beta(self, v: Floats) -> Floats:
+        """Equation (22) at normalised amplitudes."""
+        return self.beta_max.value * _share(v, self.rho.value)
+
+
+def fit_growth(v: Floats, branches: Sequence[MeasuredBranch], rho: float) -> Growth:
+    """(22) through the residuals of one direction at normalised amplitudes, weighted by their standard errors.
+
+    ``rho`` is kept where the amplitudes do not determine it. Raises ``Unphysical``.
+    """
+    remarks: list[Remark] = []
+    beta = np.array([branch.beta.value for branch in branches])
+    error = np.maximum([branch.beta.standard_error for branch in branches], _LEAST_BETA_ERROR)
+    found = None
+    if float(np.max(v)) - float(np.min(v)) > 0.05:
+        found = _both(v, beta, error, rho, remarks)
+    freedom = max(len(v) - (1 if found is None else 2), 1)
+    if found is None:
+        steep = _steepest(v, beta, error, rho)
+        found = _height(v, beta, error, steep or rho, remarks)
+        remarks.append(
+            Remark(f"the residual hardly grows with the amplitude: rho is only known to be large, {steep:g} was taken")
+            if steep
+            else spoils(
+                f"rho is not determined by these amplitudes and was left at {rho:g}; it takes two or "
+                f"more, best from 0.2 to 1 of v_max"
+            )
+        )
+    beta_max, estimate = found
+    if beta_max.value <= 0.0 and np.all(beta > -_NOISE_LIMIT_ERRORS * error):
+        raise Unphysical(_NO_HYSTERESIS)
+    if beta_max.value <= 0.0:
+        raise Unphysical(
+            f"the residual has the wrong sign (beta_max = {beta_max.value:.3g}): the displacement leads the drive; "
+            f"is the delay of the drive's channel larger than the sensor's?"
+        )
+    top = float(np.max(v))
+    if top < 0.6:
+        remarks.append(spoils(f"beta_max is extrapolated from {top:.2g} of v_max; it holds up to about there"))
+    missed = beta_max.value * _share(v, estimate.value) - beta
+    off_errors = sqrt(float(np.sum((missed / error) ** 2)) / freedom)
+    off_share = sqrt(float(np.sum(missed**2)) / freedom) / float(np.max(np.abs(beta)))
+    return Growth(beta_max, estimate, _peak(branches, beta, error, remarks), tuple(remarks), off_errors, off_share)
+
+
+def _both(
+    v: Floats, beta: Floats, error: Floats, rho: float, remarks: list[Remark]
+) -> tuple[Estimate, Estimate] | None:
+    """beta_max and rho, or None where rho stays open."""
+
+    def residuals(x: Floats) -> Floats:
+        left: Floats = (x[0] * _share(v, float(x[1])) - beta) / error
+        return left
+
+    start = [float(beta[np.argmax(v)]) / float(_share(np.array(np.max(v)), rho)), rho]
+    found = solve(residuals, start, ("beta_max", "rho"), [0.5, 5.0], ([-1.0, 1e-6], [1.0, 100.0]))
+    value, spread = found.values, np.sqrt(np.diag(found.unit_covariance))
+    if not 2e-6 < value[1] < _LARGEST_RHO or not spread[1] < _OPEN_RHO:
+        return None
+    what, percent = "(22) misses the measured residuals", _percent(found.residuals * error)
+    spread = spread * sqrt(_variance(found.residuals, found.freedom, what, remarks, percent))
+    return Estimate(float(value[0]), float(spread[0])), Estimate(float(value[1]), float(spread[1]))
+
+
+def _steepest(v: Floats, beta: Floats, error: Floats, rho: float) -> float | None:
+    """The rho that fits best where it is large and open, if the one that would be kept is far worse; else None."""
+    grid = np.geomspace(_OPEN_RHO, _LARGEST_RHO, 60)
+
+    def cost(one: float) -> float:
+        share = _share(v, one) / error
+        left = float(share @ (beta / error)) / float(share @ share) * share - beta / error
+        return float(left @ left)
+
+    costs = [cost(one) for one in grid.tolist()]
+    best = int(np.argmin(costs))
+    spread = max(costs[best] / max(len(v) - 1, 1), 1.0)  # what it misses itself counts as error
+    return float(f"{grid[best]:.3g}") if cost(rho) - costs[best] > _CHI2_LIMIT * spread else None
+
+
+def _height(v: Floats, beta: Floats, error: Floats, rho: float, remarks: list[Remark]) -> tuple[Estimate, Estimate]:
+    """beta_max alone."""
+    share = _share(v, rho) / error
+    value = float(share @ (beta / error)) / float(share @ share)
+    left = value * share - beta / error
+    what = f"(22) with rho = {rho:g} misses the measured residuals"
+    variance = _variance(left, len(v) - 1, what, remarks, _percent(left * error))
+    return Estimate(value, sqrt(variance / float(share @ share))), Estimate(rho)
+
+
+def _peak(branches: Sequence[MeasuredBranch], beta: Floats, error: Floats, remarks: list[Remark]) -> Estimate:
+    """The mean of u_peak over the amplitudes, each weighted by its error: the paper finds it the same at all."""
+    seen = [branch.u_peak for branch, b, e in zip(branches, beta, error, strict=True) if b > _NOISE_LIMIT_ERRORS * e]
+    if not seen:
+        raise Unphysical(_NO_HYSTERESIS)
+    value = np.array([estimate.value for estimate in seen])
+    spread = np.maximum([estimate.standard_error for estimate in seen], _LEAST_BETA_ERROR)
+    weight = 1.0 / spread**2
+    mean = float(value @ weight) / float(np.sum(weight))
+    left = (value - mean) / spread
+    low, high = float(np.min(value)), float(np.max(value))
+    what = f"u_peak differs from amplitude to amplitude, {low:.3g} to {high:.3g}, where the scanner file has one,"
+    more = "; --points writes it as measured, or leave out amplitudes that you do not scan with"
+    variance = _variance(left, len(seen) - 1, what, remarks, more=more)
+    return Estimate(mean, sqrt(variance / float(np.sum(weight))))
+
+
+def _percent(missed: Floats) -> float:
+    """What is missed of the scan, rms."""
+    return 100.0 * sqrt(float(np.mean(missed**2)))
+
+
+def _variance(
+    left: Floats, freedom: int, what: str, remarks: list[Remark], percent: float = 0.0, more: str = ""
+) -> float:
+    """1 where errors explain what is left; otherwise by how much they have to be widened, which is remarked."""
+    total = float(left @ left)
+    if freedom < 1 or chdtrc(freedom, total) > _SIGNIFICANCE_LEVEL:
+        return 1.0
+    text = f"{what} by {sqrt(total / freedom):.3g} times their standard errors; these were widened{more}"
+    remarks.append(spoils(text, percent))
+    return total / freedom * few_points(freedom) ** 2
+
+
+def _share(v: Floats, rho: float) -> Floats:
+    """(1 - exp(-rho v)) / (1 - exp(-rho))."""
+    if rho < _STRAIGHT_RHO:
+        return np.asarray(v, dtype=np.float64)
+    share: Floats = np.expm1(-rho * np.asarray(v)) / expm1(-rho)
+    return share

@@ -1,0 +1,134 @@
+"""Least squares with standard errors that can be believed, and with the parameters that data cannot determine."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from math import nan, sqrt
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.special import stdtrit
+
+from tablegen.base.input_errors import Unphysical
+from tablegen.fitting.estimate import Estimate
+from tablegen.numerics.arrays import Floats
+
+_NORMAL_AT_2_SIGMA = 0.9772498680518208  # the normal distribution's at 2: what two standard errors cover, on one side
+_SCATTER_STEPS = 20
+_SINGULAR_VALUE_LIMIT = 1e-10  # relative to the largest; finite differences leave less than this of a zero
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Values, their covariance for a unit variance of the residuals, and what is left.
+
+    ``undetermined`` names the parameters that can move by their whole scale without the data noticing.
+    ``known_errors`` says that residuals are in standard errors, known without their scatter, unless that is more:
+    then ``scatter`` is what was added to each error, a share of the value.
+    """
+
+    names: tuple[str, ...]
+    values: Floats
+    unit_covariance: Floats
+    residuals: Floats
+    jacobian: Floats
+    undetermined: tuple[str, ...]
+    known_errors: bool = False
+    scatter: float = 0.0
+
+    @property
+    def freedom(self) -> int:
+        """Points less parameters that were fitted."""
+        return len(self.residuals) - len(self.names)
+
+    @property
+    def variance(self) -> float:
+        """Variance of the residuals; nan where it is not known and there are no more points than parameters."""
+        if self.known_errors:
+            return 1.0
+        return float(self.residuals @ self.residuals) / self.freedom if self.freedom > 0 else nan
+
+    def estimate(self, name: str) -> Estimate:
+        """One parameter, its error widened for few points."""
+        i = self.names.index(name)
+        if self.known_errors:
+            widened = few_points(self.freedom) if self.scatter > 0.0 else 1.0
+            return Estimate(float(self.values[i]), sqrt(self.unit_covariance[i, i]) * widened)
+        error = sqrt(self.unit_covariance[i, i] * self.variance) if self.freedom > 0 else nan
+        return Estimate(float(self.values[i]), error * few_points(self.freedom))
+
+
+def few_points(freedom: int) -> float:
+    """By how much Student's distribution widens what two standard errors have to be; nan where nothing is left."""
+    return float(stdtrit(freedom, _NORMAL_AT_2_SIGMA)) / 2.0 if freedom > 0 else nan
+
+
+def solve(
+    residuals: Callable[[Floats], Floats],
+    start: Sequence[float] | Floats,
+    names: Sequence[str],
+    scales: Sequence[float] | Floats,
+    bounds: tuple[Sequence[float], Sequence[float]] | None = None,
+    jacobian: Callable[[Floats], Floats] | None = None,
+) -> Solution:
+    """Minimise the sum of squares of ``residuals``.
+
+    ``scales`` says of each parameter by how much it could at most differ from scanner to scanner: one whose standard
+    error is larger was not determined. Raises ``Unphysical`` where no minimum is found.
+    """
+    start = np.asarray(start, dtype=np.float64)
+    scales = np.asarray(scales, dtype=np.float64)
+    low, high = (np.full(len(start), -np.inf), np.full(len(start), np.inf)) if bounds is None else map(np.array, bounds)
+    found = least_squares(
+        residuals,
+        np.clip(start, low + 1e-9 * scales, high - 1e-9 * scales),
+        jac="3-point" if jacobian is None else jacobian,
+        bounds=(low, high),
+        x_scale=scales,
+        xtol=1e-13,
+        ftol=1e-13,
+        gtol=1e-13,
+        max_nfev=200,
+    )
+    if not found.success or not np.all(np.isfinite(found.x)):
+        raise Unphysical("the fit does not converge; check the data for gaps, steps and wrong units")
+    values, left = found.x, found.fun
+    jac = np.asarray(found.jac)
+    _, size, directions = np.linalg.svd(jac * scales, full_matrices=False)
+    size = np.append(size, np.zeros(len(values) - len(size)))
+    weak = size <= _SINGULAR_VALUE_LIMIT * size[0]
+    inverse = np.where(weak, 0.0, 1.0 / np.where(weak, 1.0, size)) ** 2
+    rows = directions[: len(size)]
+    covariance = (rows.T * inverse[: len(rows)]) @ rows * np.outer(scales, scales)
+    blind = np.sqrt(np.sum(rows[weak[: len(rows)]] ** 2, axis=0)) > 0.1
+    if len(rows) < len(values):  # fewer points than parameters: what no row sees
+        blind |= np.sum(rows**2, axis=0) < 0.99
+    freedom = len(left) - len(values)
+    if freedom > 0:
+        errors = np.sqrt(np.diag(covariance) * float(left @ left) / freedom)
+        blind |= errors * few_points(freedom) > scales
+    undetermined = tuple(name for name, is_blind in zip(names, blind, strict=True) if is_blind)
+    return Solution(tuple(names), values, covariance, left, jac, undetermined)
+
+
+def with_errors(fit: Callable[[Floats], Solution], values: Floats, errors: Floats) -> Solution:
+    """A fit of values whose standard errors are known; ``fit`` solves for some errors, residuals in units of them.
+
+    Where values scatter by more than that, since no law is exact, all get one relative error more: as much as makes
+    their scatter the expected one (Paule and Mandel, 1982). Else precise values would bend the law for all others.
+    """
+
+    def at(share: float) -> Solution:
+        return replace(fit(np.hypot(errors, share * values)), known_errors=True, scatter=share)
+
+    def excess(solution: Solution) -> float:
+        return float(solution.residuals @ solution.residuals) - solution.freedom
+
+    found = at(0.0)
+    if found.freedom <= 0 or excess(found) <= 0.0:
+        return found
+    low, high = 0.0, float(np.max(np.abs(found.residuals) * errors / values))
+    for _ in range(_SCATTER_STEPS):
+        middle = 0.5 * (low + high)
+        found = at(middle)
+        low, high = (middle, high) if excess(found) > 0.0 else (low, middle)
+    return at(high)

@@ -1,0 +1,124 @@
+"""One image of a file, what the file says of it, and which of several is meant."""
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import isfinite
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from tablegen.base.input_errors import shortened
+
+Matrix = npt.NDArray[np.generic]
+Direction = Literal["trace", "retrace"]
+FirstRow = Literal["top", "bottom"]
+
+MAX_PIXELS = 1 << 25  # 5792 x 5792; more than that in floating point would be most of a computer's memory
+_MAX_LISTED = 12  # channels in a message
+_MAX_TITLE = 60  # characters of a channel in a message
+_MAX_SPLIT = 1000  # characters of a title that is looked into
+_DIRECTION = re.compile(r"(.+?)[\s_\-\[(]*(retrace|trace|forward|backward)\s*[\])]*", re.IGNORECASE | re.DOTALL)
+_MEANT: dict[str, Direction] = {"trace": "trace", "forward": "trace", "retrace": "retrace", "backward": "retrace"}
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """One image of a file: what it is called, its shape by the file, and what reads it, once that is known to fit.
+
+    ``load`` gives rows x columns of a frame, counted from 0: row 0 is the first in time where the file says so, and
+    the left end of the line is at the left in both directions. It raises ``ValueError`` with what is wrong.
+    """
+
+    number: int
+    title: str
+    shape: tuple[int, ...]
+    load: Callable[[int], Matrix]
+    signal: str = ""  # the title without the direction
+    direction: Direction | None = None  # None where the file does not say
+    unit: str = ""  # of the values; empty where the file does not say
+    width_nm: float | None = None  # of the line, all pixels
+    height_nm: float | None = None
+    line_rate_hz: float | None = None  # lines in one direction per second
+    first_row: FirstRow | None = None  # where row 0 is in the picture; None where that is not known
+    frames: int = 1
+
+
+def loaded(number: int, title: str, matrix: Matrix) -> Channel:
+    """A channel that is read already, of a file that says no more of it."""
+    signal, direction = split_direction(title)
+    return Channel(number, title, matrix.shape, lambda _: matrix, signal, direction)
+
+
+def split_direction(title: str) -> tuple[str, Direction | None]:
+    """``HeightRetrace``, ``Height (Retrace)`` or ``Height backward`` as ``Height`` and its direction."""
+    if len(title) > _MAX_SPLIT or title.strip().lower() in _MEANT:  # "Retrace" is no trace of "Re"
+        return title, None
+    found = _DIRECTION.fullmatch(title)
+    return (found[1], _MEANT[found[2].lower()]) if found else (title, None)
+
+
+def choose(channels: Sequence[Channel], wanted: str | None, direction: Direction | None) -> Channel:
+    """The channel that a title, a signal or a number names; of a signal with both directions, that of ``direction``.
+
+    Raises ``ValueError`` with the channels that there are.
+    """
+    if not channels:
+        raise ValueError("contains no image")
+    there = listed(channels)
+    if wanted is None:
+        found = list(channels)
+        if len({one.signal for one in channels}) == 1:
+            found = _of_direction(channels, direction)
+        if len(found) > 1:
+            raise ValueError(f"has several channels, {there}; choose with --channel")
+        return found[0]
+    found = (
+        [one for one in channels if one.title == wanted]
+        or _of_direction([one for one in channels if one.signal == wanted], direction)
+        or [one for one in channels if str(one.number) == wanted]
+    )
+    if len(found) != 1:
+        raise ValueError(f"has {'no' if not found else 'more than one'} channel {quoted(wanted)}; there is {there}")
+    return found[0]
+
+
+def partner(channels: Sequence[Channel], trace: Channel) -> Channel | None:
+    """The retrace of the same signal; None where there is none, or more than one."""
+    found = [one for one in channels if one.signal == trace.signal and one.direction == "retrace"]
+    return found[0] if trace.direction == "trace" and len(found) == 1 else None
+
+
+def _of_direction(channels: Sequence[Channel], direction: Direction | None) -> list[Channel]:
+    """Those of the direction, where the file tells directions; all where it does not."""
+    found = [one for one in channels if one.direction == direction]
+    return found if direction is not None and found else list(channels)
+
+
+def listed(channels: Sequence[Channel]) -> str:
+    """Numbers and titles for a message."""
+    there = ", ".join(
+        f"{one.number} ({shortened(one.title, _MAX_TITLE)})" if one.title else f"{one.number}"
+        for one in channels[:_MAX_LISTED]
+    )
+    return there + (", ..." if len(channels) > _MAX_LISTED else "")
+
+
+def quoted(title: str) -> str:
+    """A title for a message."""
+    return f"'{shortened(title, _MAX_TITLE)}'"
+
+
+def positive(value: object, unit: float = 1.0) -> float | None:
+    """A number, or the text of one, in another unit; None for what is no positive number."""
+    try:
+        found = float(value) * unit  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        return None
+    return found if isfinite(found) and found > 0.0 else None
+
+
+def first_line(error: BaseException) -> str:
+    """What a library says of a fault, for a message."""
+    return shortened((str(error).strip() or type(error).__name__).splitlines()[0], 100)

@@ -1,0 +1,97 @@
+"""Igor binary waves (.ibw) with images, as Asylum Research writes them: version 5 of the format.
+
+A header of 64 bytes, one of the wave of 320, the values with x first, and texts: a note of ``key: value`` lines, and
+a label for each channel, such as HeightTrace. The first row is the bottom one; it is the last in time, and rows are
+turned, if the note has ``ScanDown: 1``.
+"""
+
+import re
+import struct
+from functools import partial
+from math import prod
+
+import numpy as np
+
+from tablegen.images.formats.channel import Channel, FirstRow, Matrix, positive, split_direction
+
+_VERSION = 5
+_HEADERS = 64 + 320  # bytes
+_LABEL = 32  # bytes
+_MAX_NOTE = 1 << 20  # bytes; files have some ten thousand
+_MAX_CHANNELS = 1000
+_KINDS = {2: "f4", 4: "f8", 0x08: "i1", 0x10: "i2", 0x20: "i4", 0x48: "u1", 0x50: "u2", 0x60: "u4"}
+_UNITS = ((r"Height|ZSensor|Deflection|Amplitude\d?", "m"), (r"Phase\d?", "deg"), (r"Frequency", "Hz"))
+
+
+def ibw_channels(content: bytes, _: str) -> list[Channel]:
+    """The layers of a wave of two or three dimensions. Raises ``ValueError`` with what is wrong."""
+    order = next((order for order in "<>" if content[:2] == struct.pack(f"{order}h", _VERSION)), None)
+    if order is None:
+        raise ValueError("does not begin as an Igor binary wave of version 5 does, which images are")
+    if len(content) < _HEADERS:
+        raise ValueError("ends in its header; copy it again")
+    if int(np.frombuffer(content, f"{order}u2", _HEADERS // 2).sum()) & 0xFFFF:
+        raise ValueError("has a header with a wrong checksum; copy it again")
+    wave_bytes, formula, note_bytes, *lengths = struct.unpack_from(f"{order}12i", content, 4)
+    kind = _KINDS.get(struct.unpack_from(f"{order}h", content, 64 + 16)[0])
+    if kind is None:
+        raise ValueError("is a wave of text or of complex numbers; images are real numbers")
+    columns, rows, layers, fourth = struct.unpack_from(f"{order}4i", content, 64 + 68)
+    layers = layers or 1
+    if min(columns, rows, layers) < 1 or fourth:
+        raise ValueError("is not a wave of columns, rows and channels; does it hold force curves?")
+    if layers > _MAX_CHANNELS:
+        raise ValueError(f"has {layers} channels; at most {_MAX_CHANNELS} are read")
+    size = columns * rows * np.dtype(kind).itemsize
+    if wave_bytes - 320 != size * layers or min(formula, note_bytes, *lengths) < 0:
+        raise ValueError(f"says that {layers} images of {columns} x {rows} pixels have {wave_bytes - 320} bytes")
+    texts = _HEADERS + size * layers
+    labels_at = texts + formula + note_bytes + sum(lengths[:7])
+    if labels_at + lengths[7] > len(content) or note_bytes > _MAX_NOTE:
+        raise ValueError("ends in the middle of its images or texts; copy it again")
+    note = _note(content[texts + formula : texts + formula + note_bytes])
+    labels = _labels(content[labels_at : labels_at + lengths[7]], layers)
+    unit = content[64 + 148 : 64 + 152].split(b"\0")[0].decode("latin-1") if layers == 1 else ""
+    down = note.get("ScanDown")
+    first: FirstRow = "top" if down == "1" else "bottom"
+    channels = []
+    for number, label in enumerate(labels):
+        signal, direction = split_direction(label)
+        load = partial(_load, content, f"{order}{kind}", _HEADERS + size * number, (rows, columns), first)
+        channels.append(
+            Channel(
+                number,
+                label,
+                (rows, columns),
+                load,
+                signal,
+                direction,
+                next((by_name for names, by_name in _UNITS if re.fullmatch(names, signal)), unit),
+                positive(note.get("FastScanSize"), 1e9),
+                positive(note.get("SlowScanSize"), 1e9),
+                positive(note.get("ScanRate"), 1.0),
+                first,
+            )
+        )
+    return channels
+
+
+def _load(content: bytes, kind: str, start: int, shape: tuple[int, int], first: FirstRow, _: int) -> Matrix:
+    values = np.frombuffer(content, kind, prod(shape), start).reshape(shape)
+    return values[::-1] if first == "top" else values
+
+
+def _note(text: bytes) -> dict[str, str]:
+    """The keys of a note and their values; the first of a key that comes again."""
+    found: dict[str, str] = {}
+    for line in re.split(r"[\r\n]+", text.decode("latin-1")):
+        key, colon, value = line.partition(":")
+        if colon:
+            found.setdefault(key.strip(), value.strip())
+    return found
+
+
+def _labels(text: bytes, layers: int) -> list[str]:
+    """A label for each layer, after that of the dimension itself; empty where the file has none."""
+    cells = [text[at : at + _LABEL].split(b"\0")[0].decode("latin-1") for at in range(_LABEL, len(text), _LABEL)]
+    return [*cells, *[""] * layers][:layers]

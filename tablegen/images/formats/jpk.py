@@ -1,0 +1,73 @@
+"""Images of JPK (.jpk, .jpk-qi-image): a TIFF file with a page for each channel, after one with a small picture.
+
+Tags of its own say what a page is. The first row is the bottom one, unless the grid is reflected.
+"""
+
+from functools import partial
+from math import isfinite
+
+import numpy as np
+
+from tablegen.images.formats.channel import Channel, Direction, Matrix, positive
+from tablegen.images.formats.tiff import TiffImage, TiffTags, tiff_pages, tiff_tags
+
+_WIDTH, _HEIGHT, _REFLECTED, _LINE_RATE = 0x8042, 0x8043, 0x8045, 0x8049  # of the first page
+_NAME, _RETRACE, _SHOWN_AS = 0x8050, 0x8051, 0x8052
+_SLOTS, _DEFAULT_SLOT = 0x8080, 0x8081
+_SLOT_NAME, _UNIT, _SCALING, _FACTOR, _OFFSET = 0x8090, 0x80A2, 0x80A3, 0x80A4, 0x80A5  # of the first slot
+_BETWEEN_SLOTS = 0x30
+_MAX_SLOTS = 64
+
+
+def jpk_channels(content: bytes, _: str) -> list[Channel]:
+    """The channels of an image. Raises ``ValueError`` with what is wrong."""
+    if content[:2] == b"PK":
+        raise ValueError("is an archive of curves, not of images; export the image as .jpk or .jpk-qi-image")
+    pages, tags = tiff_pages(content), tiff_tags(content)
+    channels: list[Channel] = []
+    for page, own in zip(pages, tags, strict=False):
+        if len(page.shape) == 2 and (own.get(_NAME) or own.get(_SHOWN_AS)):
+            channels.append(_channel(len(channels), page, own, tags[0]))
+    return channels
+
+
+def _channel(number: int, page: TiffImage, own: TiffTags, grid: TiffTags) -> Channel:
+    signal = str(own.get(_NAME) or own.get(_SHOWN_AS))
+    direction: Direction = "retrace" if own.get(_RETRACE) else "trace"
+    factor, offset, unit = _scale(own)
+    return Channel(
+        number,
+        f"{signal} {direction}",
+        page.shape,
+        partial(_load, page, factor, offset),
+        signal,
+        direction,
+        unit,
+        positive(grid.get(_WIDTH), 1e9),
+        positive(grid.get(_HEIGHT), 1e9),
+        positive(grid.get(_LINE_RATE), 1.0),
+        "top" if grid.get(_REFLECTED) else "bottom",
+    )
+
+
+def _load(page: TiffImage, factor: float, offset: float, _: int) -> Matrix:
+    matrix = page.load()
+    return matrix.astype(np.float64) * factor + offset if matrix.dtype.kind in "iuf" else matrix
+
+
+def _scale(own: TiffTags) -> tuple[float, float, str]:
+    """What one step of the values is, what is added, and the unit, by the slot that the instrument shows."""
+    wanted, count = own.get(_DEFAULT_SLOT), own.get(_SLOTS)
+    for slot in range(min(int(count), _MAX_SLOTS) if isinstance(count, int) else 0):
+        at = slot * _BETWEEN_SLOTS
+        if wanted is None or own.get(_SLOT_NAME + at) != wanted:
+            continue
+        unit = own.get(_UNIT + at)
+        named = unit if isinstance(unit, str) else ""
+        factor, offset = own.get(_FACTOR + at), own.get(_OFFSET + at)
+        scaling = own.get(_SCALING + at)
+        if scaling == "NullScaling":
+            return 1.0, 0.0, named
+        if scaling == "LinearScaling" and isinstance(factor, float) and isinstance(offset, float):
+            return (factor or 1.0, offset, named) if isfinite(factor) and isfinite(offset) else (1.0, 0.0, "LSB")
+    return 1.0, 0.0, "LSB"

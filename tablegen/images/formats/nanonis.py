@@ -1,0 +1,134 @@
+"""Scans of Nanonis (.sxm): tags in colons with their lines, then blocks of numbers, forward and backward.
+
+Rows are in the order of time. Backward lines are too, from right to left, and are turned here. A scan that was stopped
+has NaN in place of what is missing; it ends with its last whole line.
+"""
+
+from functools import partial
+from math import prod
+
+import numpy as np
+
+from tablegen.images.formats.channel import Channel, Direction, FirstRow, Matrix, positive, quoted
+
+_MAGIC = b":NANONIS_VERSION:"
+_END, _DATA = b":SCANIT_END:", b"\x1a\x04"
+_MAX_HEADER = 1 << 20  # bytes; files have some thousand
+_MAX_BLOCKS = 1000
+_DIRECTIONS: dict[str, tuple[Direction, ...]] = {
+    "both": ("trace", "retrace"),
+    "forward": ("trace",),
+    "fwd": ("trace",),
+    "backward": ("retrace",),
+    "bwd": ("retrace",),
+}
+_NAMES = {"trace": "forward", "retrace": "backward"}
+_FIRST_ROW: dict[str, FirstRow] = {"up": "bottom", "down": "top"}
+
+
+def sxm_channels(content: bytes, _: str) -> list[Channel]:
+    """Both directions of each signal of a .sxm file. Raises ``ValueError`` with what is wrong."""
+    if not content.startswith(_MAGIC):
+        raise ValueError("does not begin as a Nanonis file does")
+    end = content.find(_END, 0, _MAX_HEADER)
+    start = content.find(_DATA, end, end + 64) + len(_DATA)
+    if end < 0 or start < end:
+        raise ValueError("has no end of its header, or no data after it; copy it again")
+    tags = _tags(content[:end].decode("latin-1"))
+    kind = {"FLOAT MSBFIRST": ">f4", "FLOAT LSBFIRST": "<f4"}.get(" ".join(_words(tags, "SCANIT_TYPE")))
+    if kind is None:
+        raise ValueError(f"has numbers of the kind {quoted(' '.join(_words(tags, 'SCANIT_TYPE')))}; FLOAT is read")
+    columns, rows = _whole(tags)
+    if _words(tags, "NANONIS_VERSION") == ["1"] and columns != rows:
+        raise ValueError("is of version 1, which does not tell columns from rows; save it with a newer version")
+    blocks = _blocks(tags)
+    if not blocks:
+        return []
+    size = 4 * columns * rows
+    if start + size * len(blocks) > len(content):
+        least = f"{len(blocks)} images of {columns} x {rows} pixels"
+        raise ValueError(f"ends in the middle of its images ({least} by its header); copy it again")
+    done = _lines_done(np.frombuffer(content, kind, len(blocks) * columns * rows, start).reshape(-1, rows, columns))
+    width, height = _lengths(tags, "SCAN_RANGE", 1e9)
+    times = _lengths(tags, "SCAN_TIME", 1.0)
+    return [
+        Channel(
+            number,
+            f"{signal} {_NAMES[direction]}",
+            (done, columns),
+            partial(_load, content, kind, start + size * number, (done, columns), direction),
+            signal,
+            direction,
+            unit,
+            width,
+            None if height is None else height * done / rows,
+            None if None in times else 1.0 / sum(filter(None, times)),
+            _FIRST_ROW.get(" ".join(_words(tags, "SCAN_DIR"))),
+        )
+        for number, (signal, unit, direction) in enumerate(blocks)
+    ]
+
+
+def _lines_done(values: Matrix) -> int:
+    """How many lines a scan has that was stopped, which ends in lines without a number; all, if that is not so."""
+    lines = values.shape[1]
+    finite = np.isfinite(values)
+    whole: list[bool] = np.all(finite, axis=(0, 2)).tolist()
+    some: list[bool] = np.any(finite, axis=(0, 2)).tolist()
+    done = whole.index(False) if False in whole else lines
+    return done if done and not any(some[done + 1 :]) else lines
+
+
+def _load(content: bytes, kind: str, start: int, shape: tuple[int, int], direction: Direction, _: int) -> Matrix:
+    values = np.frombuffer(content, kind, prod(shape), start).reshape(shape)
+    return values[:, ::-1] if direction == "retrace" else values
+
+
+def _tags(header: str) -> dict[str, list[str]]:
+    """The lines below each tag."""
+    tags: dict[str, list[str]] = {}
+    lines: list[str] = []
+    for line in header.splitlines():
+        text = line.strip()
+        if len(text) > 2 and text[0] == text[-1] == ":":
+            lines = tags.setdefault(text[1:-1], [])
+        elif text:
+            lines.append(line)
+    return tags
+
+
+def _words(tags: dict[str, list[str]], name: str) -> list[str]:
+    return tags.get(name, [""])[0].split() if tags.get(name) else []
+
+
+def _whole(tags: dict[str, list[str]]) -> tuple[int, int]:
+    words = _words(tags, "SCAN_PIXELS")
+    if len(words) != 2 or not all(word.isdecimal() and len(word) < 7 for word in words):
+        raise ValueError(f"has no two numbers as SCAN_PIXELS, but {quoted(' '.join(words))}")
+    columns, rows = map(int, words)
+    if not columns * rows:
+        raise ValueError(f"has an image of {columns} x {rows} pixels; is it damaged?")
+    return columns, rows
+
+
+def _lengths(tags: dict[str, list[str]], name: str, unit: float) -> tuple[float | None, float | None]:
+    """Two positive numbers in units, each None where it is none."""
+    first, second = [*_words(tags, name), "", ""][:2]
+    return positive(first, unit), positive(second, unit)
+
+
+def _blocks(tags: dict[str, list[str]]) -> list[tuple[str, str, Direction]]:
+    """Signal, unit and direction of each block, in the order of the file."""
+    head, *rows = [line.strip().split("\t") for line in tags.get("DATA_INFO", [])] or [[]]
+    try:
+        name, unit, direction = (head.index(key) for key in ("Name", "Unit", "Direction"))
+        found = [
+            (row[name].strip(), row[unit].strip(), one)
+            for row in rows
+            for one in _DIRECTIONS[row[direction].strip().lower()]
+        ]
+    except (ValueError, KeyError, IndexError):
+        raise ValueError("has a table DATA_INFO that does not say Name, Unit and Direction of each row") from None
+    if len(found) > _MAX_BLOCKS:
+        raise ValueError(f"has {len(found)} images; at most {_MAX_BLOCKS} are read")
+    return found

@@ -1,0 +1,158 @@
+"""Pages of a TIFF file, each read when it is wanted, and no file that would take more time or memory than its pages.
+
+tifffile reads them, if the extra ``images`` is installed. What it believes of a file is checked before: a directory
+that points back at itself has no end, and a few packed bytes can unpack into any number.
+"""
+
+import logging
+import lzma
+import struct
+import zlib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from io import BytesIO
+from math import prod
+from typing import Any
+
+import numpy as np
+
+from tablegen.images.formats.channel import Channel, Matrix, first_line
+
+_MAX_PAGES = 1000
+_MAX_TAGS = 100_000  # of all pages
+_MAX_TEXT = 256  # characters of a tag
+_TEXT = 2
+_KINDS = {1: "B", 3: "H", 4: "I", 6: "b", 8: "h", 9: "i", 11: "f", 12: "d"}  # of a number in a tag
+TiffTags = dict[int, int | float | str]
+_DEFLATE, _LZMA = (8, 32946), (34925,)  # values of the tag Compression
+
+
+@dataclass(frozen=True, eq=False)
+class TiffImage:
+    """The shape of a page, and what reads it; that raises ``ValueError``."""
+
+    shape: tuple[int, ...]
+    load: Callable[[], Matrix]
+
+
+def tiff_channels(content: bytes, _: str) -> list[Channel]:
+    """The pages of a .tif file, in grey. Raises ``ValueError`` with what is wrong."""
+    pages = tiff_pages(content)
+    for page in pages:
+        if len(page.shape) == 3 and page.shape[-1] in (3, 4):
+            raise ValueError("is in colour, not heights; export it in grey, 16 bits or floating point")
+    return [Channel(number, "", page.shape, partial(_of_frame, page)) for number, page in enumerate(pages)]
+
+
+def _of_frame(page: TiffImage, _: int) -> Matrix:
+    return page.load()
+
+
+def tiff_pages(content: bytes) -> list[TiffImage]:
+    """The pages of a file, in order. Raises ``ValueError`` with what is wrong."""
+    import tifffile
+
+    logging.getLogger("tifffile").setLevel(logging.CRITICAL)  # what it logs is said by what it raises
+    try:
+        for _ in _directories(content):
+            pass
+        file = tifffile.TiffFile(BytesIO(content))
+        pages = list(file.pages)
+        return [TiffImage(tuple(map(int, page.shape)), _loader(page, content)) for page in pages]
+    except Exception as error:  # the library raises whatever a damaged structure leads to
+        raise _unreadable(error) from None
+
+
+def _loader(page: Any, content: bytes) -> Callable[[], Matrix]:
+    def load() -> Matrix:
+        try:
+            _require_bounded(page, content)
+            return np.asarray(page.asarray())
+        except Exception as error:
+            raise _unreadable(error) from None
+
+    return load
+
+
+def _unreadable(error: Exception) -> ValueError:
+    advice = "save it without compression" if "codec" in str(error) else "copy or export it again"
+    return ValueError(f"is not a readable TIFF file ({first_line(error)}); {advice}")
+
+
+def tiff_tags(content: bytes) -> list[TiffTags]:
+    """Tags of each page that hold one number or a short text, by code; other ones are left out.
+
+    Raises ``ValueError`` where the directories, or what these tags point at, do not end inside the file.
+    """
+    found: list[TiffTags] = []
+    for order, big, at, count in _directories(content):
+        tags: TiffTags = {}
+        for entry in range(at, at + count * (20 if big else 12), 20 if big else 12):
+            code, kind = struct.unpack_from(f"{order}HH", content, entry)
+            length = _number(content, entry + 4, order + ("Q" if big else "I"))
+            layout = f"{length}s" if kind == _TEXT and length <= _MAX_TEXT else _KINDS.get(kind, "")
+            if not layout or (kind != _TEXT and length != 1):
+                continue
+            place = entry + (12 if big else 8)
+            if struct.calcsize(layout) > (8 if big else 4):
+                place = _number(content, place, order + ("Q" if big else "I"))
+            if place + struct.calcsize(layout) > len(content):
+                raise ValueError(f"ends before byte {place}, where a tag should be; copy it again")
+            (value,) = struct.unpack_from(order + layout, content, place)
+            tags[code] = value.split(b"\0")[0].decode("latin-1") if isinstance(value, bytes) else value
+        found.append(tags)
+    return found
+
+
+def _directories(content: bytes) -> Iterator[tuple[str, bool, int, int]]:
+    """Byte order, whether the file is a big one, place and number of the tags of each page.
+
+    Raises ``ValueError`` unless the chain ends, inside the file and after a sensible number.
+    """
+    order = {b"II": "<", b"MM": ">"}.get(content[:2])
+    version = struct.unpack_from(f"{order}H", content, 2)[0] if order and len(content) >= 4 else 0
+    if order is None or version not in (42, 43):
+        raise ValueError("does not begin as a TIFF file does")
+    # Where the first directory is named; how a count of tags, a tag, and a place are stored.
+    at, count, tag_bytes, place = (4, "H", 12, "I") if version == 42 else (8, "Q", 20, "Q")
+    count, place = order + count, order + place
+    seen: set[int] = set()
+    total = 0
+    while True:
+        directory = _number(content, at, place)
+        if directory == 0:
+            return
+        if directory in seen:
+            raise ValueError(f"its directory at byte {directory} comes again after itself")
+        if len(seen) == _MAX_PAGES:
+            raise ValueError(f"more than {_MAX_PAGES} pages")
+        seen.add(directory)
+        first, tags = directory + struct.calcsize(count), _number(content, directory, count)
+        total += tags
+        if total > _MAX_TAGS:
+            raise ValueError(f"more than {_MAX_TAGS} tags")
+        at = first + tag_bytes * tags
+        _number(content, at, place)
+        yield order, version == 43, first, tags
+
+
+def _number(content: bytes, at: int, layout: str) -> int:
+    if at + struct.calcsize(layout) > len(content):
+        raise ValueError(f"ends before byte {at}, where a directory should be")
+    return int(struct.unpack_from(layout, content, at)[0])
+
+
+def _require_bounded(page: Any, content: bytes) -> None:
+    """Raise ``ValueError`` where a part of the page unpacks into more than the page has."""
+    most = prod(page.shape) * page.dtype.itemsize + (1 << 20)
+    for first, count in zip(page.dataoffsets, page.databytecounts, strict=False):
+        packed = content[first : first + count]
+        if page.compression in _DEFLATE:
+            size = len(zlib.decompressobj().decompress(packed, most + 1))
+        elif page.compression in _LZMA:
+            size = len(lzma.LZMADecompressor().decompress(packed, most + 1))
+        else:
+            size = 0
+        if size > most:
+            raise ValueError("a part of it unpacks into more than the image has")

@@ -1,0 +1,133 @@
+"""What is wrong with images of a scan, before anything is fitted to them and after; shared by all that reads images.
+
+Each check raises ``Unphysical``, whose message says what to do. Names are those of the images: "trace", "retrace".
+"""
+
+import numpy as np
+
+from tablegen.base.input_errors import Unphysical
+from tablegen.numerics.arrays import Floats
+
+MIN_PIXELS = 32  # along and across
+MIN_PERIODS = 3.0  # in the line
+MAX_PERIODS_PER_COLUMN = 0.33  # where a branch may compress them by a third
+ALIASING_HINT = " (periods finer than two pixels look like that too)"
+_MAX_CLIPPED = 0.04  # share of the pixels that may have the least height, or the largest
+_CLIPPED_STEP = 0.01  # of the heights' range: how near to a limit the heights are that a limit is compared with
+_CLIPPED_SPIKE = 4.0  # times the pixels next to it
+_MAX_LINE_POWER = 100.0  # times the usual power of a line
+_FLAT, _MANY_FLAT = 1e-9, 0.02  # share of the largest power of a line; share of all lines
+_MAX_SIZE_RATIO = 1.4  # between the size that is seen and the one that was said: below the root of two
+_STRIPS = 8  # of the columns, in each of which trace and retrace are matched
+_REACH = 0.12  # of the columns: how far apart trace and retrace are searched
+_MIRRORED = 1.5, 0.25  # how much better the mirrored retrace has to match, and how well
+_LEAST_POWER = 1e-12  # of unit variance: what has less is a constant
+
+
+def check_pair(trace: Floats, retrace: Floats) -> None:
+    """Two images that can be of one scan: of one shape, and not the same image."""
+    if trace.shape != retrace.shape:
+        sizes = " and ".join(f"{image.shape[0]} x {image.shape[1]}" for image in (trace, retrace))
+        raise Unphysical(f"trace and retrace have {sizes} pixels; both must be from one scan")
+    for name, image in (("trace", trace), ("retrace", retrace)):
+        check_heights(name, image)
+    if np.array_equal(trace, retrace) or np.array_equal(trace, retrace[:, ::-1]):
+        raise Unphysical(
+            "trace and retrace are the same image; both directions are needed, since the scanner file has a branch for "
+            "each"
+        )
+
+
+def check_heights(name: str, image: Floats) -> None:
+    """Rows and columns enough, numbers, and not cut off at the end of the converter's range."""
+    if image.ndim != 2 or min(image.shape) < MIN_PIXELS:
+        raise Unphysical(f"{' x '.join(map(str, image.shape))} pixels are too few; {MIN_PIXELS} rows and columns do")
+    if not np.all(np.isfinite(image)):
+        raise Unphysical(f"the {name} has {int(np.sum(~np.isfinite(image)))} pixels that are not numbers; crop it")
+    low, high = float(np.min(image)), float(np.max(image))
+    if not high > low:
+        raise Unphysical(f"the {name} has no contrast: all its pixels are {low:g}; was a different channel saved?")
+    moving = image[np.ptp(image, axis=1) > 0.0]  # lines of a scan that was stopped are another matter
+    step = _CLIPPED_STEP * (high - low)
+    for limit, inward in ((low, 1.0), (high, -1.0)):
+        at = int(np.sum(moving == limit))
+        beside = int(np.sum((moving != limit) & ((moving - limit) * inward <= step)))
+        if at > max(_MAX_CLIPPED * moving.size, _CLIPPED_SPIKE * beside):
+            raise Unphysical(
+                f"the {name} is saturated: {100.0 * at / moving.size:.2g} % of its pixels are {limit:g}, the "
+                f"{'largest' if inward < 0.0 else 'least'} height; scan again with more range, or save heights "
+                f"without a clipped colour scale"
+            )
+
+
+def check_lines(name: str, level: Floats, largest: float) -> None:
+    """Levelled lines that have contrast, all about as much; ``largest`` is the largest height before."""
+    if not np.max(np.abs(level)) > 1e-12 * largest:
+        raise Unphysical(f"the {name} has no contrast along its lines")
+    power = np.sum(level**2, axis=1)
+    flat = np.flatnonzero(power <= _FLAT * np.max(power))
+    if len(flat) > _MANY_FLAT * len(power):
+        raise Unphysical(
+            f"{len(flat)} rows of the {name}, from {flat[0] + 1} to {flat[-1] + 1}, have no contrast, as of a scan "
+            f"that was stopped; crop both images"
+        )
+    loud = np.flatnonzero(power > _MAX_LINE_POWER * np.median(power))
+    if np.sum(power[loud]) > 0.5 * np.sum(power):
+        raise Unphysical(f"rows {loud[0] + 1} to {loud[-1] + 1} have most of the {name}'s contrast; crop them")
+
+
+def check_periods(periods: float, span: float, columns: int) -> None:
+    """Enough periods in the line, of which the columns show ``span``, and none finer than the columns can show."""
+    if periods * span > MAX_PERIODS_PER_COLUMN * columns:
+        raise Unphysical(f"{periods:.3g} periods in {columns} columns are too fine; scan less, or take more pixels")
+    if periods < MIN_PERIODS - 0.2:
+        raise Unphysical(
+            f"the line has about {periods:.2g} periods; at least {MIN_PERIODS:g} are needed: scan more of them"
+        )
+
+
+def check_size(found_nm: float, said_nm: float, said_by: str) -> None:
+    """The size by the sample's constant against the one that was said, by ``said_by``.
+
+    A constant of another direction of a lattice is wrong by the root of two or of three, an alias by more.
+    """
+    ratio = found_nm / said_nm
+    if not 1.0 / _MAX_SIZE_RATIO < ratio < _MAX_SIZE_RATIO:
+        raise Unphysical(
+            f"the line is {found_nm:.4g} nm long by the sample's constant, and {said_nm:.4g} nm by "
+            f"{said_by}; is the constant that of this sample, the lattice of this kind, and a period more than "
+            f"two pixels?"
+        )
+
+
+def check_mirrored(trace: Floats, retrace: Floats, advice: str) -> None:
+    """Whether the retrace, left on the left, shows what the trace shows; of any sample but its own mirror image.
+
+    Strips of both are matched by themselves, so that hysteresis does not hide it.
+    """
+    straight, turned = _match(trace, retrace), _match(trace, retrace[:, ::-1])
+    if turned > _MIRRORED[0] * max(straight, 0.0) and turned > _MIRRORED[1]:
+        raise Unphysical(f"the retrace shows the trace's pattern only when it is mirrored; {advice}{ALIASING_HINT}")
+
+
+def _match(one: Floats, other: Floats) -> float:
+    """Median over strips of the best correlation of one's strip with the other's columns near by."""
+    columns = one.shape[1]
+    width, reach = max(columns // _STRIPS, 8), max(round(_REACH * columns), 2)
+    found = []
+    for start in range(0, columns - width + 1, width):
+        strip = _plain(one[:, start : start + width])
+        best = -1.0
+        for at in range(max(start - reach, 0), min(start + reach, columns - width) + 1):
+            best = max(best, float(np.mean(strip * _plain(other[:, at : at + width]))))
+        found.append(best)
+    return float(np.median(found))
+
+
+def _plain(strip: Floats) -> Floats:
+    """Without the rows' means and slopes, of unit variance."""
+    ramp = np.linspace(-1.0, 1.0, strip.shape[1])
+    level = strip - strip.mean(axis=1, keepdims=True)
+    level = level - np.outer(level @ ramp / (ramp @ ramp), ramp)
+    power = float(np.sqrt(np.mean(level**2)))
+    return level / power if power > _LEAST_POWER else np.zeros_like(level)

@@ -1,0 +1,197 @@
+"""One trace and one retrace image of a periodic sample -> both branches of the model."""
+
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+from scipy.special import chdtrc
+
+from tablegen.base.input_errors import Unphysical
+from tablegen.compensation.hysteresis import BranchShape
+from tablegen.fitting.estimate import Curve, Estimate
+from tablegen.fitting.measured_branch import BINS, WINDOW, AmplitudeFit, measured_branch
+from tablegen.images.model_start import begin, check_signs, grown, prepared
+from tablegen.images.pair_checks import MIN_PERIODS
+from tablegen.images.periodic_model import FitState, PeriodicModel
+from tablegen.images.position_errors import LeftInBins, covariance, loud_rows, pixel_noise
+from tablegen.numerics.arrays import Bools, Floats
+
+_MIN_EXPLAINED_VARIANCE = 0.03  # share of the variance
+_MAX_MISFIT_PERCENT = 3.0  # percent of the line that the model may leave
+_MAX_SHAPE_ERROR = 0.05  # largest standard error of the first coordinate of a branch
+_MISFIT_SIGNIFICANCE = 1e-3  # probability that noise alone is taken for misfit
+_MIN_SIGNED_BETA = 0.004  # least |beta| that is a sign
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImageFit(AmplitudeFit):
+    """What a pair says; see ``AmplitudeFit``.
+
+    ``periods`` in the line of the spot that carries most, ``spots`` how many were fitted; ``explained`` the share of
+    the heights' variance that is periodic; ``registration_percent`` how far trace and retrace are apart where they are
+    farthest, of the line. ``widened`` is the factor on standard errors; ``strays`` are rows unlike the others, counted
+    from 0.
+    """
+
+    periods: float
+    pixels_a_period: float
+    spots: int
+    explained: float
+    registration_percent: float
+    widened: float
+    strays: tuple[int, ...]
+
+
+def fit_pair(
+    trace: Floats,
+    retrace: Floats,
+    v_scan: float,
+    turn: float = 0.5,
+    window: tuple[float, float] = (0.0, 1.0),
+    retrace_mirrored: bool = False,
+    delay_pixels: float = 0.0,
+) -> ImageFit:
+    """Both branches from heights in any unit, rows x columns, rows in the order of time.
+
+    Columns are evenly spread in time over ``window`` of each sweep; the retrace is stored with left on the left, or
+    ``retrace_mirrored`` in the order of time. Columns show the sample ``delay_pixels`` late, as of a feedback.
+    Raises ``Unphysical``.
+    """
+    geometry, heights = prepared(
+        trace, np.ascontiguousarray(retrace[:, ::-1]) if retrace_mirrored else retrace, turn, window, delay_pixels
+    )
+    spot, bends = begin(geometry, heights, retrace_mirrored)
+    model, state, free = grown(geometry, heights, spot, bends)
+    check_fit(model, state, free)
+    return _result(model, state, free, v_scan)
+
+
+def _carrying(model: PeriodicModel, state: FitState) -> float:
+    """Periods in the line of the spot that says most of x."""
+    along = np.abs(model.spots @ model.q(state.parameters))
+    return float(along[np.argmax(along * np.abs(state.amplitudes))])
+
+
+def check_fit(model: PeriodicModel, state: FitState, free: Bools) -> None:
+    """Whether it is a fit at all."""
+    shares = [1.0 - float(np.mean(left**2)) / float(np.mean(image**2)) for (_, image), left in _both(model, state)]
+    if min(shares) < _MIN_EXPLAINED_VARIANCE:
+        name = "trace" if shares[0] < shares[1] else "retrace"
+        raise Unphysical(
+            f"{100.0 * max(min(shares), 0.0):.0f} % of the {name}'s contrast is a periodic sample; the rest is "
+            f"something else, or trace and retrace are not of one scan"
+        )
+    first = float(model.q(state.parameters)[0])
+    if max(_carrying(model, state), first) < MIN_PERIODS - 0.2:
+        raise Unphysical(f"the line has {first:.2g} periods; at least {MIN_PERIODS:g} are needed: scan more of them")
+    forward, backward = (BranchShape.at(state.parameters[i : i + 2]).peak()[0] for i in (0, 2))
+    check_signs(forward, backward, _MIN_SIGNED_BETA, "try --retrace-mirrored")
+
+
+def _both(model: PeriodicModel, state: FitState) -> list[tuple[tuple[bool, Floats], Floats]]:
+    return list(zip(model.images, state.left, strict=True))
+
+
+def _result(model: PeriodicModel, state: FitState, free: Bools, v_scan: float) -> ImageFit:
+    geometry, x = model.geometry, state.parameters
+    noise = pixel_noise(state)
+    residual, scaling, curves, misfit, clean = _positions(model, state)
+    worst = float(np.max(np.abs(residual)))
+    if worst > _MAX_MISFIT_PERCENT:
+        raise Unphysical(
+            f"no branches of the harmonic model join these images: up to {worst:.2g} % of the line is left; are trace "
+            f"and retrace of one scan, --window and --turn right, and the drive a triangle?"
+        )
+    shapes = np.arange(len(free)) < 4
+    found, widened = covariance(model, state, free, shapes, misfit, clean)
+    if float(np.sqrt(np.max(np.diag(found)[[0, 2]]))) > _MAX_SHAPE_ERROR:
+        raise Unphysical("these images do not determine the shape of the branches; scan more periods, or average")
+    forward, backward = (measured_branch(x[i : i + 2], found[i : i + 2, i : i + 2]) for i in (0, 2))
+    line = np.linspace(0.0, 1.0, 201)
+    lagging = [BranchShape.at(x[i : i + 2]) for i in (0, 2)]
+    apart = lagging[0].value(line) - line + lagging[1].value(1.0 - line) - (1.0 - line)
+    carrying = _carrying(model, state)
+    slope = max(float(np.max(model.columns(x, side).steep)) for side in (True, False))
+    span = geometry.window[1] - geometry.window[0]
+    bent = model.s(x)[0, 1:] @ model.y_powers[2:]
+    drawn = np.concatenate([image - left for (_, image), left in _both(model, state)])
+    return ImageFit(
+        turn=Estimate(geometry.turn),
+        v_scan=v_scan,
+        samples=2 * geometry.rows * geometry.columns,
+        forward=forward,
+        backward=backward,
+        noise_percent=100.0 * noise / float(np.ptp(drawn)),
+        drift_percent=100.0 * float(np.ptp(bent)) / max(carrying, 1.0),
+        residual_percent=residual,
+        scaling_percent=scaling,
+        curves=curves,
+        periods=carrying,
+        pixels_a_period=geometry.columns / (span * slope * carrying),
+        spots=len(model.spots),
+        explained=1.0 - 2.0 * state.cost / sum(float(np.vdot(image, image)) for _, image in model.images),
+        registration_percent=100.0 * float(apart[np.argmax(np.abs(apart))]),
+        widened=sqrt(widened),
+        strays=loud_rows(state),
+    )
+
+
+def _positions(
+    model: PeriodicModel, state: FitState
+) -> tuple[Floats, tuple[float, float], tuple[Curve, ...], float, list[Floats]]:
+    """The position error of each twentieth of the window, what it does to scaling, and curves.
+
+    Then by how much it is larger than noise would have it, at least 1, and what is left of the images without it.
+    """
+    geometry = model.geometry
+    residuals, scaling, lines, clean, beyond = [], [], [], [], 0.0
+    span = geometry.window[1] - geometry.window[0]
+    for forward, left, steep in zip((True, False), state.left, state.steepness, strict=True):
+        binned = LeftInBins.of(geometry, left, steep)
+        clean.append(binned.clean)
+        columns = model.columns(state.parameters, forward)
+        place = binned.place
+        count = np.bincount(place, minlength=BINS)
+        # The model's own x is without what was added to it: that is a part of the error.
+        known = np.bincount(place, model.off[0 if forward else 1], minlength=BINS) / count
+        off = known + binned.off
+        beyond += float(np.sum((off / binned.error) ** 2))
+        at, x = (np.bincount(place, values, minlength=BINS) / count for values in (geometry.place, columns.x))
+        x = x - known
+        stretch = np.diff(x + off) / np.diff(at)
+        residuals.append(100.0 * off if forward else -100.0 * off)
+        inside = np.diff(off)[WINDOW] / span * BINS
+        scaling.append(100.0 * float(np.ptp(inside)))
+        lines.append((geometry.place, columns, at, x + off, 0.5 * (at[1:] + at[:-1]), stretch))
+    expected = 2 * BINS - 6
+    misfit = beyond / expected if chdtrc(expected, beyond) < _MISFIT_SIGNIFICANCE else 1.0
+    backward = len(lines[0][2]), len(lines[0][0])
+    residual = Curve(
+        "residual against the drive",
+        "drive [share of the sweep]",
+        "position less a straight line [% of the scan]",
+        (
+            np.concatenate([at for _, _, at, *_ in lines]),
+            np.concatenate([100.0 * (x - at) for _, _, at, x, *_ in lines]),
+        ),
+        (
+            np.concatenate([place for place, *_ in lines]),
+            np.concatenate([100.0 * (c.x - o - p) for o, (p, c, *_) in zip(model.off, lines, strict=True)]),
+        ),
+        backward,
+    )
+    period = Curve(
+        "local period less that of an undistorted image",
+        "x of the image [share]",
+        "stretch of the period [%]",
+        (
+            np.concatenate([middle for *_, middle, _ in lines]),
+            np.concatenate([100.0 * (1.0 / stretch - 1.0) for *_, stretch in lines]),
+        ),
+        (
+            np.concatenate([place for place, *_ in lines]),
+            np.concatenate([100.0 * (1.0 / c.steep - 1.0) for _, c, *_ in lines]),
+        ),
+        (len(lines[0][4]), backward[1]),
+    )
+    return np.concatenate(residuals), (scaling[0], scaling[1]), (residual, period), max(misfit, 1.0), clean

@@ -1,0 +1,97 @@
+"""What a device may claim of itself: a value that no device can have ends in ``NotUnderstood``, by field and value.
+
+HELLO and STATUS decide how much memory a host takes and how long it waits, so that nothing here is believed unseen.
+The ranges are those of docs/protocol.md.
+"""
+
+from dataclasses import fields
+
+from tablegen.link.errors import NotUnderstood
+from tablegen.link.messages import DATA_BYTES, VERSION, AxisLimits, AxisShape, DeviceInfo, DeviceStatus
+
+PROGRAM_BYTES = 192  # as tablegen.link.program_image has it, without numpy
+MAXIMUM_INDEX_BITS = 16
+MAXIMUM_HARMONICS = 4096
+MAXIMUM_LINE = (1 << 31) - 1
+_WORD_BITS = range(8, 25)  # of table words and of codes
+_CONVERTER_BITS = 63  # of AxisShape.converter: the bits of its word
+_MAXIMUM_CONVERTER_BITS = 32
+_FOURIER_BYTES = 4
+_MAXIMUM_WORD_BYTES = 3
+MAXIMUM_IMAGE_BYTES = PROGRAM_BYTES + 2 * (_MAXIMUM_WORD_BYTES << MAXIMUM_INDEX_BITS)
+
+
+def most_bytes(info: DeviceInfo) -> int:
+    """Return the bytes that no image of a device exceeds, by the widths that it announced.
+
+    ``image_bytes`` may be more, where its memory is; and less, where tables are longer than what was uploaded for them.
+    """
+    fourier = _FOURIER_BYTES * (2 * info.harmonics + 1)
+    return PROGRAM_BYTES + sum(max(axis.word_bytes << axis.index_bits, fourier) for axis in (info.x, info.y))
+
+
+def check_device(info: DeviceInfo) -> None:
+    """Raise ``NotUnderstood`` for the first field of HELLO that no device of this version can have."""
+    _check("HELLO", "version", info.version, VERSION, VERSION)
+    _check("HELLO", "window", info.window, 1, 255)
+    _check("HELLO", "data_bytes", info.data_bytes, 1, DATA_BYTES)
+    _check("HELLO", "harmonics", info.harmonics, 0, MAXIMUM_HARMONICS)
+    for name, shape, limits in (("x", info.x, info.x_limits), ("y", info.y, info.y_limits)):
+        _check_shape(name, shape)
+        _check("HELLO", f"{name} code_max", limits.code_max, limits.code_min, (1 << shape.dac_bits) - 1)
+        _check("HELLO", f"{name} max_step", limits.max_step, 1, (1 << 32) - 1)
+    _check("HELLO", "image_bytes", info.image_bytes, 0, MAXIMUM_IMAGE_BYTES)
+
+
+def _check_shape(name: str, shape: AxisShape) -> None:
+    _check("HELLO", f"{name} index_bits", shape.index_bits, 0, MAXIMUM_INDEX_BITS)
+    for field, bits in (("word_bits", shape.word_bits), ("dac_bits", shape.dac_bits)):
+        _check("HELLO", f"{name} {field}", bits, _WORD_BITS.start, _WORD_BITS.stop - 1)
+    if shape.converter:  # 0 of a device that does not say it
+        _check(
+            "HELLO",
+            f"{name} converter (its bits)",
+            shape.converter & _CONVERTER_BITS,
+            shape.dac_bits,
+            _MAXIMUM_CONVERTER_BITS,
+        )
+
+
+def check_unchanged(before: DeviceInfo, now: DeviceInfo) -> None:
+    """Raise ``NotUnderstood`` where HELLO announces another device than the one that was there before."""
+    for field in (field.name for field in fields(DeviceInfo)):
+        was, is_now = getattr(before, field), getattr(now, field)
+        if was != is_now:
+            raise NotUnderstood(
+                f"HELLO: {field} was {was} and is {is_now} now", "is another device connected to the port now?"
+            )
+
+
+def check_status(status: DeviceStatus, info: DeviceInfo, source: str) -> None:
+    """Raise ``NotUnderstood`` for the first field of a status that a device cannot have; ``source`` is its request."""
+    _check(source, "line", status.line, 0, MAXIMUM_LINE)
+    _check(source, "received", status.received, 0, info.image_bytes)
+
+
+def check_limits(limits: tuple[AxisLimits, AxisLimits], info: DeviceInfo) -> None:
+    """Raise ``NotUnderstood`` where active limits are wider than those of the device's build."""
+    for name, active, build in (("x", limits[0], info.x_limits), ("y", limits[1], info.y_limits)):
+        inner = active.within(build)
+        for field in (field.name for field in fields(AxisLimits)):
+            value = getattr(active, field)
+            if value != getattr(inner, field):
+                raise NotUnderstood(
+                    f"LIMITS: {name} {field} is {value}, wider than {getattr(build, field)}, which HELLO announced"
+                )
+
+
+def check_length(source: str, payload: bytes, size: int) -> None:
+    """Raise ``NotUnderstood`` for an answer that is too short; a longer one is of a later version."""
+    if len(payload) < size:
+        raise NotUnderstood(f"{source}: its answer has {len(payload)} bytes; at least {size} are needed")
+
+
+def _check(source: str, field: str, value: int, least: int, most: int) -> None:
+    if not least <= value <= most:
+        span = str(least) if least == most else f"{least} to {most}"
+        raise NotUnderstood(f"{source}: {field} is {value}; possible: {span}")

@@ -1,0 +1,198 @@
+"""What refusals mean, in a sentence each, with what to do about them: docs/protocol.md, "Reasons"."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from tablegen.link.errors import Refused
+from tablegen.link.messages import VERSION, AxisLimits, DeviceInfo, Reason, Request
+
+if TYPE_CHECKING:
+    from tablegen.link.messages import AxisShape
+    from tablegen.link.program_image import Contents
+
+_AXES = "xy"
+Limits = tuple[AxisLimits, AxisLimits]
+_ORDERS = {0: "no shaping", 1: "'first'", 2: "'first' and 'second'", 3: "all orders"}
+
+# For these, `detail` is an axis, plus 2 times the index of a word where there is one.
+_AXIS_REASONS = {
+    Reason.SHAPE: "its table is too long for the device, or of another mode or width of words than the device has; an "
+    "FPGA plays one mode and length; build for this device",
+    Reason.PERIOD: "its period, phase step and remainder do not match; build it again",
+    Reason.OUTPUT: "gain, offset, code limits or max_step are out of range or order; build it again",
+    Reason.FOURIER: "its Fourier words sum to 4.0 or more, too much for the device; upload --as table",
+}
+_MESSAGES = {
+    Reason.TYPE: "the device does not know this request; its firmware is older, or was built without it",
+    Reason.PAYLOAD: "the device reports a wrong length or value; do the versions of tablegen and firmware match?",
+    Reason.SESSION: "the device was reset, or another program uses it; try again",
+    Reason.OLD: "a later request has replaced it; try again",
+    Reason.BUSY: "a program is being checked or waits for a line start; try again when it is active",
+    Reason.UPLOAD: "the device has no upload of this image in progress; upload again",
+    Reason.INTERLOCK: "the interlock input is open; close it and try again",
+    Reason.IMAGE: "the memory of the device does not contain what was sent; upload again. If it happens again, the "
+    "memory may be faulty",
+    Reason.SCHEDULE: "line_ticks, frame_lines or a window of the schedule are out of range; build it again",
+    Reason.WITHDRAWN: "it was withdrawn, by an ABORT or a reset of the sequencer; upload again",
+    Reason.READBACK: "there is nothing to read: the scan came with the firmware, or a later upload uses its memory",
+    Reason.TICKS: "no samples are requested from the sequencer; does the timer of the device run?",
+}
+
+
+def refused(
+    request: int,
+    reason: int,
+    detail: int,
+    info: DeviceInfo | None = None,
+    contents: "Contents | None" = None,
+    limits: Limits | None = None,
+) -> Refused:
+    """The error for a refusal; what is known of the device and of the scan makes it more precise."""
+    names = [known.name for known in Request if known == request]
+    asked = names[0] if names else f"request {request}"
+    sentence = explain(reason, detail, info, contents, limits)
+    name = Reason(reason).name.lower() if reason in list(Reason) else str(reason)
+    return Refused(request, reason, detail, f"the device refused {asked} ({name}): {sentence}")
+
+
+def keyless(request: Request) -> Refused:
+    """The error where a device has a key and the host has none; nothing was sent."""
+    why = f"the device has a key, and refuses {request.name} without it; give the key of this device (--key-file FILE)"
+    return Refused(request, Reason.KEY, 0, why)
+
+
+def explain(
+    reason: int,
+    detail: int,
+    info: DeviceInfo | None = None,
+    contents: "Contents | None" = None,
+    limits: Limits | None = None,
+) -> str:
+    """What a refusal means, and what to do.
+
+    ``info``, the active ``limits`` of x and y, and the ``contents`` of what was uploaded are used where they are given.
+    """
+    if reason not in list(Reason):
+        return f"reason {reason}, detail {detail}: this version of tablegen does not know it; update it"
+    known = Reason(reason)
+    if known in _MESSAGES:
+        return _MESSAGES[known]
+    axis, index = _AXES[detail & 1], detail >> 1
+    if known in _AXIS_REASONS:
+        return f"{axis}: {_AXIS_REASONS[known]}"
+    if known in _SENTENCES:
+        return _SENTENCES[known](detail, info)
+    page = 1 + (detail & 1)
+    allowed = limits[detail & 1] if limits is not None else None
+    return f"{axis}: " + _CHECKS[known](page, index, contents, allowed)
+
+
+def _key(detail: int, info: DeviceInfo | None) -> str:
+    return "the tag is missing, wrong or too late; give the key of this device (--key-file FILE)"
+
+
+def _version(detail: int, info: DeviceInfo | None) -> str:
+    return f"the device speaks version {detail} of the protocol, this tablegen version {VERSION}; update the older one"
+
+
+def _length(detail: int, info: DeviceInfo | None) -> str:
+    most = info.image_bytes if info is not None else None
+    if detail == most:
+        return f"the device accepts images of at most {detail} bytes; upload --as fourier, or make the tables shorter"
+    return f"the length of the image is wrong: it should have {detail} bytes, or at most that; build it again"
+
+
+def _harmonics(detail: int, info: DeviceInfo | None) -> str:
+    if not detail:
+        return "the device does not support Fourier words; upload --as table"
+    return f"the device supports at most {detail} harmonics; lower band_limit.harmonics, or upload --as table"
+
+
+def _incomplete(detail: int, info: DeviceInfo | None) -> str:
+    return f"the device has received {detail} bytes only; repeat the upload to continue"
+
+
+def _shaping(detail: int, info: DeviceInfo | None) -> str:
+    has = "" if info is None else f" It has {_ORDERS.get(info.shaping, f'order {info.shaping}')}."
+    return (
+        f"{_AXES[detail & 1]}: the device cannot shape its output as this scan asks.{has} Build the device with the "
+        "SHAPING of the scan, or set dac.shaping to what the device has"
+    )
+
+
+def _other(detail: int, info: DeviceInfo | None) -> str:
+    return f"its sequencer refused the program for an internal reason ({detail}); build for this device"
+
+
+_SENTENCES: dict[Reason, Callable[[int, DeviceInfo | None], str]] = {
+    Reason.KEY: _key,
+    Reason.VERSION: _version,
+    Reason.LENGTH: _length,
+    Reason.HARMONICS: _harmonics,
+    Reason.INCOMPLETE: _incomplete,
+    Reason.REFUSED: _other,
+    Reason.SHAPING: _shaping,
+}
+
+
+def _codes(page: int, index: int, contents: "Contents | None", limits: AxisLimits | None) -> str:
+    asked = "" if contents is None else f" {contents.axis(page, 'code_min')}..{contents.axis(page, 'code_max')}"
+    limit = "the limit" if limits is None else f"{limits.code_min}..{limits.code_max}"
+    return f"its codes{asked} go beyond {limit} of the device; lower scanner and scan, or raise the limit in its build"
+
+
+def _step(page: int, index: int, contents: "Contents | None", limits: AxisLimits | None) -> str:
+    asked = "" if contents is None else f" of {contents.axis(page, 'max_step')} codes a tick"
+    limit = "the limit" if limits is None else str(limits.max_step)
+    return f"its max_step{asked} is beyond {limit} of the device; lower max_slew_v_per_s, or raise the limit"
+
+
+def _word(page: int, index: int, contents: "Contents | None", limits: AxisLimits | None) -> str:
+    value = _value(page, index, contents)
+    bits = "the table's width" if contents is None else f"{_shape(page, contents).word_bits} bits"
+    return f"word {index} of its table{value} does not fit {bits}; build it again"
+
+
+def _range(page: int, index: int, contents: "Contents | None", limits: AxisLimits | None) -> str:
+    value = _value(page, index, contents)
+    ends = "code_min..code_max"
+    if contents is not None:
+        ends = f"codes {contents.axis(page, 'code_min')}..{contents.axis(page, 'code_max')}"
+    return f"word {index} of its table{value} leads outside {ends}; build it again"
+
+
+def _slew(page: int, index: int, contents: "Contents | None", limits: AxisLimits | None) -> str:
+    step = "its max_step" if contents is None else f"its max_step of {contents.axis(page, 'max_step')} codes a tick"
+    return (
+        f"at word {index} of its table it moves faster than {step}; scan slower or smaller, or raise max_slew_v_per_s"
+    )
+
+
+def _jump(page: int, index: int, contents: "Contents | None", limits: AxisLimits | None) -> str:
+    limit = "the limit" if limits is None else f"{limits.max_jump} codes"
+    return (
+        f"it begins further than {limit} of the device from where the playing scan may be; `tablegen park --wait` "
+        "first, or raise the limit"
+    )
+
+
+_CHECKS: dict[Reason, Callable[[int, int, "Contents | None", AxisLimits | None], str]] = {
+    Reason.CODES: _codes,
+    Reason.STEP: _step,
+    Reason.WORD: _word,
+    Reason.RANGE: _range,
+    Reason.SLEW: _slew,
+    Reason.JUMP: _jump,
+}
+
+
+def _shape(page: int, contents: "Contents") -> "AxisShape":
+    return contents.x_shape if page == 1 else contents.y_shape
+
+
+def _value(page: int, index: int, contents: "Contents | None") -> str:
+    """The word itself, where it was sent as it is."""
+    if contents is None or contents.axis(page, "harmonics"):
+        return ""
+    words = contents.x if page == 1 else contents.y
+    return f" ({int(words[index])})" if index < len(words) else ""

@@ -1,0 +1,82 @@
+"""What a device holds against what it should hold, by the names of its words."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS, SCAN_WORDS
+from tablegen.link.messages import AxisShape
+from tablegen.link.prepare import PreparedScan
+from tablegen.link.program_image import PROGRAM_BYTES, Contents, take_apart
+
+_SIGNED = {"gain", "offset_high"}
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """A word that is another one; ``address`` is that of its first byte in the image, ``found`` None beyond its end."""
+
+    word: str
+    address: int
+    expected: int
+    found: int | None
+
+    def __str__(self) -> str:
+        if self.found is None:
+            return f"its image ends before {self.word} (byte {self.address})"
+        return f"{self.word} (byte {self.address}) is {self.found}, not {self.expected}"
+
+
+def differences(scan: PreparedScan, image: bytes) -> list[Difference]:
+    """All words of an image read out of a device that are not those of the scan, in order; empty if there are none.
+
+    Each axis is compared in the form in which the device holds it, words or Fourier words.
+    """
+    wanted = scan.like(image)
+    expected = take_apart(wanted.data, wanted.info.x, wanted.info.y)
+    found = []
+    ours, theirs = _words(wanted.data), _words(image)
+    for index, word in enumerate(ours):
+        there = theirs[index] if index < len(theirs) else None
+        if there != word:
+            name = _name(index)
+            found.append(
+                Difference(name, 4 * index, _shown(name, word), None if there is None else _shown(name, there))
+            )
+    at = PROGRAM_BYTES
+    for axis, page, words, shape in (("x", 1, expected.x, expected.x_shape), ("y", 2, expected.y, expected.y_shape)):
+        size = _size(expected, page, shape)
+        there_words = _signed(image[at : at + size * len(words)], size)
+        what = "Fourier" if expected.axis(page, "harmonics") else "table"
+        for index, word in enumerate(words.tolist()):
+            other = there_words[index] if index < len(there_words) else None
+            if other != word:
+                found.append(Difference(f"{axis}: {what} word {index}", at + size * index, word, other))
+        at += size * len(words)
+    if len(image) > at:
+        found.append(Difference("after the last word", at, 0, len(image) - at))
+    return found
+
+
+def _words(data: bytes) -> list[int]:
+    head = data[:PROGRAM_BYTES]
+    return [int(word) for word in np.frombuffer(head[: len(head) // 4 * 4], dtype="<u4")]
+
+
+def _name(index: int) -> str:
+    page, word = divmod(index, PAGE_WORDS)
+    names = AXIS_WORDS if page else SCAN_WORDS
+    return f"{('scan', 'x', 'y')[page]}: {names[word] if word < len(names) else f'unused word {word}'}"
+
+
+def _shown(name: str, word: int) -> int:
+    return word - (1 << 32) if name[3:] in _SIGNED and word >> 31 else word
+
+
+def _size(contents: Contents, page: int, shape: AxisShape) -> int:
+    return 4 if contents.axis(page, "harmonics") else shape.word_bytes
+
+
+def _signed(data: bytes, size: int) -> list[int]:
+    whole = len(data) // size * size
+    return [int.from_bytes(data[at : at + size], "little", signed=True) for at in range(0, whole, size)]

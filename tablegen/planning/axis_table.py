@@ -1,0 +1,94 @@
+"""From the waveform of an axis to the integers that play it: the table, gain, offset and limits."""
+
+from msgspec import Struct
+
+from tablegen.base.input_errors import Problems
+from tablegen.config.load import Setup
+from tablegen.config.schema import FastAxis
+from tablegen.fixedpoint.converter import Converter, make_output
+from tablegen.fixedpoint.phase import RationalPhase
+from tablegen.fixedpoint.program import Program
+from tablegen.fixedpoint.synthesis import FourierWords
+from tablegen.fixedpoint.table_shape import TableShape
+from tablegen.planning.drive import Drive
+from tablegen.planning.feasibility import Feasibility
+from tablegen.planning.shaping_choice import chosen_shaping
+from tablegen.planning.table_choice import TableChoice, asked_of, choose, possible_shapes, written_shape
+from tablegen.planning.table_maker import TableMaker
+from tablegen.planning.timing import AxisTiming
+from tablegen.waveform.series import FourierSeries
+
+
+class AxisTable(Struct, frozen=True, eq=False):
+    """The integers of one axis, and what was asked of a table that the build chose."""
+
+    converter: Converter
+    scale: float
+    fourier: FourierWords
+    program: Program
+    asked: TableChoice | None
+
+
+def make_table(
+    setup: Setup,
+    axis: str,
+    timing: AxisTiming,
+    drive: Drive,
+    series: FourierSeries,
+    feasible: Feasibility,
+    problems: Problems,
+) -> AxisTable | None:
+    """Quantise a waveform; None where ``problems`` grew: converter, amplifier, driver or table cannot hold it."""
+    before = len(problems.found)
+    scan: FastAxis = getattr(setup.scan, axis)
+    hardware = setup.hardware(axis)
+    converter = Converter.of(hardware.dac, hardware.amplifier)
+    shaping = chosen_shaping(setup, axis, drive, problems)
+    park_v = drive.v_offset if scan.park_v is None else scan.park_v
+    maker = TableMaker(
+        series=series,
+        amplitude=0.5 * drive.v_amplitude / converter.v_per_code,
+        offset=converter.code(drive.v_offset),
+        phase=RationalPhase(timing.period),
+        hold=timing.hold,
+        output=make_output(hardware.dac, converter, drive.driver, park_v, shaping),
+    )
+    feasible.check_words(maker.as_asked)
+    feasible.check_range(drive, converter, *maker.as_asked.reach, shaping)
+    asked = asked_of(scan.table, setup.scan.limits, shaping.order > 0)
+    shape = written_shape(scan.table, timing.period)
+    if asked is not None and len(problems.found) == before:
+        shape = _chosen(setup, axis, timing, asked, shape, maker, drive, converter, feasible, problems)
+    stored = maker.stored(shape)
+    if shape.mode == "cubic" and len(problems.found) == before:
+        feasible.check_words(stored)
+        feasible.check_gain(maker.gain(shape)[0])
+    max_step = feasible.max_step(drive, converter, stored, float(timing.rate), timing.period, shape, shaping)
+    if len(problems.found) > before:
+        return None
+    table = maker.limited(max_step).made(shape)
+    return AxisTable(converter, table.scale, table.fourier, table.program, asked)
+
+
+def _chosen(
+    setup: Setup,
+    axis: str,
+    timing: AxisTiming,
+    asked: TableChoice,
+    shape: TableShape,
+    maker: TableMaker,
+    drive: Drive,
+    converter: Converter,
+    feasible: Feasibility,
+    problems: Problems,
+) -> TableShape:
+    """Return the table of least memory that keeps the error asked for; ``shape`` where none does."""
+    from tablegen.planning.table_search import TableSearch  # here: most tables are written
+
+    table = getattr(setup.scan, axis).table
+    key = f"{axis}.table.{'mode' if table.max_error_lsb is None else 'max_error_lsb'}"
+    with problems.at(setup.scan_file, key):
+        possible = possible_shapes(table, timing.period, maker.series.harmonics)
+        shapes = feasible.fitting(possible, drive, converter, maker)
+        return choose(TableSearch(maker), shapes, asked.max_error_lsb)
+    return shape

@@ -1,0 +1,1 @@
+"""Play the C sequencer of a build: on this machine, or on an emulated Cortex-M."""

@@ -1,0 +1,91 @@
+"""Compile the C bench and run it: no more than a process of its own needs, which begins in little time."""
+
+import resource
+import shutil
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from tablegen.verification.c.objects import Objects, maker
+from tablegen.verification.failures import SimulationFailed, ToolMissing
+
+OBJECTS = "objects"
+
+
+def compile_line(line: Sequence[str], place: Path | None = None) -> None:
+    """Run a compiler, in a directory if one is given; raises ``SimulationFailed`` with all that it says."""
+    done = subprocess.run(line, capture_output=True, text=True, check=False, cwd=place)
+    if done.returncode or done.stderr:
+        raise SimulationFailed(f"{' '.join(line)}\n{done.stdout}{done.stderr}".strip())
+
+
+def require_headers(compiler: Sequence[str]) -> None:
+    """Raise ``ToolMissing`` if a compiler has no C library; Debian's gcc only recommends that package."""
+    line = [*compiler, "-fsyntax-only", "-x", "c", "-"]
+    done = subprocess.run(line, input="#include <stdint.h>\n", capture_output=True, text=True, check=False)
+    if done.returncode and "stdint.h" in done.stderr:
+        raise ToolMissing(f"{compiler[0]} finds no headers of the C library: apt-get install libc6-dev")
+
+
+def run(program: Path, script: bytes, timeout: float | None = None) -> bytes:
+    """What a bench writes while it plays a script; one fails that takes longer than ``timeout``, in seconds."""
+    return _ended(script, timeout, [str(program)], stdout=subprocess.PIPE)
+
+
+def record(command: Sequence[str], script: bytes, place: Path, most: int, timeout: float | None = None) -> None:
+    """The same into a file; the system ends a bench that writes more than ``most`` bytes."""
+
+    def limited() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))
+
+    with place.open("wb") as stored:
+        _ended(script, timeout, command, stdout=stored, preexec_fn=limited)
+
+
+def _ended(script: bytes, timeout: float | None, command: Sequence[str], **options: Any) -> bytes:
+    try:
+        done = subprocess.run(command, input=script, stderr=subprocess.PIPE, check=False, timeout=timeout, **options)
+    except subprocess.TimeoutExpired:
+        raise SimulationFailed(f"the bench did not end in {timeout:.0f} s") from None
+    if done.returncode:
+        raise SimulationFailed(
+            done.stderr.decode("utf-8", "replace").strip() or f"the bench ended with status {done.returncode}"
+        )
+    return done.stdout or b""
+
+
+def play_job(folder: Path, job: dict[str, Any]) -> dict[str, Any]:
+    """Compile the ``objects`` of a job and its program, and play the script of ``folder`` in each of its ways.
+
+    Places and files are named within ``folder``; a way of playing is a record, of ``most_bytes``, and arguments.
+    Returns what went wrong, by the record; nothing is played after that.
+    """
+    program = folder / job["program"]
+    program.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        _compile(folder, job["compiler"], [Objects(**one) for one in job["objects"]])
+        compile_line(job["line"], folder)
+    except SimulationFailed:
+        require_headers(job["compiler"])
+        raise
+    script = (folder / job["script"]).read_bytes()
+    for stored, arguments in job["plays"]:
+        try:
+            record([str(program), *arguments], script, folder / stored, job["most_bytes"], job["timeout"])
+        except SimulationFailed as error:
+            return {stored: str(error)}
+    return {}
+
+
+def _compile(folder: Path, compiler: list[str], objects: list[Objects]) -> None:
+    """Put objects into their place in ``folder``: those that were kept, others from the compiler, to be kept."""
+    place = folder / OBJECTS
+    shutil.rmtree(place, ignore_errors=True)  # a directory that is kept may have those of another build
+    place.mkdir()
+    made_by = maker(compiler)
+    for one in objects:
+        if made_by is None or not one.take(made_by, place):
+            compile_line(one.line(compiler), place)
+            if made_by is not None:
+                one.keep(made_by, place)

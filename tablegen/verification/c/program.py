@@ -1,0 +1,120 @@
+"""What is compiled to play the C of a build: its own files, its runtime, and the file that hands them to the bench."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from tablegen.emit.constants import scan_constants
+from tablegen.emit.content import Content
+from tablegen.emit.formats.c import arrays_file
+from tablegen.emit.stored import stored_content
+from tablegen.fixedpoint.program import Program
+from tablegen.manifest.read import StoredBuild
+from tablegen.verification.c.bench import storage_bits
+from tablegen.verification.checks.directory import copies
+
+OPTIONS = ("-std=c99", "-O2")
+MOST_FILLED = 600  # ticks a call of a fill
+
+
+@dataclass(frozen=True)
+class CProgram:
+    """Files and choices; the runtime has a folder of its own, so that it finds no header but its own.
+
+    ``own`` are the header and the arrays of the build, with the file that hands them to the bench.
+    """
+
+    own: list[Path]
+    runtime: list[Path]
+    choices: dict[str, int]  # of a firmware for this build, which the runtime is compiled with
+    bench: dict[str, int]  # of the bench, beside them
+
+    @property
+    def sources(self) -> list[Path]:
+        """All of them."""
+        return [*self.own, *self.runtime]
+
+    @property
+    def defines(self) -> dict[str, int]:
+        """All choices."""
+        return self.choices | self.bench
+
+
+def c_program(folder: Path, work: Path, stored: StoredBuild, fourier: bool) -> tuple[CProgram, list[str]]:
+    """What is compiled of the build in ``folder``, copied to ``work``, and what of it is missing."""
+    names = stored.runtime(".c", ".h")
+    own, absent = copies(folder, sorted({f"{stored.manifest.name}.h", arrays_file(stored_content(stored))}), work / "c")
+    runtime, missing = copies(folder, names, work / "runtime")
+    absent += missing
+    if not names:
+        absent.append("the build holds no dac_*.c")
+    (work / "bench").mkdir(exist_ok=True)
+    handed = work / "bench" / "bench_program.c"
+    handed.write_text(_bench_program(stored, fourier), "ascii")
+    return CProgram([*own, handed], runtime, _choices(stored), _bench_choices(stored, fourier)), absent
+
+
+def header_constants(content: Content) -> dict[str, int]:
+    """What the emitted header defines, by whole names; of the hash each character is a number."""
+    own = {f"{content.name.upper()}_{key}": value for key, value in scan_constants(content).items()}
+    digits = {f"{content.name.upper()}_HASH[{at}]": ord(digit) for at, digit in enumerate(content.hash)}
+    return own | digits
+
+
+def _choices(stored: StoredBuild) -> dict[str, int]:
+    """What a firmware for this build is compiled with."""
+    axes = [axis for _, axis in stored.axes]
+    order = max(program.output.shaping.order for program in (stored.program.x, stored.program.y))
+    return {
+        "DAC_TABLE_STORAGE_BITS": storage_bits(max(axis.table.bits for axis in axes)),
+        "DAC_OUTPUT_STORAGE_BITS": storage_bits(max(axis.output.word_bits for axis in axes)),
+        **({"DAC_SPLINE": 1} if any(axis.table.mode == "cubic" for axis in axes) else {}),
+        **({"DAC_SHAPING": order} if order else {}),
+    }
+
+
+def _bench_choices(stored: StoredBuild, fourier: bool) -> dict[str, int]:
+    """What the bench is for this build."""
+    axes = [axis for _, axis in stored.axes]
+    rendered = [len(axis.table.words) for axis in axes if fourier and axis.table.mode != "direct"]
+    return {
+        "BENCH_EMITTED": 1,
+        "BENCH_TABLE_WORDS": max([*rendered, *map(_variation_words, (stored.program.x, stored.program.y))]),
+        "BENCH_CONSTANTS": len(scan_constants(stored_content(stored))),
+    }
+
+
+def _variation_words(own: Program) -> int:
+    """Words that the table of a variation may have."""
+    return len(own.words) if own.mode != "direct" else max(len(own.words), 8)
+
+
+def _bench_program(stored: StoredBuild, fourier: bool) -> str:
+    """The C file that hands what the build emitted to the bench, by the names that its header has."""
+    name = stored.manifest.name
+    capital = name.upper()
+    lines = [
+        "/* Hands what a build emitted to the bench of tablegen verify. */",
+        f'#include "{name}.h"',
+        '#include "stream_bench.h"',
+        "",
+        f"const dac_program bench_program = DAC_PROGRAM({capital}, {name});",
+    ]
+    rendered = []
+    for axis, content in stored.axes:
+        rendered.append(fourier and content.table.mode != "direct")
+        of = f"{capital}_{axis.upper()}"
+        words = f"{name}_{axis}_fourier, {of}_HARMONICS" if rendered[-1] else "NULL, 0"
+        lines += [
+            f"const dac_converter bench_{axis}_converter = DAC_CONVERTER({of}, 0);",
+            f"const bench_axis bench_{axis} = {{{words}}};",
+        ]
+    lines += [
+        f"const int32_t *const bench_sine = {f'{name}_sine' if any(rendered) else 'NULL'};",
+        f"const unsigned bench_sine_index_bits = {f'{capital}_SINE_INDEX_BITS' if any(rendered) else '0'};",
+        "",
+        "const int64_t bench_constants[BENCH_CONSTANTS] = {",
+        *(f"    {capital}_{constant}," for constant in scan_constants(stored_content(stored))),
+        "};",
+        f"const char bench_hash[BENCH_HASH_DIGITS + 1] = {capital}_HASH;",
+    ]
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,1 @@
+"""Check a build: its files, its certificate, and what was played."""

@@ -1,0 +1,104 @@
+"""The certificates of a build against what its words and its waveform make of them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tablegen.manifest.fields import ManifestAxis, ManifestShaped
+from tablegen.manifest.read import StoredBuild
+from tablegen.verification.checks.certified import PlayedPeriod, different_figures
+from tablegen.verification.checks.directory import some
+from tablegen.verification.checks.expectations import wrong_expectations
+from tablegen.verification.checks.passage_checks import wrong_passage
+from tablegen.verification.checks.played_checks import Check
+from tablegen.verification.checks.scaling import (
+    knows,
+    peak_acceleration,
+    refinement_figures,
+    rounded_scaling,
+    scaling_figures,
+)
+from tablegen.verification.checks.shaped import told_of
+
+_ROUNDED = 1.0 + 1e-9  # the target is worked out again from what is played
+
+
+@dataclass(frozen=True)
+class Certificates:
+    """A check of each axis, and the largest error of its codes in LSB, as it was found here."""
+
+    checks: list[Check]
+    limits: dict[str, float]
+    unknown_models: list[str]
+
+
+def check_certificates(stored: StoredBuild, same_version: bool) -> Certificates:
+    """Every figure of both axes; those of scaling errors only of this version of tablegen and of its own models."""
+    checks: list[Check] = []
+    limits: dict[str, float] = {}
+    unknown: set[str] = set()
+    for name, axis in stored.axes:
+        try:
+            with np.errstate(over="raise", divide="raise", invalid="raise"):
+                check, limits[name] = _check(name, axis, stored, same_version)
+                if same_version and not knows(axis.drive.model):
+                    unknown.add(axis.drive.model)
+        except (ArithmeticError, ValueError) as error:  # figures that no build states, whatever their types allow
+            why = f"{name}: axes.{name} makes no certificate: {error}"
+            check, limits[name] = Check(name, "its certificate", "0 figures", "all differ", "0", why), 0.0
+        checks.append(check)
+    return Certificates(checks, limits, sorted(unknown))
+
+
+def _wrong_rounded(stated: ManifestShaped, sides: dict[str, float] | None, exact: bool) -> list[str]:
+    """Scaling errors without shaping that are others; ``sides`` are None where they cannot be known."""
+    told, name = stated.rounded.scaling_error_percent, "shaped.rounded.scaling_error_percent"
+    if sides is None:
+        return []
+    if sides.keys() != told.keys():
+        return [f"certificate.{name} has {', '.join(told) or 'no direction'}"]
+    return different_figures(told, sides, exact, f"{name}.")
+
+
+def _check(name: str, axis: ManifestAxis, stored: StoredBuild, same_version: bool) -> tuple[Check, float]:
+    period = PlayedPeriod(axis)
+    schedule = stored.program.schedule
+    rate_hz = float(schedule.line_rate if name == "x" else schedule.frame_rate)
+    shaped = period.shaped_by(float(schedule.update_rate_hz))
+    found = period.figures(rate_hz, shaped)
+    gentle = axis.fourier.max_scaling_error_percent is not None
+    if gentle or axis.certificate.peak_acceleration is not None:
+        found["peak_acceleration"] = peak_acceleration(axis) if gentle else None
+    told = {key: getattr(axis.certificate, key) for key in found}
+    wrong, count = different_figures(told, found, period.is_whole), len(found)
+    wrong += wrong_passage(axis, rate_hz)
+    if shaped is not None:
+        figures = shaped.figures()
+        count += len(figures)
+        wrong += different_figures(told_of(axis.certificate.shaped), figures, period.is_whole, "shaped.")
+        if same_version and knows(axis.drive.model) and axis.certificate.shaped is not None:
+            wrong += _wrong_rounded(axis.certificate.shaped, rounded_scaling(axis, period, shaped), period.is_whole)
+    if same_version and knows(axis.drive.model):
+        for key, sides in (
+            ("scaling_error_percent", scaling_figures(axis, period, shaped)),
+            ("refinement_percent", refinement_figures(axis)),
+        ):
+            stated = getattr(axis.certificate, key)
+            if (stated or {}).keys() != (sides or {}).keys():
+                wrong.append(f"certificate.{key} has {', '.join(stated or {}) or 'no direction'}")
+                continue
+            for side, parts in (sides or {}).items():
+                count += len(parts)
+                wrong += different_figures(stated[side], parts, period.is_whole, f"{key}.{side}.")
+                most = axis.fourier.max_scaling_error_percent
+                if key == "scaling_error_percent" and most is not None and parts["band_limit"] > most * _ROUNDED:
+                    wrong.append(f"fourier.max_scaling_error_percent is {most}, {side} has {parts['band_limit']:.6g}")
+    if same_version:
+        wrong += wrong_expectations(axis)
+    step = found["largest_step"]
+    if isinstance(step, int) and step > axis.output.max_step:
+        wrong.append(f"output.max_step is {axis.output.max_step}, the words step by {step}")
+    failure = f"{name}: {some([f'axes.{name}.{one}' for one in wrong])}" if wrong else None
+    return Check(
+        name, "its certificate", f"{count} figures", f"{len(wrong)} differ", "0", failure
+    ), period.largest_code_error()

@@ -1,0 +1,62 @@
+"""The files of a build against its manifest: their digests; and words and copies for what plays them."""
+
+import shutil
+from pathlib import Path
+
+from tablegen.base.reading import BUILD_FILE, file_sha256, read_text
+from tablegen.manifest.read import StoredBuild
+
+_MAX_SHOWN = 5
+
+
+def wrong_files(folder: Path, stored: StoredBuild) -> list[str]:
+    """What is wrong with the files that the manifest lists."""
+    wrong = []
+    for name, digest in stored.manifest.files.items():
+        try:
+            found = file_sha256(folder / name)
+        except OSError as error:
+            wrong.append(f"{name}: {'missing' if isinstance(error, FileNotFoundError) else error.strerror or error}")
+            continue
+        if found != digest:
+            wrong.append(f"{name}: stale or edited: its SHA-256 is not that of the manifest")
+    return wrong
+
+
+def memory_words(path: Path, count: int) -> list[int]:
+    """The words of a memory file as a device gets them; ``ValueError`` says what is wrong with it."""
+    try:
+        lines = read_text(path, BUILD_FILE, "ascii").split()
+        words = [int(line, 16) for line in lines]
+    except FileNotFoundError:
+        raise ValueError(f"{path.name} is missing") from None
+    except OSError as error:
+        raise ValueError(f"{path.name} cannot be read: {error.strerror or error}") from None
+    except ValueError:
+        raise ValueError(f"{path.name} does not hold one hexadecimal word a line") from None
+    if len(words) != count:
+        raise ValueError(f"{path.name} has {len(words)} words in place of {count}")
+    return words
+
+
+def copies(folder: Path, names: list[str], into: Path) -> tuple[list[Path], list[str]]:
+    """Copies of files of a build, and what is wrong where there are none.
+
+    They are copied since make, and with it Verilator, does not like every path.
+    """
+    into.mkdir(exist_ok=True)
+    wrong = []
+    for name in names:
+        try:
+            shutil.copyfile(folder / name, into / name)
+        except FileNotFoundError:
+            wrong.append(f"{name} is missing")
+        except OSError as error:
+            wrong.append(f"{name} cannot be read: {error.strerror or error}")
+    return [into / name for name in names], wrong
+
+
+def some(wrong: list[str]) -> str:
+    """A few of many."""
+    more = [f"... and {len(wrong) - _MAX_SHOWN} more"] if len(wrong) > _MAX_SHOWN else []
+    return "\n".join(wrong[:_MAX_SHOWN] + more)

@@ -1,0 +1,56 @@
+"""Which modules and options of an emitted runtime a session plays, and which it does not."""
+
+from collections.abc import Iterable, Sequence
+
+from tablegen.fixedpoint.program import Program
+from tablegen.verification.play.placement import Placement
+
+_ALWAYS = {
+    "dac_sequencer", "dac_fit", "dac_bank", "dac_scan", "dac_markers", "dac_window", "dac_pixels", "dac_register",
+    "dac_verdict", "dac_faults", "dac_coding", "dac_spi", "dac_axi_stream", "dac_boot",
+}  # fmt: skip
+_PIPELINED = {"dac_axis", "dac_output", "dac_offset", "dac_slew", "dac_delay"}
+_RENDERER = {"dac_render", "dac_fourier", "dac_fourier_product", "dac_fourier_sum"}
+_SPLINE = {"dac_phase", "dac_spline", "dac_spline_step"}
+_LINES = {"dac_phase", "dac_table", "dac_interpolator"}
+
+
+def played_modules(placement: Placement, programs: Sequence[Program]) -> set[str]:
+    """The Verilog modules that a session of programs of x and y elaborates."""
+    modes = {program.mode for program in programs}
+    played = set(_ALWAYS) | (_RENDERER if placement.fourier else set())
+    if placement.shaping:
+        played.add("dac_shaper")
+    if placement.axis == "serial":
+        return played | {"dac_axis_serial"} | ({"dac_spline_terms"} if "cubic" in modes else set())
+    played |= _PIPELINED | {"dac_multiply_plain" if placement.axis == "blocks" else "dac_multiply_digits"}
+    for mode, modules in (("interpolated", _LINES), ("cubic", _SPLINE), ("direct", {"dac_direct_table"})):
+        if mode in modes:
+            played |= modules
+    if "interpolated" in modes and placement.axis != "blocks":
+        played.add("dac_skew")
+    return played
+
+
+def unplayed_verilog(files: Iterable[str], placements: Sequence[Placement], programs: Sequence[Program]) -> list[str]:
+    """The files of a runtime, and the options of its sequencer, that no session of these placements plays."""
+    played = set().union(*(played_modules(placement, programs) for placement in placements))
+    unplayed = sorted(name for name in files if name.removesuffix(".v") not in played)
+    options = [
+        f"PLAIN_MULTIPLIER = {int(axis == 'blocks')}"
+        for axis in ("pipelined", "blocks")
+        if axis not in {one.axis for one in placements}
+    ]
+    if "serial" not in {one.axis for one in placements}:
+        options.append("LOW_AREA = 1")
+    if not any(one.fourier for one in placements):
+        options.append("FOURIER = 1")
+    highest = max(one.shaping for one in placements)
+    if highest < 3:
+        options.append(f"SHAPING above {highest}")
+    return [*unplayed, f"dac_sequencer.v with {', '.join(options)}"]
+
+
+def unplayed_c(files: Iterable[str], fourier: bool) -> list[str]:
+    """The C files of a runtime that no session plays: the link, and what renders tables unless it is to."""
+    return sorted(name for name in files if name.startswith("dac_link") or (name == "dac_fourier.c" and not fourier))

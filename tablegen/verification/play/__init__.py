@@ -1,0 +1,1 @@
+"""Sessions that exercise a sequencer, and the capture of what it plays."""

@@ -1,0 +1,118 @@
+"""Programs into the idle bank of a device that plays a script: that of the build as its files have it, and others."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from tablegen.device.dual_program import DualProgram
+from tablegen.device.registers import AXIS_WORDS, PAGE_WORDS, program_words
+from tablegen.verification.play.placement import Placement
+from tablegen.verification.play.sequencer_shape import SequencerShape
+from tablegen.verification.play.stream import PROGRAM, X_FOURIER, X_TABLE, Y_FOURIER, Y_TABLE, Script
+from tablegen.verification.play.unfit_words import c_edges, device_widths, edges
+from tablegen.verification.play.variation import Kind, variation
+from tablegen.verification.play.wide_program import Part, wide_program
+
+_LOADING_PACE, _LOADING_TICKS = 7, 500  # clocks between ticks while words are written, at least, and how many at most
+_OWN_TABLE = 0  # in place of the length of a variation's table
+VARIATION = 1  # as the argument of a commit, to a device that has the program of the build already
+
+
+@dataclass(frozen=True)
+class Memories:
+    """The words of a bank as they stand in the memory files: of x and y the table, or what it is rendered from."""
+
+    program: Sequence[int]
+    x: Sequence[int]
+    y: Sequence[int]
+    x_harmonics: int = 0  # where x has Fourier words
+    y_harmonics: int = 0
+
+
+@dataclass
+class Loader:
+    """Loads and commits programs; without ``memories`` the device has that of the build already."""
+
+    script: Script
+    own: DualProgram
+    memories: Memories | None
+    placement: Placement
+    _tables: dict[tuple[int, int], int] = field(
+        default_factory=dict
+    )  # length of a variation's table, or that of the build, by bank and region
+
+    @property
+    def own_commit_clocks(self) -> int:
+        """Clocks from a commit of the build's program to its committed bank."""
+        harmonics = (self.memories.x_harmonics, self.memories.y_harmonics) if self.memories else (0, 0)
+        return self.placement.commit_clocks(
+            (len(self.own.x.words), harmonics[0]), (len(self.own.y.words), harmonics[1])
+        )
+
+    def load_own(self) -> None:
+        """Write the program of the build, word for word as its files have it; tables unless the bank has them still."""
+        memories, script = self.memories, self.script
+        self._begin()
+        bank_has = {region: self._tables.get((self._bank, region)) for region in (X_TABLE, Y_TABLE)}
+        self._tables |= {(self._bank, region): _OWN_TABLE for region in bank_has}
+        if memories is None:
+            return
+        script.write(PROGRAM, list(memories.program))
+        for words, harmonics, page, table, fourier in (
+            (memories.x, memories.x_harmonics, 1, X_TABLE, X_FOURIER),
+            (memories.y, memories.y_harmonics, 2, Y_TABLE, Y_FOURIER),
+        ):
+            if harmonics or bank_has[table] != _OWN_TABLE:
+                script.write(fourier if harmonics else table, list(words))
+            if harmonics:  # 0 in the file, which is for uploaded tables
+                script.write(PROGRAM, [harmonics], first=page * PAGE_WORDS + AXIS_WORDS.index("harmonics"))
+
+    def commit_own(self) -> None:
+        """Commit it; its tables are rendered first if they have to be."""
+        self.script.request("commit", program=self.own, commit_clocks=self.own_commit_clocks)
+
+    def load(self, kind: Kind, longer: int = 0) -> DualProgram:
+        """Write a variation: its registers, and its tables unless the bank has them."""
+        program, script = variation(self.own, kind, self._bank, longer), self.script
+        self._begin()
+        script.write(PROGRAM, program_words(program.schedule, program.x, program.y))
+        for axis, region in ((program.x, X_TABLE), (program.y, Y_TABLE)):
+            # Tables of one length are alike in all variations of a bank.
+            if self._tables.get((self._bank, region)) != len(axis.words):
+                script.write(region, axis.words)
+            self._tables[self._bank, region] = len(axis.words)
+        return program
+
+    @property
+    def has_long_tables(self) -> bool:
+        """True if tables serve a period of any length."""
+        return "direct" not in (self.own.x.mode, self.own.y.mode)
+
+    def load_wide(self, part: Part) -> DualProgram:
+        """Write a program that fills its registers, with the tables of a variation."""
+        wide = wide_program(part, self.load("free"))
+        self.script.write(PROGRAM, wide.words)
+        return wide.program
+
+    def edges(self, words: list[int]) -> tuple[list[tuple[int, int]], list[dict[int, int]]]:
+        """Words about the edges of what fits the device, near those of a program: ``unfit.edges``, or those of C."""
+        shape = SequencerShape.of((self.own.x, self.own.y))
+        if self.memories is None:
+            return c_edges(shape, words, max(one.output.shaping.order for one in (self.own.x, self.own.y))), []
+        harmonics = max(self.memories.x_harmonics, self.memories.y_harmonics)
+        return edges(words, device_widths(shape, self.placement, harmonics))
+
+    def commit(self, program: DualProgram) -> None:
+        """Commit a variation that was loaded."""
+        self.script.request("commit", program=program, frames=VARIATION)
+
+    def _begin(self) -> None:
+        self.script.wait_writable()
+        assert self.script.writable
+        words = len(self.own.x.words) + len(self.own.y.words)
+        least = self.placement.tick_clocks
+        self.script.pace(max(_LOADING_PACE, words // _LOADING_TICKS, least), least)
+
+    @property
+    def _bank(self) -> int:
+        """The bank that is idle once nothing waits: they take turns."""
+        return self.script.swaps % 2

@@ -1,0 +1,1 @@
+"""Play the Verilog sequencer of a build in a simulator."""

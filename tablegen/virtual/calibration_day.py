@@ -1,0 +1,286 @@
+"""A calibration day on the virtual scanner: its own simulated data through the fits of ``tablegen.calibration``.
+
+What comes out is the scanner file that a laboratory would have, noise and all; nothing is known but what was measured.
+Needs scipy, of the extra ``calibrate``.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import pi
+from typing import Any, Literal, TypeVar
+
+import msgspec
+import numpy as np
+from msgspec.structs import replace
+
+from tablegen.base.input_errors import Unphysical
+from tablegen.calibration.laws.frequency import fit_frequency
+from tablegen.calibration.laws.hysteresis import HysteresisFit, Trace, fit_hysteresis
+from tablegen.calibration.laws.image_sizes import ImageSizes, KnownSample, SampleImage, Taking, apparent_of, sizes_of
+from tablegen.calibration.laws.images import Pair, fit_images
+from tablegen.calibration.laws.offset_sizes import fit_offset_sizes
+from tablegen.calibration.laws.resonance import ResonanceFit, fit_resonance
+from tablegen.calibration.laws.size import SizeFit, fit_size
+from tablegen.calibration.summary import change
+from tablegen.compensation import models
+from tablegen.compensation.size import SizeLaw
+from tablegen.config.load import Setup
+from tablegen.config.scanner import Frequency, Offset, Resonance, ScannerAxis, Size
+from tablegen.fitting.estimate import Fit
+from tablegen.images.line_length import Cell, Grating
+from tablegen.numerics.arrays import Floats
+from tablegen.virtual.experiments import actual_sizes, apparent_sizes, frequency_response, sensor_trace
+from tablegen.virtual.imaging import Surface, grating, hexagonal, image_pair
+from tablegen.virtual.scanner import VirtualAxis, VirtualScanner
+from tablegen.virtual.sensor import Sensor
+
+T = TypeVar("T")
+_AXES: tuple[Literal["x", "y"], ...] = ("x", "y")
+NOISE = 0.002  # rms noise of every reading, relative to the scan or to the value
+# Shares of v_max. Offsets stay away from the ends, as the paper advises.
+OFFSETS = (0.07, 0.285, 0.5, 0.715, 0.93)
+OFFSET_SIZE = 0.13
+OFFSET_SIZES = (0.06, 0.13, 0.25, 0.4, 0.55)  # where m is measured over the size too
+OFFSET_ROOM = 0.97  # of the offsets at which a scan of such a size fits, those that are used
+SIZES = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
+AMPLITUDES = (0.2, 0.4, 0.6, 0.8, 1.0)
+SMALL_IMAGE, LATTICE_NM, GRATING_NM = 0.2, 17.7, 50.0
+SAMPLES_SEEN = KnownSample(Cell.hexagonal(LATTICE_NM), Grating(GRATING_NM))
+IMAGED_SIZES = SIZES[1:]  # shares of v_max: below, a lattice has too few periods
+IMAGE_DRIFT, IMAGE_SLOPE = 0.02, 2e-3  # drift along x in a frame, of the line, at most; heights per nm
+PERIODS, SAMPLES = 4, 1000  # periods per trace, samples per period
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """The scanner as calibrated, and by axis and kind the fits that it rests on."""
+
+    setup: Setup
+    fits: dict[str, dict[str, Fit]]
+
+
+def calibrate(
+    setup: Setup,
+    scanner: VirtualScanner,
+    noise: float = NOISE,
+    seed: int = 0,
+    amplitudes: Sequence[float] = AMPLITUDES,
+    points: bool = True,
+    images: bool = False,
+    offset_sizes: Sequence[float] = (),
+    sizes_from_images: bool = False,
+) -> Calibration:
+    """Measure both axes with a sensor and fit what a scanner file holds; its base size, references and boost are kept.
+
+    ``noise`` is relative, rms, of every reading; ``amplitudes`` of the traces are shares of v_max. Hysteresis is taken
+    as measured at each amplitude, or by (22) with one u_peak where ``points`` is false; with ``images`` not from a
+    sensor, but from trace and retrace of a lattice and a grating, 256 x 256 with 5 % noise. ``offset_sizes`` are the
+    scan voltages, shares of v_max, of the images that give m; none stands for ``OFFSET_SIZE``. With
+    ``sizes_from_images`` size and offset are fitted to such images too, drifting and tilted, and not to sizes with
+    ``noise``. Raises ``Unphysical``.
+    """
+    axes: dict[str, ScannerAxis] = {}
+    fits: dict[str, dict[str, Fit]] = {}
+    for number, name in enumerate(_AXES):
+        axis: VirtualAxis = getattr(scanner, name)
+        day = _Day(setup, name, axis, noise, 1000 * (2 * seed + number), sizes_from_images)
+        fits[name] = day.fits(amplitudes, images, offset_sizes)
+        axes[name] = day.scanner_axis(fits[name], points)
+    scan = msgspec.structs.replace(  # what was learnt over another model does not fit to this one
+        setup.scan,
+        x=msgspec.structs.replace(setup.scan.x, refinement=None),
+        y=msgspec.structs.replace(setup.scan.y, refinement=None),
+    )
+    return Calibration(replace(setup, scan=scan, scanner=msgspec.structs.replace(setup.scanner, **axes)), fits)
+
+
+class _Day:
+    """One axis on the bench. Every measurement has noise of its own."""
+
+    def __init__(
+        self, setup: Setup, name: Literal["x", "y"], axis: VirtualAxis, noise: float, seed: int, imaged: bool
+    ) -> None:
+        self._imaged = imaged
+        self._axis, self._noise, self._seed = axis, noise, seed
+        self._before: ScannerAxis = getattr(setup.scanner, name)
+        self._driver = setup.scanner.driver
+        self._turn: float = getattr(setup.scan, name).turn
+        timing = setup.scan.timing
+        self._rate_hz = timing.line_rate_hz if name == "x" else timing.line_rate_hz / timing.lines
+        frequency = self._before.frequency
+        self._reference_hz = self._rate_hz if frequency is None else frequency.reference_hz
+        scan = getattr(setup.scan, name)
+        self._scan_v: float = scan.size_v or scan.size_nm / self._before.size.k_nm_per_v
+
+    def fits(self, amplitudes: Sequence[float], images: bool, offset_sizes: Sequence[float]) -> dict[str, Fit]:
+        """Everything that can be calibrated; a resonance only where the scanner file has one."""
+        size = self._size()
+        offset = self._offset(size, offset_sizes or (OFFSET_SIZE,))
+        imaged = self._imaged_hysteresis(amplitudes) if images else None
+        traces = [] if images else self._traces(amplitudes)
+        gains = self._gains()
+        resonance, delay_s = None, 0.0
+        if self._before.resonance is not None:
+            try:
+                resonance = self._resonance(self._before.resonance)
+            except Unphysical:
+                if traces:  # of two reasons that of the hysteresis is told: without it there is nothing to correct
+                    fit_hysteresis(traces, self._driver)
+                raise
+            # A build undoes this lag by the resonance; left in the loops, it would be undone by them once more.
+            lag_s = 1.0 / (2.0 * pi * resonance.frequency_hz.value * resonance.quality.value)
+            delay_s = resonance.delay_s.value + lag_s
+        fits: dict[str, Fit] = {
+            "offset": offset,
+            "size": size,
+            "hysteresis": imaged or fit_hysteresis(traces, self._driver, delay_s=delay_s),
+            "frequency": fit_frequency(gains["frequency_hz"], gains["gain"], self._reference_hz),
+        }
+        if resonance is not None:
+            fits["resonance"] = resonance
+        return fits
+
+    def scanner_axis(self, fits: dict[str, Fit], points: bool) -> ScannerAxis:
+        """The axis of a scanner file with these parameters, as ``tablegen calibrate --write`` would put them."""
+        changes = {kind: change(fit, (), points) for kind, fit in fits.items()}
+        branches = list(changes["hysteresis"].branches)
+        resonance = None
+        if self._before.resonance is not None:
+            boost = {"max_boost_db": self._before.resonance.max_boost_db}
+            resonance = _as(Resonance, {**changes["resonance"].values, **boost})
+        return ScannerAxis(
+            size=_as(Size, changes["size"].values),
+            offset=_as(Offset, changes["offset"].values),
+            hysteresis=_as(models.get(changes["hysteresis"].values["model"]), {"branches": branches}),
+            frequency=_as(Frequency, changes["frequency"].values),
+            resonance=resonance,
+            dac=self._before.dac,
+            amplifier=self._before.amplifier,
+        )
+
+    def _offset(self, size: SizeFit, sizes: Sequence[float]) -> Fit:
+        """From images of one object, at five offsets each; of a large scan closer to the middle, so that it fits."""
+        k, beta, threshold = size.k_nm_per_v.value, size.beta.value, size.v_threshold.value
+        law = SizeLaw.calibrated(k, self._driver.span, beta, size.base_nm, threshold)
+        found = []
+        for share in sizes:
+            room = min(1.0, OFFSET_ROOM * (1.0 - share) / (OFFSETS[-1] - OFFSETS[0])) if len(sizes) > 1 else 1.0
+            volts = [self._driver.volts(0.5 + room * (offset - 0.5)) for offset in OFFSETS]
+            size_v = share * self._driver.span
+            if self._imaged:
+                taken = self._images([(size_v, offset) for offset in volts])
+                nm, errors = apparent_of(taken, law, self._driver, SAMPLES_SEEN)
+                found.append((np.array(volts), nm, np.full(len(volts), size_v), errors))
+                continue
+            seen = apparent_sizes(
+                self._axis, volts, size_v, self._reference_hz, noise=self._noise, seed=self._next(), turn=self._turn
+            )
+            unknown = np.zeros(len(volts))
+            found.append((seen["offset_v"], seen["apparent_nm"], np.full(len(volts), size_v), unknown))
+        offset_v, apparent_nm, size_v_each, errors = (np.concatenate(column) for column in zip(*found, strict=True))
+        known = errors if self._imaged else None
+        return fit_offset_sizes(offset_v, apparent_nm, size_v_each, self._driver, law, known)
+
+    def _size(self) -> SizeFit:
+        size = self._before.size
+        if self._imaged:
+            drives = [share * self._driver.span for share in IMAGED_SIZES]
+            taken = self._images([(volts, self._driver.middle) for volts in drives])
+            return fit_size(
+                np.array(drives),
+                taken.nm,
+                self._driver,
+                size.base_nm,
+                errors_nm=taken.errors_nm,
+                shared=taken.shared,
+            )
+        nominal = [share * self._driver.span * size.k_nm_per_v for share in SIZES]
+        found = actual_sizes(
+            self._axis,
+            nominal,
+            size.k_nm_per_v,
+            self._reference_hz,
+            noise=self._noise,
+            seed=self._next(),
+            turn=self._turn,
+        )
+        return fit_size(
+            found["nominal_nm"] / size.k_nm_per_v, found["actual_nm"], self._driver, size.base_nm, None, "relative"
+        )
+
+    def _images(self, scans: Sequence[tuple[float, float]]) -> ImageSizes:
+        """Images at scan voltages and offsets, of a lattice where the line is short and of a grating where it is long.
+
+        The sample drifts by a share of the line and lies on a slope.
+        """
+        taken = []
+        for volts, offset in scans:
+            sample = hexagonal(LATTICE_NM) if volts <= SMALL_IMAGE * self._driver.span else grating(GRATING_NM)
+            random = np.random.default_rng(self._next())
+            slope, drift = random.uniform(-IMAGE_SLOPE, IMAGE_SLOPE, 2), float(random.uniform(-1.0, 1.0)) * IMAGE_DRIFT
+            tilted = _tilted(sample, slope)
+            trace, retrace = image_pair(
+                self._axis,
+                tilted,
+                volts,
+                offset,
+                self._reference_hz,
+                turn=self._turn,
+                drift=drift,
+                seed=self._next(),
+            )
+            taken.append(SampleImage(f"{volts:g} V at {offset:g} V", volts, offset, trace, retrace))
+        return sizes_of(taken, self._driver, SAMPLES_SEEN, Taking(turn=self._turn))
+
+    def _traces(self, amplitudes: Sequence[float]) -> list[Trace]:
+        traces = []
+        for share in amplitudes:
+            volts = share * self._driver.span
+            rate = self._rate_at(volts)
+            size_nm = volts * self._before.size.k_nm_per_v
+            sensor = Sensor(noise_nm=self._noise * size_nm, seed=self._next())
+            found = sensor_trace(
+                self._axis, volts, self._driver.middle, rate, PERIODS, SAMPLES, turn=self._turn, sensor=sensor
+            )
+            traces.append(Trace(f"{volts:g} V", found["time_s"], found["drive_v"], found["displacement_nm"]))
+        return traces
+
+    def _imaged_hysteresis(self, amplitudes: Sequence[float]) -> HysteresisFit:
+        """The same from images: of a lattice where the line is short, of a grating where it is long."""
+        pairs = []
+        for share in amplitudes:
+            volts = share * self._driver.span
+            rate = self._rate_at(volts)
+            sample = hexagonal(LATTICE_NM) if share <= SMALL_IMAGE else grating(GRATING_NM)
+            middle, seed = self._driver.middle, self._next()
+            trace, retrace = image_pair(self._axis, sample, volts, middle, rate, turn=self._turn, seed=seed)
+            pairs.append(Pair(f"{volts:g} V", volts, trace, retrace))
+        return fit_images(pairs, self._driver, turn=self._turn)
+
+    def _rate_at(self, volts: float) -> float:
+        """The rate, in Hz, with the scan's tip velocity, and no faster than the scan, as the paper does."""
+        return self._rate_hz * min(self._scan_v / volts, 1.0)
+
+    def _gains(self) -> dict[str, Floats]:
+        """Two decades about the reference, below a tenth of any resonance."""
+        f = self._reference_hz * np.geomspace(0.1, 10.0, 15)
+        return frequency_response(self._axis, f, noise=self._noise, seed=self._next())
+
+    def _resonance(self, before: Resonance) -> ResonanceFit:
+        near = before.frequency_hz or 1e4
+        f = near * np.geomspace(0.2, 3.0, 200)
+        found = frequency_response(self._axis, f, noise=self._noise, seed=self._next())
+        return fit_resonance(found["frequency_hz"], found["gain"], found["phase_deg"])
+
+    def _next(self) -> int:
+        self._seed += 1
+        return self._seed
+
+
+def _tilted(sample: Surface, slope: Floats) -> Surface:
+    """The sample on a plane."""
+    return lambda x, y: sample(x, y) + slope[0] * x + slope[1] * y
+
+
+def _as(kind: type[T], values: Any) -> T:
+    return msgspec.convert(dict(values), kind)
