@@ -28,6 +28,7 @@ _SLOWEST = 0.3  # of the slowest wave of the cell: cells of three times its side
 _FINEST = 0.42  # of the sampling rate
 _OWN_WAVE = 2.2, 3.0  # periods: how near to a wave of the cell power is its own, least and most
 _OWN_SHARE = 0.35  # of the slowest wave of the cell, within these
+_FEWEST = 2.0 * _OWN_WAVE[0]  # periods of a lattice: a wave of half the frequency is then apart from its own
 _BESIDE = 14.0  # periods: how far around a spot its background is taken
 _VISIBLE = 0.025  # of the strongest amplitude of the cell: weaker spots may be distortion that is left
 _STANDS_OUT = 4.0  # times the background's amplitude
@@ -73,6 +74,12 @@ def check_cell(fit: PeriodicScan, heights: Floats, forward: bool) -> None:
     distortion = fit.distortion
     (left, right), (first, last) = distortion.x_range, distortion.y_range
     waves = fit.waves * np.array([right - left, last - first])
+    if len(waves) > 1 and _slowest(waves) < _FEWEST:
+        raise Unphysical(
+            f"the cell may be a multiple or a root of the sample's: with {_slowest(waves):.2g} periods across the "
+            f"picture spots of a larger cell cannot be told from its own; image {_FEWEST:g} periods or more, or "
+            f"correct with --scanner"
+        )
     spot = strange_spot(Resampler.of(distortion, forward)(heights), waves)
     if spot is None or (spot.share < _VISIBLE or (spot.contrast < _STANDS_OUT and spot.share < _HIDDEN)):
         return
@@ -104,7 +111,7 @@ def strange_spot(picture: Floats, waves: Floats) -> StrangeSpot | None:
     amplitude = _amplitudes(picture)
     u = np.fft.rfftfreq(columns * _PADDING)[None, :] * columns
     v = np.fft.fftfreq(rows * _PADDING)[:, None] * rows
-    slowest = min(float(np.hypot(*wave)) for wave in _short_waves(waves))
+    slowest = _slowest(waves)
     own_reach = float(np.clip(_OWN_SHARE * slowest, *_OWN_WAVE))
     own, strongest = np.zeros(amplitude.shape, bool), 0.0
     for along, across in _lattice(waves, rows, columns, own_reach):
@@ -146,16 +153,15 @@ def _amplitudes(picture: Floats) -> Floats:
     return np.asarray(2.0 * np.abs(spectrum) / np.sum(window), dtype=np.float64)
 
 
-def _short_waves(waves: Floats) -> list[Floats]:
-    """The base vectors, their sum and difference: the slowest waves of a cell that is about reduced."""
-    if len(waves) == 1:
-        return [waves[0]]
-    return [waves[0], waves[1], waves[0] + waves[1], waves[0] - waves[1]]
+def _slowest(waves: Floats) -> float:
+    """Periods of the slowest wave of a cell: of the base vectors, their sum and their difference."""
+    short = [waves[0]] if len(waves) == 1 else [waves[0], waves[1], waves[0] + waves[1], waves[0] - waves[1]]
+    return min(float(np.hypot(*wave)) for wave in short)
 
 
 def _lattice(waves: Floats, rows: int, columns: int, reach: float) -> list[tuple[float, float]]:
     """All waves of the cell that the pixels can show, and half a line more."""
-    most = max(rows, columns) / min(float(np.hypot(*wave)) for wave in _short_waves(waves))
+    most = max(rows, columns) / _slowest(waves)
     span = range(-int(min(most, 60.0)) - 1, int(min(most, 60.0)) + 2)
     count = np.array(list(product(span, repeat=len(waves))), dtype=np.float64)
     points = count @ waves
