@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from math import floor, log10, sqrt
+from typing import TYPE_CHECKING
 
 import numpy as np
 from msgspec import Struct
@@ -22,6 +23,9 @@ from tablegen.compensation.expectation import Expectation
 from tablegen.compensation.line import Sweep
 from tablegen.planning.line_plan import LinePlan, Plan
 
+if TYPE_CHECKING:
+    from tablegen.certificate.position_errors import ArrivingErrors
+
 
 class Certificate(Struct, frozen=True):
     """The error budget of one axis. Codes and LSB are the converter's; dB are of power, relative to the scan's.
@@ -32,7 +36,7 @@ class Certificate(Struct, frozen=True):
     ``peak_acceleration`` is that of the target, of the line a period squared, where the waveform was made for the
     least; ``optimum`` the least of any, where ``certificate.optimum`` has worked it out.
     Errors of an axis with a ``shaped`` part are those of the position, and its codes and largest step are bounds: no
-    two of its periods are the same.
+    two of its periods are the same. ``position`` has those of an unshaped axis whose scanner has a response.
     """
 
     ticks: int
@@ -53,6 +57,7 @@ class Certificate(Struct, frozen=True):
     peak_acceleration: float | None = None
     optimum: float | None = None
     shaped: ShapedErrors | None = None
+    position: "ArrivingErrors | None" = None
 
     @property
     def scaling_error_percent(self) -> float:
@@ -201,7 +206,27 @@ def _certify(line: LinePlan) -> Certificate:
         expected=certified_expectation(line, played),
         peak_acceleration=None if line.kept_percent is None else line.target.peak_acceleration(),
         shaped=shaped_errors(line, played, _directions(line)),
+        position=_position(line, played),
     )
+
+
+def _position(line: LinePlan, played: EmittedPeriod) -> "ArrivingErrors | None":
+    """What arrives behind the response of the axis."""
+    if line.drive.response is None:
+        return None
+    from tablegen.certificate.position_errors import position_errors  # few scanners have one
+
+    return position_errors(line, played, _directions(line))
+
+
+def position_scaling(line: LinePlan) -> float:
+    """The larger scaling error of both directions behind the response of an axis, in percent; 0 where none is known."""
+    played = EmittedPeriod(line)
+    position = _position(line, played)
+    scaling = (
+        {side: one.total for side, one in _scaling(line, played).items()} if position is None else position.scaling
+    )
+    return max(scaling.values(), default=0.0)
 
 
 def scaling_errors(line: LinePlan) -> dict[str, ScalingError]:

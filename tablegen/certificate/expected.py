@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from tablegen.certificate.converter_errors import converter_errors
 from tablegen.certificate.line_errors import EmittedPeriod
-from tablegen.compensation.expectation import Expectation, Figure
+from tablegen.compensation.expectation import Expectation, Figure, PlayedStroke
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan
 from tablegen.waveform.sampler import Expansion, on_grid
@@ -31,8 +31,8 @@ def expected_of(line: LinePlan) -> Expectation | None:
     known = line.drive.shape.expectation
     if known is not None:
         return known if both else known.forward_only
-    mismatch = rounding_mismatch(line) if both else None
-    return None if mismatch is None else Expectation("laws", mismatch=Figure(mismatch))
+    found = _rounding(line) if both else None
+    return None if found is None else Expectation("laws", mismatch=Figure(found[0]), stroke=found[1])
 
 
 def certified_expectation(line: LinePlan, played: EmittedPeriod) -> Expectation | None:
@@ -61,6 +61,11 @@ def rounding_mismatch(line: LinePlan) -> float | None:
 
     None where a model has no branches for the stroke that is played.
     """
+    found = _rounding(line)
+    return None if found is None else found[0]
+
+
+def _rounding(line: LinePlan) -> tuple[float, PlayedStroke] | None:
     drive = line.drive
     if drive.shape.waveform is not None or not drive.hysteresis.compensates:
         return None
@@ -74,7 +79,8 @@ def rounding_mismatch(line: LinePlan) -> float | None:
     there, back = (_share(line, target, side, x, low, high) for side in ("forward", "backward"))
     apart = played.forward.inverse(there) - (1.0 - played.backward.inverse(1.0 - back))
     extent = drive.size_law.size_nm(drive.v_scan_normalised * (high - low)) / drive.size_nm
-    return 100.0 * extent * float(np.max(np.abs(apart)))
+    forward, backward = ((one.beta, one.u_peak) for one in played.peaks)
+    return 100.0 * extent * float(np.max(np.abs(apart))), PlayedStroke(forward, backward, extent)
 
 
 def _share(line: LinePlan, target: Expansion, side: str, x: Floats, low: float, high: float) -> Floats:

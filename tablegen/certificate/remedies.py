@@ -17,7 +17,7 @@ from msgspec.structs import replace
 
 from tablegen.base.figures import at_least, at_most, shown_path
 from tablegen.base.input_errors import Rejected
-from tablegen.certificate.certificate import scaling_errors
+from tablegen.certificate.certificate import position_scaling, scaling_errors
 from tablegen.certificate.excess import Cause, Excess, excess
 from tablegen.certificate.expected import expected_of
 from tablegen.certificate.line_errors import EmittedPeriod
@@ -88,6 +88,28 @@ def tried_on_operator(setup: Setup, plan: Plan, line: LinePlan, most: float, own
         return Remedy(_text(setup, change), left, left <= most, _keeps_the_error(plan, other))
 
     return _tried(_other_bands(setup, plan, line), trial)
+
+
+def tried_against_resonance(setup: Setup, plan: Plan, line: LinePlan, most: float) -> list[Remedy]:
+    """The same for the resonance that the steps of the codes drive: shaping of the codes, or more of them."""
+    hardware = [setup.hardware(one.axis) for one in plan.lines]
+    shaping = _keys(setup.hardware(line.axis).where("dac.shaping"))
+    dac = setup.hardware(line.axis).dac
+    finest = min(_MOST_BITS, *(one.dac.word_bits or _MOST_BITS for one in hardware))
+    bits = _keys(place for one in hardware for place in one.where("dac.bits"))
+    ways: list[Iterator[Change]] = [
+        (dict.fromkeys(shaping, order) for order in ("scanner", "second", "first")),
+        (dict.fromkeys(bits, n) for n in range(dac.bits + 1, min(dac.bits + 5, finest + 1))),
+    ]
+
+    def trial(change: Change) -> Remedy | None:
+        other = _planned(setup, change)
+        if other is None:
+            return None
+        left = position_scaling(other.x if line.axis == "x" else other.y)
+        return Remedy(_text(setup, change), left, left <= most, _keeps_the_error(plan, other))
+
+    return _tried(ways, trial)
 
 
 def _tried(ways: Iterable[Iterable[Change]], trial: Callable[[Change], Remedy | None]) -> list[Remedy]:

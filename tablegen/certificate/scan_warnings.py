@@ -18,7 +18,10 @@ if TYPE_CHECKING:
 
 def brief_warnings(plan: Plan, certificates: Mapping[str, Certificate]) -> list[str]:
     """What exceeds 1 % or the uncompensated line, and what is to be doubted, without remedies: it costs nothing."""
-    found = [Finding("spoils", abs(one.percent), one.text(line.axis)) for line, one in _found(plan, certificates)]
+    found = [
+        Finding("spoils", abs(one.percent), f"{one.text(line.axis)}{_behind_resonance(one, certificates[line.axis])}")
+        for line, one in _found(plan, certificates)
+    ]
     found += [
         Finding("spoils", doubt_percent(doubt, certificates[line.axis]), doubt.text)
         for line, doubt in _doubts(plan, certificates)
@@ -41,7 +44,8 @@ def weighed_warnings(setup: Setup, plan: Plan, certificates: Mapping[str, Certif
     warnings = []
     for line, found in _found(plan, certificates):
         share = _share(line, found, certificates[line.axis])
-        why = f"{found.text(line.axis)}; {share}{_advice(setup, plan, line, found)}"
+        text = f"{found.text(line.axis)}{_behind_resonance(found, certificates[line.axis])}"
+        why = f"{text}; {share}{_advice(setup, plan, line, found)}"
         warnings.append((abs(found.percent), setup.scan_file.problem(_key(setup, line, found), why)))
     for line, doubt in _doubts(plan, certificates):
         key, advice = _size_key(setup, line), ""
@@ -50,6 +54,10 @@ def weighed_warnings(setup: Setup, plan: Plan, certificates: Mapping[str, Certif
 
             tried = tried_on_operator(setup, plan, line, doubt.limit, own=False)
             key, advice = _band_key(setup, line), "; " + _in_words(tried, doubt.percent)
+        elif doubt.kind == "resonance":
+            from tablegen.certificate.remedies import tried_against_resonance
+
+            advice = "; " + _in_words(tried_against_resonance(setup, plan, line, doubt.limit), doubt.percent)
         percent = doubt_percent(doubt, certificates[line.axis])
         warnings.append((percent, setup.scan_file.problem(key, doubt.text + advice)))
     if apart := apart_warning(plan):
@@ -104,7 +112,19 @@ def _found(plan: Plan, certificates: Mapping[str, Certificate]) -> list[tuple[Li
 
 
 def _doubts(plan: Plan, certificates: Mapping[str, Certificate]) -> list[tuple[LinePlan, Doubt]]:
-    return [(line, doubt) for line in plan.lines for doubt in doubts(line, certificates[line.axis])]
+    """A resonance that is driven is told with the error of the codes, where that is told."""
+    told = {line.axis for line, found in _found(plan, certificates) if found.what == "scaling error"}
+    every = [(line, doubt) for line in plan.lines for doubt in doubts(line, certificates[line.axis])]
+    return [(line, doubt) for line, doubt in every if doubt.kind != "resonance" or line.axis not in told]
+
+
+def _behind_resonance(found: Excess, certificate: Certificate) -> str:
+    """What the steps of the codes make of a scaling error behind the resonance that they drive, where that is more."""
+    position = certificate.position
+    if position is None or found.what != "scaling error":
+        return ""
+    side, percent = position.worst
+    return f"; with the resonance that steps drive it is {percent:.3g} % {side}" if percent > found.percent else ""
 
 
 def _share(line: LinePlan, found: Excess, certificate: Certificate) -> str:

@@ -115,6 +115,11 @@ def certificate_lines(certificate: Certificate) -> list[tuple[str, str]]:
         )
         rows.append(("scaling " + side, f"{_percent(e.total)} % peak to peak ({parts})"))
         rows.append(("", f"uncompensated {_percent(e.uncompensated)} %; window's size off by {e.size:+.4f} %"))
+    if c.position is not None:
+        sides = ", ".join(f"scaling {side} {_percent(value)} %" for side, value in c.position.scaling.items())
+        rows.append(("position", f"{sides}, with the steps of the codes"))
+        errors = f"max {_lsb(c.position.max_error_lsb)} LSB, rms {_lsb(c.position.rms_error_lsb)} LSB"
+        rows.append(("", f"{errors}, {behind(c.position.passage)}"))
     for side, r in (c.refinement or {}).items():
         moves = f"moves up to {_percent(r.position)} % of the line, takes away {_percent(r.scaling)} % peak to peak"
         rows.append(("refined " + side, moves))

@@ -129,6 +129,12 @@ def _certificate(axis: str, entry: ManifestAxis) -> Iterator[ComparedQuantity]:
     for side, moved in (found.refinement_percent or {}).items():
         for part, value in moved.items():
             yield ComparedQuantity(section, f"refinement {side}, {part}", value, "%")
+    if found.position is not None:
+        for side, value in found.position.scaling_error_percent.items():
+            yield ComparedQuantity(section, f"scaling error {side}, with the resonance", value, "%")
+        yield ComparedQuantity(section, "largest error behind the resonance", found.position.max_error_lsb, "LSB")
+        yield ComparedQuantity(section, "rms error behind the resonance", found.position.rms_error_lsb, "LSB")
+        yield ComparedQuantity(section, "response", digest(found.position.passage))
     of = "a code" if found.shaped is None else "the position"
     numbers = (
         (f"largest error of {of}", found.max_error_lsb, "LSB"),
@@ -168,6 +174,8 @@ def _expected(axis: str, entry: ManifestAxis) -> Iterator[ComparedQuantity]:
             yield ComparedQuantity(section, name, figure.value, "%")
             if figure.uncertainty is not None:
                 yield ComparedQuantity(section, f"{name}, uncertain by", figure.uncertainty, "%")
+    if expected.stroke is not None:
+        yield ComparedQuantity(section, "branches at the stroke that is played", digest(expected.stroke))
     if expected.distance_percent is not None:
         yield ComparedQuantity(section, "distance to the nearest trace", expected.distance_percent, "% of v_max")
 

@@ -19,6 +19,17 @@ class Figure(Struct, frozen=True):
     uncertainty: float | None = None
 
 
+class PlayedStroke(Struct, frozen=True):
+    """What the laws say of the stroke that is played: the peak of each branch and where it is, and the size.
+
+    ``size`` is that of the stroke over that of the line.
+    """
+
+    forward: tuple[float, float]
+    backward: tuple[float, float]
+    size: float
+
+
 class Expectation(Struct, frozen=True):
     """What the scanner should do with the line; a waveform's own errors are the certificate's.
 
@@ -26,7 +37,7 @@ class Expectation(Struct, frozen=True):
     direction; ``mismatch`` the largest distance of trace and retrace; ``size`` the error of the size, with its sign.
     ``basis`` says where they are from: "traces" of the piezo, or the "laws" of the scanner file, by which the
     mismatch alone is known. ``distance`` is how far stroke or centre are from the nearest measured line, in percent of
-    v_max.
+    v_max. ``stroke`` is what the mismatch follows from where it is by the laws.
     """
 
     basis: Literal["traces", "laws"]
@@ -35,6 +46,7 @@ class Expectation(Struct, frozen=True):
     mismatch: Figure | None = None
     size: Figure | None = None
     distance: float | None = None
+    stroke: PlayedStroke | None = None
 
     @property
     def forward_only(self) -> "Expectation":

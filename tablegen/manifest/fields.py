@@ -167,6 +167,14 @@ class ManifestFigure(Struct):
     uncertainty: float | None = None
 
 
+class ManifestStroke(Struct):
+    """The branches at the stroke that is played, and its size over that of the line."""
+
+    forward: ManifestBranch
+    backward: ManifestBranch
+    size: Annotated[float, Meta(gt=0.0, le=1.0)]
+
+
 class ManifestExpected(Struct):
     """What the scanner should do with the line, by an operator or by the laws of the scanner file."""
 
@@ -176,6 +184,7 @@ class ManifestExpected(Struct):
     mismatch_percent: ManifestFigure | None = None
     size_percent: ManifestFigure | None = None
     distance_percent: float | None = None
+    stroke: ManifestStroke | None = None
 
 
 class ManifestResponse(Struct):
@@ -230,6 +239,15 @@ class ManifestShaped(Struct):
     rounded: ManifestRounded
 
 
+class ManifestPosition(Struct):
+    """What the held codes of an unshaped axis leave in its position, behind the response of the scanner."""
+
+    passage: ManifestPassage
+    max_error_lsb: float
+    rms_error_lsb: float
+    scaling_error_percent: dict[str, float]
+
+
 class ManifestCertificate(Struct):
     """What the build promised of an axis."""
 
@@ -250,6 +268,7 @@ class ManifestCertificate(Struct):
     expected: ManifestExpected | None = None
     peak_acceleration: float | None = None
     shaped: ManifestShaped | None = None
+    position: ManifestPosition | None = None
 
 
 class ManifestAxis(Struct):

@@ -34,7 +34,7 @@ def certificate_record(certificate: Certificate) -> dict[str, Any]:
     record: dict[str, Any] = {
         name: _figure(getattr(certificate, name))
         for name in certificate.__struct_fields__
-        if name not in ("scaling", "refinement", "expected", "peak_acceleration", "optimum", "shaped")
+        if name not in ("scaling", "refinement", "expected", "peak_acceleration", "optimum", "shaped", "position")
     }
     if certificate.peak_acceleration is not None:
         record["peak_acceleration"] = _bound(certificate.peak_acceleration)
@@ -46,6 +46,14 @@ def certificate_record(certificate: Certificate) -> dict[str, Any]:
         record["expected"] = _expected(certificate.expected)
     if certificate.shaped is not None:
         record["shaped"] = _shaped(certificate.shaped)
+    if certificate.position is not None:
+        position = certificate.position
+        record["position"] = {
+            "passage": _passage(position.passage),
+            "max_error_lsb": _bound(position.max_error_lsb),
+            "rms_error_lsb": _figure(position.rms_error_lsb),
+            "scaling_error_percent": {side: _figure(value) for side, value in position.scaling.items()},
+        }
     return record
 
 
@@ -91,6 +99,15 @@ def _expected(expectation: Expectation) -> dict[str, Any]:
     for name, figure in (("mismatch", expectation.mismatch), ("size", expectation.size)):
         if figure is not None:
             record[f"{name}_percent"] = pair(figure)
+    if expectation.stroke is not None:
+        stroke = expectation.stroke
+        record["stroke"] = {
+            **{
+                side: dict(zip(("beta", "u_peak"), getattr(stroke, side), strict=True))
+                for side in ("forward", "backward")
+            },
+            "size": stroke.size,
+        }
     if expectation.distance is not None:
         record["distance_percent"] = _figure(expectation.distance)
     return record

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 from tablegen.certificate.excess import LARGEST_PERCENT
+from tablegen.certificate.expectation_checks import RESONANCE_PERCENT
 from tablegen.config.schema import Limits
 from tablegen.manifest.fields import ManifestAxis, ManifestCertificate, ManifestFigure, ManifestShaped
 from tablegen.report.blocks import Grid, Paragraph, Section, TableCell, row
@@ -58,6 +59,9 @@ def _rows(entry: ManifestAxis, limits: Limits, slew: float | None) -> list[tuple
         worst = max(error.get("total", 0.0), error.get("band_limit", 0.0))
         rows.append(_bounded(f"scaling error {side}, peak to peak", worst, most, "%", LARGEST_PERCENT))
         rows.append(_bounded(f"size error {side}", error.get("size", 0.0), most, "%", LARGEST_PERCENT, signed=True))
+    if found.position is not None:
+        for side, value in found.position.scaling_error_percent.items():
+            rows.append(_bounded(f"with the resonance that steps drive, {side}", value, None, "%", RESONANCE_PERCENT))
     for side, moved in (found.refinement_percent or {}).items():
         text = f"moves {moved.get('position', 0.0):.3g} % of the line, removes {moved.get('scaling', 0.0):.3g} %"
         rows.append(row(f"refinement {side}", text, "", ""))

@@ -126,7 +126,7 @@ def verify_build(
     checks += watch.timed(_file_checks(folder, stored, content, known, other_version))
     checks += watch.timed(_format_checks(folder, content, known))
     progress("measuring the certificate")
-    certificates = check_certificates(stored, same)
+    certificates = check_certificates(stored, same, folder)
     checks += watch.timed(certificates.checks)
     outcome = target.play(PlayJob(folder, work, stored, certificates.limits, most_ticks, seed, progress))
     checks += watch.timed(outcome.checks)

@@ -21,7 +21,7 @@ def wrong_passage(axis: ManifestAxis, rate_hz: float) -> list[str]:
             "certificate.shaped is there, and the output does not shape" if stated else "certificate.shaped is missing"
         ]
     if stated is None:
-        return []
+        return _wrong_response(axis, rate_hz)
     passage = stated.passage
     if resonance is None:
         band = axis.fourier.harmonics * rate_hz
@@ -30,6 +30,18 @@ def wrong_passage(axis: ManifestAxis, rate_hz: float) -> list[str]:
     if passage.band_hz is not None or not _follows(axis, passage, rate_hz) or not _is_resonance(axis, passage):
         return ["certificate.shaped.passage is not the response that was compensated"]
     return []
+
+
+def _wrong_response(axis: ManifestAxis, rate_hz: float) -> list[str]:
+    """The response behind which the position of an unshaped axis is judged, if it is not the one of the axis."""
+    stated, resonance = axis.certificate.position, axis.drive.resonance
+    if stated is None or resonance is None:
+        return []
+    passage = stated.passage
+    known = passage.response is not None or (passage.frequency_hz is not None and passage.quality is not None)
+    if known and passage.band_hz is None and _follows(axis, passage, rate_hz) and _is_resonance(axis, passage):
+        return []
+    return ["certificate.position.passage is not the response that was compensated"]
 
 
 def _follows(axis: ManifestAxis, passage: ManifestPassage, rate_hz: float) -> bool:

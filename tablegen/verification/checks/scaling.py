@@ -124,6 +124,11 @@ def knows(model: str) -> bool:
     return False
 
 
+def law(branch: ManifestBranch, model: str) -> ModelBranch | None:
+    """The branch of an equation that is known here; None of another model."""
+    return ModelBranch.of(branch, model) if model in _EQUATIONS else None
+
+
 def _branch(axis: ManifestAxis, side: str) -> ModelBranch | WaveformBranch:
     if axis.drive.model == OPERATOR:
         return WaveformBranch.of(axis, side)
@@ -198,6 +203,12 @@ def rounded_scaling(axis: ManifestAxis, period: PlayedPeriod, shaped: ShapedPlay
     every: list[PlayedPeriod | PositionErrors] = [PositionErrors(period, errors) for errors in shaped.rounded_errors]
     sides = ("forward", "backward") if axis.fourier.directions == "both" else ("forward",)
     return {side: _direction(axis, every, side)["total"] for side in sides}
+
+
+def position_scaling(axis: ManifestAxis, period: PlayedPeriod, errors: Floats) -> dict[str, float]:
+    """The total of each direction whose errors of the position, in LSB at every tick, are these."""
+    sides = ("forward", "backward") if axis.fourier.directions == "both" else ("forward",)
+    return {side: _direction(axis, [PositionErrors(period, errors)], side)["total"] for side in sides}
 
 
 class PositionErrors:
