@@ -414,8 +414,6 @@ class Requests:
         if self._in_c:
             return
         self._until_valid(frame)
-        while not script.image_goes_on:
-            self._ticks(1)
         script.come_to_rest()
         script.missed_with_sample(self.placement.latency)
         script.state("with the sample of this clock missed")
@@ -423,9 +421,9 @@ class Requests:
         self._ticks(1)
 
     def _until_valid(self, most: int) -> None:
-        """Play until the last pixel was valid, as it is somewhere in so many ticks of a frame."""
+        """Play into valid ticks, as there are some in so many of a frame: one more may come before it rests."""
         for _ in range(most):
-            if self.script.images:
+            if self.script.images(2):
                 return
             self._ticks(1)
         raise AssertionError("a variation without an image")

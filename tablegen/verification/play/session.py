@@ -50,12 +50,15 @@ def needed_ticks(program: DualProgram) -> int:
 
 
 def power_up_codes(program: DualProgram) -> tuple[int, int]:
-    """Codes of converters at power-up from which the first ramp leads up in x and down in y, where there is room."""
+    """Codes of converters at power-up from which the first ramp leads up in x and down in y, where there is room.
+
+    That of y takes longer, and ends with a step of one code.
+    """
     x, y = program.x.output, program.y.output
     top = (1 << x.dac_bits) - 1
     return (
         max(x.park_code - _POWER_UP_STEPS * x.max_step - 1, 0),
-        min(y.park_code + _POWER_UP_STEPS * y.max_step + 1, top),
+        min(y.park_code + (_POWER_UP_STEPS + 2) * y.max_step + 1, top),
     )
 
 

@@ -263,17 +263,11 @@ class Script:
         self.states.append((when, StoredState(flags, int(model.faults) | reported, counts, self._outputs)))
         self._command(_STATE)
 
-    @property
-    def images(self) -> bool:
-        """True if the last tick is a valid one of an image."""
-        return bool(self.expected and self.expected[-1] & _VALID)
-
-    @property
-    def image_goes_on(self) -> bool:
-        """True if the next tick will be a valid one too, while nothing else comes."""
-        ahead = copy(self.model)
-        ahead.fault_counts = dict(self.model.fault_counts)
-        return bool(ahead.step().valid)
+    def images(self, ahead: int) -> bool:
+        """Return True if the last tick is a valid one of an image, and so many after it, if nothing else comes."""
+        model = copy(self.model)
+        model.fault_counts = dict(self.model.fault_counts)
+        return bool(self.expected[-1] & _VALID) and all(model.step().valid for _ in range(ahead))
 
     @property
     def _outputs(self) -> int:

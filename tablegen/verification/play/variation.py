@@ -35,13 +35,19 @@ def variation(own: DualProgram, kind: Kind, bank: int, longer: int = 0) -> DualP
     """A program for the device of ``own`` whose tables are those of a bank, 0 or 1; lines ``longer`` by so many ticks.
 
     A ``free`` one neither clamps nor is held back, and images both ways. A ``clamped`` one is held at both limits of
-    both axes, a ``held`` one by the slew guard, up and down; it steps y once a line. For a device that shapes, they
+    both axes, a ``held`` one by the slew guard, up and down. ``held`` ones step y once a line, and so does the
+    ``clamped`` one of bank 1, whose two lines are the largest step of a phase. For a device that shapes, they
     have all orders that it has.
     """
     x_words = _room(own.x)
     ticks = min(_LEAST_TICKS + {"free": 24, "clamped": 21, "held": 23}[kind] + longer, x_words)
     lines = min({"free": 3, "clamped": 2, "held": 4}[kind], _room(own.y))
-    steps = kind == "held" or (kind == "free" and longer > 0) or lines * ticks > _room(own.y)
+    steps = (
+        kind == "held"
+        or (kind == "clamped" and bank == 1)
+        or (kind == "free" and longer > 0)
+        or lines * ticks > _room(own.y)
+    )
     schedule = _schedule(kind, bank, ticks, lines)
     y_phase, hold = RationalPhase(lines if steps else lines * ticks), ticks if steps else 1
     highest = max(own.x.output.shaping.order, own.y.output.shaping.order)

@@ -16,7 +16,8 @@ from tablegen.verification.play.stream import Words, read_capture
 
 TOP = "verify_bench"
 WORDS, WIRES, STATES, CONSTANTS = "words.hex", "wires.hex", "states.hex", "constants.txt"  # in the folder of a bench
-OUTPUTS, BOOT_PROGRAM, BOOT_WORDS = "outputs.txt", "boot_program.hex", "boot_words.hex"
+OUTPUTS = "outputs.txt"
+BOOT = {"BOOT_PROGRAM": "boot_program.hex", "BOOT_X": "boot_x.hex", "BOOT_Y": "boot_y.hex"}
 OUTPUT_BENCH = Path(str(files("tablegen.verification.verilog"))) / "output_bench.v"
 SPACING_CLOCKS = 200  # a strobe so long after the one before it is sent on the wires
 COUNT_BITS = 8  # of a fault counter: few enough that it ends at its largest number
@@ -29,8 +30,8 @@ _MODULE = """\
 
 module verify_bench #(
     parameter SCRIPT = "", parameter CAPTURE = "", parameter STATES = "", parameter WORDS = "", parameter WIRES = "",
-    parameter CONSTANTS = "", parameter OUTPUTS = "", parameter BOOT_PROGRAM = "", parameter BOOT_WORDS = "",
-    parameter CONVERTERS = 1, parameter COUNT_BITS = 16, parameter PLAIN_MULTIPLIER = 0,
+    parameter CONSTANTS = "", parameter OUTPUTS = "", parameter BOOT_PROGRAM = "", parameter BOOT_X = "",
+    parameter BOOT_Y = "", parameter CONVERTERS = 1, parameter COUNT_BITS = 16, parameter PLAIN_MULTIPLIER = 0,
     parameter LOW_AREA = 0, parameter FOURIER = 0, parameter HARMONICS = 64, parameter SINE_FILE = "",
     parameter SHAPING = 0, parameter X_POWER_UP_CODE = 0, parameter Y_POWER_UP_CODE = 0
 );
@@ -121,7 +122,7 @@ module verify_bench #(
             end
 
             // What stands beside the sequencer, with the options that this build does not use.
-            output_bench #(.RESULTS(OUTPUTS), .PROGRAM_FILE(BOOT_PROGRAM), .WORDS_FILE(BOOT_WORDS)) outputs ();
+            output_bench #(.RESULTS(OUTPUTS), .PROGRAM_FILE(BOOT_PROGRAM), .X_FILE(BOOT_X), .Y_FILE(BOOT_Y)) outputs ();
         end
     endgenerate
 endmodule
@@ -165,15 +166,15 @@ def bench_parameters(script: str, capture: str, converters: bool) -> dict[str, i
         "WIRES": WIRES,
         "CONSTANTS": CONSTANTS,
     }
-    names |= {"OUTPUTS": OUTPUTS, "BOOT_PROGRAM": BOOT_PROGRAM, "BOOT_WORDS": BOOT_WORDS}
+    names |= {"OUTPUTS": OUTPUTS, **BOOT}
     paths: dict[str, int | str] = {key: f"../{name}" for key, name in names.items()}
     return {**paths, "CONVERTERS": int(converters), "COUNT_BITS": COUNT_BITS}
 
 
 def write_boot_files(folder: Path) -> None:
-    """Memory files that a ``dac_boot`` loads in the bench of the outputs: 48 words of 32 bits, and 9 of 16."""
+    """Memory files that a ``dac_boot`` loads in the bench of the outputs: 48 words of 32 bits, and twice 9 of 16."""
     random = np.random.default_rng(1)
-    for name, count, bits in ((BOOT_PROGRAM, 48, 32), (BOOT_WORDS, 9, 16)):
+    for name, (count, bits) in zip(BOOT.values(), ((48, 32), (9, 16), (9, 16)), strict=True):
         words = random.integers(0, 1 << bits, count)
         (folder / name).write_text("".join(f"{word:0{bits // 4}x}\n" for word in words), "ascii")
 
