@@ -222,7 +222,7 @@ module dac_sequencer #(
     dac_scan #(.TICK_BITS(TICK_BITS), .LINE_BITS(LINE_BITS), .FRAME_BITS(16)) scan (
         .clock(clock), .reset(reset), .write(scan_write), .write_address(address[3:0]), .write_data(data),
         .tick(accepted_tick), .arm(arm), .arm_frames(arm_frames), .trigger(trigger), .park(park),
-        .committed(committed), .loaded(loaded), .take(take), .armed(armed), .running(running),
+        .committed(committed), .withdraw(withdraw), .loaded(loaded), .take(take), .armed(armed), .running(running),
         .tick_out(tick_0), .load(load_0), .runs(runs_0), .begins(begins_0), .line(line_0), .frame(frame_0),
         .y_advance(y_advance_0), .tick_number(tick_number), .line_number(line_number)
     );

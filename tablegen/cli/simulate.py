@@ -14,6 +14,7 @@ from tablegen.cli.shared.progress import Progress
 
 if TYPE_CHECKING:
     from tablegen.config.load import Setup
+    from tablegen.virtual.parameters import Truth
     from tablegen.virtual.report import SimulationStage
     from tablegen.virtual.scanner import VirtualScanner
     from tablegen.virtual.simulation import Run
@@ -102,21 +103,18 @@ def simulate(
     from msgspec.structs import replace
 
     from tablegen.api.laboratory import Laboratory
-    from tablegen.base.input_errors import Rejected, Unphysical
+    from tablegen.base.input_errors import Rejected
     from tablegen.config.load import load
     from tablegen.virtual import report
     from tablegen.virtual.own_run import own_axes
-    from tablegen.virtual.report import SimulationStage
 
     try:
         setup = load(scan)
     except Rejected as faults:
         fail(faults.problems, ExitStatus.WRONG_INPUT)
     if setup.scan.y.off:
-        fail(
-            [setup.scan_file.problem("y.motion", "'off' makes a line scan, and frames alone are simulated")],
-            ExitStatus.WRONG_INPUT,
-        )
+        problem = setup.scan_file.problem("y.motion", "'off' makes a line scan, and frames alone are simulated")
+        fail([problem], ExitStatus.WRONG_INPUT)
     if _plays_own(context, setup, truth_file):
         _simulate_own(setup, seed, plot, as_json)
         return
@@ -136,27 +134,12 @@ def simulate(
             heading += "; its operator is that of the piezo on which it was measured"
         stages = [_play("given", heading, setup, scanner, truth_file, progress)]
         if not stages[0].runs:
-            fail(
-                list(dict.fromkeys(why for _, reasons in stages[0].rejected for why in reasons)), ExitStatus.WRONG_INPUT
-            )
+            fail(_reasons(stages[0]), ExitStatus.WRONG_INPUT)
         if calibrated:
-            from tablegen.virtual.calibration_day import calibrate
-
-            progress.now("calibrating")
-            heading = f"with one calibrated on the virtual scanner's own data, {noise:g} % noise"
-            try:
-                after = calibrate(setup, scanner, 0.01 * noise, seed).setup
-                stages.append(_play("calibrated", heading, after, scanner, truth_file, progress))
-            except (Unphysical, ValueError) as reason:
-                stages.append(SimulationStage("calibrated", heading, (), (("calibration", (str(reason),)),)))
+            stages.append(_calibrated(setup, scanner, truth_file, noise, seed, progress))
     if csv_file is not None:
         written(csv_file.parent, {csv_file.name: report.csv(stages).encode()})
-    if as_json:
-        import json
-
-        click.echo(json.dumps(report.data(setup.scan.name, truth, stages), indent=2))
-    else:
-        click.echo("\n".join(report.text(setup.scan.name, truth, stages)))
+    _print_stages(setup, truth, stages, as_json)
     if plot is not None:
         from tablegen.report.simulated import stage_charts
 
@@ -209,6 +192,39 @@ def _simulate_own(setup: "Setup", seed: int, plot: Path | None, as_json: bool) -
         from tablegen.report.simulated import own_charts
 
         put_plot(plot, lambda: own_charts(setup.scan.name, runs))
+
+
+def _print_stages(setup: "Setup", truth: "Truth", stages: "list[SimulationStage]", as_json: bool) -> None:
+    from tablegen.virtual import report
+
+    if as_json:
+        import json
+
+        click.echo(json.dumps(report.data(setup.scan.name, truth, stages), indent=2))
+    else:
+        click.echo("\n".join(report.text(setup.scan.name, truth, stages)))
+
+
+def _reasons(stage: "SimulationStage") -> list[str]:
+    """Return why no model could be played, each reason once."""
+    return list(dict.fromkeys(why for _, reasons in stage.rejected for why in reasons))
+
+
+def _calibrated(
+    setup: "Setup", scanner: "VirtualScanner", truth_file: str, noise: float, seed: int, progress: Progress
+) -> "SimulationStage":
+    """Play with parameters that were calibrated on simulated data; ``noise`` is in percent."""
+    from tablegen.base.input_errors import Unphysical
+    from tablegen.virtual.calibration_day import calibrate
+    from tablegen.virtual.report import SimulationStage
+
+    progress.now("calibrating")
+    heading = f"with one calibrated on the virtual scanner's own data, {noise:g} % noise"
+    try:
+        after = calibrate(setup, scanner, 0.01 * noise, seed).setup
+        return _play("calibrated", heading, after, scanner, truth_file, progress)
+    except (Unphysical, ValueError) as reason:
+        return SimulationStage("calibrated", heading, (), (("calibration", (str(reason),)),))
 
 
 def _play(

@@ -47,18 +47,8 @@ class _Decoder:
         match kind:
             case types.Metadata():
                 return self._any(kind.type, value, key)
-            case types.UnionType():  # in the schema "something or None", and TOML has no null; or a number or a word
-                some = [t for t in kind.types if not isinstance(t, types.NoneType)]
-                arrays = [t for t in some if isinstance(_bare(t), types.ListType)]
-                if arrays and len(some) > 1:  # a number, or an array of them
-                    return self._any(next(t for t in some if (t in arrays) == isinstance(value, list)), value, key)
-                words = [word for t in some if isinstance(t, types.LiteralType) for word in t.values]
-                if len(some) > 1 and isinstance(value, str):
-                    wrong = f"{_shown(value)} is not a number, nor {' or '.join(map(repr, words))}"
-                    return value if value in words else self._wrong(key, wrong)
-                return self._any(
-                    next(t for t in some if len(some) == 1 or not isinstance(t, types.LiteralType)), value, key
-                )
+            case types.UnionType():
+                return self._union(kind, value, key)
             case types.StructType():
                 return self.struct(kind.cls, value, key)
             case types.ListType():
@@ -79,6 +69,18 @@ class _Decoder:
             case types.BoolType():
                 return value if isinstance(value, bool) else self._wrong(key, f"{_shown(value)} is not true or false")
         raise NotImplementedError(kind)  # pragma: no cover - a type that the schema does not use
+
+    def _union(self, kind: types.UnionType, value: Any, key: str) -> Any:
+        """In the schema this is "something or None", and TOML has no null; or a number or a word."""
+        some = [t for t in kind.types if not isinstance(t, types.NoneType)]
+        arrays = [t for t in some if isinstance(_bare(t), types.ListType)]
+        if arrays and len(some) > 1:  # a number, or an array of them
+            return self._any(next(t for t in some if (t in arrays) == isinstance(value, list)), value, key)
+        words = [word for t in some if isinstance(t, types.LiteralType) for word in t.values]
+        if len(some) > 1 and isinstance(value, str):
+            wrong = f"{_shown(value)} is not a number, nor {' or '.join(map(repr, words))}"
+            return value if value in words else self._wrong(key, wrong)
+        return self._any(next(t for t in some if len(some) == 1 or not isinstance(t, types.LiteralType)), value, key)
 
     def struct(self, kind: type[Struct], value: Any, key: str) -> Any:
         if not isinstance(value, dict):

@@ -116,25 +116,14 @@ def check_hardware(
     problems: Problems,
 ) -> None:
     """Note what the values of both files say of the hardware together; faults of single keys were noted before."""
-    written: dict[Place, Any] = {}
-    for part in _KINDS:
-        written[Place(False, part)] = scan.get(part, {})
-        written[Place(True, part)] = scanner.get(part, {})
-        for axis in _AXES:
-            its = scanner.get(axis)
-            written[Place(True, f"{axis}.{part}")] = its.get(part, {}) if isinstance(its, dict) else {}
+    written = _written(scan, scanner)
     if not all(isinstance(table, dict) for table in written.values()):
         return
     files = {False: scan_file, True: scanner_file}
     missing = _missing(written)
     for place, why in missing:
         problems.add(files[place.in_scanner], place.key, why)
-    tables: dict[Place, Dac | Amplifier] = {}
-    for place, table in written.items():
-        kind = _KINDS[place.key.rsplit(".", 1)[-1]]
-        decoded = decode(kind, table, files[place.in_scanner], Problems(), lambda *_: None)
-        if decoded is not None:
-            tables[place] = decoded
+    tables = _decoded(written, files)
     if missing or len(tables) < len(written):
         return
     if contradictions := _contradictions(tables, scanner_file):
@@ -149,6 +138,29 @@ def check_hardware(
     for key, why in _apart(both["x"], both["y"], files):
         place = both["y"].where(key)[0]
         problems.add(files[place.in_scanner], place.key, why)
+
+
+def _written(scan: Mapping[str, Any], scanner: Mapping[str, Any]) -> dict[Place, Any]:
+    """Return the tables of the hardware as both files have them, empty where they have none."""
+    written: dict[Place, Any] = {}
+    for part in _KINDS:
+        written[Place(False, part)] = scan.get(part, {})
+        written[Place(True, part)] = scanner.get(part, {})
+        for axis in _AXES:
+            its = scanner.get(axis)
+            written[Place(True, f"{axis}.{part}")] = its.get(part, {}) if isinstance(its, dict) else {}
+    return written
+
+
+def _decoded(written: Mapping[Place, Any], files: Mapping[bool, Document]) -> "dict[Place, Dac | Amplifier]":
+    """Decode the tables, but for those with faults of single keys."""
+    tables: dict[Place, Dac | Amplifier] = {}
+    for place, table in written.items():
+        kind = _KINDS[place.key.rsplit(".", 1)[-1]]
+        decoded = decode(kind, table, files[place.in_scanner], Problems(), lambda *_: None)
+        if decoded is not None:
+            tables[place] = decoded
+    return tables
 
 
 def _missing(written: Mapping[Place, Mapping[str, Any]]) -> list[tuple[Place, str]]:

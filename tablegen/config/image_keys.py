@@ -31,48 +31,78 @@ class Solved(Struct, frozen=True):
 def check_words(values: Mapping[str, Any], file: Document, problems: Problems) -> None:
     """Words of different tables that say the same thing, or contradict each other; ``values`` as they were written."""
 
-    def table(name: str) -> Mapping[str, Any]:
-        found = values.get(name)
+    _Contradictions(values, file, problems).check()
+
+
+class _Contradictions:
+    """Words of the scan file ``values`` that say the same thing twice."""
+
+    def __init__(self, values: Mapping[str, Any], file: Document, problems: Problems) -> None:
+        self._values, self._file, self._problems = values, file, problems
+        self._timing, self._y = self._table("timing"), self._table("y")
+        self._off = self._y.get("motion") == "off"
+        self._own = [key for key in self._y if f"y.{key}" not in file.inherited]
+        self._image = next((key for key in IMAGES if key in values), None)
+
+    def check(self) -> None:
+        """Note all of them."""
+        if self._off:
+            self._check_rest()
+        if self._image is not None:
+            self._check_sizes(self._image)
+        if self._timing.get("frame") is not None:
+            self._check_frame()
+        self._check_rates()
+
+    def _table(self, name: str) -> Mapping[str, Any]:
+        found = self._values.get(name)
         return found if isinstance(found, dict) else {}
 
-    def refuse(key: str, other: str, why: str) -> None:
-        line = file.line_of(other) if file.lines is not None else 0
+    def _refuse(self, key: str, other: str, why: str) -> None:
+        line = self._file.line_of(other) if self._file.lines is not None else 0
         at = f" on line {line}" if line else ""
-        problems.add(file, key, f"{other}{at} {why}")
+        self._problems.add(self._file, key, f"{other}{at} {why}")
 
-    timing, y = table("timing"), table("y")
-    off = y.get("motion") == "off"
-    own = [key for key in y if f"y.{key}" not in file.inherited]
-    if off:
+    def _check_rest(self) -> None:
+        """What an axis at rest has not."""
         for key in ("turn", "band_limit", "table", "refinement", *SIZES, "size_of"):
-            if key in own:
-                refuse(f"y.{key}", "y.motion", "keeps y where it is; leave this out, or motion = 'off'")
-        if "frame" in timing:
-            refuse("timing.frame", "y.motion", "keeps y where it is; leave out one of the two")
-    image = next((key for key in IMAGES if key in values), None)
-    if off and image is not None and isinstance(values[image], list):
-        refuse(image, "y.motion", "keeps y where it is; give one number, the length of the line scan")
-    for axis in ("x", "y"):
-        for key in (*SIZES, "size_of"):
-            rests = off and axis == "y"  # which is told already
-            if image is None or rests or key not in table(axis) or f"{axis}.{key}" in file.inherited:
-                continue
-            why = "sets the size of both axes already, as that of the imaging windows"
-            refuse(f"{axis}.{key}", image, f"{why}; leave out one of the two")
-    frame = timing.get("frame")
-    if frame is not None and "turn" in own:
-        refuse("y.turn", "timing.frame", "sets where y turns; leave out one of the two")
-    limit = table("y").get("band_limit")
-    named = isinstance(limit, dict) and "directions" in limit and "y.band_limit.directions" not in file.inherited
-    if frame is not None and named:
-        refuse("y.band_limit.directions", "timing.frame", "sets the directions of y; leave out one of the two")
-    speed = next((key for key in RATES[2:] if key in timing), None)
-    if speed is not None and "size_v" in table("x"):
-        refuse(f"timing.{speed}", "x.size_v", "gives no length, which a speed needs; give a size in nm, or a line rate")
-    ticks = next((key for key in ("ticks_per_line", "ticks_per_pixel") if key in timing), None)
-    rate = next((key for key in RATES[1:] if key in timing), None)
-    if ticks is not None and rate is not None:
-        refuse(f"timing.{rate}", f"timing.{ticks}", "sets the length of the line already; leave out one of the two")
+            if key in self._own:
+                self._refuse(f"y.{key}", "y.motion", "keeps y where it is; leave this out, or motion = 'off'")
+        if "frame" in self._timing:
+            self._refuse("timing.frame", "y.motion", "keeps y where it is; leave out one of the two")
+        if self._image is not None and isinstance(self._values[self._image], list):
+            self._refuse(self._image, "y.motion", "keeps y where it is; give one number, the length of the line scan")
+
+    def _check_sizes(self, image: str) -> None:
+        """Sizes of axes beside that of the image; those of an axis at rest are told already."""
+        for axis in ("x",) if self._off else ("x", "y"):
+            for key in (*SIZES, "size_of"):
+                if key in self._table(axis) and f"{axis}.{key}" not in self._file.inherited:
+                    why = "sets the size of both axes already, as that of the imaging windows"
+                    self._refuse(f"{axis}.{key}", image, f"{why}; leave out one of the two")
+
+    def _check_frame(self) -> None:
+        """What the kind of frame sets."""
+        if "turn" in self._own:
+            self._refuse("y.turn", "timing.frame", "sets where y turns; leave out one of the two")
+        limit = self._y.get("band_limit")
+        if isinstance(limit, dict) and "directions" in limit:
+            key = "y.band_limit.directions"
+            if key not in self._file.inherited:
+                self._refuse(key, "timing.frame", "sets the directions of y; leave out one of the two")
+
+    def _check_rates(self) -> None:
+        """A speed without a length, and a line whose length is given twice."""
+        timing = self._timing
+        speed = next((key for key in RATES[2:] if key in timing), None)
+        if speed is not None and "size_v" in self._table("x"):
+            why = "gives no length, which a speed needs; give a size in nm, or a line rate"
+            self._refuse(f"timing.{speed}", "x.size_v", why)
+        ticks = next((key for key in ("ticks_per_line", "ticks_per_pixel") if key in timing), None)
+        rate = next((key for key in RATES[1:] if key in timing), None)
+        if ticks is not None and rate is not None:
+            why = "sets the length of the line already; leave out one of the two"
+            self._refuse(f"timing.{rate}", f"timing.{ticks}", why)
 
 
 def solved(

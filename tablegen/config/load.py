@@ -256,11 +256,7 @@ def _check(
     elif kind is BandLimit:
         _at_most_one(("harmonics", "cutoff_hz"), key, written, file, problems)
     elif kind is WrittenTiming:
-        _at_most_one(("ticks_per_line", "ticks_per_pixel"), key, written, file, problems)
-        for names in (("lines", "image_lines"), RATES):
-            _at_most_one(names, key, written, file, problems)
-            if not _any_of(names, written, kind):
-                problems.add(file, f"{key}.{names[0]}", f"missing; give {' or '.join(names)}")
+        _check_timing(kind, key, written, file, problems)
     elif kind is Offset:
         _check_ways(key, written, file, problems)
     elif kind is Resonance:
@@ -271,6 +267,15 @@ def _check(
     if built is not None:
         for name, why in _faults(built):
             problems.add(file, f"{key}.{name}", why)
+
+
+def _check_timing(kind: type, key: str, written: Mapping[str, Any], file: Document, problems: Problems) -> None:
+    """Lines and a rate, each said once."""
+    _at_most_one(("ticks_per_line", "ticks_per_pixel"), key, written, file, problems)
+    for names in (("lines", "image_lines"), RATES):
+        _at_most_one(names, key, written, file, problems)
+        if not _any_of(names, written, kind):
+            problems.add(file, f"{key}.{names[0]}", f"missing; give {' or '.join(names)}")
 
 
 def _check_axis(
@@ -335,26 +340,9 @@ def _faults(built: Struct) -> list[tuple[str, str]]:
         case FastAxis() if built.size_v is not None and built.size_of == "window":
             return [("size_of", "only a size in nm can be that of the window; size_v is the drive's")]
         case BandLimit():
-            low, high = built.window
-            if high <= low:
-                return [("window", f"[{low:g}, {high:g}] does not ascend")]
-            if high - low < 0.01:
-                return [("window", f"[{low:.12g}, {high:.12g}] is narrower than 0.01 of the line")]
-            if built.method != "window":
-                keys = {
-                    "max_scaling_error_percent": built.max_scaling_error_percent is not None,
-                    "harmonics": built.harmonics == "fewest",
-                }
-                why = f"method = '{built.method}' keeps no scaling error; take method = 'window'"
-                return [(key, why) for key, given in keys.items() if given]
-        case Table() if built.mode == "cubic" and (built.bits or 0) > MAXIMUM_SPLINE_BITS:
-            return [("bits", f"{built.bits} is above the {MAXIMUM_SPLINE_BITS} of mode = 'cubic'")]
-        case Table() if built.mode == "cubic" and (built.length or 0) > MAXIMUM_SPLINE_LENGTH:
-            return [("length", f"{built.length} is above the {MAXIMUM_SPLINE_LENGTH} of mode = 'cubic'")]
-        case Table() if built.mode != "direct" and built.length is not None:
-            lower = 1 << (built.length.bit_length() - 1)
-            if built.length != lower:
-                return [("length", f"{built.length} is not a power of two; the nearest are {lower} and {2 * lower}")]
+            return _band_limit_faults(built)
+        case Table():
+            return _table_faults(built)
         case Refinement() if len(built.a) != len(built.b):
             return [("b", f"{len(built.b)} harmonics, and {len(built.a)} in a")]
         case Offset():
@@ -363,6 +351,34 @@ def _faults(built: Struct) -> list[tuple[str, str]]:
             return built.faults()
         case _:
             pass
+    return []
+
+
+def _band_limit_faults(limit: BandLimit) -> list[tuple[str, str]]:
+    low, high = limit.window
+    if high <= low:
+        return [("window", f"[{low:g}, {high:g}] does not ascend")]
+    if high - low < 0.01:
+        return [("window", f"[{low:.12g}, {high:.12g}] is narrower than 0.01 of the line")]
+    if limit.method == "window":
+        return []
+    keys = {
+        "max_scaling_error_percent": limit.max_scaling_error_percent is not None,
+        "harmonics": limit.harmonics == "fewest",
+    }
+    why = f"method = '{limit.method}' keeps no scaling error; take method = 'window'"
+    return [(key, why) for key, given in keys.items() if given]
+
+
+def _table_faults(table: Table) -> list[tuple[str, str]]:
+    if table.mode == "cubic" and (table.bits or 0) > MAXIMUM_SPLINE_BITS:
+        return [("bits", f"{table.bits} is above the {MAXIMUM_SPLINE_BITS} of mode = 'cubic'")]
+    if table.mode == "cubic" and (table.length or 0) > MAXIMUM_SPLINE_LENGTH:
+        return [("length", f"{table.length} is above the {MAXIMUM_SPLINE_LENGTH} of mode = 'cubic'")]
+    if table.mode != "direct" and table.length is not None:
+        lower = 1 << (table.length.bit_length() - 1)
+        if table.length != lower:
+            return [("length", f"{table.length} is not a power of two; the nearest are {lower} and {2 * lower}")]
     return []
 
 

@@ -13,11 +13,13 @@ from tablegen.compensation import models
 from tablegen.config.load import load, load_scanner
 from tablegen.correction.agreement import difference
 from tablegen.correction.distortion import Distortion, Resampler
+from tablegen.correction.fit_checks import check_agreement, check_cell, check_moves
 from tablegen.correction.periodic_scan import PeriodicScan, periodic_scan
 from tablegen.correction.settled_scan import AxisScan, ScannerModel, lines_of, scanner_distortion, triangle
 from tablegen.correction.straight import ScanPicture, StraightScan, put_straight
 from tablegen.images.files import ScanImage, channels_of, read_channels, read_image
 from tablegen.images.pair_checks import check_heights, check_pair, check_size
+from tablegen.images.scan_angle import is_turned
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.laws import size_law_of
 from tablegen.planning.line_plan import LinePlan, make_plan
@@ -107,6 +109,12 @@ class Images:
             {"file": source.name, "sha256": source.sha256}
             for source in dict.fromkeys(channel.source for channel in self.channels)
         ]
+
+    @property
+    def angle(self) -> dict[str, float]:
+        """The scan angle in degrees, for the record; empty where the file states none, or 0."""
+        angle = self.first.angle_deg
+        return {"scan_angle_deg": round(angle, 4)} if angle is not None and is_turned(self.first) else {}
 
 
 def read_scan(trace: Path, retrace: Path | None, choice: Choice) -> Images:
@@ -289,6 +297,7 @@ def _scanned(
     record: dict[str, Any] = {
         "by": "scanner file",
         "sources": images.sources,
+        **images.angle,
         "scanner": {"file": path.name, "sha256": file_sha256(path, CONFIGURATION)},
         **how,
     }
@@ -316,7 +325,11 @@ def _scanned(
 def by_fit(
     images: Images, taken: OldScan, pitch_nm: float | None = None, lattice_nm: float | None = None
 ) -> tuple[StraightScan, PeriodicScan]:
-    """Put straight by a fit to a periodic sample, and the fit. Raises ``Unphysical``."""
+    """Put straight by a fit to a periodic sample, and the fit.
+
+    Raises ``Unphysical`` where there is no fit, or where the image does not support the correction: another cell would
+    do as well, the displacement is too large, or trace and retrace do not agree better.
+    """
     if not images.forward[images.judged[0]]:
         raise Unphysical("is a retrace by the file; a fit needs the trace")
     trace, retrace = (*(images.channels[i].heights for i in images.judged), None)[:2]
@@ -327,7 +340,7 @@ def by_fit(
     first, (rows, columns) = images.first, images.shape
     size: tuple[float, float] | None = None
     found: Distortion = fit.distortion
-    record: dict[str, Any] = {"by": "fit to a periodic sample", "sources": images.sources}
+    record: dict[str, Any] = {"by": "fit to a periodic sample", "sources": images.sources, **images.angle}
     if lattice_nm is not None or pitch_nm is not None:
         if lattice_nm is not None:
             found = fit.of_lattice(lattice_nm)
@@ -340,6 +353,8 @@ def by_fit(
         size = found.x_range[1] - found.x_range[0], found.y_range[1] - found.y_range[0]
         if first.width_nm is not None:
             check_size(size[0], first.width_nm, "the file")
+        if first.height_nm is not None and fit.tells_y and lattice_nm is not None:
+            check_size(size[1], first.height_nm, "the file", "frame")
     elif first.width_nm is not None and first.height_nm is not None:
         size = first.width_nm, first.height_nm
     record |= {
@@ -349,7 +364,11 @@ def by_fit(
         "explained": round(fit.explained, 6),
         "slow_axis": "fitted" if fit.tells_y else "as taken: a grating does not tell it",
     }
-    return _made(images, found, size, record), fit
+    scan = _made(images, found, size, record)
+    check_moves(found)
+    check_cell(fit, images.heights(images.judged[0]), True)
+    check_agreement(scan.agreement)
+    return scan, fit
 
 
 def check_order(images: Images, distortion: Distortion) -> None:

@@ -58,7 +58,8 @@ class Sequencer:
     ``commit`` fills the idle bank; it is taken at the next line start, or on the next tick while no line plays.
     ``arm`` and ``trigger`` start ``frames`` frames (0: without end) from line 0; ``park`` ends them at once. Parked
     and parking outputs follow the park code under the slew guard of the bank that plays. A device without a program
-    (``playing`` is None) holds its ``codes`` and ignores triggers.
+    (``playing`` is None) holds its ``codes``. It ignores triggers, unless its first program is committed: then the scan
+    starts when that program is taken.
     """
 
     playing: DualProgram | None
@@ -99,8 +100,10 @@ class Sequencer:
         self.idle = program
 
     def withdraw(self) -> None:
-        """A committed program that was not taken yet is not to be played."""
+        """Do not play a committed program that was not taken yet; nor a scan of it, if it is the first one."""
         self.idle = None
+        if self.playing is None:
+            self.running = False
 
     def arm(self, frames: int = 0) -> None:
         """Let the next trigger start so many frames; 0 is without end."""
@@ -110,15 +113,17 @@ class Sequencer:
     def trigger(self) -> bool:
         """Start at line 0 on the next tick; ignored unless armed, not running, and with a program to play.
 
-        The codes need not have parked: in a pipeline nobody knows yet, and the slew guard holds anyway.
+        A program that waits is one: the next tick takes it. The codes need not have parked: in a pipeline nobody knows
+        yet, and the slew guard holds anyway.
         """
-        if not self.armed or self.running or self.playing is None:
+        program = self.idle if self.playing is None else self.playing
+        if not self.armed or self.running or program is None:
             return False
         self.armed = self.parked = False
         self._endless = self._armed_frames == 0
         self.frames_left = self._armed_frames
         self.running = True
-        self._begin(self.playing)
+        self._begin(program)
         return True
 
     def park(self) -> None:

@@ -65,6 +65,7 @@ class ScanImage:
     first_row: FirstRow | None = None  # where row 0 is in the picture
     frame: int = 0  # counted from 0
     frames: int = 1  # images of a movie
+    angle_deg: float | None = None  # of the fast axis against the scanner's x
 
 
 def read_image(
@@ -207,6 +208,7 @@ def _read(file: _ImageFile, channel: Channel, frame: int | None) -> ScanImage:
         first_row=channel.first_row,
         frame=chosen,
         frames=channel.frames,
+        angle_deg=channel.angle_deg,
     )
 
 

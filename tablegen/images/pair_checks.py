@@ -3,6 +3,8 @@
 Each check raises ``Unphysical``, whose message says what to do. Names are those of the images: "trace", "retrace".
 """
 
+from typing import Literal
+
 import numpy as np
 
 from tablegen.base.input_errors import Unphysical
@@ -86,15 +88,16 @@ def check_periods(periods: float, span: float, columns: int) -> None:
         )
 
 
-def check_size(found_nm: float, said_nm: float, said_by: str) -> None:
+def check_size(found_nm: float, said_nm: float, said_by: str, side: Literal["line", "frame"] = "line") -> None:
     """The size by the sample's constant against the one that was said, by ``said_by``.
 
     A constant of another direction of a lattice is wrong by the root of two or of three, an alias by more.
     """
     ratio = found_nm / said_nm
+    long = "long" if side == "line" else "high"
     if not 1.0 / _MAX_SIZE_RATIO < ratio < _MAX_SIZE_RATIO:
         raise Unphysical(
-            f"the line is {found_nm:.4g} nm long by the sample's constant, and {said_nm:.4g} nm by "
+            f"the {side} is {found_nm:.4g} nm {long} by the sample's constant, and {said_nm:.4g} nm by "
             f"{said_by}; is the constant that of this sample, the lattice of this kind, and a period more than "
             f"two pixels?"
         )

@@ -114,8 +114,7 @@ def row_polynomial(
     geometry: Geometry, heights: Floats, bend: Bend, spot: Spot, order: int, smoothed: float = 0.01
 ) -> Floats:
     """s_1, s_2, ... of a forward image: the phase of the spot along the rows, ``smoothed`` over a part of the frame."""
-    tau = _inverse(bend.shape.coordinates, geometry.sweep(True))
-    assert tau is not None
+    tau = _required(_inverse(bend.shape.coordinates, geometry.sweep(True)))
     seen = (heights @ np.exp(-2j * np.pi * bend.q * tau)) * np.exp(-2j * np.pi * spot.s * geometry.y)
     box = np.ones(max(round(smoothed * geometry.rows), 1) | 1)
     smooth = np.convolve(np.convolve(seen, box, "same"), box, "same")
@@ -133,8 +132,7 @@ def column_phase(
     Over a whole period of x the harmonics, and the spot's other half, cancel. Within half a period of the ends the
     phase is that of the last whole one.
     """
-    tau = _inverse(bend.shape.coordinates, geometry.sweep(forward))
-    assert tau is not None
+    tau = _required(_inverse(bend.shape.coordinates, geometry.sweep(forward)))
     x = tau if forward else 1.0 - tau
     turns = np.polynomial.polynomial.polyval(geometry.y, np.append(0.0, polynomial))
     seen = (np.exp(-2j * np.pi * turns) @ heights) * np.exp(-2j * np.pi * bend.q * x)
@@ -169,6 +167,16 @@ def _inverse(coordinates: Floats, u: Floats) -> Floats | None:
     if np.min(np.diff(value)) < 0.1 / 512:
         return None
     return np.interp(u, value, tau)
+
+
+def _required(tau: Floats | None) -> Floats:
+    """Raise ``Unphysical`` where the branch that fits best runs backwards: no scanner has such a branch."""
+    if tau is None:
+        raise Unphysical(
+            "the branch that fits best runs backwards; are rows that jump, steps or debris in the image? Crop it, or "
+            "choose another --channel"
+        )
+    return tau
 
 
 def second_base(

@@ -128,6 +128,10 @@ class Device:
         payload = self._session.ask(Request.STATUS, b"", DeviceStatus.LAYOUT.size, self._until(None))
         return self._session.status_of(payload)
 
+    def needs_key(self) -> bool:
+        """Return whether uploads carry a tag; raises ``Refused`` if they do and no key was given. Sends nothing."""
+        return self._session.needs_key(Request.COMMIT)
+
     def upload(
         self,
         image: "ProgramImage",

@@ -259,6 +259,8 @@ class LinePlayer(_Queue):
 
         def act() -> None:
             self._waits = None
+            if self.playing is None:
+                self._running = False
 
         return self._ask(act)
 
@@ -274,7 +276,7 @@ class LinePlayer(_Queue):
         """Start at line 0."""
 
         def act() -> None:
-            if self._armed and not self._running and self.playing is not None:
+            if self._armed and not self._running and (self.playing or self._waits) is not None:
                 self._armed, self._running = False, True
                 self._endless, self._frames_left = self._armed_frames == 0, self._armed_frames
                 self._tick = self.line = 0

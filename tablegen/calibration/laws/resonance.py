@@ -46,11 +46,7 @@ def fit_resonance(frequency_hz: Floats, gain: Floats, phase_deg: Floats | None =
     if phase_deg is None:
         remarks.append(Remark("without phase_deg the delay is not determined; delay_s is set to 0"))
     else:
-        phase = np.unwrap(np.radians(phase_deg[order]))
-        turned = round(float(phase[0]) / pi)  # 180 degrees at low frequency: an inverting amplifier or sensor
-        if turned % 2:
-            remarks.append(Remark("the response is inverted at the lowest frequency; 180 degrees were taken off"))
-        phase = phase - pi * turned
+        phase = _unwrapped(phase_deg[order], remarks)
     solution = _best(f, g, phase)
     at, quality = float(np.exp(solution.values[1])), float(np.exp(solution.values[2]))
     if not f[0] < at < f[-1]:
@@ -59,17 +55,7 @@ def fit_resonance(frequency_hz: Floats, gain: Floats, phase_deg: Floats | None =
             f"measure through it"
         )
     frequency, q = (_of_logarithm(solution.estimate(name)) for name in ("frequency_hz", "quality"))
-    delay = Estimate(0.0)
-    if phase is not None:
-        delay = solution.estimate("delay_s")
-        delay = Estimate(delay.value / at, delay.standard_error / at)
-        if delay.value < 0.0:
-            if not -delay.value <= 2.0 * delay.standard_error:
-                raise Unphysical(
-                    f"the phase leads as by a delay of {delay.value:.3g} s; a lag has to be negative in phase_deg"
-                )
-            remarks.append(Remark("no delay is measurable; delay_s is set to 0"))
-            delay = Estimate(0.0, delay.standard_error)
+    delay = Estimate(0.0) if phase is None else _delay(solution, at, remarks)
     for name in solution.undetermined:
         remarks.append(spoils(f"{name} is not determined by these points; measure more of them around the resonance"))
     near = np.abs(f - at) <= at / quality
@@ -111,6 +97,27 @@ def fit_resonance(frequency_hz: Floats, gain: Floats, phase_deg: Floats | None =
         gain=_of_logarithm(solution.estimate("gain")),
         response=None if phase is None else np.stack([f, g, np.degrees(phase)], axis=1),
     )
+
+
+def _unwrapped(phase_deg: Floats, remarks: list[Remark]) -> Floats:
+    """Return the phase in radians, from near 0 at the lowest frequency."""
+    phase = np.unwrap(np.radians(phase_deg))
+    turned = round(float(phase[0]) / pi)  # 180 degrees at low frequency: an inverting amplifier or sensor
+    if turned % 2:
+        remarks.append(Remark("the response is inverted at the lowest frequency; 180 degrees were taken off"))
+    return np.asarray(phase - pi * turned)
+
+
+def _delay(solution: Solution, resonance_hz: float, remarks: list[Remark]) -> Estimate:
+    """Return the delay in s, 0 where none can be measured. Raises ``Unphysical`` for a phase that leads."""
+    fitted = solution.estimate("delay_s")
+    delay = Estimate(fitted.value / resonance_hz, fitted.standard_error / resonance_hz)
+    if delay.value >= 0.0:
+        return delay
+    if not -delay.value <= 2.0 * delay.standard_error:
+        raise Unphysical(f"the phase leads as by a delay of {delay.value:.3g} s; a lag has to be negative in phase_deg")
+    remarks.append(Remark("no delay is measurable; delay_s is set to 0"))
+    return Estimate(0.0, delay.standard_error)
 
 
 def _response(f: Floats, x: Floats) -> tuple[Floats, Floats]:

@@ -22,6 +22,8 @@ from tablegen.cli.images.pairs import (
     read_both,
     retrace_channel_option,
 )
+from tablegen.cli.shared.common import fail
+from tablegen.cli.shared.exit_status import ExitStatus
 
 
 @click.command(cls=CommandOfPairs, short_help="Fit beta_max, rho, u_peak to trace and retrace images.")
@@ -60,15 +62,24 @@ def images(
     Columns: pixels at equal time steps within --window of each sweep.
     Rows:    scan lines in order of time. Both images have the left end of the line at the
              left; otherwise give --retrace-mirrored.
+    Angle:   files of instruments state the scan angle. The fast axis is x at 0 degrees and y
+             at 90; --axis has to be that one.
 
     \b
     Example:
       tablegen calibrate images --axis x --v-max 100 --pair 50 t1.npy r1.npy --pair 100 t2.npy r2.npy
       tablegen calibrate images --axis x --v-max 100 --pair 50 1.ibw --pair 100 2.ibw --channel Height
     """
+    from tablegen.base.input_errors import Rejected
     from tablegen.calibration.laws.images import Pair, fit_images
+    from tablegen.images.scan_angle import require_fast_axis
 
     read = [read_both(trace, retrace, channel, retrace_channel, frame) for _, trace, retrace in pairs]
+    files = [image for both in read for image in both]
+    try:
+        require_fast_axis(files, common.axis)
+    except Rejected as rejected:
+        fail(rejected.problems, ExitStatus.WRONG_INPUT)
     driver = driver_of(common)
     taken = [
         Pair(
@@ -76,6 +87,5 @@ def images(
         )
         for (volts, *_), (trace, retrace) in zip(pairs, read, strict=True)
     ]
-    files = [image for both in read for image in both]
     fit = partial(fit_images, taken, driver, rho, turn, window, retrace_mirrored, delay_pixels)
     return finish(common, files, fit, points)

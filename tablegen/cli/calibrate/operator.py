@@ -60,7 +60,7 @@ _MEASURES = "    rms   scaling  mismatch"
     (PAIR_NAME,),
 )
 @sample_options
-def operator(
+def operator(  # noqa: C901
     common: Common,
     data: tuple[Path, ...],
     delay_s: str,
@@ -91,6 +91,7 @@ def operator(
       tablegen calibrate operator --axis x 10v.csv 25v.csv 50v.csv 75v.csv 97v.csv --scanner scanner.toml --write
     """
     from tablegen.base.input_errors import Unphysical
+    from tablegen.base.warnings import of_remarks, worst_first
     from tablegen.calibration.operator.advice import next_trace
     from tablegen.calibration.operator.delay import fit_delay
     from tablegen.calibration.operator.fit import fit_operator
@@ -99,6 +100,7 @@ def operator(
     from tablegen.calibration.tables.columns import DISPLACEMENT, DRIVE, TIME, TRACE
     from tablegen.calibration.tables.traces import split_traces
     from tablegen.fitting.estimate import Estimate
+    from tablegen.images.scan_angle import angle_remarks
 
     wanted_delay = delay_of(delay_s)
     if not data and not images:
@@ -135,6 +137,8 @@ def operator(
         click.echo(json.dumps(_record(fit, lines, further, common.axis, sources, delay), indent=2, allow_nan=False))
     else:
         click.echo("\n".join(_text(fit, lines, further, common.axis, driver, delay)))
+        for finding in worst_first(of_remarks(angle_remarks(sources, common.axis))):
+            click.echo(finding.line)
     plot_fit(common, lambda: _charts(fit, lines, further, driver, common.axis))
     if common.report is not None:
         written(common.report.parent, {common.report.name: _page(fit, lines, further, common.axis, driver, sources)})
@@ -262,6 +266,7 @@ def _record(
 ) -> dict[str, Any]:
     """The same for programs."""
     from tablegen.compensation.models.operator import OperatorModel
+    from tablegen.images.scan_angle import angle_remarks
 
     traces = [
         {
@@ -290,6 +295,7 @@ def _record(
             "standard_error": delay.standard_error if isfinite(delay.standard_error) else None,
         },
         "traces": traces,
+        "remarks": list(angle_remarks(tables, axis)),
         "next_trace": {"size_v": further.size_v, "offset_v": further.offset_v, "rate_hz": further.rate_hz},
         "sources": [{"file": table.source.name, "sha256": table.source.sha256} for table in tables],
     }

@@ -3,7 +3,7 @@
 import json
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -245,11 +245,14 @@ def finish(
     from tablegen.base.input_errors import Unphysical
     from tablegen.calibration.fit_warnings import fit_findings
     from tablegen.cli.calibrate.text import calibration_text
+    from tablegen.images.scan_angle import angle_remarks
 
     try:
         with Progress() as progress:
             progress.now("fitting")
             fit = run()
+            remarks = angle_remarks(tables, common.axis)
+            fit = replace(fit, remarks=(*remarks, *fit.remarks)) if remarks else fit
     except Unphysical as reason:
         fail([f"{', '.join(dict.fromkeys(table.file for table in tables))}: {reason}"], ExitStatus.WRONG_INPUT)
     sources = list(dict.fromkeys(table.source for table in tables))  # images may stand in one file

@@ -14,6 +14,7 @@ from tablegen.cli.shared.terminal import tell
 if TYPE_CHECKING:
     from tablegen.images.formats.channel import Channel
 
+_ANGLE = "angle [deg]"
 _HEAD = ("", "channel", "direction", "pixels", "size [nm]", "unit", "lines [Hz]", "frames", "first row")
 
 
@@ -28,7 +29,8 @@ def channels(files: tuple[Path, ...], as_json: bool) -> int:
            .npy, .tif, .png, or a matrix of numbers: .txt, .asc, .csv, .dat.
 
     The options --channel and --retrace-channel of other commands take the number, or the name. A name without the
-    direction, such as Height, finds trace and retrace. A column is empty where a file does not say.
+    direction, such as Height, finds trace and retrace. A column is empty where a file does not say. A scan angle other
+    than 0 has a column of its own: at 90 degrees the fast axis is the other piezo.
 
     \b
     Example:
@@ -53,7 +55,10 @@ def channels(files: tuple[Path, ...], as_json: bool) -> int:
     for path, here in found:
         tell(str(path), bold=True)
         rows = [_HEAD, *(_row(one) for one in here)]
-        widths = [max(len(row[i]) for row in rows) for i in range(len(_HEAD))]
+        if any(one.angle_deg for one in here):
+            angles = ["" if one.angle_deg is None else f"{one.angle_deg:.4g}" for one in here]
+            rows = [(*row, cell) for row, cell in zip(rows, [_ANGLE, *angles], strict=True)]
+        widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
         for row in rows:
             tell("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
     return ExitStatus.OK
@@ -73,6 +78,7 @@ def _record(channel: "Channel") -> dict[str, Any]:
         "line_rate_hz": channel.line_rate_hz,
         "frames": channel.frames,
         "first_row": channel.first_row,
+        "scan_angle_deg": channel.angle_deg,
     }
 
 

@@ -1,7 +1,7 @@
 """``tablegen refine --images``: its options, and the round that trace and retrace of the running scan give."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
@@ -72,6 +72,7 @@ class ImageArguments:
         from tablegen.api.refine import RefinedScan
         from tablegen.base.input_errors import Rejected, Unphysical
         from tablegen.config.load import load
+        from tablegen.images.scan_angle import running_scan_remarks
         from tablegen.refinement.image_round import refine_images, refine_mismatch
         from tablegen.refinement.lattice_line import ImageOptions
 
@@ -101,6 +102,8 @@ class ImageArguments:
             fail([f"{self.names}: {reason}"], ExitStatus.WRONG_INPUT)
         except OSError as error:
             fail([f"{scan}: {error.strerror or error}"], ExitStatus.WRONG_INPUT)
+        remarks = running_scan_remarks(image for pair in read for image in pair)
+        found = replace(found, remarks=(*remarks, *found.remarks))
         return RefinedScan(found, tuple(sources), scan, text)
 
 

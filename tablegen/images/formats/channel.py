@@ -43,6 +43,7 @@ class Channel:
     line_rate_hz: float | None = None  # lines in one direction per second
     first_row: FirstRow | None = None  # where row 0 is in the picture; None where that is not known
     frames: int = 1
+    angle_deg: float | None = None  # of the fast axis against the scanner's x; None where the file does not say
 
 
 def loaded(number: int, title: str, matrix: Matrix) -> Channel:
@@ -112,11 +113,30 @@ def quoted(title: str) -> str:
 
 def positive(value: object, unit: float = 1.0) -> float | None:
     """A number, or the text of one, in another unit; None for what is no positive number."""
+    found = number(value, unit)
+    return found if found is not None and found > 0.0 else None
+
+
+def number(value: object, unit: float = 1.0) -> float | None:
+    """A finite number, or the text of one, in another unit; None for anything else."""
     try:
         found = float(value) * unit  # type: ignore[arg-type]
     except (TypeError, ValueError):
         return None
-    return found if isfinite(found) and found > 0.0 else None
+    return found if isfinite(found) else None
+
+
+def lines_done(values: Matrix) -> int:
+    """Count the complete lines of a stopped scan, (channels, lines, columns), whose missing lines are NaN.
+
+    All lines count unless the missing ones are the last: NaN elsewhere is a defect of the image.
+    """
+    lines = values.shape[1]
+    finite = np.isfinite(values)
+    whole: list[bool] = np.all(finite, axis=(0, 2)).tolist()
+    some: list[bool] = np.any(finite, axis=(0, 2)).tolist()
+    done = whole.index(False) if False in whole else lines
+    return done if done and not any(some[done + 1 :]) else lines
 
 
 def first_line(error: BaseException) -> str:

@@ -9,7 +9,16 @@ from math import prod
 
 import numpy as np
 
-from tablegen.images.formats.channel import Channel, Direction, FirstRow, Matrix, positive, quoted
+from tablegen.images.formats.channel import (
+    Channel,
+    Direction,
+    FirstRow,
+    Matrix,
+    lines_done,
+    number,
+    positive,
+    quoted,
+)
 
 _MAGIC = b":NANONIS_VERSION:"
 _END, _DATA = b":SCANIT_END:", b"\x1a\x04"
@@ -48,15 +57,16 @@ def sxm_channels(content: bytes, _: str) -> list[Channel]:
     if start + size * len(blocks) > len(content):
         least = f"{len(blocks)} images of {columns} x {rows} pixels"
         raise ValueError(f"ends in the middle of its images ({least} by its header); copy it again")
-    done = _lines_done(np.frombuffer(content, kind, len(blocks) * columns * rows, start).reshape(-1, rows, columns))
+    done = lines_done(np.frombuffer(content, kind, len(blocks) * columns * rows, start).reshape(-1, rows, columns))
     width, height = _lengths(tags, "SCAN_RANGE", 1e9)
     times = _lengths(tags, "SCAN_TIME", 1.0)
+    angle = number(next(iter(_words(tags, "SCAN_ANGLE")), None))
     return [
         Channel(
-            number,
+            at,
             f"{signal} {_NAMES[direction]}",
             (done, columns),
-            partial(_load, content, kind, start + size * number, (done, columns), direction),
+            partial(_load, content, kind, start + size * at, (done, columns), direction),
             signal,
             direction,
             unit,
@@ -64,19 +74,10 @@ def sxm_channels(content: bytes, _: str) -> list[Channel]:
             None if height is None else height * done / rows,
             None if None in times else 1.0 / sum(filter(None, times)),
             _FIRST_ROW.get(" ".join(_words(tags, "SCAN_DIR"))),
+            angle_deg=angle,
         )
-        for number, (signal, unit, direction) in enumerate(blocks)
+        for at, (signal, unit, direction) in enumerate(blocks)
     ]
-
-
-def _lines_done(values: Matrix) -> int:
-    """How many lines a scan has that was stopped, which ends in lines without a number; all, if that is not so."""
-    lines = values.shape[1]
-    finite = np.isfinite(values)
-    whole: list[bool] = np.all(finite, axis=(0, 2)).tolist()
-    some: list[bool] = np.any(finite, axis=(0, 2)).tolist()
-    done = whole.index(False) if False in whole else lines
-    return done if done and not any(some[done + 1 :]) else lines
 
 
 def _load(content: bytes, kind: str, start: int, shape: tuple[int, int], direction: Direction, _: int) -> Matrix:
