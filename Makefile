@@ -41,8 +41,9 @@ TOOLS := $(COMMON_TOOLS) $(HDL_TOOLS) $(FIRMWARE_TOOLS) cppcheck
 # A process that has nothing more to do takes tests from the end of the other's: neighbours stay together, so that what
 # they share is made once. OpenBLAS threads only spin beside the other processes. Half of what is compiled of each model
 # of Verilator is its library, the same for all. Without bytecode every process compiles anew: the processes that run the
-# tests hundreds of files, each command of tablegen that a test starts its modules, which doubles what it takes.
-PYTEST := PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 OBJCACHE=ccache CCACHE_DIR=$(CURDIR)/build/ccache $(BIN)/python -m pytest --numprocesses auto --dist worksteal
+# tests hundreds of files, each command of tablegen that a test starts its modules, which doubles what it takes. A make
+# that a test starts is no part of this one.
+PYTEST := MAKEFLAGS= MFLAGS= PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 OBJCACHE=ccache CCACHE_DIR=$(CURDIR)/build/ccache $(BIN)/python -m pytest --numprocesses auto --dist worksteal
 
 .PHONY: demo lint style types check run-quick test run-common test-rest test-all test-hdl test-long durations resources instructions link fuzz bench cost figures notebooks site man reference paper clean
 .DELETE_ON_ERROR:
