@@ -54,14 +54,7 @@ def _rows(entry: ManifestAxis, limits: Limits, slew: float | None) -> list[tuple
         rows.append(row(f"rms error of {of}", f"{figure(found.rms_error_lsb, 3)} LSB", "", ""))
     if found.shaped is not None:
         rows += _shaped(found.shaped)
-    for side, error in (found.scaling_error_percent or {}).items():
-        most = limits.max_scaling_error_percent
-        worst = max(error.get("total", 0.0), error.get("band_limit", 0.0))
-        rows.append(_bounded(f"scaling error {side}, peak to peak", worst, most, "%", LARGEST_PERCENT))
-        rows.append(_bounded(f"size error {side}", error.get("size", 0.0), most, "%", LARGEST_PERCENT, signed=True))
-    if found.position is not None:
-        for side, value in found.position.scaling_error_percent.items():
-            rows.append(_bounded(f"with the resonance that steps drive, {side}", value, None, "%", RESONANCE_PERCENT))
+    rows += _scaling(found, limits.max_scaling_error_percent)
     for side, moved in (found.refinement_percent or {}).items():
         text = f"moves {moved.get('position', 0.0):.3g} % of the line, removes {moved.get('scaling', 0.0):.3g} %"
         rows.append(row(f"refinement {side}", text, "", ""))
@@ -79,6 +72,19 @@ def _rows(entry: ManifestAxis, limits: Limits, slew: float | None) -> list[tuple
         rows.append(row("power beyond the cutoff", f"{found.beyond_cutoff_db:.1f} dB", "", ""))
     if found.at_resonance_db is not None:
         rows.append(row("power at the resonance", f"{found.at_resonance_db:.1f} dB", "", ""))
+    return rows
+
+
+def _scaling(certificate: ManifestCertificate, most: float | None) -> list[tuple[TableCell, ...]]:
+    """Return the rows of scaling and size errors, with ``most`` percent as their limit."""
+    rows = []
+    for side, error in (certificate.scaling_error_percent or {}).items():
+        worst = max(error.get("total", 0.0), error.get("band_limit", 0.0))
+        rows.append(_bounded(f"scaling error {side}, peak to peak", worst, most, "%", LARGEST_PERCENT))
+        rows.append(_bounded(f"size error {side}", error.get("size", 0.0), most, "%", LARGEST_PERCENT, signed=True))
+    if certificate.position is not None:
+        for side, value in certificate.position.scaling_error_percent.items():
+            rows.append(_bounded(f"with the resonance that steps drive, {side}", value, None, "%", RESONANCE_PERCENT))
     return rows
 
 
