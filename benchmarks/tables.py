@@ -34,7 +34,7 @@ from tablegen.planning.other_table import maker_of, with_table
 from tablegen.planning.table_choice import possible_shapes
 from tablegen.planning.table_search import TableSearch
 from tablegen.report.table_charts import table_charts
-from tablegen.report.table_costs import CELLS, COUNTS, Run
+from tablegen.report.table_costs import CELLS, COUNTS, MeasuredRun
 from tablegen.report.table_rows import axis_tables
 from tablegen.verification.c.emulate import Processor, compile_bare
 
@@ -46,7 +46,7 @@ COSTS = HERE.parent / "tablegen" / "report" / "table_costs.py"
 CORES = ("cortex-m4", "cortex-m0plus")
 ERRORS = (2.0, 1.0, 0.75, 0.6, 0.55)
 SINES = ((16, 1000, 1.0), (16, 65536, 1.0), (18, 1000, 0.6), (18, 65536, 0.6))
-NARROW = Run(16, 16, False)
+NARROW = MeasuredRun(16, 16, False)
 _WORDS = {16: "to 16 bits", 32: "above"}
 # Words of the tables that are counted: how many changes nothing.
 _LENGTHS: dict[Mode, int | None] = {"direct": None, "interpolated": 512, "cubic": 128}
@@ -123,7 +123,7 @@ def figure() -> bytes:
     return picture(charts.charts, "svg", "", charts.columns)
 
 
-def instructions(core: str, run: Run = NARROW) -> dict[Mode, float]:
+def instructions(core: str, run: MeasuredRun = NARROW) -> dict[Mode, float]:
     """Count an axis sample of ``fill`` by mode: of x alone, since y keeps lines between its words."""
     counts: dict[Mode, float] = {}
     for mode in MODES:
@@ -133,7 +133,7 @@ def instructions(core: str, run: Run = NARROW) -> dict[Mode, float]:
 
 
 @cache
-def _fill(core: str, mode: Mode, spline: bool, run: Run) -> float:
+def _fill(core: str, mode: Mode, spline: bool, run: MeasuredRun) -> float:
     """Mean of a frame of the example, of samples of both axes."""
     setup, wide = load(EXAMPLE), run.table_storage_bits > 16
     x = structs.replace(setup.scan.x, table=Table(mode=mode, length=_LENGTHS[mode], bits=18 if wide else 16))
@@ -177,15 +177,15 @@ def cells() -> dict[Mode, int | None]:
 
 def write_costs() -> None:
     """Measure what the modes take, and put it where the command reads it."""
-    lines = ["COUNTS: dict[Run, dict[Mode, dict[str, float]]] = {"]
+    lines = ["COUNTS: dict[MeasuredRun, dict[Mode, dict[str, float]]] = {"]
     for run in COUNTS:
         by_core = {core: instructions(core, run) for core in CORES}
-        lines.append(f"    Run({run.table_storage_bits}, {run.output_storage_bits}, {run.coded}): {{")
+        lines.append(f"    MeasuredRun({run.table_storage_bits}, {run.output_storage_bits}, {run.coded}): {{")
         for mode in MODES:
             counts = ", ".join(f'"{core}": {by_core[core][mode]}' for core in CORES)
             lines.append(f'        "{mode}": {{{counts}}},')
         lines.append("    },")
-    lines += ["}", "INSTRUCTIONS = COUNTS[Run(16, 16, False)]"]
+    lines += ["}", "INSTRUCTIONS = COUNTS[MeasuredRun(16, 16, False)]"]
     lines += ["# Cells of one axis in Verilog on an iCE40 HX8K, a sample a clock, of a cubic table one in 11."]
     lines += [
         "CELLS: dict[Mode, int] = {",

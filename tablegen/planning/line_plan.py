@@ -156,8 +156,6 @@ def _line_plan(setup: Setup, axis: Literal["x", "y"], schedule: Schedule, proble
     feasible.check_table(timing.period)
 
     voltages = axis_voltages(setup, axis, float(timing.rate), problems)
-    if voltages is None:
-        return None
     straight = choice.for_straight_line(voltages.allowed)
     drive = make_drive(setup, axis, float(timing.rate), voltages, straight, problems)
     if drive is None or len(problems.found) > before:
@@ -192,5 +190,4 @@ def _line_plan(setup: Setup, axis: Literal["x", "y"], schedule: Schedule, proble
 def _examine(setup: Setup, axis: str, rate_hz: float, problems: Problems) -> None:
     """Examine one axis at the rate asked for, where there is no schedule: its problems are reported in the same run."""
     voltages = axis_voltages(setup, axis, rate_hz, problems)
-    if voltages is not None:
-        make_drive(setup, axis, rate_hz, voltages, DEFAULT_HARMONICS, problems)
+    make_drive(setup, axis, rate_hz, voltages, DEFAULT_HARMONICS, problems)

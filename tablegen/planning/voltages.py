@@ -55,10 +55,11 @@ class Voltages(Struct, frozen=True, eq=False):
         return self.m * self.g * self.v * self.driver.span
 
 
-def axis_voltages(setup: Setup, axis: str, rate_hz: float, problems: Problems) -> Voltages | None:
-    """Apply (1)-(12) and (23) to one axis ("x" or "y") at its rate in Hz; None where there is no size law.
+def axis_voltages(setup: Setup, axis: str, rate_hz: float, problems: Problems) -> Voltages:
+    """Apply (1)-(12) and (23) to one axis ("x" or "y") at its rate in Hz.
 
-    What contradicts the calibration goes to ``problems``, at its key.
+    What contradicts the calibration goes to ``problems``, at its key. A linear size law stands for one that is refused,
+    so that the rest is examined too.
     """
     scan: FastAxis = getattr(setup.scan, axis)
     scanner: ScannerAxis = getattr(setup.scanner, axis)
@@ -81,7 +82,7 @@ def axis_voltages(setup: Setup, axis: str, rate_hz: float, problems: Problems) -
         with problems.at(scanner_file, key):
             response = dynamics_of(scanner.resonance, setup.scanner_folder)
     if size_law is None:
-        return None
+        size_law = SizeLaw(scanner.size.k_nm_per_v * driver.span, 0.0, 1.0)
 
     p, offset_law = driver.p(v_offset), surface.at(v)
     m = offset_law.factor(p)

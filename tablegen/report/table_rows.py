@@ -17,7 +17,7 @@ from tablegen.fixedpoint.table_shape import TableShape
 from tablegen.planning.line_plan import LinePlan
 from tablegen.planning.other_table import with_table
 from tablegen.planning.table_front import table_front
-from tablegen.report.table_costs import CELLS, COUNTS, Run
+from tablegen.report.table_costs import CELLS, COUNTS, MeasuredRun
 from tablegen.waveform.sampler import Sampler
 
 _CHUNK_TICKS = 1 << 16  # that are worked out together
@@ -37,7 +37,7 @@ class TableRow:
     stored_bits: int
     chosen: bool
     planned: bool
-    run: Run
+    run: MeasuredRun
 
     @property
     def instructions(self) -> dict[str, float]:
@@ -112,11 +112,11 @@ def _behind(shape: TableShape) -> int:
     return WORDS_BEHIND if shape.mode == "cubic" else 1
 
 
-def _run(shape: TableShape, output: Output) -> Run:
+def _run(shape: TableShape, output: Output) -> MeasuredRun:
     """Return the class of a table and a converter by which instructions are measured."""
     shifted = output.align == "left" and output.word_bits > output.dac_bits
     coded = shifted or output.coding == "twos-complement"
-    return Run(storage_bits(shape.bits), storage_bits(output.word_bits), coded)
+    return MeasuredRun(storage_bits(shape.bits), storage_bits(output.word_bits), coded)
 
 
 def axis_tables(setup: Setup, line: LinePlan) -> AxisTables:

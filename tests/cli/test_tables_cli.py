@@ -14,7 +14,7 @@ from tablegen.config.load import load
 from tablegen.emit.constants import storage_bits
 from tablegen.fixedpoint.table_shape import MODES
 from tablegen.planning.line_plan import make_plan
-from tablegen.report.table_costs import CELLS, COUNTS, INSTRUCTIONS, Run
+from tablegen.report.table_costs import CELLS, COUNTS, INSTRUCTIONS, MeasuredRun
 
 AUTO = ("x.table.mode = 'auto'", "- x.table.length", "- x.table.bits")
 
@@ -145,7 +145,7 @@ def test_instructions_are_those_of_the_widths_and_the_coding(
     rows = json.loads(run("tables", path, "--axis", "x", "--json").out)["axes"][0]["tables"]
     assert {row["bits"] > 16 for row in rows} == {False, True}
     for row in rows:
-        counted = Run(32 if row["bits"] > 16 else 16, output_storage_bits, coded)
+        counted = MeasuredRun(32 if row["bits"] > 16 else 16, output_storage_bits, coded)
         assert row["instructions"] == COUNTS[counted][row["mode"]]
 
 

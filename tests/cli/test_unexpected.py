@@ -124,7 +124,7 @@ def test_a_build_that_is_checked_is_not_called_stale(tmp_path: Path) -> None:
 def test_a_pipe_that_is_not_stdout_is_no_success(tmp_path: Path, error: OSError) -> None:
     """Of a simulator or a worker that died. Where the reader of stdout has gone, there is nothing left to say."""
     outcome = broken(tmp_path, error, "build", "-o", str(tmp_path / "out"))
-    assert (outcome.status, outcome.err.startswith("Broken pipe (api/build.py:")) == (70, True)
+    assert (outcome.status, outcome.err.startswith("Broken pipe (certificate/certified_scan.py:")) == (70, True)
     assert not (tmp_path / "out").exists()
 
 

@@ -13,7 +13,7 @@ from editing import SCAN, edited, run, write_pair
 
 from tablegen.config.load import load
 from tablegen.planning.line_plan import Plan, make_plan
-from tablegen.report.table_costs import CELLS, COUNTS, Run
+from tablegen.report.table_costs import CELLS, COUNTS, MeasuredRun
 
 PAGE = (REPOSITORY / "docs" / "tables.md").read_text("utf-8")
 ROWS = [row for row in PAGE.splitlines() if re.match(r"\| (?:[xy]|\d+ bits, \d+ ticks) \|", row)]
@@ -69,8 +69,8 @@ def test_what_the_modes_take_is_what_the_command_says(benchmark: ModuleType) -> 
 
 
 @pytest.mark.rest
-@pytest.mark.parametrize("widths", [Run(16, 16, False), Run(32, 32, True)])
-def test_instructions_are_counted(benchmark: ModuleType, widths: Run) -> None:
+@pytest.mark.parametrize("widths", [MeasuredRun(16, 16, False), MeasuredRun(32, 32, True)])
+def test_instructions_are_counted(benchmark: ModuleType, widths: MeasuredRun) -> None:
     """On a Cortex-M4; a cubic table of 16 bits may take 30."""
     counted = benchmark.instructions("cortex-m4", widths)
     assert counted == {mode: takes["cortex-m4"] for mode, takes in COUNTS[widths].items()}

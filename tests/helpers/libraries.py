@@ -29,7 +29,7 @@ x.size_nm = 150.0
 [[scans]]
 name = "broad"
 x = { size_nm = 400.0, offset_v = 45.0 }
-timing.line_rate_hz = 625.0
+timing.line_rate_hz = 600.0
 timing.lines = 10
 
 [[scans]]

@@ -13,7 +13,7 @@ from replacing import replace
 
 from tablegen.config.load import Setup
 from tablegen.numerics.driver import Driver
-from tablegen.planning import line_plan
+from tablegen.planning import waveforms
 from tablegen.planning.line_plan import Plan, make_plan
 from tablegen.planning.windows import retrace_mismatch
 from tablegen.refinement.round import Options, refine
@@ -98,7 +98,7 @@ def test_what_is_played_is_measured_at_its_time(tmp_path: Path, monkeypatch: pyt
     limits = []
     for undone in (True, False):
         if not undone:
-            monkeypatch.setattr(line_plan, "hold_inverse", lambda n, *_, **__: (np.ones(n), np.zeros(n)))
+            monkeypatch.setattr(waveforms, "hold_inverse", lambda n, *_, **__: (np.ones(n), np.zeros(n)))
         error = run_line(planned(tmp_path, SIZES[0]).x, linear()).imaged
         limits.append([max(map(abs, branch.residual_range)) for branch in (error.forward, error.backward)])
     assert max(limits[0]) < AGREES
