@@ -13,7 +13,7 @@ from tablegen.base.figures import at_least
 from tablegen.compensation.line import WholeLine
 from tablegen.compensation.operator.operator import Operator
 from tablegen.compensation.operator.scan_line import Found, Linear, ThroughInverse, Wanted, find_waveform
-from tablegen.waveform.minimum_acceleration import Straightness, Unreachable, gentlest, least_percent
+from tablegen.waveform.minimum_acceleration import Straightness, Unreachable, least_percent, minimum_acceleration_series
 from tablegen.waveform.series import FourierSeries
 
 _ROUNDS = 2  # a third changes nothing that shows
@@ -57,7 +57,7 @@ def _gentle(wanted: Wanted, learnt: Found, share: float, percent: float) -> Four
     if share < _LEAST_SHARE * percent:
         raise _unreachable(wanted, learnt)
     try:
-        return gentlest(_straightness(wanted, learnt), learnt.series.harmonics, share)
+        return minimum_acceleration_series(_straightness(wanted, learnt), learnt.series.harmonics, share)
     except Unreachable:
         raise _unreachable(wanted, learnt) from None
 
