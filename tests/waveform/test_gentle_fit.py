@@ -124,8 +124,8 @@ def test_at_the_error_of_the_window_fit_it_is_never_rougher(harmonics: int, stra
     assert series.peak_acceleration() <= fitted.peak_acceleration()
 
 
-def test_the_range_is_held_where_the_gentlest_way_would_leave_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    """turn 0.5, forward only: the way back is long, and the minimum-acceleration one leaves the line. The control is free."""
+def test_the_range_is_held_where_minimum_acceleration_would_leave_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """turn 0.5, forward only: the way back is long, and minimum acceleration leaves the line. The control is free."""
     straight = Straightness(SECTION_8, SECTION_8, (0.1, 0.9), False)
     low, high = range_of(minimum_acceleration_series(straight, 16, 0.3))
     assert low >= 0.0
