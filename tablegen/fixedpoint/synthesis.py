@@ -90,8 +90,8 @@ def _cached_sine_table(length: int) -> Ints:
 def sine_quarter(index_bits: int) -> Ints:
     """Return the first quarter of the sine words, which a device holds for tables of up to 2^index_bits words.
 
-    index_bits >= 3. sin(pi/2) is not among them: it is 2^30, the only word that does not fit 30 bits. The sine table of a shorter length
-    is every 2^n-th word of a longer one.
+    index_bits >= 3. sin(pi/2) is not among them: it is 2^30, the only word that does not fit 30 bits. The sine table of
+    a shorter length is every 2^n-th word of a longer one.
     """
     return sine_table(1 << index_bits)[: 1 << (index_bits - 2)]
 
