@@ -167,7 +167,7 @@ def _text(setup: Setup, change: Change) -> str:
 
     def part(key: str, value: Any) -> str:
         name = f" in {shown_path(Path(Path(setup.scanner_file.name).name))}" if key.startswith(_SCANNER) else ""
-        written, factor = setup.scan_file.as_said(key)
+        written, factor = setup.scan_file.written_key(key)
         shown = _value(value if factor == 1.0 else factor * value)
         return f"{written.removeprefix(_SCANNER)} = {shown}{name}"
 

@@ -25,7 +25,7 @@ class ModelProblems:
     @property
     def count(self) -> int:
         """The number of problems so far."""
-        return len(self._problems.found)
+        return len(self._problems.entries)
 
     @contextmanager
     def at(self, key: str) -> Iterator[None]:

@@ -39,7 +39,7 @@ def make_table(
     problems: Problems,
 ) -> AxisTable | None:
     """Quantise a waveform; None where ``problems`` grew: converter, amplifier, driver or table cannot hold it."""
-    before = len(problems.found)
+    before = len(problems.entries)
     scan: FastAxis = getattr(setup.scan, axis)
     hardware = setup.hardware(axis)
     converter = Converter.of(hardware.dac, hardware.amplifier)
@@ -57,14 +57,14 @@ def make_table(
     feasible.check_range(drive, converter, *maker.original.reach, shaping)
     request = table_request(scan.table, setup.scan.limits, shaping.order > 0)
     shape = written_shape(scan.table, timing.period)
-    if request is not None and len(problems.found) == before:
+    if request is not None and len(problems.entries) == before:
         shape = _chosen(setup, axis, timing, request, shape, maker, drive, converter, feasible, problems)
     stored = maker.stored(shape)
-    if shape.mode == "cubic" and len(problems.found) == before:
+    if shape.mode == "cubic" and len(problems.entries) == before:
         feasible.check_words(stored)
         feasible.check_gain(maker.gain(shape)[0])
     max_step = feasible.max_step(drive, converter, stored, float(timing.rate), timing.period, shape, shaping)
-    if len(problems.found) > before:
+    if len(problems.entries) > before:
         return None
     table = maker.limited(max_step).quantise(shape)
     return AxisTable(converter, table.scale, table.fourier, table.program, request)

@@ -117,10 +117,10 @@ def make_drive(
         folder=setup.scanner_folder,
         allowed=voltages.allowed,
     )
-    before = len(problems.found)
+    before = len(problems.entries)
     places = ModelProblems(axis, setup.scan_file, setup.scanner_file, problems)
     shape = models.line_of(hysteresis, request, places)
-    if len(problems.found) > before or shape is None:
+    if len(problems.entries) > before or shape is None:
         return None
     return Drive(
         driver=driver,
@@ -157,4 +157,4 @@ def _factor_at(law: OffsetLaw, driver: Driver, share: float) -> float:
 def _line_at(hysteresis: Hysteresis, request: LineRequest, v: float) -> LineShape | None:
     problems = Problems()
     shape = models.line_of(hysteresis, replace(request, v=v), ModelProblems.without_files(request.axis, problems))
-    return None if problems.found else shape
+    return None if problems.entries else shape

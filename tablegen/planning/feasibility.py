@@ -335,7 +335,7 @@ class Feasibility:
             return "timing.ticks_per_line", f"{ceil(times * timing.ticks_per_line)} ticks_per_line"
         if timing.ticks_per_pixel is not None:
             return "timing.ticks_per_pixel", f"{ceil(times * timing.ticks_per_pixel)} ticks_per_pixel"
-        written, factor = self._setup.scan_file.as_said("timing.line_rate_hz")
+        written, factor = self._setup.scan_file.written_key("timing.line_rate_hz")
         slower = at_most(factor * timing.line_rate_hz / times, 5)
         if factor == 1.0:
             return "timing.line_rate_hz", f"{slower} Hz"

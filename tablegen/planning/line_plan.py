@@ -163,7 +163,7 @@ def make_plan(setup: Setup) -> Plan:
 
 def _line_plan(setup: Setup, axis: Literal["x", "y"], schedule: Schedule, problems: Problems) -> LinePlan | None:
     """Plan one axis: clock, voltages, harmonics, shape, waveform, table; None where ``problems`` grew."""
-    before = len(problems.found)
+    before = len(problems.entries)
     timing = AxisTiming.of(setup, axis, schedule)
     feasible = Feasibility(setup, axis, problems)
     choice = HarmonicChoice(setup, axis, timing.rate, timing.period, feasible, problems)
@@ -174,14 +174,14 @@ def _line_plan(setup: Setup, axis: Literal["x", "y"], schedule: Schedule, proble
         return None
     straight = choice.for_straight_line(voltages.allowed)
     drive = make_drive(setup, axis, float(timing.rate), voltages, straight, problems)
-    if drive is None or len(problems.found) > before:
+    if drive is None or len(problems.entries) > before:
         return None
     harmonics = choice.for_drive(drive, straight)
     waveforms = make_waveforms(setup, axis, timing, drive, choice, harmonics, problems)
     if waveforms is None:
         return None
     table = make_table(setup, axis, timing, drive, waveforms.series, feasible, problems)
-    if table is None or len(problems.found) > before:
+    if table is None or len(problems.entries) > before:
         return None
     return LinePlan(
         axis=axis,

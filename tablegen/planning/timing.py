@@ -22,10 +22,10 @@ def make_schedule(setup: Setup, problems: Problems) -> Schedule | None:
     """Lay a scan out in ticks; None where ``problems`` grew."""
     scan = setup.scan
     timing = scan.timing
-    before = len(problems.found)
+    before = len(problems.entries)
     rate = exact(setup.hardware("x").dac.update_rate_hz)
     ticks = _line_ticks(setup, rate, problems)
-    if len(problems.found) > before:
+    if len(problems.entries) > before:
         return None
     low, high = (exact(edge) for edge in scan.x.band_limit.window)
     both = scan.x.band_limit.directions == "both"
@@ -35,7 +35,7 @@ def make_schedule(setup: Setup, problems: Problems) -> Schedule | None:
     up, down = (Window(*lines) for lines in inside)
     _check_pixels(setup, rate, ticks, forward, backward, problems)
     _check_lines(setup, up, down, problems)
-    if len(problems.found) > before:
+    if len(problems.entries) > before:
         return None
     return Schedule(
         ticks=ticks,
@@ -87,7 +87,7 @@ def _line_ticks(setup: Setup, rate: Fraction, problems: Problems) -> int:
             fits = "take more of them" if ticks < 8 else f"at most {most} fit" if most else "take fewer pixels"
         problems.add(file, key, f"a line of {shown} ticks is outside 8..{MAXIMUM_LINE_TICKS}; {fits}")
     elif ticks * timing.lines > MAXIMUM_TICKS:
-        what = "lines" if file.as_said("timing.lines")[0] == "timing.lines" else "line periods"
+        what = "lines" if file.written_key("timing.lines")[0] == "timing.lines" else "line periods"
         problems.add(
             file,
             "timing.lines",

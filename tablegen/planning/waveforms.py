@@ -37,10 +37,10 @@ def make_waveforms(
     problems: Problems,
 ) -> Waveforms | None:
     """Limit the band of a drive's shape, and undo what dynamics and hold do to it; None where ``problems`` grew."""
-    before = len(problems.found)
+    before = len(problems.entries)
     rate_hz = float(timing.rate)
     layer = learnt_layer(setup, axis, drive, rate_hz, harmonics, problems)
-    if len(problems.found) > before:
+    if len(problems.entries) > before:
         return None
     target, kept_percent = None, None
     with problems.at(setup.scan_file, choice.key):

@@ -121,7 +121,7 @@ def read_operator(path: Path, name: str) -> tuple[Operator, OperatorFile]:
     except ValidationError as error:
         why, _, place = str(error).partition(" - at ")
         problems.add(document, re.sub(r"^\$\.?", "", place.strip("`")), f"{why[:1].lower()}{why[1:]}")
-        raise Rejected(problems.found) from None
+        raise Rejected(problems.entries) from None
     for key, why in _contradictions(file):
         problems.add(document, key, why)
     problems.stop_if_any()
