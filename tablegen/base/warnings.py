@@ -56,6 +56,7 @@ class Remark(str):
     percent: float
 
     def __new__(cls, text: str, weight: Weight = "note", percent: float = 0.0) -> "Remark":
+        """Make a remark of a text, its weight and its percentage of the scan."""
         remark = super().__new__(cls, text)
         remark.weight, remark.percent = weight, percent
         return remark

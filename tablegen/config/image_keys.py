@@ -36,7 +36,6 @@ def check_image_keys(values: Mapping[str, Any], file: Document, problems: Proble
 
     ``values`` are those of the scan file as written.
     """
-
     _Contradictions(values, file, problems).check()
 
 

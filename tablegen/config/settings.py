@@ -59,9 +59,7 @@ def check_repeated_keys(settings: "Sequence[Setting]") -> None:
     for at, setting in enumerate(settings):
         for other in settings[:at]:
             if setting.key == other.key:
-                raise _refused(
-                    setting.origin or setting.key, f"{setting.key} is given twice; list its values in one"
-                )
+                raise _refused(setting.origin or setting.key, f"{setting.key} is given twice; list its values in one")
             shorter, longer = sorted((setting.parts, other.parts), key=len)
             if longer[: len(shorter)] == shorter:
                 raise _refused(setting.origin or setting.key, f"{'.'.join(longer)} lies in {'.'.join(shorter)}")

@@ -377,7 +377,6 @@ def _amplifier_that_fits(dac: AxisDac, amplifier: AxisAmplifier, bottom: float, 
 
 def _offsets_that_fit(drive: Drive, low: float, high: float) -> str:
     """Return the offsets at which the drive stays inside the driver; its amplitude changes with the offset by (1)."""
-
     driver = drive.driver
 
     def fits(v_offset: float) -> bool:
