@@ -182,7 +182,7 @@ def scanner_tables(path: Path) -> tuple[dict[str, Any], list[Problem]]:
     tables: dict[str, Any] = {}
     problems = Problems()
     decode(Scanner, values, document, problems, lambda _kind, key, _values, built: tables.update({key: built}))
-    return tables, problems.found
+    return tables, problems.entries
 
 
 def _values(path: Path) -> dict[str, Any]:

@@ -234,7 +234,7 @@ def _check(old: str, new: str, name: str) -> None:
         problems = Problems()
         values, document = parse_toml(text, name)
         decode(Scanner, values, document, problems, lambda *_: None)
-        found.append(problems.found)
+        found.append(problems.entries)
     known = {(problem.key, problem.why) for problem in found[0]}
     added = [p for p in found[1] if (p.key, p.why) not in known and not p.why.startswith("missing")]
     if added:  # at lines that are not in the file

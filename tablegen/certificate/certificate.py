@@ -157,7 +157,7 @@ def _foreseen(certificate: Certificate, limit: float) -> str:
 def _finer_table(line: LinePlan, written: str = "lengthen or widen {}") -> str:
     """How a table is made to err less: one that is written, and one that the build chooses."""
     table = f"{line.axis}.table"
-    return written.format(table) if line.asked_table is None else f"a lower {table}.max_error_lsb"
+    return written.format(table) if line.table_request is None else f"a lower {table}.max_error_lsb"
 
 
 def _remedy(line: LinePlan, parts: ScalingError) -> str:

@@ -49,7 +49,7 @@ def least_acceleration(straight: Straightness, harmonics: int, percent: float) -
 
     count = _SLOPES_PER_HARMONIC * harmonics + _MORE_SLOPES
     t = np.concatenate(straight.times(0.5 - 0.5 * np.cos(np.pi * np.arange(count) / (count - 1))))
-    slopes, wanted = rows(t, 1) / shape.slope(t)[:, None], straight.asked.slope(t) / shape.slope(t)
+    slopes, wanted = rows(t, 1) / shape.slope(t)[:, None], straight.target.slope(t) / shape.slope(t)
     grid = np.arange(ceil(_PER_WAVE * harmonics)) / ceil(_PER_WAVE * harmonics)
     place = np.where(grid <= turn, grid / turn, (1.0 - grid) / (1.0 - turn))
     free = (place <= low) | (place >= high) | ((grid > turn) & (not straight.both))

@@ -167,7 +167,7 @@ def _text(setup: Setup, change: Change) -> str:
 
     def part(key: str, value: Any) -> str:
         name = f" in {shown_path(Path(Path(setup.scanner_file.name).name))}" if key.startswith(_SCANNER) else ""
-        written, factor = setup.scan_file.as_said(key)
+        written, factor = setup.scan_file.written_key(key)
         shown = _value(value if factor == 1.0 else factor * value)
         return f"{written.removeprefix(_SCANNER)} = {shown}{name}"
 
@@ -191,15 +191,15 @@ def _value(value: object) -> str:
 
 def _against_quantisation(setup: Setup, plan: Plan, line: LinePlan, found: Excess) -> Iterator[Iterator[Change]]:
     axis, table = line.axis, line.program
-    if line.asked_table is not None:
-        asked, least = line.asked_table.max_error_lsb, 0.0 if line.asked_table.shaped else _ROUNDED_LSB
+    if line.table_request is not None:
+        asked, least = line.table_request.max_error_lsb, 0.0 if line.table_request.shaped else _ROUNDED_LSB
         yield ({f"{axis}.table.max_error_lsb": asked / share} for share in (2.0, 4.0) if asked / share > least)
     bits = ceil(log2(_MARGIN) + log2(abs(found.percent)) - log2(found.limit))  # their quotient may be no float
     words_per_code = 2.0**table.bits / (abs(line.codes_per_unit) * line.scale)
-    if words_per_code < 2.0 and line.asked_table is None:
+    if words_per_code < 2.0 and line.table_request is None:
         yield ({f"{axis}.table.bits": b} for b in range(table.bits + bits, _MOST_BITS + 1))
     length = len(table.words)
-    if line.asked_table is None and table.mode != "direct" and length < 64 * line.series.harmonics:
+    if line.table_request is None and table.mode != "direct" and length < 64 * line.series.harmonics:
         yield ({f"{axis}.table.length": n} for n in (4 * length, 16 * length) if n <= MOST_LENGTH[table.mode])
     yield _amplifiers(setup, plan, line, found)
     hardware = [setup.hardware(one.axis) for one in plan.lines]

@@ -81,7 +81,7 @@ def _needs_of_table(line: LinePlan) -> list[tuple[str, str]]:
 
 
 def _chosen(line: LinePlan) -> str:
-    return "" if line.asked_table is None else f", {line.asked_table}"
+    return "" if line.table_request is None else f", {line.table_request}"
 
 
 def _asked(line: LinePlan) -> str:

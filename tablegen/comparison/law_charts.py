@@ -128,7 +128,7 @@ def _shape(axis: str, scanner: Scanner, turn: float, share: float) -> LineShape 
         folder=Path(),
     )
     made = None if table is None else table.line(request, ModelProblems.without_files(axis, problems))
-    return None if problems.found else made
+    return None if problems.entries else made
 
 
 def _bent(shape: LineShape, side: str) -> Pair:

@@ -130,7 +130,7 @@ class ScannerModel:
         )
         problems.stop_if_any()
         if found is None:
-            raise Rejected(problems.found)
+            raise Rejected(problems.entries)
         loop, creep = found
         return settled(loop, driver.share(drive), scan.rate_hz, creep, response, _HARMONICS)
 

@@ -183,9 +183,9 @@ def _resonance(line: LinePlan) -> dict[str, Any]:
 
 def _asked_table(line: LinePlan) -> dict[str, Any]:
     """What was asked of a table that the build chose; nothing of one that was written."""
-    if line.asked_table is None:
+    if line.table_request is None:
         return {}
-    return {"asked": {"max_error_lsb": line.asked_table.max_error_lsb, "free": list(line.asked_table.free)}}
+    return {"asked": {"max_error_lsb": line.table_request.max_error_lsb, "free": list(line.table_request.free)}}
 
 
 def _shaping(shaping: Shaping) -> dict[str, Any]:

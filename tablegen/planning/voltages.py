@@ -51,7 +51,7 @@ class Voltages(Struct, frozen=True, eq=False):
 
     @property
     def v_amplitude(self) -> float:
-        """m g V_scan: volts peak to peak at the piezo for w from 0 to 1."""
+        """The amplitude m g V_scan: volts peak to peak at the piezo for w from 0 to 1."""
         return self.m * self.g * self.v * self.driver.span
 
 
@@ -112,7 +112,7 @@ def axis_voltages(setup: Setup, axis: str, rate_hz: float, problems: Problems) -
 
 
 def _offset_surface(setup: Setup, axis: str, size_law: SizeLaw | None, problems: Problems) -> OffsetSurface:
-    """m of (1) over offset and size; 1 everywhere where it is not calibrated."""
+    """Return m of (1) over offset and size; 1 everywhere where it is not calibrated."""
     offset: Offset | None = getattr(setup.scanner, axis).offset
     surface = OffsetSurface.everywhere(OffsetLaw())
     if offset is not None and size_law is not None:
@@ -124,7 +124,7 @@ def _offset_surface(setup: Setup, axis: str, size_law: SizeLaw | None, problems:
 
 
 def _check_points(setup: Setup, axis: str, offset: Offset, problems: Problems) -> None:
-    """No point can have been measured where the driver does not reach."""
+    """Check that every point was measured inside the driver's range."""
     driver = setup.scanner.driver
     for i, point in enumerate(offset.points or []):
         if driver.beyond(point.offset_v, point.offset_v) > 0.0:
@@ -139,7 +139,7 @@ def _check_points(setup: Setup, axis: str, offset: Offset, problems: Problems) -
 
 
 def _offset_voltage(setup: Setup, axis: str, surface: OffsetSurface, problems: Problems) -> float:
-    """V_offset: as written, or of a position in nm by the integral of the local slope, or the middle of the driver."""
+    """Return V_offset: as written, from a position in nm by the integral of the local slope, or the driver's middle."""
     scan: FastAxis = getattr(setup.scan, axis)
     driver = setup.scanner.driver
     v_offset = driver.middle

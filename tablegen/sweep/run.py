@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 from tablegen.api.build import BrokenLimit
 from tablegen.base.input_errors import Problem, Rejected
-from tablegen.base.interruption import ENDINGS, held
+from tablegen.base.interruption import ENDINGS, defer_signals
 from tablegen.base.reading import BUILD_FILE, file_sha256, holds, read_bytes
 from tablegen.base.workers import results
 from tablegen.config.names import of_the_runtime
@@ -209,7 +209,7 @@ def _finish(sweep: ScanLibrary, before: dict[str, str], only_check: bool) -> Non
         return
     for entry in dropped:
         _remove_program(sweep, entry)
-    with held(*ENDINGS) as came:
+    with defer_signals(*ENDINGS) as came:
         write_files(sweep.folder, index.files, outdated)
     if came:
         raise KeyboardInterrupt

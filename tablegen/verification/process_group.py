@@ -14,7 +14,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from tablegen.base.interruption import deliver, held
+from tablegen.base.interruption import defer_signals, deliver
 from tablegen.verification.failures import SimulationFailed, ToolMissing
 
 _JOB, _OUTCOME, _LOG = "job.json", "outcome.json", "worker.log"
@@ -32,7 +32,7 @@ def run_all(module: str, jobs: Sequence[tuple[Path, Mapping[str, Any]]]) -> list
     """The same for several jobs at once, each with a folder of its own; the first that fails is raised."""
     processes: list[subprocess.Popen[bytes]] = []
     try:
-        with held(signal.SIGINT, signal.SIGTERM) as came:  # inside Popen nobody could end what it has started
+        with defer_signals(signal.SIGINT, signal.SIGTERM) as came:  # inside Popen nobody could end what it has started
             for folder, job in jobs:
                 processes.append(_started(folder, module, job))
         deliver(came)

@@ -110,4 +110,4 @@ def test_what_it_shows_of_a_scan_file_is_one(tmp_path: Path) -> None:
     for block in blocks:
         assert set(tomllib.loads(block)) == {"x"}
         line = make_plan(load(write_pair(tmp_path, edited(SCAN, "- [x.table]", f"+ {block}")))).x
-        assert line.asked_table is not None
+        assert line.table_request is not None

