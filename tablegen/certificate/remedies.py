@@ -7,6 +7,7 @@ trials, so that the search ends soon where nothing helps.
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from itertools import islice
 from math import ceil, copysign, log2
 from pathlib import Path
 from typing import Any
@@ -91,7 +92,7 @@ def tried_on_operator(setup: Setup, plan: Plan, line: LinePlan, most: float, own
 
 
 def tried_against_resonance(setup: Setup, plan: Plan, line: LinePlan, most: float) -> list[Remedy]:
-    """The same for the resonance that the steps of the codes drive: shaping of the codes, or more of them."""
+    """The same for the resonance that the steps of the codes drive: shaping of the codes, more of them, more ticks."""
     hardware = [setup.hardware(one.axis) for one in plan.lines]
     shaping = _keys(setup.hardware(line.axis).where("dac.shaping"))
     dac = setup.hardware(line.axis).dac
@@ -100,6 +101,7 @@ def tried_against_resonance(setup: Setup, plan: Plan, line: LinePlan, most: floa
     ways: list[Iterator[Change]] = [
         (dict.fromkeys(shaping, order) for order in ("scanner", "second", "first")),
         (dict.fromkeys(bits, n) for n in range(dac.bits + 1, min(dac.bits + 5, finest + 1))),
+        islice(_slower(setup, plan), 2),  # where not the rounding but the ticks are coarse
     ]
 
     def trial(change: Change) -> Remedy | None:
