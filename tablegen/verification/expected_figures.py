@@ -27,7 +27,7 @@ _MOST_CHANGE, _LEAST_BETA = 2.0, 0.01  # of a branch between the line's stroke a
 
 
 def wrong_mismatch(axis: ManifestAxis) -> list[str]:
-    """The mismatch by the laws, if it is not that of the branches at the stroke that is played; of known models."""
+    """Check the stated mismatch against that of the branches at the played stroke; of known models only."""
     expected = axis.certificate.expected
     if expected is None or expected.basis != "laws" or expected.mismatch_percent is None:
         return []
@@ -57,7 +57,7 @@ def wrong_mismatch(axis: ManifestAxis) -> list[str]:
 
 
 def header_texts(folder: Path, stored: StoredBuild) -> dict[str, str]:
-    """The comments of the headers of a build, by name; one that cannot be read is told of elsewhere."""
+    """Return the comments of the headers of a build by name; another check reports one that cannot be read."""
     name = stored.manifest.name
     found = {}
     for suffix in _HEADERS:
@@ -70,7 +70,7 @@ def header_texts(folder: Path, stored: StoredBuild) -> dict[str, str]:
 
 
 def wrong_texts(name: str, axis: ManifestAxis, texts: dict[str, str]) -> list[str]:
-    """The headers that expect something else of an axis than its certificate."""
+    """List the headers whose expected figures of an axis differ from its certificate."""
     expected = axis.certificate.expected
     wrong = []
     for file, text in texts.items():
@@ -86,7 +86,7 @@ def wrong_texts(name: str, axis: ManifestAxis, texts: dict[str, str]) -> list[st
 
 
 def _stated(name: str, text: str) -> list[float]:
-    """The numbers of the lines about the scanner in the certificate of an axis."""
+    """Return the numbers of the lines about the scanner in the certificate of an axis."""
     rows = [row.strip(" */") for row in text.splitlines()]
     begin = next((i for i, row in enumerate(rows) if row == f"{name} certificate"), len(rows))
     numbers: list[float] = []
@@ -105,7 +105,7 @@ def _stated(name: str, text: str) -> list[float]:
 
 
 def _figures(expected: ManifestExpected) -> list[tuple[float, float]]:
-    """The numbers that a header states, in its order, each with the room that its digits leave."""
+    """Return the numbers that a header states, in its order, each with the tolerance of its digits."""
     if expected.basis == "laws":
         return [] if expected.mismatch_percent is None else [(expected.mismatch_percent.value, _THREE_DIGITS)]
     figures: list[ManifestFigure | None] = [

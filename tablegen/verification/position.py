@@ -69,14 +69,14 @@ def position_errors(axis: ManifestAxis, period: PlayedPeriod, passage: ManifestP
 
 
 def _later(series: ManifestSeries, by: float) -> ManifestSeries:
-    """A series whose value at t is that of this one at t + by, in periods."""
+    """Return a series whose value at t is that of this one at t + by, in periods."""
     angle = 2.0 * pi * by * np.arange(1, len(series.a) + 1)
     a, b, c, s = np.array(series.a), np.array(series.b), np.cos(angle), np.sin(angle)
     return ManifestSeries((a * c + b * s).tolist(), (b * c - a * s).tolist(), series.a0)
 
 
 def _stepped(passage: ManifestPassage, w: Floats, update_hz: float) -> Floats:
-    """What follows values that are each held for a tick, in the middle of ticks, once it has settled."""
+    """Return the settled response, in the middle of ticks, to values that are each held for a tick."""
     omega_s, quality = 2.0 * pi * (passage.frequency_hz or 0.0) / update_hz, passage.quality or 1.0
     if not (isfinite(omega_s) and omega_s > 0.0):
         raise ValueError("a response without a frequency")
@@ -115,7 +115,7 @@ def _exponential(matrix: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
 
 
 def _measured(passage: ManifestPassage, w: Floats, rate_hz: float) -> Floats:
-    """The same behind a measured response: its harmonics, each with the images that it has in held codes."""
+    """Return the response of a measured passage: harmonics, each with its images in held codes."""
     ticks = len(w)
     spectrum = np.fft.fft(w)
     harmonic = np.fft.fftfreq(ticks, 1.0 / ticks)

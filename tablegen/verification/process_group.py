@@ -21,15 +21,20 @@ _JOB, _OUTCOME, _LOG = "job.json", "outcome.json", "worker.log"
 
 
 def run(folder: Path, module: str, job: Mapping[str, Any]) -> dict[str, Any]:
-    """What ``play_job(folder, job)`` of a module returns, called in a process of its own; both are plain data.
+    """Run ``play_job(folder, job)`` of a module in a process of its own; ``job`` and the result are plain data.
 
-    Raises ``ToolMissing`` and ``SimulationFailed`` as it does.
+    Raises
+    ------
+    ToolMissing
+        If the job needs a tool that is not installed.
+    SimulationFailed
+        If the job raises it, or its process ends.
     """
     return run_all(module, [(folder, job)])[0]
 
 
 def run_all(module: str, jobs: Sequence[tuple[Path, Mapping[str, Any]]]) -> list[dict[str, Any]]:
-    """The same for several jobs at once, each with a folder of its own; the first that fails is raised."""
+    """Run several jobs at once, each in a folder of its own; raise the exception of the first that fails."""
     processes: list[subprocess.Popen[bytes]] = []
     try:
         with held(signal.SIGINT, signal.SIGTERM) as came:  # inside Popen nobody could end what it has started

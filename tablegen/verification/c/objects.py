@@ -39,7 +39,7 @@ class Objects:
         return [f"{Path(source).stem}.o" for source in self.sources]
 
     def line(self, compiler: Sequence[str]) -> list[str]:
-        """The command that makes them, in the folder where it runs."""
+        """Return the command that compiles these objects, for the folder where it runs."""
         places = sorted({os.path.dirname(path) for path in self.files})
         return [*compiler, *self.words, *(f"-I{place}" for place in places), "-c", *self.sources]
 

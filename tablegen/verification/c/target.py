@@ -50,7 +50,7 @@ class CTarget:
     format_name: str = "c"
 
     def require(self) -> None:
-        """A compiler, and what runs its output."""
+        """Require a compiler, and what runs its output."""
         if self.machine == "cortex-m":
             from tablegen.verification.c.emulate import require_emulator
 
@@ -123,7 +123,7 @@ class CTarget:
 
     @staticmethod
     def _header(stored: StoredBuild, step: CPlayed) -> Check:
-        """The constants of the header as the compiler reads them."""
+        """Check the constants of the header as the compiler reads them."""
         content = stored_content(stored)
         wanted = header_constants(content)
         wrong = [

@@ -37,7 +37,17 @@ def on_grid(series: ManifestSeries, count: int, derivative: int = 0) -> Floats:
 
 
 def at(series: ManifestSeries, t: Floats, derivative: int = 0) -> Floats:
-    """The same at times in periods, term by term."""
+    """Evaluate the series, or a derivative, term by term.
+
+    Parameters
+    ----------
+    t
+        Times in periods, any shape.
+
+    Returns
+    -------
+    Values of the shape of ``t``, in the series' unit (per period for each derivative).
+    """
     total = np.full(t.shape, series.a0 if derivative == 0 else 0.0)
     for n, (a, b) in enumerate(zip(series.a, series.b, strict=True), start=1):
         for _ in range(derivative):
@@ -48,7 +58,7 @@ def at(series: ManifestSeries, t: Floats, derivative: int = 0) -> Floats:
 
 
 def played_series(axis: ManifestAxis) -> ManifestSeries:
-    """The w that is played."""
+    """Return the series of the played waveform w."""
     return ManifestSeries(axis.fourier.a, axis.fourier.b, axis.fourier.a0)
 
 
@@ -65,7 +75,7 @@ class PlayedPeriod:
         self._slope = np.zeros(0) if self.is_whole else on_grid(played_series(axis), points, 1)
 
     def shaped_by(self, update_rate_hz: float) -> ShapedPlay | None:
-        """What is played of a shaped axis; None of any other."""
+        """Return what a shaped axis plays; None of any other axis."""
         if self.axis.output.shaping is None:
             return None
         ticks = np.arange(min(self.program.ticks, MOST_TICKS), dtype=np.int64)
@@ -90,7 +100,7 @@ class PlayedPeriod:
         return errors
 
     def _between(self, advance: Ints) -> Floats:
-        """The waveform between points of the grid, by values and slopes."""
+        """Interpolate the waveform between points of the grid, by values and slopes."""
         at, rest = np.divmod(advance * _GRID, self.program.phase.ticks)
         f, after = rest / self.program.phase.ticks, (at + 1) % _GRID
         y0, y1 = self._asked[at], self._asked[after]
@@ -191,7 +201,7 @@ def agree(told: float | int | None, found: float | int | None, exact: bool, tiny
 def different_figures(
     told: Mapping[str, float | int | None], found: Mapping[str, float | int | None], exact: bool, prefix: str = ""
 ) -> list[str]:
-    """The figures that a certificate states otherwise, or not at all."""
+    """List the figures that a certificate states otherwise, or not at all."""
     wrong = []
     for name, value in found.items():
         tiny = 1e-3 if name.endswith("_db") else 1e-9

@@ -41,7 +41,7 @@ Found = list[tuple[str, bool, str]]
 
 
 def _hardware(x: ManifestAxis, y: ManifestAxis) -> Found:
-    """Converter and amplifier of y are those of x, unless the manifest says that they are not."""
+    """Compare converter and amplifier of y with those of x, unless the manifest states that they differ."""
     pairs = [(key, getattr(y.output, key), getattr(x.output, key)) for key in CONVERTER_KEYS]
     if y.output.own_hardware:
         apart = any(mine != other for _, mine, other in pairs)
@@ -52,7 +52,7 @@ def _hardware(x: ManifestAxis, y: ManifestAxis) -> Found:
 
 
 def _sequence(manifest: Manifest) -> Found:
-    """Turns and windows, from the turn of each axis and its imaging window."""
+    """Compare turns and windows with the turn of each axis and its imaging window."""
     sequence, x, y = manifest.sequence, manifest.axes.x, manifest.axes.y
     found: Found = []
     ticks, lines = sequence.line_ticks, sequence.frame_lines

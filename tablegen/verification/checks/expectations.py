@@ -10,7 +10,7 @@ from tablegen.verification.checks.scaling import OPERATOR
 
 
 def wrong_expectations(axis: ManifestAxis) -> list[str]:
-    """What no build of this version states."""
+    """List expectations that no build of this version states."""
     expected, layer = axis.certificate.expected, axis.fourier.refinement is not None
     if expected is None:
         return ["certificate.expected is missing, and the operator says it"] if _by_operator(axis) and not layer else []

@@ -15,7 +15,7 @@ _REWRITTEN = ("c", "verilog")  # formats that are compared constant by constant 
 
 
 def known_formats(stored: StoredBuild) -> tuple[list[Format], list[str]]:
-    """The formats of a build that are installed here, and why others are not."""
+    """Return the formats of a build that are installed here, and why others are not."""
     formats, unknown = [], []
     for name in stored.formats:
         try:
@@ -89,7 +89,7 @@ def unlike_installed(folder: Path, written: Written) -> tuple[int, list[str]]:
 
 
 def _content(path: Path) -> bytes | None:
-    """What is in a file; missing ones are told elsewhere."""
+    """Read a file; None if it is missing, which another check reports."""
     try:
         return read_bytes(path, BUILD_FILE)
     except OSError:
@@ -97,7 +97,7 @@ def _content(path: Path) -> bytes | None:
 
 
 def _first_difference(found: bytes, right: bytes) -> int | None:
-    """The first line that differs, counted from 1, after the comment at the beginning of both."""
+    """Return the first line that differs, counted from 1, after the comment at the beginning of both."""
     skipped, ours = _after_comment(found)
     others = _after_comment(right)[1]
     if ours == others:

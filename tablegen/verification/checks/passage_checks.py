@@ -14,7 +14,7 @@ _SAME = 1e-9  # of the largest harmonic; both ways are in float64
 
 
 def wrong_passage(axis: ManifestAxis, rate_hz: float) -> list[str]:
-    """A passage that is not the one of the axis: the response that takes harmonics to their target, or their band."""
+    """Check the passage against the axis: the response that takes harmonics to their target, or their band."""
     stated, resonance = axis.certificate.shaped, axis.drive.resonance
     if (stated is None) != (axis.output.shaping is None):
         return [
@@ -33,7 +33,7 @@ def wrong_passage(axis: ManifestAxis, rate_hz: float) -> list[str]:
 
 
 def _wrong_response(axis: ManifestAxis, rate_hz: float) -> list[str]:
-    """The response behind which the position of an unshaped axis is judged, if it is not the one of the axis."""
+    """Check the response behind which the position of an unshaped axis is judged."""
     stated, resonance = axis.certificate.position, axis.drive.resonance
     if stated is None or resonance is None:
         return []

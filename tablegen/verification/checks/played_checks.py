@@ -39,7 +39,7 @@ class Check:
 
 
 def first_difference(capture: Capture) -> str | None:
-    """The first tick at which anything differs, with all that was expected and got."""
+    """Describe the first tick at which anything differs, with all that was expected and captured."""
     differs = np.flatnonzero(capture.got != capture.wanted)
     if not len(differs):
         return f"{capture.lost} ticks are missing or too many at the end of the capture" if capture.lost else None
@@ -128,7 +128,7 @@ def _float(capture: Capture, axis: Literal["x", "y"], content: ManifestAxis, lim
 
 
 def _slew(capture: Capture, axis: str, content: ManifestAxis) -> Check:
-    """The slew guard on every tick, whatever plays; exercised where the model held codes back, up and down."""
+    """Check the slew guard on every tick; exercised where the model limited codes, up and down."""
     known = capture.known
     steps, most = np.diff(part(axis, capture.got)), capture.limits(axis, "max_step")[1:]
     beyond = np.flatnonzero((np.abs(steps) > most) & known[1:] & known[:-1])
@@ -166,7 +166,7 @@ def _clamp(capture: Capture, axis: str) -> Check:
 
 
 def check_no_faults(capture: Capture) -> Check:
-    """The program of the build raises no fault."""
+    """Check that the program of the build raises no fault."""
     flags = part("faults", capture.got)
     wrong = np.flatnonzero((flags != 0) & capture.own)
     failure = None
@@ -198,7 +198,7 @@ def check_faults(capture: Capture, counted: list[int], counts: list[int]) -> Che
 def check_states(
     wanted: list[tuple[str, StoredState]], got: list[StoredState], most_counted: int, untold: tuple[str, ...] = ()
 ) -> Check:
-    """What the device says of itself after each request; it does not tell what is ``untold``."""
+    """Check the status that the device reports after each request; fields in ``untold`` are not reported."""
     wrong = []
     for (when, state), found in zip(wanted, got, strict=False):
         right, found = state.limited(most_counted, untold), found.limited(most_counted, untold)
@@ -222,7 +222,7 @@ def _told(state: StoredState) -> list[str]:
 
 
 def _converter(capture: Capture, axis: str, content: ManifestAxis, words: Ints) -> Check:
-    """What the converter is sent: coding and alignment of the model's codes."""
+    """Check the words sent to the converter: coding and alignment of the model's codes."""
     wanted = coded(part(axis, capture.wanted), content)
     words = words[: len(wanted)]
     differs = np.flatnonzero(words != wanted[: len(words)])
@@ -239,7 +239,17 @@ def _converter(capture: Capture, axis: str, content: ManifestAxis, words: Ints) 
 
 
 def coded(codes: Ints, content: ManifestAxis) -> Ints:
-    """Converter words of codes, by the coding and the alignment that the manifest has."""
+    """Return the converter words of codes, by the manifest's coding and alignment.
+
+    Parameters
+    ----------
+    codes
+        Codes in LSB, any shape.
+
+    Returns
+    -------
+    Words of the same shape.
+    """
     output = content.program.output
     return output.word(codes)
 
@@ -302,7 +312,7 @@ def check_whole(subject: str, capture: Capture, how: str) -> Check:
 
 
 def check_filled(capture: Capture, states: Check, counted: list[int], counts: list[int]) -> Check:
-    """The same session played many ticks at a time: codes and markers; of faults how many there were, and states."""
+    """Check the session played many ticks a call: codes, markers, states, and the number of faults."""
     check = check_whole("fill", _with(capture, without_faults(capture.got), without_faults(capture.wanted)), "")
     failure = check.failure
     if failure is None and counted != counts:
@@ -325,7 +335,7 @@ def _counts(counted: list[int]) -> str:
 
 
 def check_timing(capture: Capture, status: Mapping[str, Any]) -> Check:
-    """A strobe for every tick, always as many clocks after it."""
+    """Check that every tick has a strobe, always as many clocks after it."""
     jitter, ticks, strobes = (int(status[key]) for key in ("jitter", "ticks", "strobes"))
     failure = None
     if jitter or ticks != strobes or capture.lost:

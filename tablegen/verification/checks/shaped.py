@@ -35,7 +35,7 @@ def code_excess(axis: ManifestAxis) -> float:
 
 
 def shaped_codes(program: Program, count: int) -> Ints:
-    """The first codes of a shaped program since it began, (count,), within its limits."""
+    """Return the first codes of a shaped program since it began, within its limits: shape (count,)."""
     output = program.output
     bits = _CODE_AND_REMAINDER_BITS - output.dac_bits
     half = 1 << (bits - 1)
@@ -113,7 +113,7 @@ class ShapedPlay:
         return np.asarray(arrived[: len(errors)].reshape(codes.shape)[self._first :])
 
     def figures(self) -> dict[str, float | int | None]:
-        """The figures of shaping; those of the position where they can be known."""
+        """Return the figures of shaping; those of the position where they can be computed."""
         errors, changes, before = self.code_errors, _changes(self.codes), _changes(self._judged_rounded)
         found: dict[str, float | int | None] = {
             "ticks": len(self.codes),
@@ -142,7 +142,7 @@ def _changes(codes: Ints) -> tuple[float, float]:
 
 
 def told_of(stated: ManifestShaped | None) -> dict[str, float | int | None]:
-    """What a certificate states of shaping, by the names of ``figures``."""
+    """Return what a certificate states of shaping, by the names of ``figures``."""
     if stated is None:
         return {}
     told: dict[str, float | int | None] = {

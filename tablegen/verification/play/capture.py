@@ -41,31 +41,36 @@ class Capture:
         return known
 
     def limits(self, axis: str, name: str) -> Ints:
-        """A figure of the output stage, such as max_step, of the program of each tick; 0 before the first one."""
+        """Return a figure of the output stage, such as max_step, of the program of each tick; 0 before the first.
+
+        Returns
+        -------
+        Shape (ticks,).
+        """
         figures = [0 if one is None else int(getattr(getattr(one, axis).output, name)) for one in self.programs]
         return np.array(figures, dtype=np.int64)[self.which]
 
 
 def part(subject: str, words: Words) -> Ints:
-    """A field of stored words: x, y, markers, or faults."""
+    """Return a field of captured words: x, y, markers, or faults, shape (ticks,)."""
     shift, mask = _MASK[subject]
     return (words >> np.uint64(shift) & np.uint64(mask)).view(np.int64)
 
 
 def differing(subject: str, capture: Capture) -> Ints:
-    """The ticks at which a field of what was stored is not that of the model."""
+    """Return the ticks at which a field of the captured words differs from the model, shape (errors,)."""
     shift, mask = _MASK[subject]
     return np.flatnonzero((capture.got ^ capture.wanted) & np.uint64(mask << shift))
 
 
 def without_faults(words: Words) -> Words:
-    """Stored words whose faults are none."""
+    """Return captured words with their faults cleared, shape (ticks,)."""
     kept: Words = words & ~np.uint64(_MASK["faults"][1] << _MASK["faults"][0])
     return kept
 
 
 def recaptured(capture: Capture, got: Words) -> Capture | None:
-    """The same session played once more, where as much came of it as before."""
+    """Return a second capture of the same session, if it has as many ticks as the first; else None."""
     return None if capture.lost or len(got) != len(capture.got) else replace(capture, got=got)
 
 
@@ -121,7 +126,7 @@ def _caught_up(program: DualProgram, place: Ints, since: Ints, wanted: Words) ->
 
 
 def _codes(program: Program, place: Ints, since: Ints) -> Ints:
-    """The codes at ticks of a frame, and since the program began."""
+    """Return the codes at ticks of a frame, and since the program began."""
     if not program.output.shaping.order:
         if len(place) > program.ticks:  # every code of a period once
             return program.codes(np.arange(program.ticks, dtype=np.int64))[place % program.ticks]

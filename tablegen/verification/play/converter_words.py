@@ -23,7 +23,7 @@ def packed(words: Words, stored: StoredBuild) -> Words:
 
 
 def codes_of(words: Words, output: Output) -> Words:
-    """The codes in converter words, by the coding that the manifest has."""
+    """Decode converter words by the manifest's coding; shape (ticks,) in and out."""
     shift = output.word_bits - output.dac_bits if output.align == "left" else 0
     flip = 1 << (output.dac_bits - 1) if output.coding == "twos-complement" else 0
     codes: Words = (words >> np.uint64(shift) ^ np.uint64(flip)) & np.uint64(0xFFFFFF)

