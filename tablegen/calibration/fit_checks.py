@@ -27,7 +27,7 @@ _LAW_ERRORS, _LAW_SHARE = 10.0, 0.25  # a law that misses by so many errors, and
 
 
 def doubts(fit: Fit, points: bool = False) -> tuple[str, ...]:
-    """What makes a fit meaningless, in sentences with what to do; empty for one that can be written.
+    """List what makes a fit meaningless, with what to do; empty for a fit that can be written.
 
     With ``points`` measured values are written in place of a law, so that a law that misses them does not count.
     """

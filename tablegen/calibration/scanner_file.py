@@ -43,7 +43,7 @@ class Change:
 
 
 def new_file(name: str, driver: Driver | float) -> str:
-    """A scanner file with nothing calibrated yet."""
+    """Return the text of a scanner file with nothing calibrated yet."""
     document = tomlkit.document()
     document["name"] = name
     driver = Driver.of(driver)
@@ -56,9 +56,12 @@ def new_file(name: str, driver: Driver | float) -> str:
 
 
 def updated(text: str, name: str, axis: str, change: Change) -> str:
-    """The text with a calibration put in; ``name`` is what messages call it.
+    """Put a calibration into the text of a scanner file; messages call the file ``name``.
 
-    Raises ``Rejected`` where the text is no TOML or where a value that was put in is outside what the file can hold.
+    Raises
+    ------
+    Rejected
+        If the text is no TOML, or a new value is outside what the file can hold.
     """
     before, _ = parse_toml(text, name)
     windows = "\r\n" in text
@@ -153,7 +156,7 @@ def _put_branches(table: Any, branches: Sequence[Mapping[str, Any]]) -> None:
 
 
 def _rows_of_tables(rows: Sequence[Mapping[str, Any]]) -> Any:
-    """A row a line."""
+    """Format a table with one row a line."""
     array = tomlkit.array()
     for row in rows:
         table = tomlkit.inline_table()
@@ -175,7 +178,7 @@ def _set(table: Any, key: str, value: Any) -> None:
 
 
 def _with_provenance(text: str, name: str, axis: str, change: Change) -> str:
-    """The text with comments above the tables, in place of those of an earlier calibration."""
+    """Replace the comments above the tables, those of an earlier calibration, by the new ones."""
     for index, lines in enumerate(change.provenance):
         key, turn = f"{axis}.{change.kind}", None
         if change.branches:
@@ -192,7 +195,7 @@ def _with_provenance(text: str, name: str, axis: str, change: Change) -> str:
 
 
 def _spaced(text: str, before: str) -> str:
-    """A blank line above the tables that are new, as between the others."""
+    """Put a blank line above the tables that are new, as between the others."""
     known = set(pairwise(before.split("\n")))
     rows: list[str] = []
     for row in text.split("\n"):

@@ -26,10 +26,21 @@ class FrequencyFit(Fit):
 
 
 def fit_frequency(frequency_hz: Floats, gain: Floats, reference_hz: float | None = None) -> FrequencyFit:
-    """The law of (23) through gains (any unit, errors in proportion) at frequencies (Hz).
+    """Fit the law of (23) to gains at frequencies, with errors in proportion to the gains.
 
-    ``reference_hz`` is the rate at which the scan size was calibrated, a choice and nothing that could be
-    fitted; without it the lowest frequency. Raises ``Unphysical``.
+    Parameters
+    ----------
+    frequency_hz
+        Frequencies in Hz, shape (points,).
+    gain
+        Gains in any unit, shape (points,).
+    reference_hz
+        The rate at which the scan size was calibrated, which no fit can know; the lowest frequency by default.
+
+    Raises
+    ------
+    Unphysical
+        If the points make no law: too few, or no resonance above them.
     """
     remarks: list[Remark] = []
     if len(np.unique(frequency_hz)) < 2:

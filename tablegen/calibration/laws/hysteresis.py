@@ -129,7 +129,7 @@ def combined(fits: Sequence[AmplitudeFit], span: float, rho: float, remarks: Seq
 
 
 def _offsets(group: Sequence[AmplitudeFit], span: float) -> tuple[float, ...]:
-    """The offset of each, those that are near each other as one.
+    """Return the offset of each amplitude, those near each other as one.
 
     Empty where there is but one, and where no offset has two sizes: traces that all begin at 0 V say nothing of it.
     """
@@ -148,7 +148,7 @@ def _offsets(group: Sequence[AmplitudeFit], span: float) -> tuple[float, ...]:
 
 
 def _check_shape(growth: Growth, v: float) -> None:
-    """The drive that a build would make of it, at the largest amplitude that was measured."""
+    """Check the drive that a build would compute from the shape, at the largest measured amplitude."""
     BranchShape.harmonic(float(growth.beta(np.array(v))), growth.u_peak.value)
 
 

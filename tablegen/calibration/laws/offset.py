@@ -39,12 +39,27 @@ def fit_offset(
     size_v: float | None = None,
     errors_nm: Floats | None = None,
 ) -> OffsetFit:
-    """The law of (1) through apparent sizes (nm, of one object, or lattice constants) at three or more offsets (V).
+    """Fit the law of (1) to apparent sizes (of one object, or lattice constants) at three or more offsets.
 
     Least squares; exact for three different offsets. m multiplies the drive, and a drive that is m times as large makes
-    the scan more than m times as large, (6): with the size law and ``size_v``, the scan voltage of the images, apparent
-    sizes are R(V) / R(V / m). Without, they are taken for m itself, as ``OffsetLaw.fit`` does. ``errors_nm``, where
-    they are known, are the sizes' weights, as in ``fit_size``. Raises ``Unphysical``.
+    the scan more than m times as large, (6): with the size law and ``size_v``, apparent sizes are R(V) / R(V / m).
+    Without them they are taken for m itself, as ``OffsetLaw.fit`` does.
+
+    Parameters
+    ----------
+    offset_v
+        Offsets in V, shape (points,).
+    apparent_nm
+        Apparent sizes in nm, shape (points,).
+    size_v
+        Scan voltage of the images, peak to peak at the piezo, in V.
+    errors_nm
+        Standard errors of the sizes, shape (points,), their weights as in ``fit_size``; equal by default.
+
+    Raises
+    ------
+    Unphysical
+        If there are too few offsets, or the sizes make no law.
     """
     driver = Driver.of(v_max)
     outside = (offset_v < driver.v_min) | (offset_v > driver.v_max)

@@ -130,8 +130,7 @@ def _response(f: Floats, x: Floats) -> tuple[Floats, Floats]:
 
 
 def _best(f: Floats, g: Floats, phase: Floats | None) -> Solution:
-    """The best of several starts: the highest point is the resonance unless another one is higher."""
-
+    """Return the best of several starts: the highest point is the resonance unless another one fits better."""
     weight = np.ones(2)
 
     def residuals(x: Floats) -> Floats:

@@ -43,13 +43,28 @@ def fit_size(
     errors_nm: Floats | None = None,
     shared: float = 0.0,
 ) -> SizeFit:
-    """The law of (6) and (10) through actual sizes (nm) at drives (V_scan, volts peak to peak at the piezo).
+    """Fit the law of (6) and (10) to actual sizes at drives.
 
-    ``threshold`` (of v_max) is kept where it is given, and where the points cannot tell. ``noise`` says whether errors
-    of the sizes are in proportion to them, as in images, or the same for all, as of a sensor. ``errors_nm``, where
-    they are known, take its place: the fit weighs sizes by them, and by one relative error more where sizes miss the
-    law by more than that. ``shared`` is a relative error that all sizes have together; it counts for k. Raises
-    ``Unphysical``.
+    Parameters
+    ----------
+    drive_v
+        V_scan, volts peak to peak at the piezo, shape (points,).
+    actual_nm
+        Actual sizes in nm, shape (points,).
+    threshold
+        Share of v_max below which the law is another, kept if given, or if the points cannot show it.
+    noise
+        Whether errors are in proportion to the sizes, as in images, or the same for all, as of a sensor.
+    errors_nm
+        Standard errors of the sizes, shape (points,), in place of ``noise``: the fit weighs sizes by them, and by
+        one relative error more if sizes miss the law by more than that.
+    shared
+        Relative error that all sizes have in common; it counts for k.
+
+    Raises
+    ------
+    Unphysical
+        If there are too few sizes, or they make no law.
     """
     driver = Driver.of(v_max)
     span, v = driver.span, drive_v / driver.span
@@ -134,11 +149,11 @@ class _SizeModel:
         self._start_k = float(np.sum(v * actual_nm) / np.sum(v * v)) / v_max
 
     def size(self, x: Floats, v: Floats) -> Floats:
-        """nm at normalised voltages."""
+        """Return sizes in nm at normalised voltages, of their shape."""
         return self._base * _unit(v, x[1], x[2]) / _unit(np.array(self.at_base(x)), x[1], x[2])
 
     def at_base(self, x: Floats) -> float:
-        """The normalised voltage of the base size."""
+        """Return the normalised voltage of the base size."""
         return self._base / (float(x[0]) * self._v_max)
 
     def solve(self, threshold: float | None, start: tuple[float, float, float] | None = None) -> Solution:

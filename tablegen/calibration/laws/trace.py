@@ -108,7 +108,7 @@ class _TraceModel:
         return float(x[-1]) if self.fits_delay else self.given_delay
 
     def position(self, x: Floats) -> tuple[Floats, Floats, Bools, Floats]:
-        """u and tau along the sweep, whether it rises, and the normalised displacement."""
+        """Return u and tau along the sweep, whether it rises, and the normalised displacement; each (samples,)."""
         if self._last is None or not np.array_equal(self._last[0], x):  # residuals and their derivatives ask in turn
             self._last = x.copy(), self._position(x)
         return self._last[1]
@@ -124,7 +124,7 @@ class _TraceModel:
         return u, tau, rising, np.where(rising, tau, 1.0 - tau)
 
     def expected(self, x: Floats) -> Floats:
-        """The modelled normalised displacement, with drift."""
+        """Return the modelled normalised displacement, with drift, shape (samples,)."""
         _, _, _, position = self.position(x)
         return float(x[4]) + float(x[5]) * position + self.drift @ x[6 : 6 + self.drift.shape[1]]
 
@@ -135,7 +135,7 @@ class _TraceModel:
         return self.expected(x) - self.measured
 
     def jacobian(self, x: Floats) -> Floats:
-        """Derivatives of ``residuals``: tau moves by -(du/dparameter) / (du/dtau)."""
+        """Return the derivatives of ``residuals``: tau moves by -(du/dparameter) / (du/dtau)."""
         columns, steep = self._shape_columns(x)
         if self.fits_delay:
             columns.append(-steep * self._by_delay(x))
@@ -227,7 +227,7 @@ def _branches(x: Floats) -> tuple[BranchShape, BranchShape]:
 
 
 def _averaged(model: _TraceModel, x: Floats, left: Floats) -> tuple[Floats, tuple[float, float], Curve]:
-    """What is left over, averaged over the periods, and the measured residual to draw."""
+    """Average the residual over the periods; return it, its noise, and the measured residual as a curve."""
     u, tau, rising, _ = model.position(x)
     height = float(x[5])
     residuals, scaling, drawn = [], [], []

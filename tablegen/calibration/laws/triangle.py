@@ -35,12 +35,12 @@ class Triangle:
         return t - np.floor(t)
 
     def value(self, time_s: Floats) -> Floats:
-        """The normalised drive, from 0 to 1."""
+        """Return the normalised drive, from 0 to 1, of the shape of ``time_s``."""
         phase = self.phase(time_s)
         return np.where(phase < self.turn, phase / self.turn, (1.0 - phase) / (1.0 - self.turn))
 
     def timing_slopes(self, time_s: Floats) -> Floats:
-        """Derivatives of ``value`` by period_s, start_s and turn, a column each."""
+        """Return the derivatives of ``value`` by period_s, start_s and turn, a column each."""
         phase = self.phase(time_s)
         rising = phase < self.turn
         slope = np.where(rising, 1.0 / self.turn, -1.0 / (1.0 - self.turn))
@@ -50,9 +50,19 @@ class Triangle:
 
 
 def find_triangle(time_s: Floats, drive_v: Floats) -> Triangle:
-    """The triangle in a recorded drive, from one period on; noise is averaged over the whole record.
+    """Fit the triangle in a recorded drive, from one period on; noise is averaged over the whole record.
 
-    Raises ``Unphysical`` where there is none.
+    Parameters
+    ----------
+    time_s
+        Times in s, shape (samples,).
+    drive_v
+        Drive in V, shape (samples,).
+
+    Raises
+    ------
+    Unphysical
+        If the drive is no triangle.
     """
     first = _first_guess(time_s, drive_v)
     middle = 0.5 * (float(time_s[0]) + float(time_s[-1]))

@@ -29,10 +29,10 @@ Factor = Callable[[float], float]
 def creep_of_fields(
     lines: Sequence[PeriodicLine], family: Family, factor: Factor, creep_of: CreepOf
 ) -> LogarithmicCreep:
-    """The loss per decade with which the fields over stroke and centre are the likeliest, whatever the hysteresis.
+    """Return the loss per decade with which the fields over stroke and centre are the likeliest.
 
-    Of several rates the sizes decide; of one rate and one turn the shapes, which are straight where the stroke
-    vanishes. Other lines leave it open, and it is taken as 0.
+    This holds whatever the hysteresis. Of several rates the sizes decide; of one rate and one turn the shapes, which
+    are straight where the stroke vanishes. Other lines leave it open, and it is taken as 0.
     """
     rates = [line.rate_hz for line in lines]
     turns = [float(np.mean(line.rising)) for line in lines]
@@ -70,7 +70,7 @@ def _unlikelihood(lines: Sequence[PeriodicLine], rows: Floats, still: bool) -> f
 
 
 def _least(creep: CreepOf, misfit: Callable[[LogarithmicCreep], float]) -> LogarithmicCreep:
-    """The creep of the least misfit: a parabola through the best of some losses."""
+    """Return the creep of the least misfit: a parabola through the best of some losses."""
     coarse = [misfit(creep(loss)) for loss in _LOSSES[::3]]
     best = 3 * int(np.argmin(coarse))
     fine = {i: misfit(creep(_LOSSES[i])) for i in range(best - 2, best + 3) if 0 <= i < len(_LOSSES)}

@@ -32,9 +32,12 @@ _PHASE_SHARE = 0.9  # of the resonance, up to which phases are put right; ``with
 
 
 def fit_delay(lines: Sequence[PeriodicLine], response: Response | None) -> Estimate:
-    """The delay in s of the sensor that recorded all lines, beyond the dynamics of ``response``.
+    """Fit the delay in s of the sensor that recorded all lines, beyond the dynamics of ``response``.
 
-    Raises ``Unphysical`` where no delay is the likeliest.
+    Raises
+    ------
+    Unphysical
+        If no delay is the likeliest.
     """
     for line in lines:
         if _sharpness(line) < _SHARP:

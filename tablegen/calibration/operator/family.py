@@ -86,7 +86,7 @@ class FamilyProblem(ABC):
 
     @abstractmethod
     def moved(self, shape: Floats) -> list[Floats]:
-        """What weights of 1 move each line by, for all of v_max 1: shape (phases, weights)."""
+        """Return what weights of 1 move each line by, in shares of v_max: shape (phases, weights) each."""
 
     @abstractmethod
     def family(self, shape: Floats, weights: Floats, reversible: Floats) -> Family:
@@ -107,7 +107,7 @@ class FamilyProblem(ABC):
         )
 
     def left(self, numbers: Floats) -> _Left:
-        """What the best weights leave."""
+        """Return what the best weights leave of measured numbers."""
         parts, measured = (
             self._moved(tuple(numbers[: self._shapes].tolist())),
             self._measured(float(numbers[self._shapes])),
@@ -165,7 +165,7 @@ class FamilyProblem(ABC):
         ]
 
     def _values(self, creep: LogarithmicCreep) -> Floats:
-        """What was measured, before its creep."""
+        """Return the measured values before their creep."""
         parts = [line.without(None, creep).displacement_nm[::STRIDE] for line in self.lines]
         return np.concatenate(
             [share / self.scale * (y - y.mean()) for share, y in zip(self._share, parts, strict=True)]

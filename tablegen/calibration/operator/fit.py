@@ -63,9 +63,12 @@ class OperatorFit:
 
 
 def fit_operator(lines: Sequence[PeriodicLine], response: Response | None, factor: Factor) -> OperatorFit:
-    """The operator of some lines; ``factor`` is m of (1) at a centre, in shares of v_max.
+    """Fit an operator to lines; ``factor`` is m of (1) at a centre, in shares of v_max.
 
-    Raises ``Unphysical`` for too few lines, for such as are alike, and for noisy ones.
+    Raises
+    ------
+    Unphysical
+        If the lines are too few, too much alike, or too noisy.
     """
     _check(lines)
     still = [line.without(response, None) for line in lines]
@@ -102,7 +105,7 @@ def _check(lines: Sequence[PeriodicLine]) -> None:
 
 
 def _main_centre(lines: Sequence[PeriodicLine]) -> float:
-    """The centre at which most strokes were measured."""
+    """Return the centre at which most strokes were measured."""
     groups = groups_of([line.centre for line in lines])
     most = max(set(groups), key=groups.count)
     return float(np.mean([line.centre for line, group in zip(lines, groups, strict=True) if group == most]))
@@ -158,7 +161,7 @@ class _Fitted:
         return Operator(self.family, residual, size, self.creep, self.main, ()), rows, sizes
 
     def weighted(self, share: float, other: "_Fitted") -> "_Fitted":
-        """A share of this family, and the rest of another one, for the same lines."""
+        """Mix a share of this family with the rest of another one, for the same lines."""
         loss = share * self.creep.loss_per_decade + (1.0 - share) * other.creep.loss_per_decade
         creep = structs.replace(self.creep, loss_per_decade=round(loss, 6))
         return _Fitted(self.lines, self.main, self.family.weighted(share, other.family), creep)
@@ -173,7 +176,7 @@ class _Candidate:
     without: list[_Fitted]
 
     def weighted(self, share: float, other: "_Candidate") -> "_Candidate":
-        """A share of this one, and the rest of another."""
+        """Mix a share of this candidate with the rest of another one."""
         name = f"{100.0 * share:.0f} % {self.name}, {100.0 * (1.0 - share):.0f} % {other.name}"
         both = zip(self.without, other.without, strict=True)
         return _Candidate(name, self.whole.weighted(share, other.whole), [a.weighted(share, b) for a, b in both])
@@ -196,7 +199,7 @@ def _candidate(name: str, lines: Sequence[PeriodicLine], main: float, factor: Fa
 
 
 def _judged(candidate: _Candidate, lines: Sequence[PeriodicLine], factor: Factor) -> OperatorFit:
-    """The best lengths for one family, and the operator with them."""
+    """Choose the best lengths for a family, and return the operator with them."""
     whole, without = candidate.whole, candidate.without
     alone = [line.without(None, one.creep) for line, one in zip(lines, without, strict=True)]
     several = max(groups_of([line.centre for line in lines])) > 0

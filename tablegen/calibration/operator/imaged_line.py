@@ -16,10 +16,15 @@ _SPANNED = (0.05, 0.95)  # of each sweep: the rest is extrapolated, to 0.4 % of 
 def imaged_line(
     image: SampleImage, rate_hz: float, driver: Driver | float, sample: KnownSample, taking: Taking
 ) -> tuple[PeriodicLine, LineSize]:
-    """The line of a triangle of ``v_scan`` about ``v_offset``, at ``rate_hz``, and its size.
+    """Fit the line of a triangle of ``v_scan`` about ``v_offset``, at ``rate_hz``, and its size.
 
-    ``noise_nm`` is the rms standard error of the position; that of the size is beside it. The columns have to show
-    both sweeps almost from turn to turn. Raises ``Unphysical``, without the image's name.
+    ``noise_nm`` is the rms standard error of the position; that of the size is beside it. The columns have to show both
+    sweeps almost from turn to turn.
+
+    Raises
+    ------
+    Unphysical
+        If the image shows no such line; the message leaves the image's name to the caller.
     """
     if image.retrace is None:
         raise Unphysical("the retrace is missing: an operator needs both directions")

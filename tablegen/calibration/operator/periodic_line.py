@@ -74,13 +74,13 @@ class PeriodicLine:
         return _RESONANCE_SHARE * response.resonance_hz
 
     def earlier(self, delay_s: float) -> "PeriodicLine":
-        """The same with the displacement of a sensor that is ``delay_s`` behind the drive."""
+        """Return the line with the displacement of a sensor that is ``delay_s`` behind the drive."""
         n = np.arange(PHASES // 2 + 1)
         ahead = np.exp(2j * np.pi * (n * self.rate_hz * delay_s))
         return replace(self, displacement_nm=np.fft.irfft(np.fft.rfft(self.displacement_nm) * ahead, PHASES))
 
     def without(self, response: Response | None, creep: LogarithmicCreep | None) -> "PeriodicLine":
-        """The same with the displacement before the dynamics, which come behind the hysteresis."""
+        """Return the line with the displacement before the dynamics, which come behind the hysteresis."""
         n = np.arange(PHASES // 2 + 1, dtype=np.float64)
         spectrum = np.fft.rfft(self.displacement_nm)
         f_hz: Floats = n * self.rate_hz
@@ -140,7 +140,7 @@ def periodic_line(trace: Trace, driver: Driver | float) -> PeriodicLine:
 
 
 def _period(time: Floats, drive: Floats) -> float:
-    """The period in s, from all rises and falls of the record through the middle."""
+    """Return the period in s, from all rises and falls of the record through the middle."""
     middle = 0.5 * (float(np.max(drive)) + float(np.min(drive)))
     level = (drive - middle) / float(np.ptp(drive))
     side = np.where(level > _LEVEL, 1, np.where(level < -_LEVEL, -1, 0))

@@ -35,7 +35,13 @@ def columns_of(content: bytes, name: str) -> dict[str, AnyArray]:
 
 
 def numbers_of(column: AnyArray, name: str, spelt: str) -> Floats:
-    """A column of real numbers as floats, shape (rows,). Raises ``Rejected``."""
+    """Convert a column of real numbers to floats, shape (rows,).
+
+    Raises
+    ------
+    Rejected
+        If the column has another shape, or something else than real numbers.
+    """
     if column.ndim != 1:
         shape = " x ".join(map(str, column.shape)) or "one number"
         raise Rejected([Problem(name, 0, spelt, f"has shape {shape}; a column has one dimension")])

@@ -137,7 +137,7 @@ class _Reader:
                 return
 
     def values(self, written: Floats, place: _Place) -> Floats:
-        """A column of numbers in the unit of the fits: at once if all are in range, otherwise one by one."""
+        """Convert a column to the unit of the fits: at once if all are in range, otherwise one by one."""
         found = _converted(written, place)
         if found is None:
             found = np.zeros(len(written))
@@ -163,7 +163,7 @@ class _Reader:
         return columns, np.frombuffer(self._lines, dtype=np.int64)
 
     def row(self, line: int, text: str) -> list[float]:
-        """The numbers of one row."""
+        """Return the numbers of one row."""
         cells = _cells(text, self._separator)
         if len(cells) != self._width:
             why = f"{len(cells)} fields where the header has {self._width}"
@@ -198,7 +198,7 @@ class _Reader:
 
 
 def _converted(written: Floats, place: _Place) -> Floats | None:
-    """A column in the unit of the fits; None where that is no plain factor, or a value is out of its range."""
+    """Convert a column to the unit of the fits; None if that is no plain factor, or a value is out of range."""
     _, column, convert, _ = place
     if not isinstance(convert, Times):
         return None
@@ -237,7 +237,7 @@ def _places(
 
 
 def _blocks(path: Path, name: str) -> Iterator[Block]:
-    """Raises ``Rejected``."""
+    """Read a file in blocks; raise ``Rejected`` with its name if that fails."""
     require_file(path, name)
     try:
         yield from blocks_of(path, MEASUREMENT)
@@ -246,7 +246,7 @@ def _blocks(path: Path, name: str) -> Iterator[Block]:
 
 
 def _rows(text: str, name: str, first: int) -> Iterator[tuple[int, str]]:
-    """What counts, with line numbers."""
+    """Yield the rows of numbers with their line numbers."""
     lines = lines_of(text, name, first)
     return ((n, line) for n, line in lines if line.strip(" \t;,") and not line.lstrip().startswith("#"))
 
