@@ -95,7 +95,7 @@ class ImageLine:
         return len(self.model.images) == 2
 
     def position(self, drive: Floats, forward: bool) -> Floats:
-        """The position where the drive, 0..1 between the turns, is on its way up or down."""
+        """Return positions, of the shape of ``drive`` (0..1 between the turns), on the way up or down."""
         i = 0 if forward else 2
         along = drive if forward else 1.0 - drive
         tau = BranchShape.at(self.state.parameters[i : i + 2]).inverse(along)
@@ -165,7 +165,7 @@ class _Degree:
 
 
 def _rippled(model: PeriodicModel, state: FitState, free: Bools) -> list[_Degree]:
-    """The same with polynomials on both sweeps: of every number, from the most that such an image may tell."""
+    """Fit polynomials on both sweeps: of every degree, from the highest that such an image may show."""
     geometry = model.geometry
     along = np.abs(model.spots @ model.q(state.parameters))
     seen = np.abs(state.amplitudes)
@@ -304,7 +304,7 @@ def _result(best: _Degree, fits: list[_Degree], gap: Floats, gap_error: Floats) 
 
 
 def _of_the_form(best: _Degree, fits: list[_Degree], gap: Floats, gap_error: Floats) -> Floats:
-    """What the choice of the polynomials adds to the covariance of the base waves; what is open at the turns as well.
+    """Return what the choice of the polynomials adds to the covariance of the base waves, and the open ends.
 
     Fits of neighbouring degrees describe the image about as well.
     """

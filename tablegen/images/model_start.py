@@ -53,7 +53,7 @@ def prepared(
 
 
 def begin(geometry: Geometry, heights: list[Floats], mirrored: bool) -> tuple[Spot, tuple[Bend, ...]]:
-    """The strongest spot and each image's shape; whether the retrace, if there is one, is the trace's retrace."""
+    """Find the strongest spot and each image's shape; check that the retrace, if any, belongs to the trace."""
     spot = strongest(geometry, heights[0])
     forward = bend_of(geometry, heights[0], True, spot, spot.sharpest)
     if len(heights) == 1:
@@ -84,16 +84,21 @@ def check_signs(forward: float, backward: float, least: float, advice: str) -> N
 
 
 def row_order() -> int:
-    """The order of the polynomial over rows."""
+    """Return the order of the polynomial over rows."""
     return _ROW_POLYNOMIAL_ORDER
 
 
 def grown(
     geometry: Geometry, heights: list[Floats], spot: Spot, bends: tuple[Bend, ...]
 ) -> tuple[PeriodicModel, FitState, Bools]:
-    """The fit, first of the strongest spot, then with another base vector if there is one, and all spots seen.
+    """Fit the strongest spot, then another base vector if there is one, and all visible spots.
 
     The shape of a retrace that there is not stays straight.
+
+    Parameters
+    ----------
+    heights
+        Levelled images, each (rows, columns).
     """
     images = list(zip((True, False), heights, strict=False))
     start = np.zeros(BASES + 1 + _ROW_POLYNOMIAL_ORDER)
@@ -121,9 +126,16 @@ def grown(
 def described(
     geometry: Geometry, images: list[tuple[bool, Floats]], start: Floats, free: Bools, off: tuple[Floats, Floats]
 ) -> tuple[PeriodicModel, FitState, Bools]:
-    """The fit from the parameters of one base vector: with another one if there is one, and all spots seen.
+    """Fit from the parameters of one base vector: with another one if there is one, and all visible spots.
 
     ``start`` has a polynomial of ``row_order()`` in the rows.
+
+    Parameters
+    ----------
+    images
+        Whether each is forward, and its heights, (rows, columns).
+    start
+        Parameters, with a polynomial of ``row_order()`` in the rows.
     """
     nowhere = np.zeros(geometry.columns)
     model = PeriodicModel(geometry, images, [(1,)], _ROW_POLYNOMIAL_ORDER, off)
@@ -168,7 +180,7 @@ def described(
 def _tracked(
     geometry: Geometry, heights: list[Floats], bends: tuple[Bend, ...], polynomial: Floats
 ) -> tuple[Floats, float, tuple[Floats, Floats]]:
-    """The shapes and q from the phase along each image, and what they leave of it, where that is much of a period.
+    """Estimate the shapes and q from the phase along each image, and the rest, if it is much of a period.
 
     Many periods tell the phase at every column, so that the start does not depend on the model.
     """
@@ -198,7 +210,7 @@ def _tracked(
 
 
 def _turns(place: Floats, apart: Floats, q: float) -> int:
-    """The whole number of periods between the phases of trace and retrace: they meet where the drive turns.
+    """Return the whole number of periods between the phases of trace and retrace: they meet where the drive turns.
 
     Raises ``Unphysical`` where one number does as well as another.
     """

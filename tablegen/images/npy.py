@@ -10,7 +10,13 @@ AnyArray = np.ndarray[tuple[int, ...], Any]  # of any type of element
 
 
 def npy_array(content: bytes) -> tuple[AnyArray, int]:
-    """The array, without a copy, and how many bytes follow it. Raises ``ValueError`` with what is wrong."""
+    """Return the array, without a copy, and how many bytes follow it.
+
+    Raises
+    ------
+    ValueError
+        If the content is no .npy file; the message has the reason.
+    """
     file = BytesIO(content)
     try:
         version = np.lib.format.read_magic(file)

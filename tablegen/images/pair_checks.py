@@ -89,7 +89,7 @@ def check_periods(periods: float, span: float, columns: int) -> None:
 
 
 def check_size(found_nm: float, said_nm: float, said_by: str, side: Literal["line", "frame"] = "line") -> None:
-    """The size by the sample's constant against the one that was said, by ``said_by``.
+    """Check the size by the sample's constant against the one stated by ``said_by``.
 
     A constant of another direction of a lattice is wrong by the root of two or of three, an alias by more.
     """

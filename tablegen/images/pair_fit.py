@@ -139,9 +139,9 @@ def _result(model: PeriodicModel, state: FitState, free: Bools, v_scan: float) -
 def _positions(
     model: PeriodicModel, state: FitState
 ) -> tuple[Floats, tuple[float, float], tuple[Curve, ...], float, list[Floats]]:
-    """The position error of each twentieth of the window, what it does to scaling, and curves.
+    """Return the position error of each twentieth of the window, its effect on scaling, and curves.
 
-    Then by how much it is larger than noise would have it, at least 1, and what is left of the images without it.
+    Then the factor by which it is larger than noise explains, at least 1, and the images less the model.
     """
     geometry = model.geometry
     residuals, scaling, lines, clean, beyond = [], [], [], [], 0.0

@@ -63,7 +63,7 @@ class Geometry:
         return rows - (rows @ self.parabola) @ self.parabola.T
 
     def sweep(self, forward: bool) -> Floats:
-        """The drive along the sweep, 0..1, that each column shows."""
+        """Return the drive along the sweep, 0..1, that each column shows: shape (columns,)."""
         low, high = self.window
         way = self.place if forward else 1.0 - self.place
         return np.clip(way - self.delay * (high - low) / self.columns, 0.0, 1.0)
@@ -193,11 +193,11 @@ class PeriodicModel:
         return replace(column, x=column.x + self.off[at] + more)
 
     def with_spots(self, spots: Sequence[tuple[int, ...]]) -> "PeriodicModel":
-        """The same of other spots."""
+        """Return the same model with other spots."""
         return PeriodicModel(self.geometry, self.images, spots, self.order, self.off, self.ripples, self.row_off)
 
     def with_offsets(self, off: tuple[Floats, Floats], row_off: Floats) -> "PeriodicModel":
-        """The same with other ``off`` and ``row_off``."""
+        """Return the same model with other ``off`` and ``row_off``."""
         spots = [tuple(spot) for spot in self.spots.tolist()]
         return PeriodicModel(self.geometry, self.images, spots, self.order, off, self.ripples, row_off)
 
@@ -224,7 +224,7 @@ class PeriodicModel:
         return found
 
     def divided(self, state: FitState, part: int) -> "tuple[PeriodicModel, FitState]":
-        """The same with base waves of one ``part`` of these."""
+        """Return the same model with base waves of one ``part`` of these."""
         spots = list(map(tuple, (self.spots * part).tolist()))
         parameters = state.parameters.copy()
         parameters[BASES : self.rippled_from] /= part
@@ -271,7 +271,7 @@ class PeriodicModel:
         )
 
     def _terms(self, parameters: Floats, amplitudes: Complexes) -> tuple[Complexes, Complexes]:
-        """What each parameter does to a forward and a backward image: (parameters, terms)."""
+        """Return the effect of each parameter on a forward and a backward image: (parameters, terms)."""
         count, order = len(self.spots), self.order
         tables = []
         waves = 2j * pi * amplitudes
@@ -347,7 +347,7 @@ def settle(model: PeriodicModel, start: Floats, free: Bools) -> FitState:
 def _products(
     rows: Complexes, columns: Complexes, places: tuple[Ints, Ints] | None = None
 ) -> tuple[Complexes, Complexes]:
-    """Sums over pixels of conj(F_m) F_n and of F_m F_n, for F = row part times column part."""
+    """Sum over pixels conj(F_m) F_n and F_m F_n, for F = row part times column part."""
     row, column = (np.conj(rows) @ rows.T, rows @ rows.T), (np.conj(columns) @ columns.T, columns @ columns.T)
     if places is not None:
         at, across = np.ix_(places[0], places[0]), np.ix_(places[1], places[1])

@@ -40,11 +40,11 @@ class LeftInBins:
 def covariance(
     model: PeriodicModel, state: FitState, free: Bools, watched: Bools, misfit: float, clean: list[Floats]
 ) -> tuple[Floats, float]:
-    """The covariance of all parameters, 0 for those that are not free; and the factor by which it was widened.
+    """Return the covariance of all parameters, 0 for those that are not free, and its widening factor.
 
-    From what each line says by itself, so that noise may have any spectrum along the line. It is widened where
-    neighbouring lines say the same of the ``watched`` parameters, and by ``misfit``; ``clean`` are the images that are
-    left without that.
+    It comes from each line by itself, so that noise may have any spectrum along the line. It is widened where
+    neighbouring lines agree on the error of the ``watched`` parameters, and by ``misfit``; ``clean`` are the images
+    less the model.
     """
     joint = np.concatenate([free, np.ones(2 * len(model.spots), bool)])
     inverse = np.linalg.pinv(state.hessian[np.ix_(joint, joint)], rcond=1e-13, hermitian=True)

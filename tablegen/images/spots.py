@@ -45,7 +45,13 @@ class Bend:
 
 
 def strongest(geometry: Geometry, heights: Floats) -> Spot:
-    """The strongest spot of a levelled forward image. Raises ``Unphysical`` where none stands out."""
+    """Find the strongest spot of a levelled forward image, (rows, columns).
+
+    Raises
+    ------
+    Unphysical
+        If no spot stands out.
+    """
     weight = np.hanning(geometry.rows + 2)[1:-1, None] * np.hanning(geometry.columns + 2)[1:-1]
     best = (0.0, 0, 0, 0.0, 1.0)
     kept = np.zeros((1, 1))
@@ -79,7 +85,7 @@ def strongest(geometry: Geometry, heights: Floats) -> Spot:
 
 
 def bend_of(geometry: Geometry, heights: Floats, forward: bool, spot: Spot, around: float | None = None) -> Bend:
-    """The branch with which a spot of this s is sharpest in a levelled image.
+    """Return the branch with which a spot of this s is sharpest in a levelled image.
 
     Its first coordinate is near ``around``, or any.
     """
@@ -127,10 +133,10 @@ def row_polynomial(
 def column_phase(
     geometry: Geometry, heights: Floats, forward: bool, bend: Bend, polynomial: Floats
 ) -> tuple[Floats, Bools]:
-    """A spot's phase along a levelled image, in periods: of every column the mean over one period; and where it is.
+    """Return a spot's phase along a levelled image, in periods, and where it is known: each (columns,).
 
-    Over a whole period of x the harmonics, and the spot's other half, cancel. Within half a period of the ends the
-    phase is that of the last whole one.
+    Of every column it is the mean over one period. Over a whole period of x the harmonics, and the spot's other half,
+    cancel. Within half a period of the ends the phase is that of the last whole one.
     """
     tau = _required(_inverse(bend.shape.coordinates, geometry.sweep(forward)))
     x = tau if forward else 1.0 - tau
@@ -145,7 +151,7 @@ def column_phase(
 
 
 def _straightened(geometry: Geometry, heights: Floats, branch: BranchShape) -> tuple[Floats, float]:
-    """A forward image at even steps of x, and how much of the line they span."""
+    """Resample a forward image at even steps of x; return it, and how much of the line they span."""
     low, high = (float(edge) for edge in branch.inverse(geometry.place[[0, -1]]))
     count = geometry.columns
     at = (branch.value(np.linspace(low, high, count)) - geometry.place[0]) / (geometry.place[1] - geometry.place[0])

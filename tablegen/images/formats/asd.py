@@ -37,7 +37,13 @@ _Header = dict[str, float]
 
 
 def asd_channels(content: bytes, _: str) -> list[Channel]:
-    """The channels of a movie. Raises ``ValueError`` with what is wrong."""
+    """Return the channels of a movie (.asd).
+
+    Raises
+    ------
+    ValueError
+        If the content is damaged; the message has the reason.
+    """
     try:
         version = struct.unpack_from("<i", content)[0]
         if version not in (0, 1, 2):
@@ -86,7 +92,7 @@ def _load(
 
 
 def _header(content: bytes, version: int) -> tuple[_Header, list[str]]:
-    """The numbers of a header, and the names of its channels. Raises ``struct.error`` where it ends."""
+    """Read the numbers of a header, and the names of its channels. Raise ``struct.error`` where it ends."""
     found: dict[str, float | bytes] = {}
     at = _take(content, 4, _LATER if version else _FIRST, found)
     if not version:
@@ -107,7 +113,7 @@ def _take(content: bytes, at: int, fields: tuple[tuple[str, str], ...], found: d
 
 
 def _scale(title: str, header: _Header) -> tuple[float, float, str]:
-    """The value at level 0, that of one level, and their unit; levels where the file does not say."""
+    """Return the value at level 0, that of one level, and their unit; levels if the file states none."""
     factor, unit = {
         "TP": (header["z_nm_per_v"] * header["z_gain"], "nm"),
         "ER": (-header["sensor"], "nm"),

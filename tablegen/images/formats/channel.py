@@ -47,7 +47,7 @@ class Channel:
 
 
 def loaded(number: int, title: str, matrix: Matrix) -> Channel:
-    """A channel that is read already, of a file that says no more of it."""
+    """Return a channel that is read already, of a file that states nothing else about it."""
     signal, direction = split_direction(title)
     return Channel(number, title, matrix.shape, lambda _: matrix, signal, direction)
 
@@ -61,9 +61,12 @@ def split_direction(title: str) -> tuple[str, Direction | None]:
 
 
 def choose(channels: Sequence[Channel], wanted: str | None, direction: Direction | None) -> Channel:
-    """The channel that a title, a signal or a number names; of a signal with both directions, that of ``direction``.
+    """Choose the channel that a title, a signal or a number names, and ``direction`` of a signal with both.
 
-    Raises ``ValueError`` with the channels that there are.
+    Raises
+    ------
+    ValueError
+        If there is no such channel; the message lists the channels that there are.
     """
     if not channels:
         raise ValueError("contains no image")
@@ -86,7 +89,7 @@ def choose(channels: Sequence[Channel], wanted: str | None, direction: Direction
 
 
 def partner(channels: Sequence[Channel], trace: Channel) -> Channel | None:
-    """The retrace of the same signal; None where there is none, or more than one."""
+    """Return the retrace of the same signal; None if there is none, or more than one."""
     found = [one for one in channels if one.signal == trace.signal and one.direction == "retrace"]
     return found[0] if trace.direction == "trace" and len(found) == 1 else None
 
@@ -107,18 +110,18 @@ def listed(channels: Sequence[Channel]) -> str:
 
 
 def quoted(title: str) -> str:
-    """A title for a message."""
+    """Quote a title for a message."""
     return f"'{shortened(title, _MAX_TITLE)}'"
 
 
 def positive(value: object, unit: float = 1.0) -> float | None:
-    """A number, or the text of one, in another unit; None for what is no positive number."""
+    """Convert a number, or the text of one, to another unit; None unless it is a positive number."""
     found = number(value, unit)
     return found if found is not None and found > 0.0 else None
 
 
 def number(value: object, unit: float = 1.0) -> float | None:
-    """A finite number, or the text of one, in another unit; None for anything else."""
+    """Convert a finite number, or the text of one, to another unit; None for anything else."""
     try:
         found = float(value) * unit  # type: ignore[arg-type]
     except (TypeError, ValueError):
@@ -140,5 +143,5 @@ def lines_done(values: Matrix) -> int:
 
 
 def first_line(error: BaseException) -> str:
-    """What a library says of a fault, for a message."""
+    """Return the first line of a library's error, for a message."""
     return shortened((str(error).strip() or type(error).__name__).splitlines()[0], 100)

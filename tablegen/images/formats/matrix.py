@@ -14,7 +14,13 @@ _DECIMAL_COMMA = re.compile(r"[+-]?\d+(,\d+)?([eE][+-]?\d+)?")
 
 
 def npy_channels(content: bytes, _: str) -> list[Channel]:
-    """The images of a .npy file. Raises ``ValueError`` with what is wrong."""
+    """Return the images of a .npy file.
+
+    Raises
+    ------
+    ValueError
+        If the content is damaged; the message has the reason.
+    """
     if content[:2] == b"PK":
         raise ValueError("is an .npz archive; save one array with numpy.save")
     array = npy_array(content)[0]
@@ -58,7 +64,7 @@ def text_channels(content: bytes, name: str) -> list[Channel]:
 
 
 def _separator(row: str) -> str | None:
-    """What separates the numbers of a row; None for blanks."""
+    """Return the separator of the numbers of a row; None for blanks."""
     mark = next((mark for mark in (";", "\t") if mark in row), None)
     if mark is not None or "," not in row:
         return mark

@@ -86,7 +86,7 @@ def _load(content: bytes, kind: str, start: int, shape: tuple[int, int], directi
 
 
 def _tags(header: str) -> dict[str, list[str]]:
-    """The lines below each tag."""
+    """Return the lines below each tag."""
     tags: dict[str, list[str]] = {}
     lines: list[str] = []
     for line in header.splitlines():

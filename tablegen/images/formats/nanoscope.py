@@ -1,4 +1,4 @@
-"""Nanoscope files of Bruker and Veeco (.spm, .000): lists of ``\\key: value`` lines, then integers.
+r"""Nanoscope files of Bruker and Veeco (.spm, .000): lists of ``\key: value`` lines, then integers.
 
 The first row is the bottom one; it is the last in time, and rows are turned, if the frame's direction is Down. Of a
 scan that was stopped only the valid rows are read; its aspect ratio is that of the whole scan.
@@ -25,7 +25,13 @@ _List = dict[str, str]
 
 
 def spm_channels(content: bytes, _: str) -> list[Channel]:
-    """The images of a Nanoscope file. Raises ``ValueError`` with what is wrong."""
+    """Return the images of a Nanoscope file.
+
+    Raises
+    ------
+    ValueError
+        If the content is damaged; the message has the reason.
+    """
     if not content.startswith(b"\\*File list"):
         what = "is a file of force curves, not images" if content.startswith(b"\\*Force file list") else ""
         raise ValueError(what or "does not begin as a Nanoscope file does")
@@ -94,7 +100,7 @@ def _channel(content: bytes, at: int, image: _List, others: _List, scan: _List) 
 
 
 def _valid_rows(image: _List, rows: int) -> slice:
-    """The stored rows that were scanned; all where the file does not say, or says what cannot be."""
+    """Return the stored rows that were scanned; all if the file states no valid number of them."""
     first, count = (image.get(f"valid data {what} y", "") for what in ("start", "len"))
     if not (first.isdecimal() and count.isdecimal() and len(first) < 7 and len(count) < 7):
         return slice(0, rows)
@@ -130,7 +136,7 @@ def _size(image: _List, columns: int, rows: int) -> tuple[float | None, float | 
 
 
 def _scale(text: str, others: _List, stored: int) -> tuple[float, str]:
-    """The unit of the values, and how much of it is one step; steps where the file does not say."""
+    """Return the size of a step of the values, and their unit; steps if the file states none."""
     found = _SCALED.match(text)
     most = positive(found["value"]) if found else None
     if found is None or most is None:

@@ -37,7 +37,13 @@ class TiffImage:
 
 
 def tiff_channels(content: bytes, _: str) -> list[Channel]:
-    """The pages of a .tif file, in grey. Raises ``ValueError`` with what is wrong."""
+    """Return the pages of a .tif file, in grey.
+
+    Raises
+    ------
+    ValueError
+        If the content is damaged; the message has the reason.
+    """
     pages = tiff_pages(content)
     for page in pages:
         if len(page.shape) == 3 and page.shape[-1] in (3, 4):
@@ -50,7 +56,13 @@ def _of_frame(page: TiffImage, _: int) -> Matrix:
 
 
 def tiff_pages(content: bytes) -> list[TiffImage]:
-    """The pages of a file, in order. Raises ``ValueError`` with what is wrong."""
+    """Return the pages of a file, in order.
+
+    Raises
+    ------
+    ValueError
+        If the content is damaged; the message has the reason.
+    """
     import tifffile
 
     logging.getLogger("tifffile").setLevel(logging.CRITICAL)  # what it logs is said by what it raises
