@@ -33,20 +33,20 @@ def doubts(fit: Fit, points: bool = False) -> tuple[str, ...]:
     """
     match fit:
         case HysteresisFit():
-            found = _hysteresis(fit, points)
+            doubtful = _hysteresis(fit, points)
         case OffsetFit():
-            found = _offset(fit)
+            doubtful = _offset(fit)
         case OffsetSizesFit():
-            found = (f"images of {one.size_v:g} V: {doubt}" for one in fit.sizes for doubt in _offset(one))
+            doubtful = (f"images of {one.size_v:g} V: {doubt}" for one in fit.sizes for doubt in _offset(one))
         case SizeFit():
-            found = _size(fit)
+            doubtful = _size(fit)
         case FrequencyFit():
-            found = _frequency(fit)
+            doubtful = _frequency(fit)
         case ResonanceFit():
-            found = iter(()) if points else _resonance(fit)
+            doubtful = iter(()) if points else _resonance(fit)
         case _:
             raise NotImplementedError(type(fit))
-    return tuple(found)
+    return tuple(doubtful)
 
 
 def _hysteresis(fit: HysteresisFit, points: bool) -> Iterator[str]:

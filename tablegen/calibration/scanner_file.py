@@ -71,10 +71,10 @@ def updated(text: str, name: str, axis: str, change: Change) -> str:
     expected = document.unwrap()
     try:
         changed = _spaced(_with_provenance(tomlkit.dumps(document), name, axis, change), text)
-        kept = tomllib.loads(changed) == expected
+        faithful = tomllib.loads(changed) == expected
     except (Rejected, ValueError):  # what came out is no TOML
-        changed, kept = text, False
-    if not kept:
+        changed, faithful = text, False
+    if not faithful:
         why = "its layout is too unusual to be edited in place; write the values by hand, or one table below the other"
         raise Rejected([Problem(name, 0, axis, why)])
     _check(text, changed, name)
@@ -213,10 +213,10 @@ def _old(rows: list[str], at: int, kind: str, turn: float | None) -> tuple[int, 
         first = end
         while first > 0 and _FILE_MARK.match(rows[first - 1].strip()):
             first -= 1
-        found = _FIRST_MARK.match(rows[first - 1].strip()) if first > 0 else None
-        if not found:
+        mark = _FIRST_MARK.match(rows[first - 1].strip()) if first > 0 else None
+        if not mark:
             break
-        if found[1] == kind and (turn is None or (found[2] and abs(float(found[2]) - turn) < TURN_TOLERANCE)):
+        if mark[1] == kind and (turn is None or (mark[2] and abs(float(mark[2]) - turn) < TURN_TOLERANCE)):
             return first - 1, end
         end = first - 1
     return at, at
@@ -232,14 +232,14 @@ def _entry(text: str, key: str, turn: float) -> str:
 
 def _check(old: str, new: str, name: str) -> None:
     """Refuse what the new text has wrong and the old one had not; a file may be incomplete while it is calibrated."""
-    found = []
+    problem_lists = []
     for text in (old, new):
         problems = Problems()
         values, document = parse_toml(text, name)
         decode(Scanner, values, document, problems, lambda *_: None)
-        found.append(problems.found)
-    known = {(problem.key, problem.why) for problem in found[0]}
-    added = [p for p in found[1] if (p.key, p.why) not in known and not p.why.startswith("missing")]
+        problem_lists.append(problems.found)
+    known = {(problem.key, problem.why) for problem in problem_lists[0]}
+    added = [p for p in problem_lists[1] if (p.key, p.why) not in known and not p.why.startswith("missing")]
     if added:  # at lines that are not in the file
         raise Rejected([Problem(name, 0, p.key, f"{p.why}; nothing was written") for p in added])
 

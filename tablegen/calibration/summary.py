@@ -153,11 +153,11 @@ def _branch_errors(branch: TurnFit, points: bool) -> list[tuple[str, Estimate]]:
     ]
 
 
-def _errors(found: Sequence[tuple[str, Estimate]]) -> list[str]:
+def _errors(estimates: Sequence[tuple[str, Estimate]]) -> list[str]:
     """Lines of the comment: each value with its standard error, where that is known. `tablegen compare` reads them."""
     known = [
         f"{key} {one.rounded:.9g} +- {one.standard_error:.2g}"
-        for key, one in found
+        for key, one in estimates
         if isfinite(one.standard_error) and one.standard_error > 0.0
     ]
     lines: list[str] = []

@@ -117,20 +117,20 @@ def size_of_line(
     if aspect is not None:
         return _size(line, cell, grating, aspect)
     span = line.geometry.window[1] - line.geometry.window[0]
-    found = _size(line, cell, grating, line.geometry.rows * span / line.geometry.columns)
+    size = _size(line, cell, grating, line.geometry.rows * span / line.geometry.columns)
     if line.geometry.rows == line.geometry.columns:
-        return found
+        return size
     try:
         other = _size(line, cell, grating, span)
     except Unphysical:
-        return found
-    differs = abs(other.nm.value / found.nm.value - 1.0)
+        return size
+    differs = abs(other.nm.value / size.nm.value - 1.0)
     if differs > _SAME_SIZE:
         raise Unphysical(
-            f"the line is {found.nm.value:.4g} nm long if pixels are square, and {other.nm.value:.4g} nm if the frame "
+            f"the line is {size.nm.value:.4g} nm long if pixels are square, and {other.nm.value:.4g} nm if the frame "
             f"is; say how high it is with --aspect"
         )
-    return replace(found, shared=hypot(found.shared, differs if isnan(found.aspect) else 0.0))
+    return replace(size, shared=hypot(size.shared, differs if isnan(size.aspect) else 0.0))
 
 
 def _size(line: ImagedWaves, cell: Cell | None, grating: Grating | None, expected: float) -> LineSize:
@@ -258,7 +258,7 @@ def _strongest_part(line: ImagedWaves, part: int) -> tuple[int, ...] | None:
     span = line.geometry.window[1] - line.geometry.window[0]
     reach = range(-2 * part, 2 * part + 1)
     waves = np.stack([model.q(state.parameters), model.s(state.parameters)[:, 0]], axis=1) / part
-    kept = []
+    spots = []
     for spot in product(reach, repeat=model.bases):
         q, s = np.array(spot) @ waves
         leading = next((n for n in spot if n), 0)
@@ -269,13 +269,13 @@ def _strongest_part(line: ImagedWaves, part: int) -> tuple[int, ...] | None:
             and abs(q) * span < 0.45 * line.geometry.columns
             and abs(s) < 0.45 * line.geometry.rows
         ):
-            kept.append(spot)
-    if not kept:
+            spots.append(spot)
+    if not spots:
         return None
     finer, at = model.divided(state, part)
-    strength = finer.strengths(at, np.array(kept))
+    strength = finer.strengths(at, np.array(spots))
     best = int(np.argmax(strength))
     pixels = line.geometry.rows * line.geometry.columns * len(model.images)
     noise = sqrt(2.0 * state.cost / pixels) * sqrt(2.0 * len(model.images) / pixels)
     least = max(_MIN_PART * float(np.max(line.amplitudes)), _MIN_PART_ERRORS * noise)
-    return tuple(kept[best]) if strength[best] > least else None
+    return tuple(spots[best]) if strength[best] > least else None

@@ -146,9 +146,9 @@ def described(
         plain = PeriodicModel(
             geometry, images, list(map(tuple, model.spots.tolist())), _ROW_POLYNOMIAL_ORDER, 2 * (nowhere,)
         )
-        found = settle(plain, state.parameters, free)
-        if found.cost < state.cost:
-            model, state, off = plain, found, (nowhere, nowhere)
+        straight = settle(plain, state.parameters, free)
+        if straight.cost < state.cost:
+            model, state, off = plain, straight, (nowhere, nowhere)
     other = second_base(
         geometry,
         state.left[0],
@@ -185,15 +185,15 @@ def _tracked(
     Many periods tell the phase at every column, so that the start does not depend on the model.
     """
     sides = list(zip(heights, (True, False), bends, strict=False))
-    found = [column_phase(geometry, image, forward, bend, polynomial) for image, forward, bend in sides]
-    phases = [phase for phase, _ in found]
+    tracks = [column_phase(geometry, image, forward, bend, polynomial) for image, forward, bend in sides]
+    phases = [phase for phase, _ in tracks]
     q = sum(bend.q for bend in bends) / len(bends)
     if len(sides) == 2:
-        whole = found[0][1] & found[1][1]
+        whole = tracks[0][1] & tracks[1][1]
         phases[1] = phases[1] + _turns(geometry.place[whole], phases[0][whole] - phases[1][whole], q)
     count = 2 * len(sides)
 
-    def left(x: Floats) -> Floats:
+    def residuals(x: Floats) -> Floats:
         if min(BranchShape.at(x[i : i + 2]).least_slope() for i in range(0, count, 2)) < 0.1:
             return np.full(len(sides) * geometry.columns, 1e3)
         columns = [Columns.of(geometry, side[1], x[2 * i : 2 * i + 2]) for i, side in enumerate(sides)]
@@ -220,9 +220,9 @@ def _turns(place: Floats, apart: Floats, q: float) -> int:
     reach = int(np.ceil(0.3 * q)) + 1
     tried = []
     for turns in range(centre - reach, centre + reach + 1):
-        left = apart - turns
-        left = left - across @ (across.T @ left)
-        tried.append((float(np.sqrt(np.mean(left**2))), turns))
+        misfit = apart - turns
+        misfit = misfit - across @ (across.T @ misfit)
+        tried.append((float(np.sqrt(np.mean(misfit**2))), turns))
     tried.sort()
     if tried[1][0] < _MIN_MISFIT_RATIO * tried[0][0]:
         raise Unphysical(
@@ -246,8 +246,8 @@ def _part_of(state: FitState, model: PeriodicModel, other: Spot, polynomial: Flo
 def _multiples(model: PeriodicModel, parameters: Floats) -> Floats:
     """(n, 2): q and s of the harmonics of the first base vector."""
     n = np.arange(1, 41)[:, None]
-    found: Floats = n * np.array([model.q(parameters)[0], model.s(parameters)[0, 0]])
-    return found
+    start: Floats = n * np.array([model.q(parameters)[0], model.s(parameters)[0, 0]])
+    return start
 
 
 def _with_spots(model: PeriodicModel, state: FitState) -> PeriodicModel:

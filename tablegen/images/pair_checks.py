@@ -117,14 +117,14 @@ def _match(one: Floats, other: Floats) -> float:
     """Median over strips of the best correlation of one's strip with the other's columns near by."""
     columns = one.shape[1]
     width, reach = max(columns // _STRIPS, 8), max(round(_REACH * columns), 2)
-    found = []
+    lags = []
     for start in range(0, columns - width + 1, width):
         strip = _plain(one[:, start : start + width])
         best = -1.0
         for at in range(max(start - reach, 0), min(start + reach, columns - width) + 1):
             best = max(best, float(np.mean(strip * _plain(other[:, at : at + width]))))
-        found.append(best)
-    return float(np.median(found))
+        lags.append(best)
+    return float(np.median(lags))
 
 
 def _plain(strip: Floats) -> Floats:

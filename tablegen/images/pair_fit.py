@@ -74,7 +74,9 @@ def _carrying(model: PeriodicModel, state: FitState) -> float:
 
 def check_fit(model: PeriodicModel, state: FitState, free: Bools) -> None:
     """Whether it is a fit at all."""
-    shares = [1.0 - float(np.mean(left**2)) / float(np.mean(image**2)) for (_, image), left in _both(model, state)]
+    shares = [
+        1.0 - float(np.mean(residual**2)) / float(np.mean(image**2)) for (_, image), residual in _both(model, state)
+    ]
     if min(shares) < _MIN_EXPLAINED_VARIANCE:
         name = "trace" if shares[0] < shares[1] else "retrace"
         raise Unphysical(
@@ -103,10 +105,10 @@ def _result(model: PeriodicModel, state: FitState, free: Bools, v_scan: float) -
             f"and retrace of one scan, --window and --turn right, and the drive a triangle?"
         )
     shapes = np.arange(len(free)) < 4
-    found, widened = covariance(model, state, free, shapes, misfit, clean)
-    if float(np.sqrt(np.max(np.diag(found)[[0, 2]]))) > _MAX_SHAPE_ERROR:
+    matrix, widened = covariance(model, state, free, shapes, misfit, clean)
+    if float(np.sqrt(np.max(np.diag(matrix)[[0, 2]]))) > _MAX_SHAPE_ERROR:
         raise Unphysical("these images do not determine the shape of the branches; scan more periods, or average")
-    forward, backward = (measured_branch(x[i : i + 2], found[i : i + 2, i : i + 2]) for i in (0, 2))
+    forward, backward = (measured_branch(x[i : i + 2], matrix[i : i + 2, i : i + 2]) for i in (0, 2))
     line = np.linspace(0.0, 1.0, 201)
     lagging = [BranchShape.at(x[i : i + 2]) for i in (0, 2)]
     apart = lagging[0].value(line) - line + lagging[1].value(1.0 - line) - (1.0 - line)
@@ -114,7 +116,7 @@ def _result(model: PeriodicModel, state: FitState, free: Bools, v_scan: float) -
     slope = max(float(np.max(model.columns(x, side).steep)) for side in (True, False))
     span = geometry.window[1] - geometry.window[0]
     bent = model.s(x)[0, 1:] @ model.y_powers[2:]
-    drawn = np.concatenate([image - left for (_, image), left in _both(model, state)])
+    drawn = np.concatenate([image - rest for (_, image), rest in _both(model, state)])
     return ImageFit(
         turn=Estimate(geometry.turn),
         v_scan=v_scan,
@@ -146,8 +148,8 @@ def _positions(
     geometry = model.geometry
     residuals, scaling, lines, clean, beyond = [], [], [], [], 0.0
     span = geometry.window[1] - geometry.window[0]
-    for forward, left, steep in zip((True, False), state.left, state.steepness, strict=True):
-        binned = LeftInBins.of(geometry, left, steep)
+    for forward, rest, steep in zip((True, False), state.left, state.steepness, strict=True):
+        binned = LeftInBins.of(geometry, rest, steep)
         clean.append(binned.clean)
         columns = model.columns(state.parameters, forward)
         place = binned.place

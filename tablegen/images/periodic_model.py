@@ -170,19 +170,19 @@ class PeriodicModel:
         terms = self._terms(parameters, amplitudes)
         hessian = np.zeros((terms[0].shape[0],) * 2)
         scores = np.zeros((self.geometry.rows, len(hessian)))
-        left, steepness = [], []
+        residuals, steepness = [], []
         for (forward, heights), column in zip(self.images, columns, strict=True):
             coefficients = terms[0] if forward else terms[1]
             drawn = (rows[0].T * amplitudes) @ column[0]
-            left.append(heights - np.real(drawn))
+            residuals.append(heights - np.real(drawn))
             waves = 2j * pi * (self.spots @ self.q(parameters))
             steepness.append(np.real((rows[0].T * (amplitudes * waves)) @ column[0]))
             r, c, places = self._laid_out(rows, column)
             first, second = _products(r, c, places)
             hessian += _gram(coefficients, (first, second))
-            scores += _scores(coefficients, (r, c, places), left[-1])
-        cost = 0.5 * sum(float(np.vdot(image, image)) for image in left)
-        return FitState(parameters, amplitudes, tuple(left), tuple(steepness), cost, hessian, scores)
+            scores += _scores(coefficients, (r, c, places), residuals[-1])
+        cost = 0.5 * sum(float(np.vdot(image, image)) for image in residuals)
+        return FitState(parameters, amplitudes, tuple(residuals), tuple(steepness), cost, hessian, scores)
 
     def columns(self, parameters: Floats, forward: bool) -> Columns:
         """Where the columns of a direction are, ``off`` and ripples with it."""
@@ -208,20 +208,20 @@ class PeriodicModel:
         """
         other = self.with_spots([tuple(one) for one in np.eye(self.bases, dtype=np.int64).tolist()])
         row = np.conj(other._rows(state.parameters)[0])
-        found = np.zeros((self.bases, self.geometry.rows), dtype=np.complex128)
+        waves = np.zeros((self.bases, self.geometry.rows), dtype=np.complex128)
         for forward, heights in self.images:
-            found += row * (np.conj(other._columns(state.parameters, forward)[0]) @ heights.T)
-        return found
+            waves += row * (np.conj(other._columns(state.parameters, forward)[0]) @ heights.T)
+        return waves
 
     def phase_slopes(self, state: FitState) -> list[Floats]:
         """Of each image what more phase of each base vector does, in heights a period: (bases, rows, columns)."""
         rows = self._rows(state.parameters)[0]
-        found = []
+        derivatives = []
         for forward, _ in self.images:
             column = self._columns(state.parameters, forward)[0]
             waves = 2j * pi * state.amplitudes[:, None] * self.spots
-            found.append(np.stack([np.real((rows.T * wave) @ column) for wave in waves.T]))
-        return found
+            derivatives.append(np.stack([np.real((rows.T * wave) @ column) for wave in waves.T]))
+        return derivatives
 
     def divided(self, state: FitState, part: int) -> "tuple[PeriodicModel, FitState]":
         """Return the same model with base waves of one ``part`` of these."""
@@ -304,13 +304,13 @@ class PeriodicModel:
         total = np.zeros(len(spots), dtype=np.complex128)
         power = np.zeros(len(spots))
         row = other._rows(state.parameters)[0]
-        for (forward, _), left in zip(self.images, state.left, strict=True):
+        for (forward, _), residual in zip(self.images, state.left, strict=True):
             column = other._columns(state.parameters, forward)[0]
-            total += np.sum(np.conj(row) * (np.conj(column) @ left.T), axis=1)
+            total += np.sum(np.conj(row) * (np.conj(column) @ residual.T), axis=1)
             power += np.sum(np.abs(column) ** 2, axis=1) * self.geometry.rows
         pixels = self.geometry.rows * self.geometry.columns * len(self.images)
-        found: Floats = 2.0 * np.abs(total) / np.sqrt(np.maximum(power, 1e-6 * pixels) * pixels)
-        return found
+        amplitudes: Floats = 2.0 * np.abs(total) / np.sqrt(np.maximum(power, 1e-6 * pixels) * pixels)
+        return amplitudes
 
 
 def settle(model: PeriodicModel, start: Floats, free: Bools) -> FitState:
@@ -355,11 +355,13 @@ def _products(
     return row[0] * column[0], row[1] * column[1]
 
 
-def _scores(coefficients: Complexes, laid_out: tuple[Complexes, Complexes, tuple[Ints, Ints]], left: Floats) -> Floats:
+def _scores(
+    coefficients: Complexes, laid_out: tuple[Complexes, Complexes, tuple[Ints, Ints]], residual: Floats
+) -> Floats:
     """For each row, the residual times each parameter's derivative, summed: (rows, parameters)."""
     row, column, (at, across) = laid_out
-    found: Floats = np.real(coefficients @ ((column @ left.T)[across] * row[at])).T
-    return found
+    scores: Floats = np.real(coefficients @ ((column @ residual.T)[across] * row[at])).T
+    return scores
 
 
 def _gram(coefficients: Complexes, products: tuple[Complexes, Complexes]) -> Floats:

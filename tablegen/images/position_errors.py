@@ -25,16 +25,16 @@ class LeftInBins:
     clean: Floats
 
     @classmethod
-    def of(cls, geometry: Geometry, left: Floats, steep: Floats) -> "LeftInBins":
+    def of(cls, geometry: Geometry, residual: Floats, steep: Floats) -> "LeftInBins":
         """From what is left of an image, and how steep it is."""
         place = np.minimum((np.arange(geometry.columns) * BINS) // geometry.columns, BINS - 1)
         bins = np.arange(BINS)[:, None] == place
-        weights, products = (bins @ values.T for values in (steep**2, steep * left))  # (bins, rows)
+        weights, products = (bins @ values.T for values in (steep**2, steep * residual))  # (bins, rows)
         weight = np.maximum(np.sum(weights, axis=1), 1e-300)
         off = np.sum(products, axis=1) / weight
         spread = np.sum((products - off[:, None] * weights) ** 2, axis=1)
         error = np.sqrt(spread / weight**2 + _ARITHMETIC_ERROR**2)
-        return cls(place, off, error, left - steep * off[place])
+        return cls(place, off, error, residual - steep * off[place])
 
 
 def covariance(
@@ -53,9 +53,9 @@ def covariance(
     lines = len(influence)
     seen = influence[:, watched[free]]
     widened = max(correlation_length(seen / np.maximum(np.sqrt(np.mean(seen**2, axis=0)), 1e-300)), misfit)
-    found = influence.T @ influence * (widened * lines / max(lines - len(inverse), 1))
+    part = influence.T @ influence * (widened * lines / max(lines - len(inverse), 1))
     whole = np.zeros((len(free), len(free)))
-    whole[np.ix_(free, free)] = found
+    whole[np.ix_(free, free)] = part
     return whole, widened
 
 
@@ -69,5 +69,5 @@ def loud_rows(state: FitState) -> tuple[int, ...]:
 
 def pixel_noise(state: FitState) -> float:
     """Noise of a pixel, rms, from the differences of neighbouring pixels."""
-    left = np.concatenate(state.left)
-    return float(np.sqrt(np.mean(np.diff(left, axis=1) ** 2) / 2.0))
+    residuals = np.concatenate(state.left)
+    return float(np.sqrt(np.mean(np.diff(residuals, axis=1) ** 2) / 2.0))

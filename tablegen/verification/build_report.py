@@ -209,10 +209,10 @@ def _format_checks(folder: Path, content: Content, formats: list[Format]) -> lis
     checks = []
     for one in formats:
         try:
-            found = one.check(folder, content)
+            comparisons = one.check(folder, content)
         except Unphysical as error:  # no build has such a manifest
-            found = [Comparison("files", "0 files", [str(error)])]
-        checks += [differing_check(f"{one.name} {it.subject}", "manifest", it.compared, it.wrong) for it in found]
+            comparisons = [Comparison("files", "0 files", [str(error)])]
+        checks += [differing_check(f"{one.name} {it.subject}", "manifest", it.compared, it.wrong) for it in comparisons]
     return checks
 
 

@@ -51,22 +51,22 @@ def wrong_mismatch(axis: ManifestAxis) -> list[str]:
     turn, x = axis.drive.turn, np.linspace(*axis.fourier.window, _POINTS)
     there, back = ((at(target, t) - low) / (high - low) for t in (turn * x, turn + (1.0 - turn) * (1.0 - x)))
     apart = forward.inverse(there) - (1.0 - backward.inverse(1.0 - back))
-    found: dict[str, float | int | None] = {"value": 100.0 * stroke.size * float(np.max(np.abs(apart)))}
-    told: dict[str, float | int | None] = {"value": expected.mismatch_percent.value}
-    return wrong + different_figures(told, found, True, "expected.mismatch_percent.")
+    figures: dict[str, float | int | None] = {"value": 100.0 * stroke.size * float(np.max(np.abs(apart)))}
+    stated: dict[str, float | int | None] = {"value": expected.mismatch_percent.value}
+    return wrong + different_figures(stated, figures, True, "expected.mismatch_percent.")
 
 
 def header_texts(folder: Path, stored: StoredBuild) -> dict[str, str]:
     """Return the comments of the headers of a build by name; another check reports one that cannot be read."""
     name = stored.manifest.name
-    found = {}
+    texts = {}
     for suffix in _HEADERS:
         if f"{name}{suffix}" in stored.manifest.files:
             try:
-                found[f"{name}{suffix}"] = read_text(folder / f"{name}{suffix}", BUILD_FILE, "ascii")
+                texts[f"{name}{suffix}"] = read_text(folder / f"{name}{suffix}", BUILD_FILE, "ascii")
             except (OSError, ValueError):
                 continue
-    return found
+    return texts
 
 
 def wrong_texts(name: str, axis: ManifestAxis, texts: dict[str, str]) -> list[str]:

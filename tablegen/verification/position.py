@@ -44,8 +44,8 @@ def wrong_position(
         "max_error_lsb": float(np.max(np.abs(errors))),
         "rms_error_lsb": float(np.sqrt(np.mean(errors * errors))),
     }
-    told: dict[str, float | int | None] = {name: getattr(stated, name) for name in figures}
-    wrong = different_figures(told, figures, True, "position.")
+    stated_figures: dict[str, float | int | None] = {name: getattr(stated, name) for name in figures}
+    wrong = different_figures(stated_figures, figures, True, "position.")
     if not scaling_known:
         return len(figures), wrong
     sides, stated_sides = position_scaling(axis, period, errors), stated.scaling_error_percent
@@ -63,9 +63,9 @@ def position_errors(axis: ManifestAxis, period: PlayedPeriod, passage: ManifestP
     output, drive = axis.output, axis.drive
     middle = (drive.v_offset - output.v_zero) / output.v_per_code
     w: Floats = np.asarray(0.5 + (period.runs.at(np.arange(ticks, dtype=np.int64)) - middle) / per_unit)
-    wanted = on_grid(_later(reached(axis), 0.5 / ticks), ticks)
-    found = _measured(passage, w, rate_hz) if passage.response is not None else _stepped(passage, w, rate_hz * ticks)
-    return np.asarray((found - wanted) * per_unit)
+    intended = on_grid(_later(reached(axis), 0.5 / ticks), ticks)
+    position = _measured(passage, w, rate_hz) if passage.response is not None else _stepped(passage, w, rate_hz * ticks)
+    return np.asarray((position - intended) * per_unit)
 
 
 def _later(series: ManifestSeries, by: float) -> ManifestSeries:
@@ -99,8 +99,8 @@ def _stepped(passage: ManifestPassage, w: Floats, update_hz: float) -> Floats:
     ends = [one[-1] for one in played(0.0, 0.0)]
     begin = np.linalg.solve(np.eye(2) - np.linalg.matrix_power(step, len(values)), ends)
     positions, speeds = (np.array(one[:-1]) for one in played(*begin.tolist()))
-    held = np.array(values)
-    return np.asarray(held + part[0, 0] * (positions - held) + part[0, 1] * speeds)
+    codes = np.array(values)
+    return np.asarray(codes + part[0, 0] * (positions - codes) + part[0, 1] * speeds)
 
 
 def _exponential(matrix: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:

@@ -153,9 +153,9 @@ def _check_shape(growth: Growth, v: float) -> None:
 
 
 def _remarks(fit: TraceFit) -> list[Remark]:
-    found: list[Remark] = []
+    remarks: list[Remark] = []
     if fit.triangle.departure > _MAX_DRIVE_DEPARTURE:
-        found.append(
+        remarks.append(
             spoils(
                 f"the drive departs from a triangle by {100.0 * fit.triangle.departure:.2g} % rms; "
                 "the fit assumes a triangle",
@@ -163,10 +163,10 @@ def _remarks(fit: TraceFit) -> list[Remark]:
             )
         )
     if fit.inverted:
-        found.append(Remark("the displacement falls where the drive rises; its sign was inverted"))
+        remarks.append(Remark("the displacement falls where the drive rises; its sign was inverted"))
     worst = float(np.max(np.abs(fit.residual_percent)))
     if worst > _POOR_FIT_PERCENT:
-        found.append(
+        remarks.append(
             spoils(
                 f"the harmonic model leaves {worst:.2g} % of the scan; is the drive the triangle itself, the delay of "
                 f"the sensor known, and the record settled?",
@@ -174,7 +174,7 @@ def _remarks(fit: TraceFit) -> list[Remark]:
             )
         )
     if fit.correlated > 3.0:
-        found.append(
+        remarks.append(
             Remark(
                 f"residuals are correlated over {fit.correlated:.0f} samples: besides noise, they contain what "
                 f"model and drift do not describe; standard errors were widened "
@@ -183,13 +183,13 @@ def _remarks(fit: TraceFit) -> list[Remark]:
         )
     if fit.strays:
         shown = ", ".join(str(i + 1) for i in fit.strays[:5]) + (", ..." if len(fit.strays) > 5 else "")
-        found.append(Remark(f"{len(fit.strays)} samples are far off the curve (number {shown}); they were kept"))
+        remarks.append(Remark(f"{len(fit.strays)} samples are far off the curve (number {shown}); they were kept"))
     for name, side in (("forward", fit.forward), ("backward", fit.backward)):
         if side.u_peak.standard_error > 0.1:
-            found.append(
+            remarks.append(
                 spoils(f"u_peak {name} is not determined by this trace; average more periods or drive it further")
             )
-    return found
+    return remarks
 
 
 def _curves(branches: Sequence[TurnFit], span: float) -> list[Curve]:

@@ -81,8 +81,8 @@ def fit_offset(
 
     def solved(errors: Floats) -> Solution:
         def residuals(x: Floats) -> Floats:
-            left: Floats = (x[2] * looks(shape @ np.array([1.0, x[0], x[1]])) - apparent_nm) / errors
-            return left
+            misfits: Floats = (x[2] * looks(shape @ np.array([1.0, x[0], x[1]])) - apparent_nm) / errors
+            return misfits
 
         return solve(residuals, start, _NAMES, [0.5, 0.5, scale])
 
@@ -90,7 +90,7 @@ def fit_offset(
     solution = solved(np.full(len(p), scale)) if errors_nm is None else with_errors(solved, apparent_nm, errors_nm)
     centre = float(solution.values[2])
     expected = centre * looks(shape @ np.array([1.0, *solution.values[:2]]))
-    found = outliers(solution.jacobian, solution.residuals, _MIN_SCATTER)
+    strays = outliers(solution.jacobian, solution.residuals, _MIN_SCATTER)
     line = np.linspace(driver.v_min, driver.v_max, 101)
     curve = looks(_shape(driver.p(line)) @ np.array([1.0, *solution.values[:2]]))
     return OffsetFit(
@@ -98,7 +98,7 @@ def fit_offset(
         residual_percent=100.0 * (apparent_nm / expected - 1.0),
         before_percent=float(np.max(np.abs(100.0 * (apparent_nm / centre - 1.0)))),
         remarks=tuple(_remarks(p, solution, driver)),
-        outliers=found,
+        outliers=strays,
         curves=(
             Curve(
                 "apparent size, relative",

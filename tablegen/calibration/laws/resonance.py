@@ -149,11 +149,11 @@ def _best(f: Floats, g: Floats, phase: Floats | None) -> Solution:
             # What a second-order lag of at most half a turn leaves at the highest frequency is the delay's.
             start.append(max(-(float(phase[-1]) + (pi if f[-1] > at else 0.0)) / (2.0 * pi * float(f[-1]) / at), 0.0))
         try:
-            found = solve(residuals, start, names, [1.0, 0.3, 1.0, 1.0][: len(start)])
+            solution = solve(residuals, start, names, [1.0, 0.3, 1.0, 1.0][: len(start)])
         except Unphysical:
             continue
-        if best is None or found.residuals @ found.residuals < best.residuals @ best.residuals:
-            best = found
+        if best is None or solution.residuals @ solution.residuals < best.residuals @ best.residuals:
+            best = solution
     if best is None:
         raise Unphysical("no resonance fits this response; is it gain, and phase_deg, against frequency?")
     for _ in range(2 if phase is not None else 0):  # gain and phase each by its own scatter

@@ -186,10 +186,10 @@ class _TraceModel:
 
 
 def _result(model: _TraceModel, solution: Solution, triangle: Triangle, periods: float, left_out: int) -> TraceFit:
-    x, left = solution.values, solution.residuals
-    correlated = correlation_length(left)
-    freedom = max(len(left) / correlated - len(x), 1.0)
-    covariance = solution.unit_covariance * float(left @ left) / freedom
+    x, residuals = solution.values, solution.residuals
+    correlated = correlation_length(residuals)
+    freedom = max(len(residuals) / correlated - len(x), 1.0)
+    covariance = solution.unit_covariance * float(residuals @ residuals) / freedom
     # Errors of the drive's timing move the branches too.
     moved = solution.unit_covariance @ solution.jacobian.T @ model.timing_jacobian(x)
     covariance = covariance + moved @ triangle.timing_covariance @ moved.T
@@ -197,27 +197,27 @@ def _result(model: _TraceModel, solution: Solution, triangle: Triangle, periods:
     delay = Estimate(model.given_delay * triangle.period_s)
     if model.fits_delay:
         delay = Estimate(float(x[-1]) * triangle.period_s, float(covariance[-1, -1]) ** 0.5 * triangle.period_s)
-    residual, scaling, curve = _averaged(model, x, left)
+    residual, scaling, curve = _averaged(model, x, residuals)
     drift = model.drift @ x[6 : 6 + model.drift.shape[1]]
-    spread = 1.4826 * float(np.median(np.abs(left - np.median(left))))
+    spread = 1.4826 * float(np.median(np.abs(residuals - np.median(residuals))))
     return TraceFit(
         triangle=triangle,
         turn=Estimate(triangle.turn, float(triangle.timing_covariance[2, 2]) ** 0.5),
         v_scan=triangle.v_high - triangle.v_low,
         v_offset=0.5 * (triangle.v_low + triangle.v_high),
         periods=periods,
-        samples=len(left),
+        samples=len(residuals),
         left_out=left_out,
         forward=forward,
         backward=backward,
         delay_s=delay,
         drift_percent=100.0 * float(np.ptp(drift)) / abs(float(x[5])) if drift.size else 0.0,
-        noise_percent=100.0 * float(np.sqrt(np.mean(np.diff(left) ** 2) / 2.0)) / abs(float(x[5])),
+        noise_percent=100.0 * float(np.sqrt(np.mean(np.diff(residuals) ** 2) / 2.0)) / abs(float(x[5])),
         residual_percent=residual,
         scaling_percent=scaling,
         correlated=correlated,
         inverted=bool(x[5] < 0.0),
-        strays=tuple((left_out + np.flatnonzero(np.abs(left) > max(7.0 * spread, 1e-6))).tolist()),
+        strays=tuple((left_out + np.flatnonzero(np.abs(residuals) > max(7.0 * spread, 1e-6))).tolist()),
         curves=(curve,),
     )
 
@@ -226,13 +226,13 @@ def _branches(x: Floats) -> tuple[BranchShape, BranchShape]:
     return BranchShape.at(x[:2]), BranchShape.at(x[2:4])
 
 
-def _averaged(model: _TraceModel, x: Floats, left: Floats) -> tuple[Floats, tuple[float, float], Curve]:
+def _averaged(model: _TraceModel, x: Floats, rest: Floats) -> tuple[Floats, tuple[float, float], Curve]:
     """Average the residual over the periods; return it, its noise, and the measured residual as a curve."""
     u, tau, rising, _ = model.position(x)
     height = float(x[5])
     residuals, scaling, drawn = [], [], []
     for side, sign, shape in ((rising, 1.0, x[:2]), (~rising, -1.0, x[2:4])):
-        errors = -left[side] / height * sign  # along the sweep, measured less model
+        errors = -rest[side] / height * sign  # along the sweep, measured less model
         place = np.minimum((tau[side] * BINS).astype(np.int64), BINS - 1)
         count = np.maximum(np.bincount(place, minlength=BINS), 1)
         mean = np.bincount(place, errors, minlength=BINS) / count

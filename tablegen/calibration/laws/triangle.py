@@ -89,13 +89,13 @@ def find_triangle(time_s: Floats, drive_v: Floats) -> Triangle:
     high = [1.4 * period, start + 0.5 * period, first.turn + 0.9 * room, np.inf, np.inf]
     scales = [0.05 * period, 0.05 * period, 0.1 * room, height, height]
     begin = [period, start, first.turn, first.v_low, first.v_high]
-    found = solve(residuals, begin, _NAMES, scales, (low, high), jacobian)
-    x = found.values
-    covariance = found.unit_covariance[:3, :3] * max(found.variance, 0.0)
+    solution = solve(residuals, begin, _NAMES, scales, (low, high), jacobian)
+    x = solution.values
+    covariance = solution.unit_covariance[:3, :3] * max(solution.variance, 0.0)
     periods = float(np.floor((float(x[1]) - float(time_s[0])) / float(x[0])))
     early = float(x[1]) - periods * float(x[0])
     back = np.array([[1.0, 0.0, 0.0], [-periods, 1.0, 0.0], [0.0, 0.0, 1.0]])  # start is that many periods earlier
-    departure = float(np.sqrt(np.mean(found.residuals**2)))
+    departure = float(np.sqrt(np.mean(solution.residuals**2)))
     return Triangle(float(x[0]), early, float(x[2]), float(x[3]), float(x[4]), back @ covariance @ back.T, departure)
 
 
@@ -127,7 +127,7 @@ def _sweeps(time_s: Floats, level: Floats) -> list[tuple[float, float]]:
     """Time of the middle and slope (1/s) of each sweep that goes all the way from a quarter to three quarters."""
     far = np.flatnonzero((level < 0.25) | (level > 0.75))
     ends = np.flatnonzero(np.diff(level[far] > 0.75))
-    found = []
+    crossings = []
     for end in ends:
         inside = slice(int(far[end]) + 1, int(far[end + 1]))
         t, v = time_s[inside], level[inside]
@@ -136,5 +136,5 @@ def _sweeps(time_s: Floats, level: Floats) -> list[tuple[float, float]]:
         centre = float(np.mean(t))
         slope = float((t - centre) @ (v - np.mean(v)) / ((t - centre) @ (t - centre)))
         if slope * (1.0 if level[far[end]] < 0.5 else -1.0) > 0.0:
-            found.append((centre + (0.5 - float(np.mean(v))) / slope, slope))
-    return found
+            crossings.append((centre + (0.5 - float(np.mean(v))) / slope, slope))
+    return crossings

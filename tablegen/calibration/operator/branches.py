@@ -44,11 +44,11 @@ def left_of(line: PeriodicLine, family: Family) -> Left:
     edges = np.polynomial.chebyshev.chebvander(np.array([-1.0, 1.0]), DEGREE)
     matrix[len(u) :] = _CLOSURE * np.hstack([edges, -edges])
     right = np.append((measured - offset) / scale - modelled, [0.0, 0.0])
-    found = np.linalg.lstsq(matrix, right, rcond=None)[0]
-    remain = right[: len(u)] - matrix[: len(u)] @ found
+    coefficients = np.linalg.lstsq(matrix, right, rcond=None)[0]
+    remain = right[: len(u)] - matrix[: len(u)] @ coefficients
     spread = np.diag(np.linalg.inv(matrix.T @ matrix)) * float(np.mean(remain * remain)) * _together(remain)
-    begin, end = (float(edge @ (found[:count] + found[count:])) / 2.0 for edge in edges)
-    return Left(found, float(scale) * (1.0 + end - begin), spread)
+    begin, end = (float(edge @ (coefficients[:count] + coefficients[count:])) / 2.0 for edge in edges)
+    return Left(coefficients, float(scale) * (1.0 + end - begin), spread)
 
 
 def _together(noise: Floats) -> float:

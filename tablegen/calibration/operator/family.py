@@ -95,8 +95,8 @@ class FamilyProblem(ABC):
     def fit(self, near: Floats | None, rounds: int) -> FamilyFit:
         """From the best of the starts, or from numbers that are near; at most so many rounds."""
         if near is None:
-            found = [self.settled(self.left(self._whole(one)), _FIRST_ROUNDS) for one in self.starts]
-            best = self.settled(min(found, key=lambda one: one.cost), rounds)
+            solutions = [self.settled(self.left(self._whole(one)), _FIRST_ROUNDS) for one in self.starts]
+            best = self.settled(min(solutions, key=lambda one: one.cost), rounds)
         else:
             best = self.settled(self.left(self._whole(near)), rounds)
         weights, shape = best.weights * self.scale, best.numbers[: self._shapes]

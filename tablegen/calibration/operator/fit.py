@@ -75,12 +75,12 @@ def fit_operator(lines: Sequence[PeriodicLine], response: Response | None, facto
     main = _main_centre(still)
     names = (*FAMILIES, NONE)
     alone = [_candidate(name, still, main, factor) for name in names]
-    found = [_judged(one, still, factor) for one in alone]
-    scores = [one.candidates[one.family] for one in found[: len(FAMILIES)]]
+    fits = [_judged(one, still, factor) for one in alone]
+    scores = [one.candidates[one.family] for one in fits[: len(FAMILIES)]]
     if max(scores) < _WORTH_MIXING * min(scores):
-        found += [_judged(alone[0].weighted(share, alone[1]), still, factor) for share in _SHARES]
-    best = min(found, key=lambda one: one.candidates[one.family] * (1.0 if one.family in names else _CLEARLY))
-    candidates = {name: value for one in found for name, value in one.candidates.items()}
+        fits += [_judged(alone[0].weighted(share, alone[1]), still, factor) for share in _SHARES]
+    best = min(fits, key=lambda one: one.candidates[one.family] * (1.0 if one.family in names else _CLEARLY))
+    candidates = {name: value for one in fits for name, value in one.candidates.items()}
     return replace(best, candidates=candidates)
 
 
@@ -191,8 +191,8 @@ def _candidate(name: str, lines: Sequence[PeriodicLine], main: float, factor: Fa
             family = _straight(some)
             return _Fitted(some, main, family, near.creep if near else creep_of_fields(some, family, factor, creep_of))
         problem = FAMILIES[name](some, main, creep_of)
-        found = problem.fit(near.numbers, _ROUNDS_WITHOUT) if near else problem.fit(None, _ROUNDS)
-        return _Fitted(some, main, found.family, creep_of(found.loss_per_decade), found.numbers)
+        solution = problem.fit(near.numbers, _ROUNDS_WITHOUT) if near else problem.fit(None, _ROUNDS)
+        return _Fitted(some, main, solution.family, creep_of(solution.loss_per_decade), solution.numbers)
 
     whole = fitted(lines, None)
     return _Candidate(name, whole, [fitted([*lines[:i], *lines[i + 1 :]], whole) for i in range(len(lines))])
@@ -215,8 +215,8 @@ def _judged(candidate: _Candidate, lines: Sequence[PeriodicLine], factor: Factor
     operator, rows, sizes = whole.operator(lengths, factor)
     inside = tuple(_errors(line, operator, factor) for line in whole.settled)
     measured = tuple(
-        MeasuredLine(line.name, line.stroke, line.centre, line.rate_hz, errors.figures, left.figures)
-        for line, errors, left in zip(lines, out, inside, strict=True)
+        MeasuredLine(line.name, line.stroke, line.centre, line.rate_hz, errors.figures, inner.figures)
+        for line, errors, inner in zip(lines, out, inside, strict=True)
     )
     operator = replace(operator, lines=measured)
     return OperatorFit(operator, candidate.name, rows, sizes, inside, tuple(out), {candidate.name: score})
@@ -229,7 +229,12 @@ def _straight(lines: Sequence[PeriodicLine]) -> Family:
 
 
 def _sizes(
-    family: Family, residual: Field, lines: Sequence[PeriodicLine], left: Sequence[Left], main: float, factor: Factor
+    family: Family,
+    residual: Field,
+    lines: Sequence[PeriodicLine],
+    residuals: Sequence[Left],
+    main: float,
+    factor: Factor,
 ) -> Floats:
     """Measured extents over expected ones, less 1."""
     nothing = Field(np.zeros((0, 2)), np.zeros((0, 1)), Lengths(1.0, 1.0, 1.0))
@@ -242,7 +247,7 @@ def _sizes(
         except Unphysical:  # where a line is left out; its errors are the worst then
             return bare.expected_extent(line.stroke, line.mean, here)
 
-    return np.array([one.extent_nm / extent(line) - 1.0 for one, line in zip(left, lines, strict=True)])
+    return np.array([one.extent_nm / extent(line) - 1.0 for one, line in zip(residuals, lines, strict=True)])
 
 
 def _errors(line: PeriodicLine, operator: Operator, factor: Factor) -> LineErrors:

@@ -119,23 +119,23 @@ def periodic_line(trace: Trace, driver: Driver | float) -> PeriodicLine:
     start = float(time[0]) + settle * period
     grid = start + period * (np.arange((periods - settle) * PHASES) / PHASES)
     rows = [np.interp(grid, time, values).reshape(-1, PHASES) for values in (drive, trace.displacement_nm)]
-    kept = periods - settle
+    settled = periods - settle
     check_repeats(rows[0])
-    centres = np.arange(kept) - 0.5 * (kept - 1)
+    centres = np.arange(settled) - 0.5 * (settled - 1)
     means = rows[1].mean(axis=1)
-    order = min(kept - 1, _MAX_DRIFT_ORDER)
+    order = min(settled - 1, _MAX_DRIFT_ORDER)
     drift = np.polynomial.Polynomial.fit(centres, means, order) if order else np.polynomial.Polynomial([means[0]])
     at = centres[:, None] + (np.arange(PHASES) / PHASES - 0.5)[None, :]
     level = rows[1] - drift(at)
     displacement, shape = level.mean(axis=0), rows[0].mean(axis=0)
-    spread = float(np.sqrt(np.mean((level - displacement) ** 2) / max(kept - 1, 1))) if kept > 1 else 0.0
+    spread = float(np.sqrt(np.mean((level - displacement) ** 2) / max(settled - 1, 1))) if settled > 1 else 0.0
     begin = int(np.argmin(shape))
     shape, displacement = np.roll(shape, -begin), np.roll(displacement, -begin)
     if np.corrcoef(shape, displacement)[0, 1] < 0.0:
         displacement = -displacement
     _check_sweeps(shape)
     return PeriodicLine(
-        trace.name, 1.0 / period, kept, shape, displacement, spread, float(np.ptp(drift(at))) if order else 0.0
+        trace.name, 1.0 / period, settled, shape, displacement, spread, float(np.ptp(drift(at))) if order else 0.0
     )
 
 

@@ -73,7 +73,7 @@ def _fields(content: bytes) -> Iterator[tuple[str, AnyArray]]:
 
 
 def _array(content: bytes) -> AnyArray:
-    array, left = npy_array(content)
-    if left:
-        raise ValueError(f"{left} bytes follow its numbers")
+    array, remaining = npy_array(content)
+    if remaining:
+        raise ValueError(f"{remaining} bytes follow its numbers")
     return array

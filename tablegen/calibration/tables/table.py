@@ -53,9 +53,9 @@ def read_table(path: Path, needed: Sequence[Column], optional: Sequence[Column] 
     Lines that are blank or begin with # count for nothing. Raises ``Rejected`` with file, line and column.
     """
     name = shown_path(path)
-    wanted = [*needed, *optional]
+    expected = [*needed, *optional]
     if is_array_file(path):
-        return _array_table(path, name, wanted, needed)
+        return _array_table(path, name, expected, needed)
     digest = hashlib.sha256()
     reader: _Reader | None = None
     header_line = 0
@@ -67,7 +67,7 @@ def read_table(path: Path, needed: Sequence[Column], optional: Sequence[Column] 
             if header_line:
                 separator = next((mark for mark in (";", "\t") if mark in header), ",")
                 cells = _cells(header, separator)
-                reader = _Reader(name, separator, len(cells), _places(name, header_line, cells, wanted, needed))
+                reader = _Reader(name, separator, len(cells), _places(name, header_line, cells, expected, needed))
                 reader.add_rows(rows)
         elif not reader.full:
             reader.add(block)
@@ -79,12 +79,12 @@ def read_table(path: Path, needed: Sequence[Column], optional: Sequence[Column] 
     return MeasuredTable(name, Source(path.name, digest.hexdigest()[:16]), columns, lines)
 
 
-def _array_table(path: Path, name: str, wanted: Sequence[Column], needed: Sequence[Column]) -> MeasuredTable:
+def _array_table(path: Path, name: str, expected: Sequence[Column], needed: Sequence[Column]) -> MeasuredTable:
     content = file_content(path, name)
     source = Source(path.name, hashlib.sha256(content).hexdigest()[:16])
     arrays = columns_of(content, name)
     del content  # an archive has it a second time
-    places = _places(name, 0, list(arrays), wanted, needed)
+    places = _places(name, 0, list(arrays), expected, needed)
     written = [numbers_of(list(arrays.values())[place[0]], name, place[3]) for place in places]
     if len({len(column) for column in written}) > 1:
         lengths = ", ".join(f"{place[3]} {len(column)}" for place, column in zip(places, written, strict=True))
@@ -118,8 +118,8 @@ class _Reader:
     def add(self, block: Block) -> None:
         """All lines of a block: at once where they are plain numbers in their ranges, otherwise one by one."""
         rows = plain_rows(block.content, self._separator, self._width)
-        found = [] if rows is None else [_converted(rows[:, place[0]], place) for place in self._places]
-        values = [each for each in found if each is not None]
+        converted = [] if rows is None else [_converted(rows[:, place[0]], place) for place in self._places]
+        values = [each for each in converted if each is not None]
         if rows is None or len(values) < len(self._places):
             self.add_rows(_rows(file_text(block.content, self._name, block.line), self._name, block.line))
             return
@@ -138,22 +138,22 @@ class _Reader:
 
     def values(self, written: Floats, place: _Place) -> Floats:
         """Convert a column to the unit of the fits: at once if all are in range, otherwise one by one."""
-        found = _converted(written, place)
-        if found is None:
-            found = np.zeros(len(written))
+        numbers = _converted(written, place)
+        if numbers is None:
+            numbers = np.zeros(len(written))
             for row, value in enumerate(written.tolist()):
-                found[row] = self._number(row + 1, repr(value), *place[1:])
+                numbers[row] = self._number(row + 1, repr(value), *place[1:])
                 if self.full:
                     break
-        return found
+        return numbers
 
     def refuse(self) -> None:
         """Raise ``Rejected`` with all that was wrong, if anything was."""
         if self.problems:
-            found = self.problems[:_MAX_PROBLEMS]
+            problems = self.problems[:_MAX_PROBLEMS]
             if self.full:
-                found.append(Problem(self._name, found[-1].line, "", "more faults follow; stopped"))
-            raise Rejected(found)
+                problems.append(Problem(self._name, problems[-1].line, "", "more faults follow; stopped"))
+            raise Rejected(problems)
 
     def columns(self) -> tuple[dict[str, Floats], Ints]:
         """By name, and the line of every row. Raises ``Rejected`` with all that was wrong."""
@@ -202,12 +202,12 @@ def _converted(written: Floats, place: _Place) -> Floats | None:
     _, column, convert, _ = place
     if not isinstance(convert, Times):
         return None
-    found: Floats = written * convert.factor
-    return found if bool(np.all((column.above < found) & (found < column.below))) else None
+    numbers: Floats = written * convert.factor
+    return numbers if bool(np.all((column.above < numbers) & (numbers < column.below))) else None
 
 
 def _places(
-    name: str, line: int, header: list[str], wanted: Sequence[Column], needed: Sequence[Column]
+    name: str, line: int, header: list[str], expected: Sequence[Column], needed: Sequence[Column]
 ) -> list[_Place]:
     header = [cell.lower() for cell in header]
     if header and all(_is_number(cell) for cell in header):
@@ -215,14 +215,14 @@ def _places(
         raise Rejected([Problem(name, line, "", why)])
     places: list[_Place] = []
     problems: list[Problem] = []
-    for column in wanted:
+    for column in expected:
         spelt = {column.spelt(unit): convert for unit, convert in column.units.items()}
-        found = [(at, cell) for at, cell in enumerate(header) if cell in spelt]
-        if len(found) > 1:
-            both = " and ".join(cell for _, cell in found[:2])
-            problems.append(Problem(name, line, found[1][1], f"the header has both {both}; keep one of them"))
-        elif found:
-            at, cell = found[0]
+        cells = [(at, cell) for at, cell in enumerate(header) if cell in spelt]
+        if len(cells) > 1:
+            both = " and ".join(cell for _, cell in cells[:2])
+            problems.append(Problem(name, line, cells[1][1], f"the header has both {both}; keep one of them"))
+        elif cells:
+            at, cell = cells[0]
             places.append((at, column, spelt[cell], cell))
         elif column in needed:
             others = [cell for cell in spelt if cell != column.name]

@@ -93,21 +93,21 @@ def _load(
 
 def _header(content: bytes, version: int) -> tuple[_Header, list[str]]:
     """Read the numbers of a header, and the names of its channels. Raise ``struct.error`` where it ends."""
-    found: dict[str, float | bytes] = {}
-    at = _take(content, 4, _LATER if version else _FIRST, found)
+    values: dict[str, float | bytes] = {}
+    at = _take(content, 4, _LATER if version else _FIRST, values)
     if not version:
-        at += max(0, int(found["name_bytes"]))
-        _take(content, at, _FIRST_SENSORS, found)
-    titles = found.pop("titles")
+        at += max(0, int(values["name_bytes"]))
+        _take(content, at, _FIRST_SENSORS, values)
+    titles = values.pop("titles")
     assert isinstance(titles, bytes)
     half = len(titles) // 2
     names = [part.replace(b"\0", b"").decode("latin-1").strip() for part in (titles[:half], titles[half:])]
-    return {key: float(value) for key, value in found.items()}, [name for name in names if name]
+    return {key: float(value) for key, value in values.items()}, [name for name in names if name]
 
 
-def _take(content: bytes, at: int, fields: tuple[tuple[str, str], ...], found: dict[str, float | bytes]) -> int:
+def _take(content: bytes, at: int, fields: tuple[tuple[str, str], ...], values: dict[str, float | bytes]) -> int:
     for names, layout in fields:
-        found.update(zip(names.split(), struct.unpack_from(f"<{layout}", content, at), strict=True))
+        values.update(zip(names.split(), struct.unpack_from(f"<{layout}", content, at), strict=True))
         at += struct.calcsize(f"<{layout}")
     return at
 

@@ -118,12 +118,12 @@ def _planned_lines(note: dict[str, str], rows: int, height_nm: float | None, ste
 
 def _note(text: bytes) -> dict[str, str]:
     """Return the keys of a note and their values; the first of a repeated key."""
-    found: dict[str, str] = {}
+    keys: dict[str, str] = {}
     for line in re.split(r"[\r\n]+", text.decode("latin-1")):
         key, colon, value = line.partition(":")
         if colon:
-            found.setdefault(key.strip(), value.strip())
-    return found
+            keys.setdefault(key.strip(), value.strip())
+    return keys
 
 
 def _labels(text: bytes, layers: int) -> list[str]:

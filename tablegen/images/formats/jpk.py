@@ -78,10 +78,10 @@ def _load(page: TiffImage, factor: float, offset: float, _: int) -> Matrix:
 
 def _scale(own: TiffTags) -> tuple[float, float, str]:
     """Return the size of a step, the offset, and the unit, of the slot that the instrument shows."""
-    wanted, count = own.get(_DEFAULT_SLOT), own.get(_SLOTS)
+    default, count = own.get(_DEFAULT_SLOT), own.get(_SLOTS)
     for slot in range(min(int(count), _MAX_SLOTS) if isinstance(count, int) else 0):
         at = slot * _BETWEEN_SLOTS
-        if wanted is None or own.get(_SLOT_NAME + at) != wanted:
+        if default is None or own.get(_SLOT_NAME + at) != default:
             continue
         unit = own.get(_UNIT + at)
         named = unit if isinstance(unit, str) else ""

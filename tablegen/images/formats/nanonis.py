@@ -123,13 +123,13 @@ def _blocks(tags: dict[str, list[str]]) -> list[tuple[str, str, Direction]]:
     head, *rows = [line.strip().split("\t") for line in tags.get("DATA_INFO", [])] or [[]]
     try:
         name, unit, direction = (head.index(key) for key in ("Name", "Unit", "Direction"))
-        found = [
+        channels = [
             (row[name].strip(), row[unit].strip(), one)
             for row in rows
             for one in _DIRECTIONS[row[direction].strip().lower()]
         ]
     except (ValueError, KeyError, IndexError):
         raise ValueError("has a table DATA_INFO that does not say Name, Unit and Direction of each row") from None
-    if len(found) > _MAX_BLOCKS:
-        raise ValueError(f"has {len(found)} images; at most {_MAX_BLOCKS} are read")
-    return found
+    if len(channels) > _MAX_BLOCKS:
+        raise ValueError(f"has {len(channels)} images; at most {_MAX_BLOCKS} are read")
+    return channels

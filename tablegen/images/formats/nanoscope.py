@@ -58,9 +58,9 @@ def _lists(header: str) -> list[tuple[str, _List]]:
         if text.startswith("*"):
             lists.append((text, {}))
         elif lists:
-            found = re.match(r"(@\d+:[^:]*|[^:]*):(.*)", text)
-            if found:
-                lists[-1][1].setdefault(found[1].strip().lower(), found[2].strip())
+            entry = re.match(r"(@\d+:[^:]*|[^:]*):(.*)", text)
+            if entry:
+                lists[-1][1].setdefault(entry[1].strip().lower(), entry[2].strip())
     return lists
 
 
@@ -137,15 +137,15 @@ def _size(image: _List, columns: int, rows: int) -> tuple[float | None, float | 
 
 def _scale(text: str, others: _List, stored: int) -> tuple[float, str]:
     """Return the size of a step of the values, and their unit; steps if the file states none."""
-    found = _SCALED.match(text)
-    most = positive(found["value"]) if found else None
-    if found is None or most is None:
+    scale = _SCALED.match(text)
+    most = positive(scale["value"]) if scale else None
+    if scale is None or most is None:
         return 1.0, "LSB"
     step = most / 256.0**stored
-    if not found["by"]:
-        return step, found["unit"]
-    sensitivity = _SCALED.match(others.get(f"@{found['by'].lower()}", ""))
+    if not scale["by"]:
+        return step, scale["unit"]
+    sensitivity = _SCALED.match(others.get(f"@{scale['by'].lower()}", ""))
     each = positive(sensitivity["value"]) if sensitivity else None
     if sensitivity is None or each is None:
-        return step, found["unit"]
-    return step * each, sensitivity["unit"].removesuffix("/V") or found["unit"]
+        return step, scale["unit"]
+    return step * each, sensitivity["unit"].removesuffix("/V") or scale["unit"]

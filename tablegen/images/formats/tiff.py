@@ -97,7 +97,7 @@ def tiff_tags(content: bytes) -> list[TiffTags]:
 
     Raises ``ValueError`` where the directories, or what these tags point at, do not end inside the file.
     """
-    found: list[TiffTags] = []
+    pages: list[TiffTags] = []
     for order, big, at, count in _directories(content):
         tags: TiffTags = {}
         for entry in range(at, at + count * (20 if big else 12), 20 if big else 12):
@@ -113,8 +113,8 @@ def tiff_tags(content: bytes) -> list[TiffTags]:
                 raise ValueError(f"ends before byte {place}, where a tag should be; copy it again")
             (value,) = struct.unpack_from(order + layout, content, place)
             tags[code] = value.split(b"\0")[0].decode("latin-1") if isinstance(value, bytes) else value
-        found.append(tags)
-    return found
+        pages.append(tags)
+    return pages
 
 
 def _directories(content: bytes) -> Iterator[tuple[str, bool, int, int]]:

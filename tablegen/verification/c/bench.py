@@ -45,8 +45,8 @@ class CPlayed:
         states = STATE_WORDS * len(re.findall(r"^6", script, re.MULTILINE))
         ticks = len(capture) - len(FAULTS) - states - constants
         tail = capture[ticks:].astype(np.int64).tolist()
-        counted, told = len(FAULTS), len(FAULTS) + states
-        return cls(capture[:ticks], tail[:counted], tail[counted:told], tail[told:])
+        counted, reported = len(FAULTS), len(FAULTS) + states
+        return cls(capture[:ticks], tail[:counted], tail[counted:reported], tail[reported:])
 
 
 def storage_bits(bits: int) -> int:

@@ -83,9 +83,9 @@ def _compile(folder: Path, compiler: list[str], objects: list[Objects]) -> None:
     place = folder / OBJECTS
     shutil.rmtree(place, ignore_errors=True)  # a directory that is kept may have those of another build
     place.mkdir()
-    made_by = maker(compiler)
+    compiler_key = maker(compiler)
     for one in objects:
-        if made_by is None or not one.take(made_by, place):
+        if compiler_key is None or not one.take(compiler_key, place):
             compile_line(one.line(compiler), place)
-            if made_by is not None:
-                one.keep(made_by, place)
+            if compiler_key is not None:
+                one.keep(compiler_key, place)

@@ -125,13 +125,13 @@ class CTarget:
     def _header(stored: StoredBuild, step: CPlayed) -> Check:
         """Check the constants of the header as the compiler reads them."""
         content = stored_content(stored)
-        wanted = header_constants(content)
+        constants = header_constants(content)
         wrong = [
             f"{content.name}.h: {name} is {value} to the compiler, it is {right} in the manifest"
-            for (name, right), value in zip(wanted.items(), step.constants, strict=True)
+            for (name, right), value in zip(constants.items(), step.constants, strict=True)
             if value != right
         ]
-        return differing_check("c header", "manifest, by the compiler", f"{len(wanted)} constants", wrong)
+        return differing_check("c header", "manifest, by the compiler", f"{len(constants)} constants", wrong)
 
 
 def _states(script: Script, played: CPlayed) -> Check:

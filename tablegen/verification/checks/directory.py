@@ -14,11 +14,11 @@ def wrong_files(folder: Path, stored: StoredBuild) -> list[str]:
     wrong = []
     for name, digest in stored.manifest.files.items():
         try:
-            found = file_sha256(folder / name)
+            actual = file_sha256(folder / name)
         except OSError as error:
             wrong.append(f"{name}: {'missing' if isinstance(error, FileNotFoundError) else error.strerror or error}")
             continue
-        if found != digest:
+        if actual != digest:
             wrong.append(f"{name}: stale or edited: its SHA-256 is not that of the manifest")
     return wrong
 

@@ -29,10 +29,10 @@ def _wrong(axis: ManifestAxis, expected: ManifestExpected) -> Iterator[str]:
     both, traces = axis.fourier.directions == "both", expected.basis == "traces"
     sides = (["forward", "backward"] if both else ["forward"]) if traces else []
     for name in ("rms_percent", "scaling_percent"):
-        found = getattr(expected, name)
-        if sorted(found) != sorted(sides):
-            yield f"{name} has {', '.join(found) or 'no direction'}, not {', '.join(sides) or 'none'}"
-        for side, figure in found.items():
+        figures = getattr(expected, name)
+        if sorted(figures) != sorted(sides):
+            yield f"{name} has {', '.join(figures) or 'no direction'}, not {', '.join(sides) or 'none'}"
+        for side, figure in figures.items():
             if figure.value < 0.0 or (figure.uncertainty or 0.0) < 0.0:
                 yield f"{name}.{side} is below 0"
     for name, due in (("mismatch_percent", both), ("size_percent", traces), ("distance_percent", traces)):

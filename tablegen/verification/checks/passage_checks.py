@@ -51,10 +51,10 @@ def _follows(axis: ManifestAxis, passage: ManifestPassage, rate_hz: float) -> bo
     f_hz: Floats = rate_hz * np.arange(1, axis.fourier.harmonics + 1, dtype=np.float64)
     if passage.response is not None and f_hz[-1] > passage.response.hz[-1]:
         return False
-    held = (np.array(played.a) - 1j * np.array(played.b)) * (real + 1j * imaginary)
-    arrives = np.asarray(held * passes(passage, f_hz))
-    wanted = np.array(target.a) - 1j * np.array(target.b)
-    return bool(np.max(np.abs(arrives - wanted)) <= _SAME * max(float(np.max(np.abs(wanted))), 1e-300))
+    output = (np.array(played.a) - 1j * np.array(played.b)) * (real + 1j * imaginary)
+    arrives = np.asarray(output * passes(passage, f_hz))
+    intended = np.array(target.a) - 1j * np.array(target.b)
+    return bool(np.max(np.abs(arrives - intended)) <= _SAME * max(float(np.max(np.abs(intended))), 1e-300))
 
 
 def _is_resonance(axis: ManifestAxis, passage: ManifestPassage) -> bool:

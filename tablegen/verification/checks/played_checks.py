@@ -44,8 +44,8 @@ def first_difference(capture: Capture) -> str | None:
     if not len(differs):
         return f"{capture.lost} ticks are missing or too many at the end of the capture" if capture.lost else None
     at = int(differs[0])
-    wanted, got = _sample(capture.wanted[at]), _sample(capture.got[at])
-    return f"{_where(capture, at)}\n  expected  {wanted}\n  got       {got}"
+    expected, got = _sample(capture.wanted[at]), _sample(capture.got[at])
+    return f"{_where(capture, at)}\n  expected  {expected}\n  got       {got}"
 
 
 def check_codes(capture: Capture, stored: StoredBuild, sent: Mapping[str, Ints]) -> list[Check]:
@@ -62,18 +62,18 @@ def _model(capture: Capture, subject: str) -> Check:
     failure = None
     worst = "0"
     if len(differs):
-        got, wanted = part(subject, capture.got), part(subject, capture.wanted)
+        got, model = part(subject, capture.got), part(subject, capture.wanted)
         at = int(differs[0])
         undefined = capture.got[at] == UNDEFINED
         if subject == "markers":
-            expected, found = _markers(int(wanted[at])), _markers(int(got[at]))
+            expected, actual = _markers(int(model[at])), _markers(int(got[at]))
             worst = f"{len(differs)} differ"
         else:
-            expected, found = str(wanted[at]), str(got[at])
-            worst = str(int(np.max(np.abs(got - wanted)[capture.known], initial=0)))
+            expected, actual = str(model[at]), str(got[at])
+            worst = str(int(np.max(np.abs(got - model)[capture.known], initial=0)))
         failure = (
             f"{subject}: {len(differs)} of {len(capture.got)} ticks differ from the model, the first at "
-            f"{_where(capture, at)}: expected {expected}, got {'undefined' if undefined else found}"
+            f"{_where(capture, at)}: expected {expected}, got {'undefined' if undefined else actual}"
         )
     elif capture.lost:
         failure = f"{subject}: {capture.lost} ticks are missing or too many at the end of the capture"
@@ -200,12 +200,12 @@ def check_states(
 ) -> Check:
     """Check the status that the device reports after each request; fields in ``untold`` are not reported."""
     wrong = []
-    for (when, state), found in zip(wanted, got, strict=False):
-        right, found = state.limited(most_counted, untold), found.limited(most_counted, untold)
-        if right == found:
+    for (when, state), state_read in zip(wanted, got, strict=False):
+        right, state_read = state.limited(most_counted, untold), state_read.limited(most_counted, untold)
+        if right == state_read:
             continue
-        expected, told = (_told(one) for one in (right, found))
-        different = [(mine, other) for mine, other in zip(expected, told, strict=True) if mine != other]
+        expected, actual = (_state_lines(one) for one in (right, state_read))
+        different = [(mine, other) for mine, other in zip(expected, actual, strict=True) if mine != other]
         texts = (", ".join(pair[side] for pair in different) for side in (0, 1))
         wrong.append("requests: {}: expected {}; got {}".format(when, *texts))
     if len(got) != len(wanted):
@@ -214,7 +214,7 @@ def check_states(
     return Check("requests", "integer model", compared, f"{len(wrong)} differ", "0", wrong[0] if wrong else None)
 
 
-def _told(state: StoredState) -> list[str]:
+def _state_lines(state: StoredState) -> list[str]:
     flags = [name if flag else f"not {name}" for name, flag in zip(STATES, state.flags, strict=True)]
     held = Sample.of(state.outputs)
     outputs = [f"x {held.x}", f"y {held.y}", f"markers {' '.join(held.flags) or 'none'}"]

@@ -168,8 +168,8 @@ def reached(axis: ManifestAxis) -> ManifestSeries:
     """Return the series that the piezo follows: the intended one less what the boost limit removed."""
     target = followed(axis)
     factor = np.ones(len(target.a))
-    for harmonic, left in zip(axis.fourier.held_harmonics, axis.fourier.held_factors, strict=True):
-        factor[harmonic - 1] = left
+    for harmonic, share in zip(axis.fourier.held_harmonics, axis.fourier.held_factors, strict=True):
+        factor[harmonic - 1] = share
     return _times(target, factor, np.zeros(len(factor)))
 
 
@@ -183,12 +183,12 @@ def scaling_figures(
     if axis.resting:
         return {}
     sides = ("forward", "backward") if axis.fourier.directions == "both" else ("forward",)
-    found = {side: _direction(axis, [period], side) for side in sides}
+    parts = {side: _direction(axis, [period], side) for side in sides}
     if shaped is None or not shaped.is_whole:
-        return found
+        return parts
     if shaped.position_errors is None:
         return {
-            side: {name: one[name] for name in one.keys() - {"total", "quantisation"}} for side, one in found.items()
+            side: {name: one[name] for name in one.keys() - {"total", "quantisation"}} for side, one in parts.items()
         }
     every: list[PlayedPeriod | PositionErrors] = [PositionErrors(period, errors) for errors in shaped.position_errors]
     return {side: _direction(axis, every, side) for side in sides}
@@ -236,15 +236,15 @@ def refinement_figures(axis: ManifestAxis) -> dict[str, dict[str, float]] | None
     if layer is None:
         return None
     sides = ("forward", "backward") if axis.fourier.directions == "both" else ("forward",)
-    found = {}
+    figures = {}
     for side in sides:
         branch, position, sweep, times = _sweep(axis, side)
         moved = at(layer, times) / branch.slope(sweep)
-        found[side] = {
+        figures[side] = {
             "position": 100.0 * float(np.max(np.abs(moved))),
             "scaling": _peak_to_peak(np.gradient(moved, position)),
         }
-    return found
+    return figures
 
 
 def _sweep(axis: ManifestAxis, side: str) -> tuple[ModelBranch | WaveformBranch, Floats, Floats, Floats]:

@@ -45,15 +45,15 @@ def shaped_codes(program: Program, count: int) -> Ints:
     value = np.resize(((exact + (1 << (output.gain_q - 1))) >> (output.gain_q - bits)) - half, count)
     order = output.shaping.order
     if order == 3:
-        left = _carried(value, half, output.shaping.zero)
+        residue = _carried(value, half, output.shaping.zero)
     else:
-        left = value
+        residue = value
         for _ in range(order):
-            left = np.cumsum(left)  # wraps at 2^64, a multiple of every code
-        left = (left + half & 2 * half - 1) - half
-    e1, e2, e3 = (np.concatenate([np.zeros(by, dtype=np.int64), left])[:count] for by in (1, 2, 3))
+            residue = np.cumsum(residue)  # wraps at 2^64, a multiple of every code
+        residue = (residue + half & 2 * half - 1) - half
+    e1, e2, e3 = (np.concatenate([np.zeros(by, dtype=np.int64), residue])[:count] for by in (1, 2, 3))
     fed = {1: e1, 2: 2 * e1 - e2}.get(order, e1 - e2 + e3 + output.shaping.zero * (e1 - e2) // 64)
-    codes: Ints = np.clip((value + fed - left) // (2 * half), output.code_min, output.code_max)
+    codes: Ints = np.clip((value + fed - residue) // (2 * half), output.code_min, output.code_max)
     return codes
 
 
@@ -115,7 +115,7 @@ class ShapedPlay:
     def figures(self) -> dict[str, float | int | None]:
         """Return the figures of shaping; those of the position where they can be computed."""
         errors, changes, before = self.code_errors, _changes(self.codes), _changes(self._judged_rounded)
-        found: dict[str, float | int | None] = {
+        values: dict[str, float | int | None] = {
             "ticks": len(self.codes),
             "max_code_error_lsb": float(np.max(np.abs(errors))),
             "rms_code_error_lsb": float(np.sqrt(np.mean(errors**2))),
@@ -126,9 +126,9 @@ class ShapedPlay:
             "rounded.changes.mean_step": before[1],
         }
         if self.rounded_errors is not None:
-            found["rounded.max_error_lsb"] = float(np.max(np.abs(self.rounded_errors)))
-            found["rounded.rms_error_lsb"] = float(np.sqrt(np.mean(self.rounded_errors**2)))
-        return found
+            values["rounded.max_error_lsb"] = float(np.max(np.abs(self.rounded_errors)))
+            values["rounded.rms_error_lsb"] = float(np.sqrt(np.mean(self.rounded_errors**2)))
+        return values
 
     @property
     def _judged_rounded(self) -> Ints:
@@ -145,9 +145,9 @@ def told_of(stated: ManifestShaped | None) -> dict[str, float | int | None]:
     """Return what a certificate states of shaping, by the names of ``figures``."""
     if stated is None:
         return {}
-    told: dict[str, float | int | None] = {
+    figures: dict[str, float | int | None] = {
         name: getattr(stated, name) for name in ("ticks", "max_code_error_lsb", "rms_code_error_lsb", "largest_step")
     }
     for prefix, changes in (("", stated.changes), ("rounded.", stated.rounded.changes)):
-        told |= {f"{prefix}changes.{name}": getattr(changes, name) for name in ("percent", "mean_step")}
-    return told | {f"rounded.{name}": getattr(stated.rounded, name) for name in ("max_error_lsb", "rms_error_lsb")}
+        figures |= {f"{prefix}changes.{name}": getattr(changes, name) for name in ("percent", "mean_step")}
+    return figures | {f"rounded.{name}": getattr(stated.rounded, name) for name in ("max_error_lsb", "rms_error_lsb")}

@@ -14,11 +14,11 @@ def packed(words: Words, stored: StoredBuild) -> Words:
     packed = np.empty(len(words) // 2, dtype=np.uint64)
     for first in range(0, len(packed), _CHUNK_TICKS):
         chunk = slice(2 * first, 2 * (first + _CHUNK_TICKS))
-        sent, told = words[: 2 * len(packed)][chunk].reshape(-1, 2).T
+        sent, flags = words[: 2 * len(packed)][chunk].reshape(-1, 2).T
         x = codes_of(sent & np.uint64(0xFFFFFFFF), stored.program.x.output)
         y = codes_of(sent >> np.uint64(32), stored.program.y.output)
-        told = (told & np.uint64(0xFFFF)) << np.uint64(48)  # faults above markers
-        packed[first : first + _CHUNK_TICKS] = told | y << np.uint64(24) | x
+        flags = (flags & np.uint64(0xFFFF)) << np.uint64(48)  # faults above markers
+        packed[first : first + _CHUNK_TICKS] = flags | y << np.uint64(24) | x
     return packed
 
 

@@ -232,7 +232,7 @@ class Requests:
             self._ticks(program.schedule.ticks)
         self._rest("with codes that clamp, after faults were cleared")
 
-    def _held_back(self) -> None:
+    def _slew_limited(self) -> None:
         """Play a program whose steps are too large, up and down: the guard limits them, and reports it."""
         script = self.script
         line = script.model.playing.schedule.ticks if script.model.playing else 1

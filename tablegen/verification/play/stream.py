@@ -274,8 +274,8 @@ class Script:
         """Codes and markers that the device holds."""
         if not self.expected:
             return self.power_up[1] << 24 | self.power_up[0]
-        held = self.expected[-1] & ~(0xFF << _FAULTS_AT)
-        return held & ~_VALID if self._faulty_after == len(self.expected) else held
+        output = self.expected[-1] & ~(0xFF << _FAULTS_AT)
+        return output & ~_VALID if self._faulty_after == len(self.expected) else output
 
     def lost_tick(self, under_way: bool) -> None:
         """Tick too early: while the last sample is ``under_way``, or reported by a driver at rest."""
@@ -384,14 +384,14 @@ class Mismatch:
 
 def compare(expected: Sequence[int], capture: Words) -> Mismatch | None:
     """Every tick of a capture against the model, codes, markers and faults; None where all are equal."""
-    wanted = np.array(expected, dtype=np.uint64)
-    length = min(len(wanted), len(capture))
-    differs = np.flatnonzero(wanted[:length] != capture[:length])
-    if not len(differs) and len(wanted) == len(capture):
+    model = np.array(expected, dtype=np.uint64)
+    length = min(len(model), len(capture))
+    differs = np.flatnonzero(model[:length] != capture[:length])
+    if not len(differs) and len(model) == len(capture):
         return None
     at = int(differs[0]) if len(differs) else length
     return Mismatch(
         at,
-        Sample.of(int(wanted[at])) if at < len(wanted) else None,
+        Sample.of(int(model[at])) if at < len(model) else None,
         Sample.of(int(capture[at])) if at < len(capture) else None,
     )

@@ -190,13 +190,13 @@ def read_outputs(folder: Path) -> dict[str, tuple[int, int, int]]:
 
 def different_constants(folder: Path, content: Content) -> list[str]:
     """List the constants that the simulator reads in the header otherwise than the manifest has them."""
-    wanted = wanted_constants(content)
-    found = (folder / CONSTANTS).read_text("ascii", "replace").split()
-    if len(found) != len(wanted):
-        return [f"{content.name}.vh: {len(found)} of its constants were read, there are {len(wanted)}"]
+    constants = wanted_constants(content)
+    readings = (folder / CONSTANTS).read_text("ascii", "replace").split()
+    if len(readings) != len(constants):
+        return [f"{content.name}.vh: {len(readings)} of its constants were read, there are {len(constants)}"]
     return [
         f"{content.name}.vh: {content.name.upper()}_{key} is {value} to the simulator, it is {right} in the manifest"
-        for (key, right), value in zip(wanted.items(), found, strict=True)
+        for (key, right), value in zip(constants.items(), readings, strict=True)
         if value != right
     ]
 

@@ -121,10 +121,10 @@ def compile_design(simulator: str, design: Design, folder: Path, *, kept: bool =
 def require(simulator: str) -> None:
     """Raise ``ToolMissing`` unless cocotb, the simulator and the shared library of Python are there."""
     try:
-        found = find_spec("cocotb_tools.runner")  # to load it takes longer than to load this program
+        runner_spec = find_spec("cocotb_tools.runner")  # to load it takes longer than to load this program
     except ImportError:
-        found = None
-    if found is None:
+        runner_spec = None
+    if runner_spec is None:
         raise ToolMissing(f"cocotb is not installed: {install_advice('hdl')}")
     if simulator == "icarus" and not (shutil.which("iverilog") and shutil.which("vvp")):
         raise ToolMissing("Icarus Verilog is not installed: apt-get install iverilog, or brew install icarus-verilog")
