@@ -128,13 +128,13 @@ def _bent(model: PeriodicModel, state: FitState, free: Bools) -> tuple[PeriodicM
     state = settle(model, state.parameters, free)
     change = np.inf
     for _ in range(_ROUNDS):
-        by = [_more_x(bends, *one) for one in zip(state.left, state.steepness, across, strict=True)]
+        by = [_more_x(bends, *one) for one in zip(state.residuals, state.steepness, across, strict=True)]
         across = [one + step for one, step in zip(across, by, strict=True)]
         more = _without_line(
             [step @ bends for step in by], [model.columns(state.parameters, way).x for way, _ in model.images]
         )
         off = [one + step for one, step in zip(model.off, [*more, np.zeros_like(more[0])], strict=False)]
-        ahead = _more_phase(row_bends, state.left, model.phase_slopes(state), along)
+        ahead = _more_phase(row_bends, state.residuals, model.phase_slopes(state), along)
         along = along + ahead
         rows = _less_line(ahead @ row_bends)
         change = max(float(np.max(np.abs(one))) for one in (*more, rows / q))

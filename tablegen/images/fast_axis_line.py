@@ -17,7 +17,7 @@ from tablegen.fitting.measured_branch import BINS
 from tablegen.images.model_start import begin, grown, prepared
 from tablegen.images.pair_checks import ALIASING_HINT, MIN_PERIODS
 from tablegen.images.periodic_model import BASES, FitState, Geometry, PeriodicModel, settle
-from tablegen.images.position_errors import LeftInBins, covariance, loud_rows, pixel_noise
+from tablegen.images.position_errors import BinnedResidual, covariance, loud_rows, pixel_noise
 from tablegen.numerics.arrays import Bools, Floats, Ints
 
 _MOST_RIPPLES = 12  # of each sweep
@@ -201,7 +201,7 @@ def _ripples(geometry: Geometry, count: int) -> tuple[Floats, Floats]:
 
 def _check(model: PeriodicModel, state: FitState) -> None:
     """Whether it is a fit at all, and of a trace and its retrace."""
-    for name, (_, image), residual in zip(("trace", "retrace"), model.images, state.left, strict=False):
+    for name, (_, image), residual in zip(("trace", "retrace"), model.images, state.residuals, strict=False):
         share = 1.0 - float(np.mean(residual**2)) / float(np.mean(image**2))
         if share < _MIN_EXPLAINED:
             raise Unphysical(
@@ -257,7 +257,7 @@ def _gap(fit: _Degree) -> tuple[Floats, Floats]:
     loose = np.concatenate([free[: at + count], [False, False], free[at + count :], [True, True]])
     settled = settle(wider, start, loose)
     watched = np.arange(len(loose)) >= len(loose) - 2
-    errors = covariance(wider, settled, loose, watched, 1.0, list(settled.left))[0]
+    errors = covariance(wider, settled, loose, watched, 1.0, list(settled.residuals))[0]
     gap, error = settled.parameters[-2:], np.sqrt(np.diag(errors)[-2:])
     worst = int(np.argmax(np.abs(gap)))
     # A narrow loop is as little open where much is cropped: how much, its width a tenth of the line further says.
@@ -280,7 +280,7 @@ def _gap(fit: _Degree) -> tuple[Floats, Floats]:
 
 def _result(best: _Degree, fits: list[_Degree], gap: Floats, gap_error: Floats) -> ImageLine:
     model, state, free = best.model, best.state, best.free
-    binned = [LeftInBins.of(model.geometry, *pair) for pair in zip(state.left, state.steepness, strict=True)]
+    binned = [BinnedResidual.of(model.geometry, *pair) for pair in zip(state.residuals, state.steepness, strict=True)]
     beyond = sum(float(np.sum((one.off / one.error) ** 2)) for one in binned)
     expected = max(len(binned) * BINS - int(np.sum(free[model.rippled_from :])), 1)
     misfit = beyond / expected if chdtrc(expected, beyond) < _MISFIT_SIGNIFICANCE else 1.0
@@ -289,7 +289,9 @@ def _result(best: _Degree, fits: list[_Degree], gap: Floats, gap_error: Floats) 
     matrix, widened = covariance(model, state, free, watched, max(misfit, 1.0), [one.clean for one in binned])
     matrix = matrix + _of_the_form(best, fits, gap, gap_error)
     power = sum(float(np.vdot(image, image)) for _, image in model.images)
-    drawn = np.concatenate([image - residual for (_, image), residual in zip(model.images, state.left, strict=True)])
+    drawn = np.concatenate(
+        [image - residual for (_, image), residual in zip(model.images, state.residuals, strict=True)]
+    )
     return ImageLine(
         geometry=model.geometry,
         model=model,

@@ -151,7 +151,7 @@ def described(
             model, state, off = plain, straight, (nowhere, nowhere)
     other = second_base(
         geometry,
-        state.left[0],
+        state.residuals[0],
         state.parameters[:2],
         _multiples(model, state.parameters),
         float(np.max(np.abs(state.amplitudes))),
@@ -201,8 +201,8 @@ def _tracked(
         return np.concatenate([phase - x[count] * column.x - x[count + 1] for phase, column in pairs])
 
     start = [*np.concatenate([bend.shape.coordinates for bend in bends]), q, float(phases[0][0])]
-    best: Floats = least_squares(left, start, x_scale=[*[0.05, 0.1] * len(sides), 1.0, 0.3]).x
-    off = left(best)
+    best: Floats = least_squares(residuals, start, x_scale=[*[0.05, 0.1] * len(sides), 1.0, 0.3]).x
+    off = residuals(best)
     if float(np.sqrt(np.mean(off**2))) < _PHASE_TOLERANCE:
         off = np.zeros_like(off)
     first, second = np.split(off / best[count], 2) if len(sides) == 2 else (off / best[count], np.zeros_like(off))

@@ -88,17 +88,17 @@ def check_periods(periods: float, span: float, columns: int) -> None:
         )
 
 
-def check_size(found_nm: float, said_nm: float, said_by: str, side: Literal["line", "frame"] = "line") -> None:
-    """Check the size by the sample's constant against the one stated by ``said_by``.
+def check_size(measured_nm: float, stated_nm: float, stated_by: str, side: Literal["line", "frame"] = "line") -> None:
+    """Check the size by the sample's constant against the one stated by ``stated_by``.
 
     A constant of another direction of a lattice is wrong by the root of two or of three, an alias by more.
     """
-    ratio = found_nm / said_nm
+    ratio = measured_nm / stated_nm
     long = "long" if side == "line" else "high"
     if not 1.0 / _MAX_SIZE_RATIO < ratio < _MAX_SIZE_RATIO:
         raise Unphysical(
-            f"the {side} is {found_nm:.4g} nm {long} by the sample's constant, and {said_nm:.4g} nm by "
-            f"{said_by}; is the constant that of this sample, the lattice of this kind, and a period more than "
+            f"the {side} is {measured_nm:.4g} nm {long} by the sample's constant, and {stated_nm:.4g} nm by "
+            f"{stated_by}; is the constant that of this sample, the lattice of this kind, and a period more than "
             f"two pixels?"
         )
 

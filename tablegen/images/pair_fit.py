@@ -13,7 +13,7 @@ from tablegen.fitting.measured_branch import BINS, WINDOW, AmplitudeFit, measure
 from tablegen.images.model_start import begin, check_signs, grown, prepared
 from tablegen.images.pair_checks import MIN_PERIODS
 from tablegen.images.periodic_model import FitState, PeriodicModel
-from tablegen.images.position_errors import LeftInBins, covariance, loud_rows, pixel_noise
+from tablegen.images.position_errors import BinnedResidual, covariance, loud_rows, pixel_noise
 from tablegen.numerics.arrays import Bools, Floats
 
 _MIN_EXPLAINED_VARIANCE = 0.03  # share of the variance
@@ -91,7 +91,7 @@ def check_fit(model: PeriodicModel, state: FitState, free: Bools) -> None:
 
 
 def _both(model: PeriodicModel, state: FitState) -> list[tuple[tuple[bool, Floats], Floats]]:
-    return list(zip(model.images, state.left, strict=True))
+    return list(zip(model.images, state.residuals, strict=True))
 
 
 def _result(model: PeriodicModel, state: FitState, free: Bools, v_scan: float) -> ImageFit:
@@ -148,8 +148,8 @@ def _positions(
     geometry = model.geometry
     residuals, scaling, lines, clean, beyond = [], [], [], [], 0.0
     span = geometry.window[1] - geometry.window[0]
-    for forward, rest, steep in zip((True, False), state.left, state.steepness, strict=True):
-        binned = LeftInBins.of(geometry, rest, steep)
+    for forward, rest, steep in zip((True, False), state.residuals, state.steepness, strict=True):
+        binned = BinnedResidual.of(geometry, rest, steep)
         clean.append(binned.clean)
         columns = model.columns(state.parameters, forward)
         place = binned.place

@@ -103,7 +103,7 @@ class FitState:
 
     parameters: Floats
     amplitudes: Complexes
-    left: tuple[Floats, ...]
+    residuals: tuple[Floats, ...]
     steepness: tuple[Floats, ...]  # d height / dx of each image, levelled
     cost: float
     hessian: Floats
@@ -231,12 +231,12 @@ class PeriodicModel:
         model = PeriodicModel(self.geometry, self.images, spots, self.order, self.off, self.ripples)
         return model, replace(state, parameters=parameters)
 
-    def scores_of(self, state: FitState, left: Sequence[Floats]) -> Floats:
-        """``FitState.scores`` were this left of each image."""
+    def scores_of(self, state: FitState, residuals: Sequence[Floats]) -> Floats:
+        """Return ``FitState.scores`` for other residuals of each image."""
         forward_terms, backward_terms = self._terms(state.parameters, state.amplitudes)
         rows = self._rows(state.parameters)
         scores = np.zeros((self.geometry.rows, len(forward_terms)))
-        for (forward, _), image in zip(self.images, left, strict=True):
+        for (forward, _), image in zip(self.images, residuals, strict=True):
             laid = self._laid_out(rows, self._columns(state.parameters, forward))
             scores += _scores(forward_terms if forward else backward_terms, laid, image)
         return scores
@@ -304,7 +304,7 @@ class PeriodicModel:
         total = np.zeros(len(spots), dtype=np.complex128)
         power = np.zeros(len(spots))
         row = other._rows(state.parameters)[0]
-        for (forward, _), residual in zip(self.images, state.left, strict=True):
+        for (forward, _), residual in zip(self.images, state.residuals, strict=True):
             column = other._columns(state.parameters, forward)[0]
             total += np.sum(np.conj(row) * (np.conj(column) @ residual.T), axis=1)
             power += np.sum(np.abs(column) ** 2, axis=1) * self.geometry.rows

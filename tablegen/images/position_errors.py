@@ -13,7 +13,7 @@ _ARITHMETIC_ERROR = 1e-7  # share of the line that rounding may leave
 
 
 @dataclass(frozen=True, eq=False)
-class LeftInBins:
+class BinnedResidual:
     """How far an image is off its model in each twentieth of its columns, as a share of the line, and the error.
 
     ``place`` is the bin of each column; ``clean`` the image that is left without that.
@@ -25,7 +25,7 @@ class LeftInBins:
     clean: Floats
 
     @classmethod
-    def of(cls, geometry: Geometry, residual: Floats, steep: Floats) -> "LeftInBins":
+    def of(cls, geometry: Geometry, residual: Floats, steep: Floats) -> "BinnedResidual":
         """From what is left of an image, and how steep it is."""
         place = np.minimum((np.arange(geometry.columns) * BINS) // geometry.columns, BINS - 1)
         bins = np.arange(BINS)[:, None] == place
@@ -61,7 +61,7 @@ def covariance(
 
 def loud_rows(state: FitState) -> tuple[int, ...]:
     """Rows, counted from 0, that leave far more than the others do."""
-    power = np.sqrt(np.mean(np.stack(state.left) ** 2, axis=(0, 2)))
+    power = np.sqrt(np.mean(np.stack(state.residuals) ** 2, axis=(0, 2)))
     middle = float(np.median(power))
     spread = 1.4826 * float(np.median(np.abs(power - middle)))
     return tuple(np.flatnonzero(power > middle + max(8.0 * spread, 0.5 * middle)).tolist())
@@ -69,5 +69,5 @@ def loud_rows(state: FitState) -> tuple[int, ...]:
 
 def pixel_noise(state: FitState) -> float:
     """Noise of a pixel, rms, from the differences of neighbouring pixels."""
-    residuals = np.concatenate(state.left)
+    residuals = np.concatenate(state.residuals)
     return float(np.sqrt(np.mean(np.diff(residuals, axis=1) ** 2) / 2.0))

@@ -44,7 +44,7 @@ class Bound:
     dynamics: bool
 
 
-def left_of_error(gain: float, ratio: Complex) -> Floats:
+def remaining_error(gain: float, ratio: Complex) -> Floats:
     """What a round leaves of an error, for true gains over modelled ones."""
     return np.abs(1.0 - gain * ratio)
 
@@ -52,7 +52,7 @@ def left_of_error(gain: float, ratio: Complex) -> Floats:
 def bound(line: LinePlan, gain: float, used: int) -> Bound:
     """The bound of one axis at a learning gain, for ``used`` harmonics, or as many of them as it allows."""
     n = np.arange(1.0, line.target.harmonics + 1.0)
-    worst = np.max(left_of_error(gain, plausible_ratios(line, n * float(line.rate))), axis=0)
+    worst = np.max(remaining_error(gain, plausible_ratios(line, n * float(line.rate))), axis=0)
     beyond = np.flatnonzero(worst > MAX_ERROR_LEFT)
     most = int(beyond[0]) if len(beyond) else line.target.harmonics
     used = min(used, most)

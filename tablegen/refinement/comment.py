@@ -9,7 +9,7 @@ from tablegen.refinement.round import Round, TraceRound, worst_scaling
 
 def provenance(found: Round, sources: Sequence[Source], stopped: bool = False) -> str:
     """The line of the comment that says what a round rests on, or why the layer before it was kept; no date."""
-    lesson = found.lesson
+    update = found.update
     said = []
     for source in sources:
         name = source.name if source.name.isprintable() else ascii(source.name)
@@ -23,11 +23,11 @@ def provenance(found: Round, sources: Sequence[Source], stopped: bool = False) -
     return ", ".join(
         [
             *said,
-            f"residual {lesson.before.rms_percent:.3g} % rms",
+            f"residual {update.before.rms_percent:.3g} % rms",
             *(
-                [f"scaling error {worst_scaling(lesson):.3g} %, larger than before: the layer before it was kept"]
+                [f"scaling error {worst_scaling(update):.3g} %, larger than before: the layer before it was kept"]
                 if stopped
-                else [f"harmonics to {lesson.harmonics}", f"gain {found.bound.gain:g}"]
+                else [f"harmonics to {update.harmonics}", f"gain {found.bound.gain:g}"]
             ),
         ]
     )

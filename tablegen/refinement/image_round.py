@@ -16,9 +16,9 @@ from tablegen.images.pair_checks import check_size
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, Plan, make_plan
 from tablegen.refinement.lattice_line import ImageOptions, LatticeLine, lattice_line
-from tablegen.refinement.learning import Lesson, learn
+from tablegen.refinement.learning import LayerUpdate, learn
 from tablegen.refinement.registration import SweepMismatch, mismatch
-from tablegen.refinement.round import Options, Round, allowed, finished, stop, why_worse, with_lesson
+from tablegen.refinement.round import Options, Round, allowed, finished, stop, why_worse, with_layer_update
 from tablegen.refinement.slow_line import slow_line
 from tablegen.refinement.window_line import WindowLine, averaged
 
@@ -73,17 +73,17 @@ def refine_images(
     frames = tuple(_frame(plan, trace, retrace, images or ImageOptions()) for trace, retrace in pairs)
     measured = averaged([frame.line for frame in frames]) if axis == "x" else slow_line(plan, frames)
     size = None if sample is None else _size(plan, frames, sample)
-    lesson = learn(line, measured, options.gain, limits.used)
-    refinement, changed = with_lesson(setup, line, lesson)
+    update = learn(line, measured, options.gain, limits.used)
+    refinement, changed = with_layer_update(setup, line, update)
     return ImageRound(
         line=line,
         bound=limits,
-        lesson=lesson,
+        update=update,
         refinement=refinement,
         setup=changed,
-        worse=why_worse(setup, axis, lesson),
-        **stop(setup, line, lesson),
-        remarks=(*_size_remarks(plan, size), *_remarks(line, frames, lesson)),
+        worse=why_worse(setup, axis, update),
+        **stop(setup, line, update),
+        remarks=(*_size_remarks(plan, size), *_remarks(line, frames, update)),
         frames=frames,
         measured=measured,
         size=size,
@@ -162,7 +162,7 @@ def _size_remarks(plan: Plan, size: LineSize | None) -> list[Remark]:
     ]
 
 
-def _remarks(line: LinePlan, frames: Sequence[LatticeLine], lesson: Lesson) -> tuple[Remark, ...]:
+def _remarks(line: LinePlan, frames: Sequence[LatticeLine], update: LayerUpdate) -> tuple[Remark, ...]:
     found = [text for frame in frames[:1] for text in _remarks_of(frame)]
     if line.axis == "y" and len(frames) == 1:
         found.append(
@@ -171,7 +171,7 @@ def _remarks(line: LinePlan, frames: Sequence[LatticeLine], lesson: Lesson) -> t
                 "other, which tell it"
             )
         )
-    return tuple(found + _learning_remarks(lesson))
+    return tuple(found + _learning_remarks(update))
 
 
 def _remarks_of(seen: LatticeLine) -> list[Remark]:
@@ -232,34 +232,34 @@ def refine_mismatch(
         _check_shape(plan, trace)
     frames = tuple(mismatch(plan, trace, retrace, images or ImageOptions()) for trace, retrace in pairs)
     measured = averaged([frame.line for frame in frames])
-    lesson = learn(plan.x, measured, options.gain, limits.used)
-    refinement, changed = with_lesson(setup, plan.x, lesson, "mismatch")
+    update = learn(plan.x, measured, options.gain, limits.used)
+    refinement, changed = with_layer_update(setup, plan.x, update, "mismatch")
     remarks = [
         spoils(
             "only what trace and retrace differ by was seen, and is corrected, half of it in each; an error that both "
             "share stays, and is in none of these figures"
         ),
-        *_learning_remarks(lesson),
+        *_learning_remarks(update),
     ]
     return MismatchRound(
         line=plan.x,
         bound=limits,
-        lesson=lesson,
+        update=update,
         refinement=refinement,
         setup=changed,
-        worse=why_worse(setup, axis, lesson, "mismatch"),
-        **stop(setup, plan.x, lesson, "mismatch"),
+        worse=why_worse(setup, axis, update, "mismatch"),
+        **stop(setup, plan.x, update, "mismatch"),
         remarks=tuple(remarks),
         frames=frames,
         measured=measured,
     )
 
 
-def _learning_remarks(lesson: Lesson) -> list[Remark]:
+def _learning_remarks(update: LayerUpdate) -> list[Remark]:
     found: list[Remark] = []
-    if lesson.harmonics == 0:
+    if update.harmonics == 0:
         found.append(Remark("the error is within the noise of the images: there is nothing more to learn from them"))
-    elif finished(lesson):
+    elif finished(update):
         found.append(Remark("most of the remaining error is noise: give several frames, or stop refining"))
     return [*found, Remark("images do not show that the build of this scan file was running")]
 

@@ -24,7 +24,7 @@ _AKAIKE_COST = 4.0  # cost of the two numbers of a harmonic, after Akaike: the n
 
 
 @dataclass(frozen=True, eq=False)
-class Lesson:
+class LayerUpdate:
     """What a round learns: ``layer`` is the new one, ``change`` by how much it differs from the one that was played.
 
     ``before`` was measured, ``after`` is what the model predicts. ``harmonics`` is 0 where nothing stands out of the
@@ -41,7 +41,7 @@ class Lesson:
     chord_noise_percent: float
 
 
-def learn(line: LinePlan, measured: LineMeasurement, gain: float, harmonics: int) -> Lesson:
+def learn(line: LinePlan, measured: LineMeasurement, gain: float, harmonics: int) -> LayerUpdate:
     """Learn harmonics 1..``harmonics`` at most from a period of the running scan, at a gain in (0, 2).
 
     The position error in the imaged windows, times the slope of the model's branch there, is what the drive lacks. It
@@ -74,7 +74,7 @@ def learn(line: LinePlan, measured: LineMeasurement, gain: float, harmonics: int
     noise = np.sqrt(np.mean(np.sum((errors @ measured.covariance) * errors, axis=1)))
     chords = _chords(line, before, measured) / seen.size_nm
     chord_noise = np.sqrt(np.mean(np.sum((chords @ measured.covariance) * chords, axis=1)))
-    return Lesson(layer, change, kept, before, after, 100.0 * float(noise), 100.0 * float(chord_noise))
+    return LayerUpdate(layer, change, kept, before, after, 100.0 * float(noise), 100.0 * float(chord_noise))
 
 
 def _chords(line: LinePlan, seen: Departure, measured: LineMeasurement) -> Floats:

@@ -16,7 +16,14 @@ from msgspec.structs import replace
 from tablegen.base.input_errors import Unphysical
 from tablegen.calibration.laws.frequency import fit_frequency
 from tablegen.calibration.laws.hysteresis import HysteresisFit, Trace, fit_hysteresis
-from tablegen.calibration.laws.image_sizes import ImageSizes, KnownSample, SampleImage, Taking, apparent_of, sizes_of
+from tablegen.calibration.laws.image_sizes import (
+    Acquisition,
+    ImageSizes,
+    KnownSample,
+    SampleImage,
+    apparent_of,
+    sizes_of,
+)
 from tablegen.calibration.laws.images import Pair, fit_images
 from tablegen.calibration.laws.offset_sizes import fit_offset_sizes
 from tablegen.calibration.laws.resonance import ResonanceFit, fit_resonance
@@ -230,7 +237,7 @@ class _Day:
                 seed=self._next(),
             )
             taken.append(SampleImage(f"{volts:g} V at {offset:g} V", volts, offset, trace, retrace))
-        return sizes_of(taken, self._driver, SAMPLES_SEEN, Taking(turn=self._turn))
+        return sizes_of(taken, self._driver, SAMPLES_SEEN, Acquisition(turn=self._turn))
 
     def _traces(self, amplitudes: Sequence[float]) -> list[Trace]:
         traces = []

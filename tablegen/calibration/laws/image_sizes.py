@@ -45,7 +45,7 @@ class KnownSample:
 
 
 @dataclass(frozen=True)
-class Taking:
+class Acquisition:
     """How all images were taken: as in ``fit_pair``; ``aspect`` where it is not that of the pixels, or of the file."""
 
     turn: float = 0.5
@@ -66,7 +66,9 @@ class ImageSizes:
     remarks: tuple[Remark, ...]
 
 
-def sizes_of(images: Sequence[SampleImage], v_max: Driver | float, sample: KnownSample, taking: Taking) -> ImageSizes:
+def sizes_of(
+    images: Sequence[SampleImage], v_max: Driver | float, sample: KnownSample, acquisition: Acquisition
+) -> ImageSizes:
     """Each image's line from turn to turn. Raises ``Unphysical``, with the image's name."""
     sizes: list[ImageSize] = []
     remarks: list[Remark] = []
@@ -76,12 +78,12 @@ def sizes_of(images: Sequence[SampleImage], v_max: Driver | float, sample: Known
             line = fit_line(
                 image.trace,
                 image.retrace,
-                taking.turn,
-                taking.window,
-                taking.retrace_mirrored and image.retrace is not None,
-                taking.delay_pixels,
+                acquisition.turn,
+                acquisition.window,
+                acquisition.retrace_mirrored and image.retrace is not None,
+                acquisition.delay_pixels,
             )
-            size = size_of_line(line, sample.cell, sample.grating, taking.aspect or image.aspect)
+            size = size_of_line(line, sample.cell, sample.grating, acquisition.aspect or image.aspect)
         except Unphysical as reason:
             raise Unphysical(f"{image.name}: {reason}") from None
         gap = float(np.max(np.abs(line.gap))) if np.isfinite(line.gap).all() else float("nan")

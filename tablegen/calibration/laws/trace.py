@@ -95,7 +95,7 @@ class _TraceModel:
             raise Unphysical("the displacement does not move")
         self.measured = (measured - self.low) / self.height
         self.fits_delay = delay_s is None
-        self.given_delay = (delay_s or 0.0) / triangle.period_s  # in periods from here on
+        self.fixed_delay = (delay_s or 0.0) / triangle.period_s  # in periods from here on
         s = 2.0 * (time_s - time_s[0]) / (time_s[-1] - time_s[0]) - 1.0
         self.drift = np.stack([s**n for n in range(1, order + 1)], axis=1) if order else np.zeros((len(s), 0))
         shape = [f"{name}_{side}" for side in "fb" for name in BranchShape.COORDINATES]
@@ -105,7 +105,7 @@ class _TraceModel:
 
     def delay(self, x: Floats) -> float:
         """In periods."""
-        return float(x[-1]) if self.fits_delay else self.given_delay
+        return float(x[-1]) if self.fits_delay else self.fixed_delay
 
     def position(self, x: Floats) -> tuple[Floats, Floats, Bools, Floats]:
         """Return u and tau along the sweep, whether it rises, and the normalised displacement; each (samples,)."""
@@ -194,7 +194,7 @@ def _result(model: _TraceModel, solution: Solution, triangle: Triangle, periods:
     moved = solution.unit_covariance @ solution.jacobian.T @ model.timing_jacobian(x)
     covariance = covariance + moved @ triangle.timing_covariance @ moved.T
     forward, backward = (measured_branch(x[i : i + 2], covariance[i : i + 2, i : i + 2]) for i in (0, 2))
-    delay = Estimate(model.given_delay * triangle.period_s)
+    delay = Estimate(model.fixed_delay * triangle.period_s)
     if model.fits_delay:
         delay = Estimate(float(x[-1]) * triangle.period_s, float(covariance[-1, -1]) ** 0.5 * triangle.period_s)
     residual, scaling, curve = _averaged(model, x, residuals)

@@ -59,7 +59,7 @@ def expected_rms(fit: OperatorFit, points: Floats) -> Floats:
     inverse = _inverse(fit)
     without = np.sqrt(1.0 / np.diag(inverse))  # of each line, by all others
     scale = np.exp(np.mean([np.log(max(out.rms, _LEAST_RMS)) for out in fit.left_out] - np.log(without)))
-    least = float(np.median([left.rms for left in fit.left]))
+    least = float(np.median([errors.rms for errors in fit.in_fit]))
     return np.asarray(np.sqrt(least**2 + scale**2 * np.maximum(_unknown(fit, points), 0.0)), dtype=np.float64)
 
 

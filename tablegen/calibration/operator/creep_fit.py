@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from tablegen.calibration.operator.branches import left_of
+from tablegen.calibration.operator.branches import branch_residual
 from tablegen.calibration.operator.family import CreepOf
 from tablegen.calibration.operator.periodic_line import PeriodicLine
 from tablegen.compensation.operator.creep import LogarithmicCreep
@@ -41,7 +41,7 @@ def creep_of_fields(
         return creep_of(0.0)
 
     def misfit(creep: LogarithmicCreep) -> float:
-        residuals = [left_of(line.without(None, creep), family) for line in lines]
+        residuals = [branch_residual(line.without(None, creep), family) for line in lines]
         if several:
             sizes = [
                 one.extent_nm * factor(line.mean) / line.stroke for one, line in zip(residuals, lines, strict=True)

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from tablegen.base.input_errors import Unphysical
-from tablegen.calibration.operator.branches import DEGREE, left_of
+from tablegen.calibration.operator.branches import DEGREE, branch_residual
 from tablegen.calibration.operator.periodic_line import PHASES, PeriodicLine
 from tablegen.compensation.dynamics import Response
 from tablegen.compensation.operator.creep import LogarithmicCreep
@@ -105,7 +105,7 @@ def _unlikelihood(lines: Sequence[PeriodicLine], straight: Family, delay_s: floa
     if loss > 0.0:
         rates = [line.rate_hz for line in lines]
         creep = LogarithmicCreep(loss, 1e-3 / max(rates), 10.0 / min(rates), max(rates))
-    residuals = [left_of(line.earlier(delay_s).without(None, creep), straight) for line in lines]
+    residuals = [branch_residual(line.earlier(delay_s).without(None, creep), straight) for line in lines]
     points = np.array([(line.stroke, line.centre) for line in lines])
     noise = np.maximum(np.mean([one.variance for one in residuals], axis=0), _FLOOR)
     rows = np.stack([one.coefficients for one in residuals]) / np.sqrt(noise)

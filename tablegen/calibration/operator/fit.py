@@ -9,7 +9,7 @@ from msgspec import structs
 
 from tablegen.base.input_errors import Unphysical
 from tablegen.calibration.operator.bouc_wen_fit import BoucWenProblem
-from tablegen.calibration.operator.branches import Left, left_of
+from tablegen.calibration.operator.branches import BranchResidual, branch_residual
 from tablegen.calibration.operator.creep_fit import creep_of_fields
 from tablegen.calibration.operator.family import CreepOf, FamilyProblem, groups_of
 from tablegen.calibration.operator.loop_errors import WORST, LineErrors, compare
@@ -57,7 +57,7 @@ class OperatorFit:
     family: str
     rows: Floats
     sizes: Floats
-    left: tuple[LineErrors, ...]
+    in_fit: tuple[LineErrors, ...]
     left_out: tuple[LineErrors, ...]
     candidates: dict[str, float]
 
@@ -149,14 +149,14 @@ class _Fitted:
         self.lines, self.main = lines, main
         self.family, self.creep, self.numbers = family, creep, numbers
         self.settled = [line.without(None, creep) for line in lines]
-        self.left = [left_of(line, family) for line in self.settled]
+        self.residuals = [branch_residual(line, family) for line in self.settled]
 
     def operator(self, lengths: Lengths, factor: Factor) -> tuple[Operator, Floats, Floats]:
         """Both fields through what is left, and the rows and sizes that they go through."""
         points = np.array([(line.stroke, line.centre) for line in self.settled])
-        rows = shrunk(points, self.left, lengths)
+        rows = shrunk(points, self.residuals, lengths)
         residual = through(points, rows, lengths, straight=True)
-        sizes = _sizes(self.family, residual, self.settled, self.left, self.main, factor)
+        sizes = _sizes(self.family, residual, self.settled, self.residuals, self.main, factor)
         size = through(points, sizes[:, None], lengths)
         return Operator(self.family, residual, size, self.creep, self.main, ()), rows, sizes
 
@@ -232,7 +232,7 @@ def _sizes(
     family: Family,
     residual: Field,
     lines: Sequence[PeriodicLine],
-    residuals: Sequence[Left],
+    residuals: Sequence[BranchResidual],
     main: float,
     factor: Factor,
 ) -> Floats:

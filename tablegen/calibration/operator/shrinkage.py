@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tablegen.calibration.operator.branches import DEGREE, Left
+from tablegen.calibration.operator.branches import DEGREE, BranchResidual
 from tablegen.compensation.operator.field import Lengths, covariance
 from tablegen.numerics.arrays import Floats
 
@@ -16,7 +16,7 @@ _POWERS = np.geomspace(1e-4, 1e12, 65)  # variance of an order over that of its 
 _FLOOR = 1e-14  # variance below which no coefficient is known
 
 
-def shrunk(points: Floats, residuals: Sequence[Left], lengths: Lengths) -> Floats:
+def shrunk(points: Floats, residuals: Sequence[BranchResidual], lengths: Lengths) -> Floats:
     """Rows without noise, shape (lines, 2 ``DEGREE`` + 2), for lines at points (stroke, centre)."""
     known = covariance(points, points, lengths, straight=True)
     rows = np.stack([one.coefficients for one in residuals])

@@ -14,7 +14,7 @@ from pathlib import Path
 from tablegen.base.file_cache import KeptFiles
 from tablegen.base.reading import file_sha256
 
-_KEPT = KeptFiles("objects", 300)
+_CACHE = KeptFiles("objects", 300)
 # Settings by which compilers find or make something else.
 _SETTINGS = (
     *("CFLAGS", "CPATH", "C_INCLUDE_PATH", "COMPILER_PATH", "GCC_EXEC_PREFIX", "CCC_OVERRIDE_OPTIONS"),
@@ -46,12 +46,12 @@ class Objects:
     def take(self, compiler_key: str, place: Path) -> bool:
         """Put the objects there that a compiler would make; whether all of them were kept."""
         keys = self._keys(compiler_key)
-        return all(_KEPT.take(key, place / name) for name, key in keys.items())
+        return all(_CACHE.take(key, place / name) for name, key in keys.items())
 
     def keep(self, compiler_key: str, place: Path) -> None:
         """Keep them for the next time."""
         for name, key in self._keys(compiler_key).items():
-            _KEPT.keep(key, place / name)
+            _CACHE.keep(key, place / name)
 
     def _keys(self, compiler_key: str) -> dict[str, str]:
         files = [(Path(path).name, file_sha256(path)) for path in self.files]

@@ -19,7 +19,7 @@ from tablegen.verification.checks.scaling import (
     rounded_scaling,
     scaling_figures,
 )
-from tablegen.verification.checks.shaped import told_of
+from tablegen.verification.checks.shaped import stated_shaping
 from tablegen.verification.expected_figures import header_texts, wrong_mismatch, wrong_texts
 from tablegen.verification.position import wrong_position
 
@@ -88,7 +88,7 @@ def _check(
     if shaped is not None:
         figures = shaped.figures()
         count += len(figures)
-        wrong += different_figures(told_of(axis.certificate.shaped), figures, period.is_whole, "shaped.")
+        wrong += different_figures(stated_shaping(axis.certificate.shaped), figures, period.is_whole, "shaped.")
         if same_version and knows(axis.drive.model) and axis.certificate.shaped is not None:
             wrong += _wrong_rounded(axis.certificate.shaped, rounded_scaling(axis, period, shaped), period.is_whole)
     if same_version and knows(axis.drive.model):

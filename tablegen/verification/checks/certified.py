@@ -71,7 +71,7 @@ class PlayedPeriod:
         self.is_whole = self.program.phase.ticks <= _MOST_ADVANCES
         points = self.program.phase.ticks if self.is_whole else _GRID
         drive, output, w = axis.drive, axis.output, on_grid(played_series(axis), points)
-        self._asked = (drive.v_offset + drive.v_amplitude * (w - 0.5) - output.v_zero) / output.v_per_code
+        self._intended = (drive.v_offset + drive.v_amplitude * (w - 0.5) - output.v_zero) / output.v_per_code
         self._slope = np.zeros(0) if self.is_whole else on_grid(played_series(axis), points, 1)
 
     def shaped_by(self, update_rate_hz: float) -> ShapedPlay | None:
@@ -95,7 +95,7 @@ class PlayedPeriod:
     def errors(self, k: Ints) -> Floats:
         """Code less the unrounded code of the waveform, at ticks k, of any period."""
         advance = k % self.program.ticks // self.program.hold
-        intended = self._asked[advance] if self.is_whole else self._between(advance)
+        intended = self._intended[advance] if self.is_whole else self._between(advance)
         errors: Floats = self.runs.at(k % self.program.ticks) - intended
         return errors
 
@@ -103,7 +103,7 @@ class PlayedPeriod:
         """Interpolate the waveform between points of the grid, by values and slopes."""
         at, rest = np.divmod(advance * _GRID, self.program.phase.ticks)
         f, after = rest / self.program.phase.ticks, (at + 1) % _GRID
-        y0, y1 = self._asked[at], self._asked[after]
+        y0, y1 = self._intended[at], self._intended[after]
         s0, s1 = (self.codes_per_unit / _GRID * self._slope[i] for i in (at, after))
         intended: Floats = y0 + f * (s0 + f * (3.0 * (y1 - y0) - 2.0 * s0 - s1 + f * (2.0 * (y0 - y1) + s0 + s1)))
         return intended

@@ -67,15 +67,15 @@ def _carried(value: Ints, half: int, zero: int) -> Ints:
 
 
 class ShapedPlay:
-    """The periods of a shaped axis that a certificate judges; ``asked`` are unrounded codes, one a tick of a period."""
+    """The periods of a shaped axis that a certificate judges; ``intended`` are unrounded codes, one a tick."""
 
-    def __init__(self, axis: ManifestAxis, asked: Floats, update_rate_hz: float) -> None:
+    def __init__(self, axis: ManifestAxis, intended: Floats, update_rate_hz: float) -> None:
         self.axis, self._rate_hz = axis, update_rate_hz
         program = axis.program
         ticks = min(program.ticks, MOST_TICKS)
         self.is_whole = ticks == program.ticks
         periods = max(1, min(_PERIODS, _SEVERAL_TICKS // ticks))
-        self._asked = asked
+        self._intended = intended
         self._shaped = shaped_codes(program, periods * ticks).reshape(periods, ticks)
         self._rounded = np.tile(program.rounded.codes(np.arange(ticks, dtype=np.int64)), (periods, 1))
         self._first = min(periods - 1, 1)
@@ -88,7 +88,7 @@ class ShapedPlay:
     @property
     def code_errors(self) -> Floats:
         """Those of these codes, (ticks,)."""
-        return np.asarray((self._shaped - self._asked)[self._first :].reshape(-1))
+        return np.asarray((self._shaped - self._intended)[self._first :].reshape(-1))
 
     @cached_property
     def position_errors(self) -> Floats | None:
@@ -104,7 +104,7 @@ class ShapedPlay:
         stated = self.axis.certificate.shaped
         if stated is None:
             return None
-        errors = (codes - self._asked).reshape(-1)
+        errors = (codes - self._intended).reshape(-1)
         size = 2
         while size < 2 * len(errors):
             size *= 2
@@ -141,7 +141,7 @@ def _changes(codes: Ints) -> tuple[float, float]:
     return 100.0 * len(moved) / max(len(steps), 1), float(np.mean(moved)) if len(moved) else 0.0
 
 
-def told_of(stated: ManifestShaped | None) -> dict[str, float | int | None]:
+def stated_shaping(stated: ManifestShaped | None) -> dict[str, float | int | None]:
     """Return what a certificate states of shaping, by the names of ``figures``."""
     if stated is None:
         return {}

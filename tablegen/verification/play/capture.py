@@ -25,7 +25,7 @@ class Capture:
     """
 
     got: Words
-    wanted: Words
+    expected: Words
     place: Ints
     since: Ints
     which: Ints
@@ -60,7 +60,7 @@ def part(subject: str, words: Words) -> Ints:
 def differing(subject: str, capture: Capture) -> Ints:
     """Return the ticks at which a field of the captured words differs from the model, shape (errors,)."""
     shift, mask = _MASK[subject]
-    return np.flatnonzero((capture.got ^ capture.wanted) & np.uint64(mask << shift))
+    return np.flatnonzero((capture.got ^ capture.expected) & np.uint64(mask << shift))
 
 
 def without_faults(words: Words) -> Words:

@@ -107,7 +107,7 @@ class Script:
     commit_clocks: int = 1
     commands: list[int] = field(default_factory=list)
     expected: "array[int]" = field(default_factory=lambda: array("Q"))  # as wide as Words
-    taken: list[DualProgram] = field(default_factory=list)  # programs, one a swap
+    swapped_programs: list[DualProgram] = field(default_factory=list)  # programs, one a swap
     refused: bool = False  # a write was to be refused, and nobody has cleared that
     states: list[tuple[str, StoredState]] = field(default_factory=list)  # when each was asked for, and what it is
     programs: list[tuple[int, DualProgram | None]] = field(default_factory=list)  # from which tick on which one plays
@@ -337,7 +337,7 @@ class Script:
             tick = self.model.step()
             if tick.swapped:
                 assert self.model.playing is not None
-                self.taken.append(self.model.playing)
+                self.swapped_programs.append(self.model.playing)
                 self.programs.append((len(self.expected), self.model.playing))
                 self._writable_at = self.clocks + self.drain
             self.expected.append(self._with_reported(pack(tick)))
@@ -347,7 +347,7 @@ class Script:
     @property
     def swaps(self) -> int:
         """How many programs were taken."""
-        return len(self.taken)
+        return len(self.swapped_programs)
 
     @property
     def all_counts(self) -> list[int]:

@@ -131,7 +131,7 @@ endmodule
 """
 
 
-def wanted_constants(content: Content) -> dict[str, str]:
+def expected_constants(content: Content) -> dict[str, str]:
     """Return the constants of the header as the bench writes them."""
     numbers = {name: str(value) for name, value in scan_constants(content).items()}
     return {"HASH": content.hash, **numbers}
@@ -140,7 +140,7 @@ def wanted_constants(content: Content) -> dict[str, str]:
 def bench_text(content: Content, index_bits: tuple[int, int]) -> str:
     """Return the bench module for the header of a build; ``index_bits`` are those of the memories of x and y."""
     name = content.name.upper()
-    formats = {key: "%h" if key == "HASH" else "%0d" for key in wanted_constants(content)}
+    formats = {key: "%h" if key == "HASH" else "%0d" for key in expected_constants(content)}
     lines = [f'        $fwrite(constants, "{how}\\n", {name}_{key});' for key, how in formats.items()]
     return _MODULE.format(
         header=f"{content.name}.vh",
@@ -190,7 +190,7 @@ def read_outputs(folder: Path) -> dict[str, tuple[int, int, int]]:
 
 def different_constants(folder: Path, content: Content) -> list[str]:
     """List the constants that the simulator reads in the header otherwise than the manifest has them."""
-    constants = wanted_constants(content)
+    constants = expected_constants(content)
     readings = (folder / CONSTANTS).read_text("ascii", "replace").split()
     if len(readings) != len(constants):
         return [f"{content.name}.vh: {len(readings)} of its constants were read, there are {len(constants)}"]

@@ -81,10 +81,10 @@ class Compiled:
             raise SimulationFailed(_tail(log)) from None
 
 
-def compile_design(simulator: str, design: Design, folder: Path, *, kept: bool = False) -> Compiled:
+def compile_design(simulator: str, design: Design, folder: Path, *, cached: bool = False) -> Compiled:
     """Compile into ``folder``, which is made; ``build.log`` is written there.
 
-    With ``kept``, a model of Verilator is taken from the cache of compiled models, or put there. Its parameters then
+    With ``cached``, a model of Verilator is taken from the cache of compiled models, or put there. Its parameters then
     must not name its folder.
     """
     require(simulator)
@@ -95,7 +95,7 @@ def compile_design(simulator: str, design: Design, folder: Path, *, kept: bool =
     folder.mkdir(parents=True, exist_ok=True)
     runner, log, model, key = get_runner(simulator), folder / "build.log", folder / design.top, ""
     with _environment(simulator, folder):
-        if kept and simulator == "verilator":
+        if cached and simulator == "verilator":
             arguments = _BUILD_ARGUMENTS[simulator]
             key = model_key(design.sources, design.includes, design.parameters, design.top, *arguments)
             if MODELS.take(key, model):

@@ -47,9 +47,9 @@ from tablegen.verification.verilog.bench import (
     bench_parameters,
     bench_text,
     different_constants,
+    expected_constants,
     read_outputs,
     read_wires,
-    wanted_constants,
     write_boot_files,
 )
 from tablegen.verification.verilog.sequencer_bench import STREAM_BENCH, run_bench
@@ -148,7 +148,7 @@ class VerilogTarget:
             differing_check(
                 "verilog header",
                 "manifest, by the simulator",
-                f"{len(wanted_constants(content))} constants",
+                f"{len(expected_constants(content))} constants",
                 different_constants(run.folder, content),
             ),
             *check_codes(capture, stored, {axis: part.astype(np.int64) for axis, part in sent.items()}),
@@ -217,7 +217,7 @@ def play_job(folder: Path, job: dict[str, Any]) -> dict[str, Any]:
     """Compile and play the script that stands in ``folder``; in a process that can be ended. The bench's counters."""
     sources, includes = ([Path(path) for path in job[key]] for key in ("sources", "includes"))
     design = Design(sources, TOP, job["parameters"], includes)
-    compiled = compile_design(job["simulator"], design, folder / job["simulator"], kept=True)
+    compiled = compile_design(job["simulator"], design, folder / job["simulator"], cached=True)
     return run_bench(compiled, folder, job["clocks"])
 
 
