@@ -106,7 +106,7 @@ def _both(
 
 
 def _steepest(v: Floats, beta: Floats, error: Floats, rho: float) -> float | None:
-    """The rho that fits best where it is large and open, if the one that would be kept is far worse; else None."""
+    """Return the rho that fits best where it is large and open, if the usual one fits far worse; else None."""
     grid = np.geomspace(_OPEN_RHO, _LARGEST_RHO, 60)
 
     def cost(one: float) -> float:
@@ -131,7 +131,7 @@ def _height(v: Floats, beta: Floats, error: Floats, rho: float, remarks: list[Re
 
 
 def _peak(branches: Sequence[MeasuredBranch], beta: Floats, error: Floats, remarks: list[Remark]) -> Estimate:
-    """The mean of u_peak over the amplitudes, each weighted by its error: the paper finds it the same at all."""
+    """Return the mean of u_peak over the amplitudes, weighted by its errors: the paper has the same at all."""
     seen = [branch.u_peak for branch, b, e in zip(branches, beta, error, strict=True) if b > _NOISE_LIMIT_ERRORS * e]
     if not seen:
         raise Unphysical(_NO_HYSTERESIS)
@@ -148,7 +148,7 @@ def _peak(branches: Sequence[MeasuredBranch], beta: Floats, error: Floats, remar
 
 
 def _percent(missed: Floats) -> float:
-    """What is missed of the scan, rms."""
+    """Return the rms residual in percent of the scan."""
     return 100.0 * sqrt(float(np.mean(missed**2)))
 
 

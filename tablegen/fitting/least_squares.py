@@ -111,10 +111,17 @@ def solve(
 
 
 def with_errors(fit: Callable[[Floats], Solution], values: Floats, errors: Floats) -> Solution:
-    """A fit of values whose standard errors are known; ``fit`` solves for some errors, residuals in units of them.
+    """Fit values whose standard errors are known; ``fit`` solves for some errors, residuals in units of them.
 
     Where values scatter by more than that, since no law is exact, all get one relative error more: as much as makes
     their scatter the expected one (Paule and Mandel, 1982). Else precise values would bend the law for all others.
+
+    Parameters
+    ----------
+    values
+        Measured values, shape (points,).
+    errors
+        Their standard errors, shape (points,).
     """
 
     def at(share: float) -> Solution:

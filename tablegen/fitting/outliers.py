@@ -9,12 +9,19 @@ _FALSE_ALARM_RATE = 0.01  # per set of points, whatever their number
 
 
 def outliers(jacobian: Floats, residuals: Floats, least: float) -> tuple[int, ...]:
-    """Indices of points that the fit to all others would not have left there, the worst first.
+    """Return the indices of points that the fit to all others would not have left there, the worst first.
 
     Each residual is held against the scatter of the fit without it (an externally studentised residual), at a level
     that is divided by the number of points. The worst is set aside and the rest is looked at again, while
     at least three quarters of the points and two degrees of freedom remain. ``least`` is the scatter that
     counts as none, in the unit of the residuals.
+
+    Parameters
+    ----------
+    jacobian
+        Derivatives of the residuals, shape (points, parameters).
+    residuals
+        Shape (points,).
     """
     count, parameters = jacobian.shape
     kept = np.arange(count)
