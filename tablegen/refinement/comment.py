@@ -8,7 +8,7 @@ from tablegen.refinement.round import Round, TraceRound, worst_scaling
 
 
 def provenance(found: Round, sources: Sequence[Source], stopped: bool = False) -> str:
-    """The line of the comment that says what a round rests on, or why the layer before it was kept; no date."""
+    """Format the comment on what a round rests on, or why the layer before it was kept; no date."""
     update = found.update
     said = []
     for source in sources:

@@ -38,7 +38,7 @@ class Imaged:
 
 
 def imaged(line: LinePlan, share: Floats) -> Imaged:
-    """The points at shares 0..1 of the window."""
+    """Return the points at shares 0..1 of the window."""
     (low, high), turn, shape = line.band_limit.window, line.drive.turn, line.drive.shape
     x = low + (high - low) * share
     sides: tuple[str, ...] = ("forward",)
@@ -63,8 +63,11 @@ def asked_position(line: LinePlan, times: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Departure:
-    """What is left: ``error`` is reached less asked at the points, in lines; ``size_nm`` of the best line, negative
-    where the sensor counts the other way."""
+    """Departure of the reached line from the requested one.
+
+    ``error`` is reached less requested at the points, in lines; ``size_nm`` of the best line, negative where the sensor
+    counts the other way.
+    """
 
     points: Imaged
     error: Floats
@@ -94,7 +97,7 @@ class Departure:
         return found
 
     def moved(self, by: Floats) -> "Departure":
-        """The same with the drive raised by so much at each point, by the model's slope."""
+        """Return the departure with the drive raised at each point, by the model's slope; ``by`` is (points,)."""
         return _straightened(self.points, self.points.asked + self.error + by / self.points.steepness, self.size_nm)
 
 
@@ -121,6 +124,6 @@ def _straightened(points: Imaged, reached: Floats, unit_nm: float) -> Departure:
 
 
 def straight_line(asked: Floats) -> Floats:
-    """The matrix, shape (2, points), that takes values to the origin and the size of their best line over ``asked``."""
+    """Return the matrix from values to the origin and the size of their best line over ``asked``: (2, points)."""
     found: Floats = np.linalg.pinv(np.column_stack([np.ones_like(asked), asked]))
     return found

@@ -45,11 +45,11 @@ class Displacement:
         return self.series.value(times)
 
     def basis(self, times: Floats) -> Floats:
-        """(times, coefficients): from (a0, a, b) to the displacement."""
+        """Return the matrix from (a0, a, b) to the displacement: (times, coefficients)."""
         return harmonic_basis(times, self.series.harmonics)
 
     def error(self, asked: Callable[[Floats], Floats], size_nm: float) -> Floats:
-        """The coefficients of the displacement less what was asked for, in nm; ``asked`` takes times to the line."""
+        """Return the coefficients of the displacement less the line ``asked`` at times, in nm."""
         times = (np.arange(_GRID) + 0.5) / _GRID
         series = np.concatenate([[0.0], self.series.a, self.series.b])
         found: Floats = series - size_nm * (2.0 / _GRID) * (self.basis(times).T @ asked(times))
@@ -63,7 +63,7 @@ class Displacement:
 
 
 def harmonic_basis(times: Floats, harmonics: int) -> Floats:
-    """(times, 2 harmonics + 1): 1, cosines, sines."""
+    """Return 1, cosines and sines at times in periods: (times, 2 harmonics + 1)."""
     angle = 2.0 * pi * np.outer(times, np.arange(1, harmonics + 1))
     basis: Floats = np.column_stack([np.ones(len(times)), np.cos(angle), np.sin(angle)])
     return basis

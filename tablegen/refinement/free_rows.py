@@ -57,8 +57,9 @@ class FreeRowsState:
 
 @dataclass(frozen=True, eq=False)
 class FreeRowsFit:
-    """The least squares: ``covariance`` of (modes, q), from what rows say by themselves, so that noise may have any
-    spectrum along a line.
+    """Least-squares fit of free rows.
+
+    ``covariance`` is of (modes, q), from each row by itself, so that noise may have any spectrum along a line.
 
     ``lags`` are how much of ``r_b`` the images show, each with its standard error: from trace to retrace, and along the
     line. Both are 1 where rows and columns are in the order of time. ``left`` of the images, of unit variance;
@@ -194,7 +195,7 @@ class FreeRows:
             yield _Chunk(rows, derivatives, self._levelled(slopes), left)
 
     def _solved(self, state: FreeRowsState, weights: Floats) -> tuple[Floats, Callable[[Floats], Floats]]:
-        """The step of the parameters, and what it does to the rows' phases."""
+        """Return the step of the parameters, and the function from a step to the rows' phases."""
         count = self._count(state)
         normal, right, kept = np.zeros((count, count)), np.zeros(count), []
         for chunk in self._chunks(state):
@@ -281,7 +282,7 @@ class FreeRows:
 
 
 def _spread(influence: Floats, parameters: int) -> Floats:
-    """The covariance of what rows, each by itself, say."""
+    """Return the covariance of the parameters from each row by itself."""
     rows = len(influence)
     centred = influence - np.mean(influence, axis=0)
     return np.asarray(centred.T @ centred * (rows / max(rows - 0.5 * parameters, 1.0)), dtype=np.float64)

@@ -32,8 +32,10 @@ _MIN_PIXELS_PER_PERIOD = 4.0
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ImageRound(Round):
-    """What trace and retrace say; ``size`` is x's, where the constant of the sample is known, and
-    ``asked_nm`` what x was to have."""
+    """Round learnt from trace and retrace.
+
+    ``size`` is x's, where the constant of the sample is known, and ``asked_nm`` the requested size of x.
+    """
 
     frames: tuple[LatticeLine, ...]
     measured: WindowLine
@@ -99,7 +101,7 @@ def _frame(plan: Plan, trace: Floats, retrace: Floats, images: ImageOptions) -> 
 
 
 def _check_shape(plan: Plan, trace: Floats) -> None:
-    """A column is a pixel of the imaging window."""
+    """Check that a column is a pixel of the imaging window."""
     if plan.x.band_limit.directions != "both":
         raise Unphysical("this scan images forward only; a retrace image says nothing of it: image both directions")
     columns, pixels = trace.shape[-1], plan.schedule.pixels

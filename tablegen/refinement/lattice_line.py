@@ -74,7 +74,13 @@ class LatticeLine:
 
 
 def lattice_line(plan: Plan, trace: Floats, retrace: Floats, options: ImageOptions) -> LatticeLine:
-    """x from heights, rows x columns, rows in the order of time, left on the left. Raises ``Unphysical``."""
+    """Fit x from heights, rows x columns, rows in the order of time, left on the left.
+
+    Raises
+    ------
+    Unphysical
+        If the images show no lattice or grating, or not the same one.
+    """
     line = plan.x
     turn, window = line.drive.turn, line.band_limit.window
     if options.retrace_mirrored:

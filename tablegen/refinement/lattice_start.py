@@ -34,9 +34,14 @@ class LatticeStart:
 def lattice_start(
     geometry: Geometry, heights: list[Floats], modes: ColumnModes, moves: bool, advice: str
 ) -> LatticeStart:
-    """The waves of levelled images of unit variance. Raises ``Unphysical`` where there is no period, or not the same.
+    """Estimate the waves of levelled images of unit variance, each (rows, columns).
 
     Trace and retrace are taken to be less than half a period apart, since a compensated scan is nearly straight.
+
+    Raises
+    ------
+    Unphysical
+        If there is no period, or not the same in both images.
     """
     spot = strongest(geometry, heights[0])
     forward, backward, turned = (

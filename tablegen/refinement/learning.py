@@ -101,7 +101,7 @@ def _stands_out(coefficients: list[Floats], covariances: list[Floats]) -> bool:
 
 
 def _noise_share(line: LinePlan, measured: LineMeasurement, size_nm: float) -> Floats:
-    """What of the coefficients of the displacement less what was asked, in nm, its noise explains.
+    """Return the part of the coefficients of the position error, in nm, that its noise explains.
 
     The error of a harmonic is taken for Gaussian, with a variance of its own. The likeliest variance is what chi
     squared of cosine and sine exceeds 2 by, which noise alone has on average; the mean of the error is then

@@ -126,7 +126,7 @@ def _step(
 
 
 def _parts(samples: int) -> list[slice]:
-    """A long trace in parts that fit into memory with their derivatives."""
+    """Split a long trace into parts that fit into memory with their derivatives."""
     return [slice(first, first + _MOST_AT_ONCE) for first in range(0, samples, _MOST_AT_ONCE)]
 
 
@@ -203,7 +203,7 @@ def _averaged(turns: Floats, left: Floats) -> float:
 
 
 def _check_layer(line: LinePlan, turns: Floats, left: Floats) -> None:
-    """The drive has to have the layer of the file in it: a trace of an older build would be learnt twice."""
+    """Check that the drive has the layer of the file: a trace of an older build would be learnt twice."""
     if line.layer is None:
         return
     low, high = line.band_limit.window

@@ -41,7 +41,13 @@ class SweepMismatch:
 
 
 def mismatch(plan: Plan, trace: Floats, retrace: Floats, options: ImageOptions) -> SweepMismatch:
-    """What trace and retrace of x differ by, half in each. Raises ``Unphysical`` where they are not of one scan."""
+    """Measure the mismatch of trace and retrace of x, half in each.
+
+    Raises
+    ------
+    Unphysical
+        If the two images are not of one scan.
+    """
     line = plan.x
     window = line.band_limit.window
     if options.retrace_mirrored:
@@ -103,7 +109,7 @@ def mismatch(plan: Plan, trace: Floats, retrace: Floats, options: ImageOptions) 
 
 
 def _laid(spline: Floats, columns: Floats) -> Floats:
-    """An image's rows at fractions of columns; it comes as coefficients of splines."""
+    """Evaluate an image's rows at fractions of columns; it comes as coefficients of splines."""
     rows = np.broadcast_to(np.arange(spline.shape[0])[:, None], (spline.shape[0], len(columns)))
     found: Floats = map_coordinates(
         spline, [rows, np.broadcast_to(columns, rows.shape)], order=3, mode="nearest", prefilter=False

@@ -122,7 +122,13 @@ BeforeOf = Literal["line", "mismatch"]
 def with_layer_update(
     setup: Setup, line: LinePlan, update: LayerUpdate, before_of: BeforeOf | None = None
 ) -> tuple[Refinement | None, Setup]:
-    """The new layer, if there is one, and the scan with it. Raises ``Rejected`` where that cannot be built."""
+    """Build the new layer, if there is one, and the scan with it.
+
+    Raises
+    ------
+    Rejected
+        If the scan with the layer cannot be built.
+    """
     if not update.layer.harmonics:
         return None, setup
     refinement = msgspec.structs.replace(_refinement(setup, line, update), before_of=before_of)
@@ -132,7 +138,7 @@ def with_layer_update(
 
 
 def _refinement(setup: Setup, line: LinePlan, update: LayerUpdate) -> Refinement:
-    """The new layer, and the scan at which it was learnt."""
+    """Build the new layer, and the scan at which it was learnt."""
     return Refinement(
         a=update.layer.a.tolist(),
         b=update.layer.b.tolist(),
@@ -151,13 +157,19 @@ def _refinement(setup: Setup, line: LinePlan, update: LayerUpdate) -> Refinement
 
 
 def with_refinement(setup: Setup, axis: str, refinement: Refinement | None) -> Setup:
-    """The scan with another layer on one axis."""
+    """Return the scan with another layer on one axis."""
     changed: Any = msgspec.structs.replace(getattr(setup.scan, axis), refinement=refinement)
     return replace(setup, scan=msgspec.structs.replace(setup.scan, **{axis: changed}))
 
 
 def allowed(line: LinePlan, options: Options) -> Bound:
-    """The bound for what was asked for. Raises ``Unphysical`` where that might not converge."""
+    """Compute the bound for the requested gain and harmonics.
+
+    Raises
+    ------
+    Unphysical
+        If learning might not converge.
+    """
     asked = options.harmonics
     limits = bound(line, options.gain, min(DEFAULT_HARMONICS, line.target.harmonics) if asked is None else asked)
     if asked is not None and asked > line.target.harmonics:
@@ -217,7 +229,7 @@ def stop(setup: Setup, line: LinePlan, update: LayerUpdate, before_of: BeforeOf 
 
 
 def worst_scaling(update: LayerUpdate) -> float:
-    """The measured scaling error of the worse direction, percent, peak to peak."""
+    """Return the measured scaling error of the worse direction, percent, peak to peak."""
     return max(update.before.scaling_percent.values())
 
 

@@ -41,7 +41,7 @@ class WindowLine:
         return self.line_covariance * self.unit_nm**2
 
     def basis(self, times: Floats) -> Floats:
-        """(times, coefficients)."""
+        """Return the matrix from coefficients to the line: (times, coefficients)."""
         forward = times % 1.0 <= self.turn
         place = np.where(forward, times % 1.0 / self.turn, (1.0 - times % 1.0) / (1.0 - self.turn))
         return error_modes(place, forward, self.window, self.degree, self.parts).T
@@ -52,7 +52,7 @@ class WindowLine:
         return found
 
     def error(self, asked: Callable[[Floats], Floats], size_nm: float) -> Floats:
-        """The coefficients of what was reached less what was asked for, in nm."""
+        """Return the coefficients of the reached line less the requested one, in nm."""
         return self.unit_nm * self.coefficients
 
     @property
@@ -65,7 +65,7 @@ class WindowLine:
 
 
 def mode_degrees(degree: int, parts: Parts) -> list[int]:
-    """The degree of each mode. Origin and size of both directions together are no error."""
+    """Return the degree of each mode. Origin and size of both directions together are no error."""
     together = [] if parts == "difference" else list(range(2, degree + 1))
     return together if parts == "forward" else [*together, *range(degree + 1)]
 
@@ -84,7 +84,7 @@ def error_modes(
 
 
 def averaged(lines: Sequence[WindowLine]) -> WindowLine:
-    """The same line seen several times, each time with its own noise."""
+    """Average the same line measured several times, each time with its own noise."""
     degree = min(line.degree for line in lines)
     kept = [[i for i, d in enumerate(mode_degrees(line.degree, line.parts)) if d <= degree] for line in lines]
     pairs = list(zip(lines, kept, strict=True))
