@@ -80,7 +80,7 @@ class Distortion:
 
     @cached_property
     def grid(self) -> tuple[Floats, Floats]:
-        """x of the columns and y of the rows of the straight image, which has as many."""
+        """Return x of the columns and y of the rows of the straight image, which has as many."""
         low, high = self.x_range
         first, last = self.y_range
         x = low + (high - low) * (np.arange(self.columns) + _HALF) / self.columns
@@ -140,11 +140,11 @@ class Resampler:
 
     @classmethod
     def of(cls, distortion: Distortion, forward: bool) -> "Resampler":
-        """What belongs where."""
+        """Return the resampler of one direction of an image."""
         return cls(*distortion.sources(forward))
 
     def __call__(self, image: Floats) -> Floats:
-        """The straight image, rows x columns; NaN where nothing was imaged. Cubic splines, used once.
+        """Resample an image, rows x columns; NaN where nothing was imaged. Cubic splines, used once.
 
         They end as the image goes on if it is turned about its outer pixels: a slope is no edge then.
         """
@@ -160,7 +160,7 @@ def _edges(x: Floats) -> tuple[float, float]:
 
 
 def ascending(values: Floats) -> slice:
-    """The part from the lowest value near the beginning to the highest one near the end."""
+    """Return the part from the lowest value near the beginning to the highest one near the end."""
     outer = max(round(_OUTER * len(values)), 1)
     first = int(np.argmin(values[:outer]))
     last = len(values) - 1 - int(np.argmax(values[: -outer - 1 : -1]))
@@ -176,7 +176,7 @@ def _standing(values: Floats) -> int | None:
 
 
 def _inverted(x: Floats, at: Floats) -> Floats:
-    """The columns at which x is ``at``; straight on for half a pixel at either end, then beyond it for good."""
+    """Invert x: the columns at which x is ``at``; straight on for half a pixel at either end, then beyond it."""
     kept = ascending(x)
     part = x[kept]
     low, high = _edges(part)

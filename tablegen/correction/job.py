@@ -171,7 +171,7 @@ def _check_exchange(groups: Sequence[tuple[list[ScanImage], bool]]) -> None:
 
 
 def _judged(channels: Sequence[ScanImage], ways: Sequence[bool], choice: Choice, first: int) -> tuple[int, ...]:
-    """The trace and the retrace that are compared and fitted; one of them alone where there is no other."""
+    """Return the trace and the retrace that are compared and fitted; one of them if there is no other."""
 
     def named(wanted: str, among: range, way: bool | None) -> int:
         found = [i for i in among if channels[i].channel == wanted and way in (None, ways[i])]
@@ -230,7 +230,7 @@ def by_scanner(images: Images, scanner: Path, taken: OldScan) -> StraightScan:
 
 
 def by_scan_file(images: Images, scan: Path, scanner: Path | None, taken: OldScan) -> StraightScan:
-    """The same of an image of a build: the drive is that of the scan file, the scanner its own unless given."""
+    """Correct an image of a build: the drive is that of the scan file, the scanner its own unless given."""
     setup = load(scan)
     plan = make_plan(setup)
     model = (
@@ -252,7 +252,7 @@ def by_scan_file(images: Images, scan: Path, scanner: Path | None, taken: OldSca
 
 
 def _rows_window(first: float, y: AxisScan, back: bool) -> tuple[float, float]:
-    """The window that begins with the first row, ``first`` of a period."""
+    """Return the window that begins with the first row, ``first`` of a period."""
     if back:
         return 0.0, 1.0 - (first - y.turn) / (1.0 - y.turn)
     return first / y.turn, 1.0
@@ -273,7 +273,7 @@ def _model(scanner: Path) -> ScannerModel:
 
 
 def _axis(model: ScannerModel, axis: Literal["x", "y"], taken: OldAxis, rate_hz: float) -> AxisScan:
-    """A triangle."""
+    """Return the scan of an axis that plays a triangle."""
     driver = model.scanner.driver
     size_v = taken.size_v
     if size_v is None and taken.size_nm is not None:

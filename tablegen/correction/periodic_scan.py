@@ -49,7 +49,7 @@ class PeriodicScan:
     tells_y: bool
 
     def of_pitch(self, pitch_nm: float, aspect: float) -> Distortion:
-        """The same in nm, where the bars of a grating, or the densest rows of a lattice, are ``pitch_nm`` apart.
+        """Return the distortion in nm, where bars of a grating, or densest rows of a lattice, are ``pitch_nm`` apart.
 
         ``aspect`` is the height of the frame over the length of the line.
         """
@@ -57,10 +57,14 @@ class PeriodicScan:
         return _scaled(self.distortion, length, length * aspect, 0.0)
 
     def of_lattice(self, constant_nm: float) -> Distortion:
-        """The same in nm, where the sample is a hexagonal or a square lattice of this constant, turned as it may be.
+        """Return the distortion in nm, where the sample is a hexagonal or a square lattice of this constant.
 
-        This gives the height of the frame too, and the shear of a steady drift. Raises ``Unphysical`` for a sample that
-        is no such lattice.
+        The lattice may be turned. This gives the height of the frame too, and the shear of a steady drift.
+
+        Raises
+        ------
+        Unphysical
+            If the sample is no such lattice.
         """
         if not self.tells_y:
             raise Unphysical("the images show waves of one direction; for a grating give its pitch, not a lattice")
@@ -156,7 +160,7 @@ def _series(count: int, terms: int) -> Floats:
 
 
 def _penalty(terms: int, normal: Floats) -> Floats:
-    """What keeps the series smooth where nothing else does."""
+    """Return the penalty that keeps the series smooth where nothing else does."""
     n = np.arange(terms, dtype=np.float64)
     found: Floats = _STIFFNESS * float(np.mean(np.diag(normal))) * (n**4 + 1e-3)
     return found
@@ -178,7 +182,7 @@ def _without_line(more: list[Floats], places: list[Floats]) -> list[Floats]:
 
 
 def _more_phase(basis: Floats, left: tuple[Floats, ...], slopes: list[Floats], known: Floats) -> Floats:
-    """The same of the phase of each base vector along the rows: (bases, terms)."""
+    """Return the step of the phase of each base vector along the rows: (bases, terms)."""
     count, bases = len(basis), len(slopes[0])
     normal, aim = np.zeros((bases * count, bases * count)), np.zeros(bases * count)
     for image, slope in zip(left, slopes, strict=True):
@@ -194,7 +198,7 @@ def _more_phase(basis: Floats, left: tuple[Floats, ...], slopes: list[Floats], k
 
 
 def _without_others(model: PeriodicModel, state: FitState, base: int, wave: Complexes) -> Complexes:
-    """A base vector's wave in the rows, averaged over so many that waves of as many periods in the line vanish."""
+    """Return a base vector's wave in the rows, averaged so that waves of as many periods in the line vanish."""
     q, s = model.q(state.parameters), model.s(state.parameters)[:, 0]
     nearest = np.inf
     for spot in (*model.spots, *-model.spots):
@@ -208,7 +212,7 @@ def _without_others(model: PeriodicModel, state: FitState, base: int, wave: Comp
 
 
 def _followed(wave: Complexes) -> Floats:
-    """The phase of each row in periods, followed from the middle outwards: each step is near the one before."""
+    """Unwrap the phase of each row in periods, from the middle outwards: each step is near the one before."""
     seen = np.angle(wave) / (2.0 * np.pi)
     out = seen.copy()
     middle = len(seen) // 2
@@ -268,7 +272,7 @@ def _at_edges(values: Floats) -> Floats:
 
 
 def _from(sweep: Sweep1D | None, left: float) -> Sweep1D | None:
-    """The same counted from ``left``."""
+    """Return the sweep counted from ``left``."""
     return None if sweep is None else Sweep1D(sweep.x - left, sweep.time)
 
 

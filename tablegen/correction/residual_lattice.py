@@ -93,7 +93,7 @@ def _strongest(flat: Floats) -> list[tuple[float, float]]:
 
 
 def _phase(flat: Floats, seen: Bools, wave: tuple[float, float]) -> tuple[Floats, Bools]:
-    """The phase less the wave's own in periods, unwrapped, and where it can be believed."""
+    """Return the phase less the wave's own in periods, unwrapped, and where it is reliable."""
     rows, columns = flat.shape
     y, x = np.mgrid[:rows, :columns]
     sigma = _PERIODS_A_MEAN / float(np.hypot(*wave))

@@ -54,7 +54,7 @@ class AxisScan:
 
 
 def triangle(size_v: float, offset_v: float, turn: float) -> Waveform:
-    """What an instrument without correction plays; (14), with the turn at the end of a period for a saw."""
+    """Return the waveform of an instrument without correction; (14), the turn at the end of a period for a saw."""
 
     def volts(time: Floats) -> Floats:
         back = (1.0 - time) / max(1.0 - turn, 1e-12)
@@ -72,9 +72,14 @@ class ScannerModel:
     folder: Path
 
     def moved(self, axis: Literal["x", "y"], scan: AxisScan) -> Floats:
-        """nm at even times of a period, above the lower turn or thereabouts.
+        """Return the position in nm at even times of a period, from near the lower turn on.
 
-        Raises ``Rejected`` with the keys that do not serve, ``Unphysical`` for a drive that the driver cannot have.
+        Raises
+        ------
+        Rejected
+            If the scanner or scan file has unsuitable keys, which the message names.
+        Unphysical
+            If the driver cannot put out the drive.
         """
         its: ScannerAxis = getattr(self.scanner, axis)
         driver = self.scanner.driver
