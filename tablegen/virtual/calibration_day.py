@@ -148,7 +148,7 @@ class _Day:
         return fits
 
     def scanner_axis(self, fits: dict[str, Fit], points: bool) -> ScannerAxis:
-        """The axis of a scanner file with these parameters, as ``tablegen calibrate --write`` would put them."""
+        """Return the axis of a scanner file with these parameters, as ``tablegen calibrate --write`` writes them."""
         changes = {kind: change(fit, (), points) for kind, fit in fits.items()}
         branches = list(changes["hysteresis"].branches)
         resonance = None
@@ -253,7 +253,7 @@ class _Day:
         return traces
 
     def _imaged_hysteresis(self, amplitudes: Sequence[float]) -> HysteresisFit:
-        """The same from images: of a lattice where the line is short, of a grating where it is long."""
+        """Fit hysteresis from images: of a lattice where the line is short, of a grating where it is long."""
         pairs = []
         for share in amplitudes:
             volts = share * self._driver.span
@@ -265,7 +265,7 @@ class _Day:
         return fit_images(pairs, self._driver, turn=self._turn)
 
     def _rate_at(self, volts: float) -> float:
-        """The rate, in Hz, with the scan's tip velocity, and no faster than the scan, as the paper does."""
+        """Return the rate in Hz with the scan's tip velocity, and no faster than the scan, as the paper does."""
         return self._rate_hz * min(self._scan_v / volts, 1.0)
 
     def _gains(self) -> dict[str, Floats]:
@@ -285,7 +285,7 @@ class _Day:
 
 
 def _tilted(sample: Surface, slope: Floats) -> Surface:
-    """The sample on a plane."""
+    """Put the sample on a plane."""
     return lambda x, y: sample(x, y) + slope[0] * x + slope[1] * y
 
 

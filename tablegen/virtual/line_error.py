@@ -62,7 +62,7 @@ class LineError:
 
 
 def about_window_line(error: LineError, directions: Sequence[str] = ("forward", "backward")) -> LineError:
-    """The same about the straight line that fits the imaged windows best, one line for all ``directions``.
+    """Return the error about the straight line that fits the imaged windows of all ``directions`` best.
 
     Where turnarounds are rounded, the ends of the line are not imaged and need not be where the ends of a straight line
     would be. What an image shows is the departure from this line, and its slope is the size of the image.
@@ -81,7 +81,7 @@ def about_window_line(error: LineError, directions: Sequence[str] = ("forward", 
 
 
 def ideal_triangle(ticks: int, turn: float, first: float = 0.0) -> Floats:
-    """The ideal position at every tick of a period, equation (14); ``first`` is when the first one is, in ticks."""
+    """Return the ideal position at every tick of a period, (14); ``first`` is when the first one is, in ticks."""
     t = (np.arange(ticks) + first) / ticks
     return np.where(t <= turn, t / turn, (1.0 - t) / (1.0 - turn))
 

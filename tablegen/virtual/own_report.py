@@ -10,7 +10,7 @@ LABEL = "simulation on the scanner file's own operator"
 
 
 def text(name: str, runs: Sequence[OwnRun], without: Sequence[str]) -> list[str]:
-    """A table for the terminal; ``without`` are the axes that have no operator."""
+    """Format a table for the terminal; ``without`` are the axes that have no operator."""
     asked = " and ".join(f"{run.nominal_nm:g} nm in {run.axis}" for run in runs)
     lines = [
         f"{name}: {LABEL}; {asked} asked for",
@@ -68,7 +68,7 @@ def _called(row: OwnRow) -> str:
 
 
 def data(name: str, runs: Sequence[OwnRun], without: Sequence[str]) -> dict[str, Any]:
-    """The same for JSON: by axis and correction; ``null`` where a correction cannot be played, and why."""
+    """Return the report for JSON: by axis and correction; ``null`` where one cannot be played, and why."""
 
     def row(one: OwnRow) -> dict[str, Any]:
         return {

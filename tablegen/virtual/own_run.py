@@ -63,7 +63,7 @@ class OwnRun:
 
 
 def own_axes(setup: Setup) -> tuple[str, ...]:
-    """The axes of which the scanner file has an operator."""
+    """Return the axes of which the scanner file has an operator."""
     return tuple(name for name in ("x", "y") if isinstance(_table(setup, name), OperatorModel))
 
 
@@ -139,7 +139,7 @@ def _table(setup: Setup, name: str) -> Hysteresis | None:
 
 
 def _laws(table: OperatorModel) -> str:
-    """The most detailed of the other models that the branches of the table serve; empty without branches."""
+    """Return the most detailed other model for the branches of the table; empty without branches."""
     served = [kind for kind in models.own() if kind.model() != models.UNCOMPENSATED and kind.order < table.order]
     found: Any = max(
         (kind for kind in served if kind.like(table) is not None), key=lambda kind: kind.order, default=None

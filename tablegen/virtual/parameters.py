@@ -47,7 +47,13 @@ class HysteresisTruth(Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
     lags: Annotated[list[LagTruth], Meta(max_length=4, description="duhem: lags that add up")] = []
 
     def operator(self) -> Preisach | Duhem:
-        """The operator. Raises ``ValueError`` where a branch could run backwards."""
+        """Return the operator.
+
+        Raises
+        ------
+        ValueError
+            If a branch could run backwards.
+        """
         if self.family == "preisach":
             return Preisach(tuple(self.reversible_nm), tuple(map(tuple, self.density_nm)))
         lags = (Lag(one.rise, one.fall, tuple(one.below_nm), tuple(one.above_nm)) for one in self.lags)

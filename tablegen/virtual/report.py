@@ -28,7 +28,7 @@ class SimulationStage:
 
 
 def text(name: str, truth: Truth, stages: Sequence[SimulationStage]) -> list[str]:
-    """A table for the terminal."""
+    """Format a table for the terminal."""
     first = next(run for stage in stages for run in stage.runs)
     lines = [
         f"{name}: {LABEL} ({truth.name!r}); "
@@ -55,7 +55,7 @@ def text(name: str, truth: Truth, stages: Sequence[SimulationStage]) -> list[str
 
 
 def simulation_findings(stages: Sequence[SimulationStage]) -> list[Finding]:
-    """What the scanner file's own models leave in the image, the worst first; of the last stage that was played."""
+    """Return what the scanner file's own models leave in the last stage's image, the worst first."""
     played = [stage for stage in stages if stage.runs]
     found = []
     for run in played[-1].runs if played else ():
@@ -92,7 +92,7 @@ def _range(branch: BranchError) -> str:
 
 
 def data(name: str, truth: Truth, stages: Sequence[SimulationStage]) -> dict[str, Any]:
-    """The same as plain data, for JSON, by stage and model."""
+    """Return the report as plain data, for JSON, by stage and model."""
 
     def branch(one: BranchError, imaged: BranchError) -> dict[str, Any]:
         peak, at = one.peak

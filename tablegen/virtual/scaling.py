@@ -33,7 +33,7 @@ class ScaledAxis(VirtualAxis):
 
 
 def scaled_to(scanner: VirtualScanner, file: Scanner) -> tuple[VirtualScanner, str]:
-    """The scanner in the drive range of a scanner file, and with its nm per V at ``base_nm``; and what was done.
+    """Scale the scanner to the drive range of a file, and to its nm per V at ``base_nm``; describe the changes.
 
     Its resonance goes to that of the file if that is more than a factor of 2 away; other frequencies stay. A scanner
     that goes as far as the file says within 5 % in both axes, over the same range, and whose resonances stay, is

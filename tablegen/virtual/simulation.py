@@ -65,7 +65,7 @@ def run_line(line: LinePlan, axis: SettledAxis) -> AxisRun:
 
 
 def run_on_each(line: LinePlan, axes: Sequence[SettledAxis], most_ticks: int = MAX_TICKS) -> list[AxisRun]:
-    """The same line on several axes, at no more ticks than that of a period."""
+    """Play the same line on several axes, at no more ticks than that of a period."""
     drive = played(line, most_ticks)
     asked = intended(line, drive)
     return [_axis_run(line, drive, asked, axis.settled(drive.volts, drive.tick_s)) for axis in axes]
@@ -88,7 +88,7 @@ def _axis_run(line: LinePlan, drive: PlayedDrive, asked: Floats, displacement: F
 
 
 def with_model(setup: Setup, model: str) -> Setup:
-    """The same scan with another hysteresis model on both axes; one that has no parameters for it keeps its own.
+    """Return the scan with another hysteresis model on both axes, unless an axis has no parameters for it.
 
     A refinement was learnt over the scanner file's own model, and stays on axes that keep it.
     """
