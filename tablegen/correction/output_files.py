@@ -35,14 +35,14 @@ def _shown(picture: ScanPicture) -> Floats:
 def _titles(pictures: Sequence[ScanPicture]) -> list[str]:
     """Return the titles of pictures: all different, and each with its direction where there are both."""
     both = len({picture.forward for picture in pictures}) > 1
-    found: list[str] = []
+    titles: list[str] = []
     for number, picture in enumerate(pictures):
         side = "trace" if picture.forward else "retrace"
         title = picture.title or (side if both else "corrected")
         if both and picture.title and not _says_direction(title):
             title = f"{title} {side}"
-        found.append(title if title not in found else f"{title} {number}")
-    return found
+        titles.append(title if title not in titles else f"{title} {number}")
+    return titles
 
 
 def _says_direction(title: str) -> bool:
@@ -96,7 +96,7 @@ def _png(scan: StraightScan, name: str, suffix: str) -> dict[str, bytes]:
     from PIL import Image as Pillow
     from PIL.PngImagePlugin import PngInfo
 
-    found = {}
+    files = {}
     titles = _titles(scan.pictures)
     for title, picture in zip(titles, scan.pictures, strict=True):
         shown = _shown(picture)
@@ -112,8 +112,8 @@ def _png(scan: StraightScan, name: str, suffix: str) -> dict[str, bytes]:
         more: dict[str, Any] = {} if seen.all() else {"transparency": 0}
         image.save(out, "png", pnginfo=info, **more)
         part = "" if len(titles) == 1 else f"_{_plain(title)}"
-        found[f"{name}{part}{suffix}"] = out.getvalue()
-    return found
+        files[f"{name}{part}{suffix}"] = out.getvalue()
+    return files
 
 
 def _plain(title: str) -> str:

@@ -68,7 +68,7 @@ class PeriodicScan:
         """
         if not self.tells_y:
             raise Unphysical("the images show waves of one direction; for a grating give its pitch, not a lattice")
-        found = []
+        readings = []
         for angle in (60.0, 90.0, 120.0):
             k = constant_nm * np.sin(np.radians(angle))
             turned = np.radians(angle)
@@ -77,8 +77,8 @@ class PeriodicScan:
             frame = apart @ self.waves  # from frames to nm, turned
             metric = np.linalg.cholesky(frame.T @ frame).T
             across, shear, along = float(metric[0, 0]), float(metric[0, 1]), float(metric[1, 1])
-            found.append((abs(np.log(along / across)) + abs(shear / across), across, along, shear))
-        worst, across, along, shear = min(found)
+            readings.append((abs(np.log(along / across)) + abs(shear / across), across, along, shear))
+        worst, across, along, shear = min(readings)
         if worst > _MOST_BENT_LATTICE:
             raise Unphysical(
                 f"as a hexagonal or square lattice the frame would be {across:.4g} x {along:.4g} nm and sheared by "
@@ -87,11 +87,15 @@ class PeriodicScan:
         return _scaled(self.distortion, across, along, shear)
 
 
-def _scaled(found: Distortion, across: float, along: float, shear: float) -> Distortion:
+def _scaled(distortion: Distortion, across: float, along: float, shear: float) -> Distortion:
     """Lines of a length and frames of a height in nm, the last line further right by ``shear``."""
-    drift = across * found.drift + shear * (found.y - 0.5 * (found.y[0] + found.y[-1]))
-    sides = [None if one is None else Sweep1D(across * one.x, one.time) for one in (found.forward, found.backward)]
-    return Distortion(found.rows, found.columns, sides[0], sides[1], along * found.y, drift, found.lag)
+    drift = across * distortion.drift + shear * (distortion.y - 0.5 * (distortion.y[0] + distortion.y[-1]))
+    sides = [
+        None if one is None else Sweep1D(across * one.x, one.time) for one in (distortion.forward, distortion.backward)
+    ]
+    return Distortion(
+        distortion.rows, distortion.columns, sides[0], sides[1], along * distortion.y, drift, distortion.lag
+    )
 
 
 def periodic_scan(
@@ -162,17 +166,17 @@ def _series(count: int, terms: int) -> Floats:
 def _penalty(terms: int, normal: Floats) -> Floats:
     """Return the penalty that keeps the series smooth where nothing else does."""
     n = np.arange(terms, dtype=np.float64)
-    found: Floats = _STIFFNESS * float(np.mean(np.diag(normal))) * (n**4 + 1e-3)
-    return found
+    penalty: Floats = _STIFFNESS * float(np.mean(np.diag(normal))) * (n**4 + 1e-3)
+    return penalty
 
 
-def _more_x(basis: Floats, left: Floats, steep: Floats, known: Floats) -> Floats:
+def _more_x(basis: Floats, residual: Floats, steep: Floats, known: Floats) -> Floats:
     """By how much more of each term x of the columns is to have than ``known``, by least squares over all rows."""
-    weight, aim = np.sum(steep**2, axis=0), np.sum(steep * left, axis=0)
+    weight, aim = np.sum(steep**2, axis=0), np.sum(steep * residual, axis=0)
     normal = (basis * weight) @ basis.T
     penalty = _penalty(len(basis), normal)
-    found: Floats = np.linalg.solve(normal + np.diag(penalty), basis @ aim - penalty * known)
-    return found
+    step: Floats = np.linalg.solve(normal + np.diag(penalty), basis @ aim - penalty * known)
+    return step
 
 
 def _without_line(more: list[Floats], places: list[Floats]) -> list[Floats]:
@@ -181,11 +185,11 @@ def _without_line(more: list[Floats], places: list[Floats]) -> list[Floats]:
     return [np.asarray(one - np.polyval(line, x), np.float64) for one, x in zip(more, places, strict=True)]
 
 
-def _more_phase(basis: Floats, left: tuple[Floats, ...], slopes: list[Floats], known: Floats) -> Floats:
+def _more_phase(basis: Floats, residuals: tuple[Floats, ...], slopes: list[Floats], known: Floats) -> Floats:
     """Return the step of the phase of each base vector along the rows: (bases, terms)."""
     count, bases = len(basis), len(slopes[0])
     normal, aim = np.zeros((bases * count, bases * count)), np.zeros(bases * count)
-    for image, slope in zip(left, slopes, strict=True):
+    for image, slope in zip(residuals, slopes, strict=True):
         for i in range(bases):
             part = slice(i * count, (i + 1) * count)
             aim[part] += basis @ np.sum(slope[i] * image, axis=1)
@@ -193,8 +197,8 @@ def _more_phase(basis: Floats, left: tuple[Floats, ...], slopes: list[Floats], k
                 weight = np.sum(slope[i] * slope[j], axis=1)
                 normal[part, j * count : (j + 1) * count] += (basis * weight) @ basis.T
     penalty = np.tile(_penalty(count, normal), bases)
-    found = np.linalg.solve(normal + np.diag(penalty), aim - penalty * known.ravel())
-    return np.asarray(found.reshape(bases, count), dtype=np.float64)
+    step = np.linalg.solve(normal + np.diag(penalty), aim - penalty * known.ravel())
+    return np.asarray(step.reshape(bases, count), dtype=np.float64)
 
 
 def _without_others(model: PeriodicModel, state: FitState, base: int, wave: Complexes) -> Complexes:
@@ -250,19 +254,19 @@ def _scan(model: PeriodicModel, state: FitState) -> PeriodicScan:
     for forward, _ in model.images:
         column = model.columns(parameters, forward)
         sweeps[forward] = Sweep1D(column.x, column.time + 0.5)
-    left = min(float(np.min(one.x)) for one in sweeps.values())
-    found = Distortion(
+    edge = min(float(np.min(one.x)) for one in sweeps.values())
+    distortion = Distortion(
         rows,
         geometry.columns,
-        _from(sweeps.get(True), left),
-        _from(sweeps.get(False), left),
+        _from(sweeps.get(True), edge),
+        _from(sweeps.get(False), edge),
         y - y[0],
         drift,
         float(parameters[LAG]),
     )
-    found.check()
+    distortion.check()
     total = sum(float(np.vdot(image, image)) for _, image in model.images)
-    return PeriodicScan(found, np.stack([q, slopes], axis=1), 1.0 - 2.0 * state.cost / total, tells_y)
+    return PeriodicScan(distortion, np.stack([q, slopes], axis=1), 1.0 - 2.0 * state.cost / total, tells_y)
 
 
 def _at_edges(values: Floats) -> Floats:
@@ -271,9 +275,9 @@ def _at_edges(values: Floats) -> Floats:
     return np.concatenate([outer[:1], 0.5 * (values[1:] + values[:-1]), outer[1:]])
 
 
-def _from(sweep: Sweep1D | None, left: float) -> Sweep1D | None:
-    """Return the sweep counted from ``left``."""
-    return None if sweep is None else Sweep1D(sweep.x - left, sweep.time)
+def _from(sweep: Sweep1D | None, edge: float) -> Sweep1D | None:
+    """Return the sweep counted from ``edge``."""
+    return None if sweep is None else Sweep1D(sweep.x - edge, sweep.time)
 
 
 def _independent(q: Floats, s: Floats) -> bool:

@@ -127,16 +127,16 @@ class ScannerModel:
             rate_gain=None if law is None else lambda hz: frequency_gain(hz, law.alpha, law.reference_hz),
             folder=self.folder,
         )
-        found = hysteresis.loop(
+        loop_and_creep = hysteresis.loop(
             request,
             driver.share(low),
             driver.share(high),
             ModelProblems(axis, Document("the image", None), self.file, problems),
         )
         problems.stop_if_any()
-        if found is None:
+        if loop_and_creep is None:
             raise Rejected(problems.found)
-        loop, creep = found
+        loop, creep = loop_and_creep
         return settled(loop, driver.share(drive), scan.rate_hz, creep, response, _HARMONICS)
 
 
@@ -169,20 +169,20 @@ def scanner_distortion(
     low, high = x.window
     place = low + (high - low) * (np.arange(columns) + 0.5) / columns
     late = delay_pixels * (high - low) / columns
-    found: dict[bool, Sweep1D] = {}
+    sweeps: dict[bool, Sweep1D] = {}
     for forward in sides:
         way = (place if forward else 1.0 - place) - late
         time = x.turn * way if forward else x.turn + (1.0 - x.turn) * way
-        found[forward] = Sweep1D(_at(moved, time), time)
+        sweeps[forward] = Sweep1D(_at(moved, time), time)
     begin = y.turn + (1.0 - y.turn) * (1.0 - y.window[1]) if back else y.turn * y.window[0]
     frame = begin + np.arange(rows + 1) / (lines or lines_of(rows, y, back))
     slow = _at(model.moved("y", y), frame) * (-1.0 if back else 1.0)
-    whole = Distortion(rows, columns, found.get(True), found.get(False), slow, np.zeros(rows + 1))
+    whole = Distortion(rows, columns, sweeps.get(True), sweeps.get(False), slow, np.zeros(rows + 1))
     whole.check()
-    left, top = whole.x_range[0], whole.y_range[0]
+    left_edge, top = whole.x_range[0], whole.y_range[0]
 
     def shifted(one: Sweep1D | None) -> Sweep1D | None:
-        return None if one is None else replace(one, x=one.x - left)
+        return None if one is None else replace(one, x=one.x - left_edge)
 
     return replace(whole, forward=shifted(whole.forward), backward=shifted(whole.backward), y=whole.y - top)
 

@@ -78,7 +78,7 @@ def solve(
     start = np.asarray(start, dtype=np.float64)
     scales = np.asarray(scales, dtype=np.float64)
     low, high = (np.full(len(start), -np.inf), np.full(len(start), np.inf)) if bounds is None else map(np.array, bounds)
-    found = least_squares(
+    minimum = least_squares(
         residuals,
         np.clip(start, low + 1e-9 * scales, high - 1e-9 * scales),
         jac="3-point" if jacobian is None else jacobian,
@@ -89,10 +89,10 @@ def solve(
         gtol=1e-13,
         max_nfev=200,
     )
-    if not found.success or not np.all(np.isfinite(found.x)):
+    if not minimum.success or not np.all(np.isfinite(minimum.x)):
         raise Unphysical("the fit does not converge; check the data for gaps, steps and wrong units")
-    values, left = found.x, found.fun
-    jac = np.asarray(found.jac)
+    values, left = minimum.x, minimum.fun
+    jac = np.asarray(minimum.jac)
     _, size, directions = np.linalg.svd(jac * scales, full_matrices=False)
     size = np.append(size, np.zeros(len(values) - len(size)))
     weak = size <= _SINGULAR_VALUE_LIMIT * size[0]
@@ -130,12 +130,12 @@ def with_errors(fit: Callable[[Floats], Solution], values: Floats, errors: Float
     def excess(solution: Solution) -> float:
         return float(solution.residuals @ solution.residuals) - solution.freedom
 
-    found = at(0.0)
-    if found.freedom <= 0 or excess(found) <= 0.0:
-        return found
-    low, high = 0.0, float(np.max(np.abs(found.residuals) * errors / values))
+    best = at(0.0)
+    if best.freedom <= 0 or excess(best) <= 0.0:
+        return best
+    low, high = 0.0, float(np.max(np.abs(best.residuals) * errors / values))
     for _ in range(_SCATTER_STEPS):
         middle = 0.5 * (low + high)
-        found = at(middle)
-        low, high = (middle, high) if excess(found) > 0.0 else (low, middle)
+        best = at(middle)
+        low, high = (middle, high) if excess(best) > 0.0 else (low, middle)
     return at(high)

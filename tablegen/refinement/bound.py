@@ -103,5 +103,5 @@ def plausible_ratios(line: LinePlan, f_hz: Floats) -> Complex:
 
 def _inverse(response: Response, f_hz: Floats) -> Complex:
     real, imaginary = response.inverse(f_hz)
-    found: Complex = real + 1j * imaginary
-    return found
+    gain: Complex = real + 1j * imaginary
+    return gain

@@ -87,14 +87,14 @@ class Departure:
     @property
     def scaling_percent(self) -> dict[str, float]:
         """Scaling error of each direction, peak to peak, by chords of 1/20 of the line as the paper's lattices are."""
-        found = {}
+        scaling = {}
         reached = self.points.by_side(self.points.asked + self.error)
         for side, x in self.points.by_side(self.points.position).items():
             k = min(max(round(CHORD / float(x[1] - x[0])), 1), len(x) - 2)
             slope = (reached[side][k:] - reached[side][:-k]) / (x[k:] - x[:-k])
             middle = 0.5 * (x[k:] + x[:-k])
-            found[side] = 100.0 * float(np.ptp(slope)) / float(np.interp(0.5, middle, slope))
-        return found
+            scaling[side] = 100.0 * float(np.ptp(slope)) / float(np.interp(0.5, middle, slope))
+        return scaling
 
     def moved(self, by: Floats) -> "Departure":
         """Return the departure with the drive raised at each point, by the model's slope; ``by`` is (points,)."""
@@ -107,13 +107,13 @@ def departure(line: LinePlan, measured: LineMeasurement, share: Floats | None = 
     Raises ``Unphysical`` where the two have nothing to do with each other.
     """
     points = imaged(line, np.linspace(0.0, 1.0, _WINDOW_POINTS) if share is None else share)
-    found = _straightened(points, measured.value(points.times), 1.0)
-    if not abs(found.size_nm) > 0.0 or found.rms_percent > 100.0 * _MAX_DEPARTURE:
+    best = _straightened(points, measured.value(points.times), 1.0)
+    if not abs(best.size_nm) > 0.0 or best.rms_percent > 100.0 * _MAX_DEPARTURE:
         raise Unphysical(
-            f"the displacement is {found.rms_percent:.3g} % of the line away from this scan; is it another axis, "
+            f"the displacement is {best.rms_percent:.3g} % of the line away from this scan; is it another axis, "
             f"or is time 0 no line start?"
         )
-    return found
+    return best
 
 
 def _straightened(points: Imaged, reached: Floats, unit_nm: float) -> Departure:
@@ -125,5 +125,5 @@ def _straightened(points: Imaged, reached: Floats, unit_nm: float) -> Departure:
 
 def straight_line(asked: Floats) -> Floats:
     """Return the matrix from values to the origin and the size of their best line over ``asked``: (2, points)."""
-    found: Floats = np.linalg.pinv(np.column_stack([np.ones_like(asked), asked]))
-    return found
+    matrix: Floats = np.linalg.pinv(np.column_stack([np.ones_like(asked), asked]))
+    return matrix

@@ -151,8 +151,8 @@ class FreeRows:
         """(spots, rows, 2 columns)."""
         x = self.positions(state) - self._centre
         phase = state.rows[rows, None, :] + x[:, None] * state.q + pace[rows, None, :] * self.modes.time[:, None]
-        found: Complexes = np.exp(2j * pi * np.moveaxis(phase @ self.spots.T, -1, 0))
-        return found
+        waves: Complexes = np.exp(2j * pi * np.moveaxis(phase @ self.spots.T, -1, 0))
+        return waves
 
     def _drawn(self, state: FreeRowsState, rows: slice, pace: Floats) -> Floats:
         waves = self._waves(state, rows, pace)
@@ -167,8 +167,8 @@ class FreeRows:
                 halves.append(half - (half @ parabola) @ parabola.T)
             else:
                 halves.append(half - parabola @ (parabola.T @ half))
-        found: Floats = np.concatenate(halves, axis=1)
-        return found
+        derivatives: Floats = np.concatenate(halves, axis=1)
+        return derivatives
 
     def _chunks(self, state: FreeRowsState, lag: bool = False) -> Iterator[_Chunk]:
         """With ``lag`` the last two derivatives are those by factors of what goes on in a line."""
@@ -190,14 +190,14 @@ class FreeRows:
             parts += [np.moveaxis(np.real(waves), 0, -1), np.moveaxis(-np.imag(waves), 0, -1)]
             if lag:
                 parts.append(np.sum(slopes * pace[rows, None, :], axis=-1, keepdims=True) * self._times())
-            left = self.heights[rows] - self._levelled(np.real(np.tensordot(state.amplitudes, waves, 1)))
+            residual = self.heights[rows] - self._levelled(np.real(np.tensordot(state.amplitudes, waves, 1)))
             derivatives = self._levelled(np.concatenate(parts, axis=-1))
-            yield _Chunk(rows, derivatives, self._levelled(slopes), left)
+            yield _Chunk(rows, derivatives, self._levelled(slopes), residual)
 
     def _solved(self, state: FreeRowsState, weights: Floats) -> tuple[Floats, Callable[[Floats], Floats]]:
         """Return the step of the parameters, and the function from a step to the rows' phases."""
         count = self._count(state)
-        normal, right, kept = np.zeros((count, count)), np.zeros(count), []
+        normal, right, blocks = np.zeros((count, count)), np.zeros(count), []
         for chunk in self._chunks(state):
             weight = weights[chunk.rows]
             basis, triangle = np.linalg.qr(chunk.across)
@@ -207,11 +207,11 @@ class FreeRows:
             flat = (np.sqrt(weight)[:, None, None] * free).reshape(-1, free.shape[-1])
             normal += flat.T @ flat
             right += np.einsum("i,ijp,ij->p", weight, free, chunk.left, optimize=True)
-            kept.append((_inverted(triangle), on_rows, seen))
+            blocks.append((_inverted(triangle), on_rows, seen))
         step = _pseudo_inverse(normal) @ right
 
-        def of_rows(taken: Floats) -> Floats:
-            return np.concatenate([(back @ (seen - on @ taken)[:, :, None])[:, :, 0] for back, on, seen in kept])
+        def of_rows(applied: Floats) -> Floats:
+            return np.concatenate([(back @ (seen - on @ applied)[:, :, None])[:, :, 0] for back, on, seen in blocks])
 
         return step, of_rows
 
@@ -219,12 +219,12 @@ class FreeRows:
         self, state: FreeRowsState, step: Floats, rows: Callable[[Floats], Floats], size: float
     ) -> FreeRowsState:
         modes, waves, spots = len(state.modes), len(state.q), len(state.amplitudes)
-        taken = size * step
-        a = taken[modes + waves :]
+        applied = size * step
+        a = applied[modes + waves :]
         return replace(
             state,
-            modes=state.modes + taken[:modes],
-            q=state.q + taken[modes : modes + waves],
+            modes=state.modes + applied[:modes],
+            q=state.q + applied[modes : modes + waves],
             amplitudes=state.amplitudes + a[:spots] + 1j * a[spots:],
             rows=state.rows + size * rows(step),
         )
@@ -240,10 +240,10 @@ class FreeRows:
         """1, and less where a row leaves far more than the others."""
         power = np.sqrt(np.mean(self._left(state) ** 2, axis=1))
         usual = _LOUD_ROWS * float(np.median(power))
-        found: Floats = (
+        image: Floats = (
             np.minimum(1.0, (usual / np.maximum(power, 1e-300)) ** 2) if usual > 0.0 else np.ones(len(power))
         )
-        return found
+        return image
 
     def _result(self, state: FreeRowsState, weights: Floats) -> FreeRowsFit:
         count, whole = len(state.modes) + len(state.q), np.zeros((self._count(state) + 2,) * 2)
@@ -263,10 +263,10 @@ class FreeRows:
         late = by_row @ _pseudo_inverse(whole)[:, -2:]
         errors = np.sqrt(np.diag(_spread(late, len(whole)))).tolist()
         first, second = zip((1.0 + np.sum(late, axis=0)).tolist(), errors, strict=True)
-        left = self._left(state)
+        residual = self._left(state)
         images = np.split(self.heights, 2, axis=1)
-        both = np.split(left, 2, axis=1)
-        noise = float(np.mean(left**2))
+        both = np.split(residual, 2, axis=1)
+        noise = float(np.mean(residual**2))
         explained = [
             1.0 - float(np.mean(one**2)) / float(np.mean(image**2)) for image, one in zip(images, both, strict=True)
         ]

@@ -95,9 +95,9 @@ def refine_images(
 
 def _frame(plan: Plan, trace: Floats, retrace: Floats, images: ImageOptions) -> LatticeLine:
     _check_shape(plan, trace)
-    found = lattice_line(plan, trace, retrace, images)
-    _check(found)
-    return found
+    line = lattice_line(plan, trace, retrace, images)
+    _check(line)
+    return line
 
 
 def _check_shape(plan: Plan, trace: Floats) -> None:
@@ -141,56 +141,57 @@ def _size(plan: Plan, frames: Sequence[LatticeLine], sample: KnownSample) -> Lin
     x, y = plan.x, plan.y
     low, high = y.band_limit.window
     aspect = y.drive.size_nm * (high - low) / x.drive.size_nm
-    found = [size_of_line(frame, sample.cell, sample.grating, aspect) for frame in frames]
-    value = float(np.mean([one.nm.value for one in found]))
-    error = float(np.sqrt(np.mean([one.nm.standard_error**2 for one in found]) / len(found)))
+    sizes = [size_of_line(frame, sample.cell, sample.grating, aspect) for frame in frames]
+    value = float(np.mean([one.nm.value for one in sizes]))
+    error = float(np.sqrt(np.mean([one.nm.standard_error**2 for one in sizes]) / len(sizes)))
     check_size(value, x.drive.size_nm, "the scan file")
-    return replace(found[0], nm=Estimate(value, float(np.hypot(error, found[0].shared * value))))
+    return replace(sizes[0], nm=Estimate(value, float(np.hypot(error, sizes[0].shared * value))))
 
 
 def _size_remarks(plan: Plan, size: LineSize | None) -> list[Remark]:
     if size is None:
         return []
-    asked, found, error = plan.x.drive.size_nm, size.nm.value, size.nm.standard_error
-    if abs(found / asked - 1.0) < max(_SIZE_NOTE_LIMIT, _SIZE_NOTE_ERRORS * error / asked):
+    requested, nm, error = plan.x.drive.size_nm, size.nm.value, size.nm.standard_error
+    if abs(nm / requested - 1.0) < max(_SIZE_NOTE_LIMIT, _SIZE_NOTE_ERRORS * error / requested):
         return []
     return [
         spoils(
-            f"the line of x is {found:.5g} nm where the scan file asks for {asked:.5g} nm "
-            f"({100.0 * (found / asked - 1.0):+.2f} %); sizes are not learnt: tablegen calibrate size --images "
-            f"corrects it at every size, or ask for {asked * asked / found:.5g} nm to have {asked:.5g} nm here",
-            100.0 * abs(found / asked - 1.0),
+            f"the line of x is {nm:.5g} nm where the scan file asks for {requested:.5g} nm "
+            f"({100.0 * (nm / requested - 1.0):+.2f} %); sizes are not learnt: tablegen calibrate size --images "
+            f"corrects it at every size, or ask for {requested * requested / nm:.5g} nm to have {requested:.5g} nm "
+            f"here",
+            100.0 * abs(nm / requested - 1.0),
         )
     ]
 
 
 def _remarks(line: LinePlan, frames: Sequence[LatticeLine], update: LayerUpdate) -> tuple[Remark, ...]:
-    found = [text for frame in frames[:1] for text in _remarks_of(frame)]
+    texts = [text for frame in frames[:1] for text in _remarks_of(frame)]
     if line.axis == "y" and len(frames) == 1:
-        found.append(
+        texts.append(
             spoils(
                 "a drift that becomes faster or slower counts as an error of y; give two frames that follow each "
                 "other, which tell it"
             )
         )
-    return tuple(found + _learning_remarks(update))
+    return tuple(texts + _learning_remarks(update))
 
 
 def _remarks_of(seen: LatticeLine) -> list[Remark]:
-    found: list[Remark] = []
+    remarks: list[Remark] = []
     fit, geometry = seen.fit, seen.geometry
     explained = min(fit.explained)
     if explained < _LITTLE_EXPLAINED:
-        found.append(
+        remarks.append(
             Remark(f"{100.0 * explained:.0f} % of the contrast is periodic, the rest noise, debris or defects")
         )
     span = (geometry.window[1] - geometry.window[0]) * float(np.max(np.abs(fit.state.q)))
     if geometry.columns / span < _MIN_PIXELS_PER_PERIOD:
-        found.append(
+        remarks.append(
             Remark(f"the shortest period has {geometry.columns / span:.2g} pixels; scan less, or take more pixels")
         )
     if seen.start.apart > _FAR_APART:
-        found.append(
+        remarks.append(
             spoils(
                 f"trace and retrace are {seen.start.apart:.2g} periods apart, and beyond half a period they would be "
                 f"taken for the next one; calibrate first, or take a sample of a longer period"
@@ -198,8 +199,8 @@ def _remarks_of(seen: LatticeLine) -> list[Remark]:
         )
     if fit.loud:
         shown = ", ".join(str(i + 1) for i in fit.loud[:5]) + (", ..." if len(fit.loud) > 5 else "")
-        found.append(Remark(f"{len(fit.loud)} rows differ from the others (row {shown}); they counted less"))
-    return found
+        remarks.append(Remark(f"{len(fit.loud)} rows differ from the others (row {shown}); they counted less"))
+    return remarks
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -258,12 +259,12 @@ def refine_mismatch(
 
 
 def _learning_remarks(update: LayerUpdate) -> list[Remark]:
-    found: list[Remark] = []
+    remarks: list[Remark] = []
     if update.harmonics == 0:
-        found.append(Remark("the error is within the noise of the images: there is nothing more to learn from them"))
+        remarks.append(Remark("the error is within the noise of the images: there is nothing more to learn from them"))
     elif finished(update):
-        found.append(Remark("most of the remaining error is noise: give several frames, or stop refining"))
-    return [*found, Remark("images do not show that the build of this scan file was running")]
+        remarks.append(Remark("most of the remaining error is noise: give several frames, or stop refining"))
+    return [*remarks, Remark("images do not show that the build of this scan file was running")]
 
 
 def _pixels(frames: Sequence[LatticeLine] | Sequence[SweepMismatch]) -> str:

@@ -61,12 +61,12 @@ def learn(line: LinePlan, measured: LineMeasurement, gain: float, harmonics: int
     fits = _fits(points.times, harmonics)
     spread = [fit @ (gain * points.steepness[:, None] * errors) for fit in fits]
     stands_out = _stands_out([fit @ noisy for fit in fits], [s @ measured.covariance @ s.T for s in spread])
-    kept = harmonics if stands_out else 0
+    learnt = harmonics if stands_out else 0
     noise_part = _noise_share(line, measured, seen.size_nm)
     lacking = noisy + gain * points.steepness * (errors @ noise_part)
     # The mean is not learnt: no sensor sees an origin.
-    c = fits[-1] @ lacking if kept else np.zeros(1)
-    change = FourierSeries(0.0, c[1 : kept + 1].copy(), c[kept + 1 :].copy())
+    c = fits[-1] @ lacking if learnt else np.zeros(1)
+    change = FourierSeries(0.0, c[1 : learnt + 1].copy(), c[learnt + 1 :].copy())
     old = line.layer if line.layer is not None else FourierSeries(0.0, np.zeros(0), np.zeros(0))
     whole = old.plus(change)
     layer = FourierSeries(0.0, np.round(whole.a, DIGITS), np.round(whole.b, DIGITS))
@@ -74,7 +74,7 @@ def learn(line: LinePlan, measured: LineMeasurement, gain: float, harmonics: int
     noise = np.sqrt(np.mean(np.sum((errors @ measured.covariance) * errors, axis=1)))
     chords = _chords(line, before, measured) / seen.size_nm
     chord_noise = np.sqrt(np.mean(np.sum((chords @ measured.covariance) * chords, axis=1)))
-    return LayerUpdate(layer, change, kept, before, after, 100.0 * float(noise), 100.0 * float(chord_noise))
+    return LayerUpdate(layer, change, learnt, before, after, 100.0 * float(noise), 100.0 * float(chord_noise))
 
 
 def _chords(line: LinePlan, seen: Departure, measured: LineMeasurement) -> Floats:
@@ -82,8 +82,8 @@ def _chords(line: LinePlan, seen: Departure, measured: LineMeasurement) -> Float
     x = seen.points.by_side(seen.points.position)["forward"]
     middle = np.linspace(float(x[0]) + 0.5 * CHORD, float(x[-1]) - 0.5 * CHORD, 41)
     ends = [measured.basis(line.drive.turn * (middle + by)) for by in (-0.5 * CHORD, 0.5 * CHORD)]
-    found: Floats = (ends[1] - ends[0]) / CHORD
-    return found
+    slopes: Floats = (ends[1] - ends[0]) / CHORD
+    return slopes
 
 
 def _stands_out(coefficients: list[Floats], covariances: list[Floats]) -> bool:
@@ -113,8 +113,8 @@ def _noise_share(line: LinePlan, measured: LineMeasurement, size_nm: float) -> F
     for group in measured.groups:
         explained = float(error[group] @ np.linalg.solve(measured.covariance[np.ix_(group, group)], error[group]))
         share[group] = min(len(group) / explained, 1.0) if explained > 0.0 else 1.0
-    found: Floats = share * error
-    return found
+    noise: Floats = share * error
+    return noise
 
 
 def _fits(times: Floats, harmonics: int) -> list[Floats]:
@@ -122,9 +122,9 @@ def _fits(times: Floats, harmonics: int) -> list[Floats]:
     none, ones = np.zeros(len(times)), np.ones(len(times))
     normal, _ = normal_equations(times, none, none, ones, none, harmonics, _SMOOTHNESS)
     basis = harmonic_basis(times, harmonics)
-    found = []
+    fits = []
     for count in range(1, harmonics + 1):
         first = np.r_[0 : count + 1, harmonics + 1 : harmonics + 1 + count]
         fit = np.linalg.solve(normal[np.ix_(first, first)], basis[:, first].T / len(times))
-        found.append(np.asarray(fit, dtype=np.float64))
-    return found
+        fits.append(np.asarray(fit, dtype=np.float64))
+    return fits

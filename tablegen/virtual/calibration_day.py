@@ -169,7 +169,7 @@ class _Day:
         """From images of one object, at five offsets each; of a large scan closer to the middle, so that it fits."""
         k, beta, threshold = size.k_nm_per_v.value, size.beta.value, size.v_threshold.value
         law = SizeLaw.calibrated(k, self._driver.span, beta, size.base_nm, threshold)
-        found = []
+        groups = []
         for share in sizes:
             room = min(1.0, OFFSET_ROOM * (1.0 - share) / (OFFSETS[-1] - OFFSETS[0])) if len(sizes) > 1 else 1.0
             volts = [self._driver.volts(0.5 + room * (offset - 0.5)) for offset in OFFSETS]
@@ -177,14 +177,14 @@ class _Day:
             if self._imaged:
                 taken = self._images([(size_v, offset) for offset in volts])
                 nm, errors = apparent_of(taken, law, self._driver, SAMPLES_SEEN)
-                found.append((np.array(volts), nm, np.full(len(volts), size_v), errors))
+                groups.append((np.array(volts), nm, np.full(len(volts), size_v), errors))
                 continue
             seen = apparent_sizes(
                 self._axis, volts, size_v, self._reference_hz, noise=self._noise, seed=self._next(), turn=self._turn
             )
             unknown = np.zeros(len(volts))
-            found.append((seen["offset_v"], seen["apparent_nm"], np.full(len(volts), size_v), unknown))
-        offset_v, apparent_nm, size_v_each, errors = (np.concatenate(column) for column in zip(*found, strict=True))
+            groups.append((seen["offset_v"], seen["apparent_nm"], np.full(len(volts), size_v), unknown))
+        offset_v, apparent_nm, size_v_each, errors = (np.concatenate(column) for column in zip(*groups, strict=True))
         known = errors if self._imaged else None
         return fit_offset_sizes(offset_v, apparent_nm, size_v_each, self._driver, law, known)
 
@@ -202,7 +202,7 @@ class _Day:
                 shared=taken.shared,
             )
         nominal = [share * self._driver.span * size.k_nm_per_v for share in SIZES]
-        found = actual_sizes(
+        sizes = actual_sizes(
             self._axis,
             nominal,
             size.k_nm_per_v,
@@ -212,7 +212,7 @@ class _Day:
             turn=self._turn,
         )
         return fit_size(
-            found["nominal_nm"] / size.k_nm_per_v, found["actual_nm"], self._driver, size.base_nm, None, "relative"
+            sizes["nominal_nm"] / size.k_nm_per_v, sizes["actual_nm"], self._driver, size.base_nm, None, "relative"
         )
 
     def _images(self, scans: Sequence[tuple[float, float]]) -> ImageSizes:
@@ -220,7 +220,7 @@ class _Day:
 
         The sample drifts by a share of the line and lies on a slope.
         """
-        taken = []
+        images = []
         for volts, offset in scans:
             sample = hexagonal(LATTICE_NM) if volts <= SMALL_IMAGE * self._driver.span else grating(GRATING_NM)
             random = np.random.default_rng(self._next())
@@ -236,8 +236,8 @@ class _Day:
                 drift=drift,
                 seed=self._next(),
             )
-            taken.append(SampleImage(f"{volts:g} V at {offset:g} V", volts, offset, trace, retrace))
-        return sizes_of(taken, self._driver, SAMPLES_SEEN, Acquisition(turn=self._turn))
+            images.append(SampleImage(f"{volts:g} V at {offset:g} V", volts, offset, trace, retrace))
+        return sizes_of(images, self._driver, SAMPLES_SEEN, Acquisition(turn=self._turn))
 
     def _traces(self, amplitudes: Sequence[float]) -> list[Trace]:
         traces = []
@@ -246,10 +246,10 @@ class _Day:
             rate = self._rate_at(volts)
             size_nm = volts * self._before.size.k_nm_per_v
             sensor = Sensor(noise_nm=self._noise * size_nm, seed=self._next())
-            found = sensor_trace(
+            trace = sensor_trace(
                 self._axis, volts, self._driver.middle, rate, PERIODS, SAMPLES, turn=self._turn, sensor=sensor
             )
-            traces.append(Trace(f"{volts:g} V", found["time_s"], found["drive_v"], found["displacement_nm"]))
+            traces.append(Trace(f"{volts:g} V", trace["time_s"], trace["drive_v"], trace["displacement_nm"]))
         return traces
 
     def _imaged_hysteresis(self, amplitudes: Sequence[float]) -> HysteresisFit:
@@ -276,8 +276,8 @@ class _Day:
     def _resonance(self, before: Resonance) -> ResonanceFit:
         near = before.frequency_hz or 1e4
         f = near * np.geomspace(0.2, 3.0, 200)
-        found = frequency_response(self._axis, f, noise=self._noise, seed=self._next())
-        return fit_resonance(found["frequency_hz"], found["gain"], found["phase_deg"])
+        response = frequency_response(self._axis, f, noise=self._noise, seed=self._next())
+        return fit_resonance(response["frequency_hz"], response["gain"], response["phase_deg"])
 
     def _next(self) -> int:
         self._seed += 1

@@ -53,10 +53,10 @@ class Lag:
         count = len(POINTS)
         ways = [(0, range(count - 1), 1), (1, range(count - 1, 0, -1), -1)]
         for direction, places, step in ways + ways:
-            at, kept = solutions[direction], exp(-(self.fall if direction else self.rise) / (count - 1))
+            at, decay = solutions[direction], exp(-(self.fall if direction else self.rise) / (count - 1))
             for n in places:
-                low[n + step] = min(low[n + step], at[n + step] + (low[n] - at[n]) * kept)
-                high[n + step] = max(high[n + step], at[n + step] + (high[n] - at[n]) * kept)
+                low[n + step] = min(low[n + step], at[n + step] + (low[n] - at[n]) * decay)
+                high[n + step] = max(high[n + step], at[n + step] + (high[n] - at[n]) * decay)
         return low, high
 
     def after(self, z: float, turned: float, drive: FloatsLike, up: bool) -> Floats:
@@ -64,10 +64,8 @@ class Lag:
         rate, solution = (self.rise, self.towards[0]) if up else (self.fall, self.towards[1])
         away = z - float(np.polynomial.polynomial.polyval(turned, solution))
         drive = np.asarray(drive, dtype=np.float64)
-        found: Floats = np.polynomial.polynomial.polyval(drive, solution) + away * np.exp(
-            -rate * np.abs(drive - turned)
-        )
-        return found
+        lag: Floats = np.polynomial.polynomial.polyval(drive, solution) + away * np.exp(-rate * np.abs(drive - turned))
+        return lag
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,8 +32,8 @@ def grating(pitch_nm: float, angle_deg: float = 3.0) -> Surface:
 
     def height(x: Floats, y: Floats) -> Floats:
         wave = np.sin(2.0 * np.pi * (x * c + y * s) / pitch_nm)
-        found: Floats = np.tanh(_STEEPNESS * (wave + _DUTY))
-        return found
+        heights: Floats = np.tanh(_STEEPNESS * (wave + _DUTY))
+        return heights
 
     return height
 

@@ -102,12 +102,12 @@ def line_error(
     triangle. The displacement's extremes are taken for those of ``ideal``: those of a triangle are the line's ends.
     """
     ticks = len(displacement_nm)
-    asked = ideal_triangle(ticks, turn, first) if ideal is None else ideal
+    intended = ideal_triangle(ticks, turn, first) if ideal is None else ideal
     low, high = float(np.min(displacement_nm)), float(np.max(displacement_nm))
-    size = (high - low) / (float(np.max(asked)) - float(np.min(asked)))
+    size = (high - low) / (float(np.max(intended)) - float(np.min(intended)))
     if not size > 0.0:
         raise ValueError("the displacement does not move")
-    reached = (displacement_nm - low) / size + float(np.min(asked))
+    reached = (displacement_nm - low) / size + float(np.min(intended))
     x = np.linspace(0.0, 1.0, POINTS)
     times = (np.arange(ticks) + first) / ticks
 

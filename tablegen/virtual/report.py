@@ -57,17 +57,17 @@ def text(name: str, truth: Truth, stages: Sequence[SimulationStage]) -> list[str
 def simulation_findings(stages: Sequence[SimulationStage]) -> list[Finding]:
     """Return what the scanner file's own models leave in the last stage's image, the worst first."""
     played = [stage for stage in stages if stage.runs]
-    found = []
+    findings = []
     for run in played[-1].runs if played else ():
         for one in (getattr(run, axis) for axis in run.asked):
-            left = {side: max(map(abs, getattr(one.imaged, side).residual_range)) for side in one.directions}
-            side = max(left, key=lambda name: left[name])
-            text = f"the {run.model} model leaves {left[side]:.2g} % of the line of {one.axis}, {side}"
-            found.append(Finding("spoils" if left[side] > _LARGE_PERCENT else "expect", left[side], text))
+            residuals = {side: max(map(abs, getattr(one.imaged, side).residual_range)) for side in one.directions}
+            side = max(residuals, key=lambda name: residuals[name])
+            text = f"the {run.model} model leaves {residuals[side]:.2g} % of the line of {one.axis}, {side}"
+            findings.append(Finding("spoils" if residuals[side] > _LARGE_PERCENT else "expect", residuals[side], text))
             by = one.size_error_percent
             if abs(by) > _LARGE_PERCENT:
-                found.append(Finding("spoils", abs(by), f"the image is {by:+.2g} % off in the size of {one.axis}"))
-    return worst_first(found)
+                findings.append(Finding("spoils", abs(by), f"the image is {by:+.2g} % off in the size of {one.axis}"))
+    return worst_first(findings)
 
 
 def _rows(axis: str, run: Run) -> list[str]:

@@ -57,8 +57,8 @@ def _scaled(axis: VirtualAxis, file: ScannerAxis, driver: Driver) -> ScaledAxis:
     share = min(file.size.base_nm / (file.size.k_nm_per_v * driver.span), 1.0)
     drive = 0.5 + share * (ideal_triangle(_TICKS, 0.5) - 0.5)
     moved = float(np.ptp(axis.hysteresis.settled(drive)))
-    kept: dict[str, Any] = {field.name: getattr(axis, field.name) for field in fields(axis)}
-    return ScaledAxis(**{**kept, "driver": driver}, times=file.size.k_nm_per_v * share * driver.span / moved)
+    attributes: dict[str, Any] = {field.name: getattr(axis, field.name) for field in fields(axis)}
+    return ScaledAxis(**{**attributes, "driver": driver}, times=file.size.k_nm_per_v * share * driver.span / moved)
 
 
 def _faster(axis: VirtualAxis, file: ScannerAxis) -> float | None:

@@ -67,12 +67,12 @@ def run_line(line: LinePlan, axis: SettledAxis) -> AxisRun:
 def run_on_each(line: LinePlan, axes: Sequence[SettledAxis], most_ticks: int = MAX_TICKS) -> list[AxisRun]:
     """Play the same line on several axes, at no more ticks than that of a period."""
     drive = played(line, most_ticks)
-    asked = intended(line, drive)
-    return [_axis_run(line, drive, asked, axis.settled(drive.volts, drive.tick_s)) for axis in axes]
+    requested = intended(line, drive)
+    return [_axis_run(line, drive, requested, axis.settled(drive.volts, drive.tick_s)) for axis in axes]
 
 
-def _axis_run(line: LinePlan, drive: PlayedDrive, asked: Floats, displacement: Floats) -> AxisRun:
-    error = line_error(displacement, line.drive.turn, line.band_limit.window, asked, 0.5)
+def _axis_run(line: LinePlan, drive: PlayedDrive, requested: Floats, displacement: Floats) -> AxisRun:
+    error = line_error(displacement, line.drive.turn, line.band_limit.window, requested, 0.5)
     directions = ("forward", "backward") if line.band_limit.directions == "both" else ("forward",)
     return AxisRun(
         axis=line.axis,
@@ -112,10 +112,10 @@ def models_of(setup: Setup) -> tuple[str, ...]:
     """
     both = (setup.scanner.x.hysteresis, setup.scanner.y.hysteresis)
     calibrated = [h for h in both if h is not None and h.calibrated]
-    found: set[type[Hysteresis]] = {models.get(models.UNCOMPENSATED), *map(type, calibrated)}
+    kinds: set[type[Hysteresis]] = {models.get(models.UNCOMPENSATED), *map(type, calibrated)}
     if calibrated:
-        found |= {kind for kind in models.own() if all(kind.like(h) is not None for h in calibrated)}
-    return tuple(kind.model() for kind in sorted(found, key=lambda kind: (kind.order, kind.model())))
+        kinds |= {kind for kind in models.own() if all(kind.like(h) is not None for h in calibrated)}
+    return tuple(kind.model() for kind in sorted(kinds, key=lambda kind: (kind.order, kind.model())))
 
 
 def simulate(setup: Setup, scanner: VirtualScanner, model: str) -> Run:
