@@ -49,7 +49,13 @@ class Distortion:
     lag: float = 1.0
 
     def side(self, forward: bool) -> Sweep1D:
-        """One of the two. Raises ``KeyError`` if it was not imaged."""
+        """Return the sweep of a direction.
+
+        Raises
+        ------
+        KeyError
+            If the direction was not imaged.
+        """
         found = self.forward if forward else self.backward
         if found is None:
             raise KeyError(forward)

@@ -118,7 +118,13 @@ class Images:
 
 
 def read_scan(trace: Path, retrace: Path | None, choice: Choice) -> Images:
-    """All channels of one file, or of one for each direction. Raises ``Rejected``."""
+    """Read all channels of one file, or of one for each direction.
+
+    Raises
+    ------
+    Rejected
+        If a file cannot be read or has no such channels.
+    """
     groups: list[tuple[list[ScanImage], bool]] = []
     left_out: list[str] = []
     for path, forward in ((trace, True), (retrace, False)):
@@ -211,7 +217,15 @@ def _height(channel: ScanImage) -> bool:
 
 
 def by_scanner(images: Images, scanner: Path, taken: OldScan) -> StraightScan:
-    """Put straight by a scanner file. Raises ``Rejected`` and ``Unphysical``."""
+    """Correct images by a scanner file.
+
+    Raises
+    ------
+    Rejected
+        If the scanner file is faulty.
+    Unphysical
+        If the scan cannot have been taken so.
+    """
     model = _model(scanner)
     rate_hz = taken.rate_hz or images.first.line_rate_hz
     if rate_hz is None:
@@ -325,7 +339,7 @@ def _scanned(
 def by_fit(
     images: Images, taken: OldScan, pitch_nm: float | None = None, lattice_nm: float | None = None
 ) -> tuple[StraightScan, PeriodicScan]:
-    """Put straight by a fit to a periodic sample, and the fit.
+    """Correct images by a fit to a periodic sample; return the fit too.
 
     Raises ``Unphysical`` where there is no fit, or where the image does not support the correction: another cell would
     do as well, the displacement is too large, or trace and retrace do not agree better.

@@ -106,9 +106,12 @@ def periodic_scan(
     retrace_mirrored: bool = False,
     delay_pixels: float = 0.0,
 ) -> PeriodicScan:
-    """Images rows x columns of heights in any unit, rows in the order of time, as for ``fit_pair``; or a trace alone.
+    """Fit images, rows x columns of heights in any unit, rows in the order of time; or a trace alone.
 
-    Raises ``Unphysical`` where the images do not show one periodic sample, or too little of it.
+    Raises
+    ------
+    Unphysical
+        If the images do not show one periodic sample, or too little of it.
     """
     if retrace_mirrored and retrace is not None:
         retrace = np.ascontiguousarray(retrace[:, ::-1])

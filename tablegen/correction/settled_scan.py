@@ -159,11 +159,18 @@ def scanner_distortion(
     sides: tuple[bool, ...] = (True, False),
     delay_pixels: float = 0.0,
 ) -> Distortion:
-    """Where the pixels of a scan were, in nm, 0 at the left edge and at the first row.
+    """Compute where the pixels of a scan were, in nm, 0 at the left edge and at the first row.
 
     Columns are evenly spread in time over the window of each sweep of ``x``; they show the sample ``delay_pixels``
     late. Rows follow each other, ``lines`` in a period of ``y``, from where its window begins, on its way there, or
-    ``back``; see ``lines_of``. Raises ``Rejected`` and ``Unphysical``.
+    ``back``; see ``lines_of``.
+
+    Raises
+    ------
+    Rejected
+        If the scanner file does not suit the scan.
+    Unphysical
+        If the driver cannot put out the drive.
     """
     moved = model.moved("x", x)
     low, high = x.window

@@ -47,9 +47,14 @@ class Growth:
 
 
 def fit_growth(v: Floats, branches: Sequence[MeasuredBranch], rho: float) -> Growth:
-    """(22) through the residuals of one direction at normalised amplitudes, weighted by their standard errors.
+    """Fit (22) to the residuals of one direction at normalised amplitudes, weighted by their standard errors.
 
-    ``rho`` is kept where the amplitudes do not determine it. Raises ``Unphysical``.
+    ``rho`` is kept where the amplitudes do not determine it.
+
+    Raises
+    ------
+    Unphysical
+        If the residuals have the wrong sign or make no law.
     """
     remarks: list[Remark] = []
     beta = np.array([branch.beta.value for branch in branches])

@@ -73,7 +73,12 @@ def solve(
     """Minimise the sum of squares of ``residuals``.
 
     ``scales`` says of each parameter by how much it could at most differ from scanner to scanner: one whose standard
-    error is larger was not determined. Raises ``Unphysical`` where no minimum is found.
+    error is larger was not determined.
+
+    Raises
+    ------
+    Unphysical
+        If no minimum is found.
     """
     start = np.asarray(start, dtype=np.float64)
     scales = np.asarray(scales, dtype=np.float64)

@@ -132,10 +132,14 @@ def fit_line(
     retrace_mirrored: bool = False,
     delay_pixels: float = 0.0,
 ) -> ImageLine:
-    """Positions and periods from heights in any unit, rows x columns, rows in the order of time.
+    """Fit positions and periods to heights in any unit, rows x columns, rows in the order of time.
 
     Columns are evenly spread in time over ``window`` of each sweep of a triangle; the rest is as in ``fit_pair``.
-    Raises ``Unphysical``.
+
+    Raises
+    ------
+    Unphysical
+        If the image does not support the fit.
     """
     if retrace is not None and retrace_mirrored:
         retrace = np.ascontiguousarray(retrace[:, ::-1])

@@ -99,7 +99,7 @@ def read_pair(
     retrace_channel: str | None = None,
     frame: int | None = None,
 ) -> tuple[ScanImage, ScanImage]:
-    """Trace and retrace of one scan, from two files, or from one that has both.
+    """Read trace and retrace of one scan, from two files, or from one that has both.
 
     The retrace is ``retrace_channel``, or the retrace that belongs to the trace's channel, or the channel of the same
     name. Raises ``Rejected`` with file and reason, also where a file calls the trace a retrace, or the reverse.
@@ -125,7 +125,13 @@ def _required(channel: Channel, direction: Direction) -> Channel:
 
 
 def read_channels(path: Path, frame: int | None = None) -> list[ScanImage]:
-    """All channels of a file, each of which has to be an image of heights. Raises ``Rejected``."""
+    """Read all channels of a file, each of which has to be an image of heights.
+
+    Raises
+    ------
+    Rejected
+        If the file cannot be read, or a channel is no image of heights.
+    """
     file = _opened(path)
     with file.named():
         if not file.channels:

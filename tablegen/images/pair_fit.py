@@ -51,11 +51,15 @@ def fit_pair(
     retrace_mirrored: bool = False,
     delay_pixels: float = 0.0,
 ) -> ImageFit:
-    """Both branches from heights in any unit, rows x columns, rows in the order of time.
+    """Fit both branches to heights in any unit, rows x columns, rows in the order of time.
 
     Columns are evenly spread in time over ``window`` of each sweep; the retrace is stored with left on the left, or
     ``retrace_mirrored`` in the order of time. Columns show the sample ``delay_pixels`` late, as of a feedback.
-    Raises ``Unphysical``.
+
+    Raises
+    ------
+    Unphysical
+        If the images do not support the fit.
     """
     geometry, heights = prepared(
         trace, np.ascontiguousarray(retrace[:, ::-1]) if retrace_mirrored else retrace, turn, window, delay_pixels

@@ -83,6 +83,7 @@ class Columns:
 
     @classmethod
     def of(cls, geometry: Geometry, forward: bool, shape: Floats) -> "Columns":
+        """Return the columns of one direction, for a branch of these coordinates, (2,)."""
         branch = BranchShape.at(shape)
         u = geometry.sweep(forward)
         tau = branch.inverse(u)
@@ -314,9 +315,12 @@ class PeriodicModel:
 
 
 def settle(model: PeriodicModel, start: Floats, free: Bools) -> FitState:
-    """Levenberg and Marquardt's way to the least squares; parameters that are not ``free`` stay.
+    """Minimise the sum of squares by Levenberg and Marquardt; parameters that are not ``free`` stay.
 
-    Raises ``Unphysical`` where it finds none.
+    Raises
+    ------
+    Unphysical
+        If no minimum is found.
     """
     state = model.at(start)
     joint = np.concatenate([free, np.ones(2 * len(model.spots), bool)])

@@ -104,7 +104,10 @@ class Departure:
 def departure(line: LinePlan, measured: LineMeasurement, share: Floats | None = None) -> Departure:
     """Compare a measured period with what the plan asks for, at shares of the window or evenly over it.
 
-    Raises ``Unphysical`` where the two have nothing to do with each other.
+    Raises
+    ------
+    Unphysical
+        If the two have nothing to do with each other.
     """
     points = imaged(line, np.linspace(0.0, 1.0, _WINDOW_POINTS) if share is None else share)
     best = _straightened(points, measured.value(points.times), 1.0)

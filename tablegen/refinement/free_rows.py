@@ -99,7 +99,13 @@ class FreeRows:
         self._centre = float(np.mean(modes.asked))
 
     def fit(self, start: FreeRowsState) -> FreeRowsFit:
-        """From a start within a fraction of a period. Raises ``Unphysical`` where it does not settle."""
+        """Fit from a start within a fraction of a period.
+
+        Raises
+        ------
+        Unphysical
+            If the fit does not converge.
+        """
         state = start
         weights = np.ones(self.geometry.rows)
         cost = self._cost(state, weights)

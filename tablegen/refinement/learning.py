@@ -46,7 +46,12 @@ def learn(line: LinePlan, measured: LineMeasurement, gain: float, harmonics: int
 
     The position error in the imaged windows, times the slope of the model's branch there, is what the drive lacks. It
     is fitted by harmonics, the gentlest of those that fit, after what noise explains of each harmonic of the error was
-    taken off. Raises ``Unphysical`` where the displacement is not that of the scan.
+    taken off.
+
+    Raises
+    ------
+    Unphysical
+        If the displacement is not that of the scan.
     """
     before = departure(line, measured)
     nodes = 4 * max(harmonics, measured.detail) + 32

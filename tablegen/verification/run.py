@@ -59,7 +59,13 @@ def default_target(folder: Path) -> TargetName:
 
 
 def rendering_clocks(folder: Path, axis: Literal["pipelined", "blocks", "serial"]) -> int:
-    """Clocks in which the Verilog of a build renders its tables once. Raises ``NotABuild``."""
+    """Return the clocks in which the Verilog of a build renders its tables once.
+
+    Raises
+    ------
+    NotABuild
+        If the folder has no readable manifest.
+    """
     from tablegen.verification.play.placement import Placement
 
     stored, placement = read_build(folder), Placement(axis, fourier=True)

@@ -84,7 +84,12 @@ def calibrate(
     sensor, but from trace and retrace of a lattice and a grating, 256 x 256 with 5 % noise. ``offset_sizes`` are the
     scan voltages, shares of v_max, of the images that give m; none stands for ``OFFSET_SIZE``. With
     ``sizes_from_images`` size and offset are fitted to such images too, drifting and tilted, and not to sizes with
-    ``noise``. Raises ``Unphysical``.
+    ``noise``.
+
+    Raises
+    ------
+    Unphysical
+        If a fit fails.
     """
     axes: dict[str, ScannerAxis] = {}
     fits: dict[str, dict[str, Fit]] = {}

@@ -68,7 +68,7 @@ def own_axes(setup: Setup) -> tuple[str, ...]:
 
 
 def simulate_own(setup: Setup, seed: int, tell: Callable[[str], None] = lambda _: None) -> list[OwnRun]:
-    """Every axis with an operator, with the models that the scanner file allows; without the scan file's refinement.
+    """Simulate every axis with an operator, with the models that the scanner file allows; without refinement.
 
     Raises ``Rejected`` where the scan cannot be built with the operator, and ``Unphysical`` where a departure makes a
     branch run backwards.

@@ -64,9 +64,12 @@ class OwnAxis:
         return replace(axis, factor=axis.factor * (1.0 + share))
 
     def settled(self, volts: Floats, tick_s: float) -> Floats:
-        """Where the axis is, in the middle of each tick, in a period that has been held tick by tick for ever.
+        """Return the settled position in the middle of each tick of a period.
 
-        Raises ``Unphysical`` where a departing branch would run backwards.
+        Raises
+        ------
+        Unphysical
+            If a departing branch would run backwards.
         """
         u = self.driver.share(volts)
         loop = self.operator.loop(float(np.min(u)), float(np.max(u)), self.factor, float(np.mean(u)))

@@ -121,7 +121,10 @@ class Truth(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 def load_truth(source: str | Path = "default") -> Truth:
     """Read a virtual scanner: the name of one of ``BUILT_IN``, or a file.
 
-    Raises ``Rejected`` with every fault of the file.
+    Raises
+    ------
+    Rejected
+        If the file is faulty; the message has every fault.
     """
     path = Path(str(files("tablegen.virtual") / f"{source}.toml")) if source in BUILT_IN else Path(source)
     values, document = read_toml(path, str(path))

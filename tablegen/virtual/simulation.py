@@ -121,7 +121,12 @@ def models_of(setup: Setup) -> tuple[str, ...]:
 def simulate(setup: Setup, scanner: VirtualScanner, model: str) -> Run:
     """Plan a scan with a hysteresis model, and play it on both axes.
 
-    Raises ``Rejected`` where it cannot be played so, and ``ValueError`` where it leaves the virtual scanner's range.
+    Raises
+    ------
+    Rejected
+        If the scan cannot be played so.
+    ValueError
+        If it leaves the virtual scanner's range.
     """
     plan = make_plan(with_model(setup, model))
     asked = tuple(

@@ -67,9 +67,14 @@ def fit_hysteresis(
     drift_order: int | None = None,
     delay_s: float | None = 0.0,
 ) -> HysteresisFit:
-    """Both branches at each turn that was measured; see ``fit_trace`` for what is done to a trace.
+    """Fit both branches at each turn that was measured; see ``fit_trace`` for the treatment of a trace.
 
-    ``rho`` is kept where a turn was measured at one amplitude only. Raises ``Unphysical``, with the trace's name.
+    ``rho`` is kept where a turn was measured at one amplitude only.
+
+    Raises
+    ------
+    Unphysical
+        If a trace does not support the fit; the message has its name.
     """
     driver = Driver.of(v_max)
     fits: list[TraceFit] = []
@@ -88,7 +93,13 @@ def fit_hysteresis(
 
 
 def combined(fits: Sequence[AmplitudeFit], span: float, rho: float, remarks: Sequence[Remark]) -> HysteresisFit:
-    """Amplitudes in any order -> (22) at each turn; remarks of the single ones come first. Raises ``Unphysical``."""
+    """Fit (22) at each turn to amplitudes in any order; remarks of the single ones come first.
+
+    Raises
+    ------
+    Unphysical
+        If the amplitudes make no law.
+    """
     remarks = list(remarks)
     groups: list[list[AmplitudeFit]] = []
     for fit in sorted(fits, key=lambda fit: fit.turn.value):

@@ -69,7 +69,13 @@ class ImageSizes:
 def sizes_of(
     images: Sequence[SampleImage], v_max: Driver | float, sample: KnownSample, acquisition: Acquisition
 ) -> ImageSizes:
-    """Each image's line from turn to turn. Raises ``Unphysical``, with the image's name."""
+    """Fit each image's line from turn to turn.
+
+    Raises
+    ------
+    Unphysical
+        If an image shows no line; the message has its name.
+    """
     sizes: list[ImageSize] = []
     remarks: list[Remark] = []
     for image in images:

@@ -36,9 +36,14 @@ def fit_images(
     retrace_mirrored: bool = False,
     delay_pixels: float = 0.0,
 ) -> HysteresisFit:
-    """Both branches from images of a triangle's scan; see ``fit_pair`` for what is done to a pair.
+    """Fit both branches to images of a triangle's scan; see ``fit_pair`` for the treatment of a pair.
 
-    ``rho`` is kept where there is one amplitude only. Raises ``Unphysical``, with the pair's name.
+    ``rho`` is kept where there is one amplitude only.
+
+    Raises
+    ------
+    Unphysical
+        If a pair does not support the fit; the message has its name.
     """
     driver = Driver.of(v_max)
     fits: list[ImageFit] = []

@@ -32,9 +32,14 @@ class ResonanceFit(Fit):
 
 
 def fit_resonance(frequency_hz: Floats, gain: Floats, phase_deg: Floats | None = None) -> ResonanceFit:
-    """``SecondOrder`` through gain (any unit, errors in proportion) and phase (degrees, a lag is negative).
+    """Fit ``SecondOrder`` to gain (any unit, errors in proportion) and phase (degrees, a lag is negative).
 
-    Without a phase the delay cannot be told and is 0. Raises ``Unphysical``.
+    Without a phase the delay cannot be told and is 0.
+
+    Raises
+    ------
+    Unphysical
+        If the points show no resonance.
     """
     order = np.argsort(frequency_hz, kind="stable")
     f, g = frequency_hz[order], gain[order]

@@ -43,14 +43,18 @@ def fit_trace(
     drift_order: int | None = None,
     delay_s: float | None = 0.0,
 ) -> TraceFit:
-    """Both branches of one trace: times ascending (s), drive at the piezo (V), displacement (any unit).
+    """Fit both branches of one trace: times ascending (s), drive at the piezo (V), displacement (any unit).
 
     Every sample is fitted at its own phase, so that periods are aligned to a fraction of a sample and averaged,
     whatever the sampling rate. The first ``settle_periods`` are left out (of three periods or more the first, if not
     given). Drift is a polynomial of ``drift_order`` over the record: a line, a parabola from two periods on, a cubic
-    from four; creep goes with it as far as these follow it. ``delay_s`` is that of the sensor against the drive;
-    None fits it.
-    Raises ``Unphysical``.
+    from four; creep goes with it as far as these follow it. ``delay_s`` is that of the sensor against the drive; None
+    fits it.
+
+    Raises
+    ------
+    Unphysical
+        If the trace does not support the fit.
     """
     if len(time_s) < _MIN_SAMPLES_PER_PERIOD:
         raise Unphysical(

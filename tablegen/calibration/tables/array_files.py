@@ -27,7 +27,13 @@ def is_array_file(path: Path) -> bool:
 
 
 def columns_of(content: bytes, name: str) -> dict[str, AnyArray]:
-    """Arrays by their names, as they are stored. Raises ``Rejected`` with ``name``."""
+    """Read arrays by their names, as they are stored.
+
+    Raises
+    ------
+    Rejected
+        If the file cannot be read; the message has ``name``.
+    """
     try:
         return dict(_members(content) if content.startswith(b"PK") else _fields(content))
     except (ValueError, zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError) as error:

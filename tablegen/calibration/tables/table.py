@@ -50,7 +50,12 @@ def read_table(path: Path, needed: Sequence[Column], optional: Sequence[Column] 
     ``.npz`` and ``.npy`` are numpy's, with an array or a field a column; everything else is CSV with a header.
 
     Commas, semicolons or tabs separate, whichever the header has; with the latter two a decimal comma is understood.
-    Lines that are blank or begin with # count for nothing. Raises ``Rejected`` with file, line and column.
+    Lines that are blank or begin with # count for nothing.
+
+    Raises
+    ------
+    Rejected
+        If the table is faulty; the message has file, line and column.
     """
     name = shown_path(path)
     expected = [*needed, *optional]
@@ -156,7 +161,13 @@ class _Reader:
             raise Rejected(problems)
 
     def columns(self) -> tuple[dict[str, Floats], Ints]:
-        """By name, and the line of every row. Raises ``Rejected`` with all that was wrong."""
+        """Return the columns by name, and the line of every row.
+
+        Raises
+        ------
+        Rejected
+            If anything was wrong; the message has all of it.
+        """
         self.refuse()
         values = (np.frombuffer(known, dtype=np.float64) for known in self._values)
         columns = {place[1].name: each for place, each in zip(self._places, values, strict=True)}

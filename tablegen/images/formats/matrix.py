@@ -30,9 +30,16 @@ def npy_channels(content: bytes, _: str) -> list[Channel]:
 
 
 def text_channels(content: bytes, name: str) -> list[Channel]:
-    """Rows of numbers; the first tells what separates. Between blanks, tabs and semicolons a comma is a decimal one.
+    """Read rows of numbers; the first row shows the separator.
 
-    Raises ``Rejected`` with the line, or ``ValueError``.
+    Between blanks, tabs and semicolons a comma is a decimal one.
+
+    Raises
+    ------
+    Rejected
+        If a line is faulty; the message has its number.
+    ValueError
+        If the content is no text of numbers.
     """
     mark: str | None = None
     width = 0

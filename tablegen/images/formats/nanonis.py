@@ -36,7 +36,13 @@ _FIRST_ROW: dict[str, FirstRow] = {"up": "bottom", "down": "top"}
 
 
 def sxm_channels(content: bytes, _: str) -> list[Channel]:
-    """Both directions of each signal of a .sxm file. Raises ``ValueError`` with what is wrong."""
+    """Return both directions of each signal of a .sxm file.
+
+    Raises
+    ------
+    ValueError
+        If the content is damaged; the message has the reason.
+    """
     if not content.startswith(_MAGIC):
         raise ValueError("does not begin as a Nanonis file does")
     end = content.find(_END, 0, _MAX_HEADER)

@@ -93,9 +93,12 @@ def _unreadable(error: Exception) -> ValueError:
 
 
 def tiff_tags(content: bytes) -> list[TiffTags]:
-    """Tags of each page that hold one number or a short text, by code; other ones are left out.
+    """Return the tags of each page that hold one number or a short text, by code; others are left out.
 
-    Raises ``ValueError`` where the directories, or what these tags point at, do not end inside the file.
+    Raises
+    ------
+    ValueError
+        If the directories, or what these tags point at, do not end inside the file.
     """
     pages: list[TiffTags] = []
     for order, big, at, count in _directories(content):

@@ -29,7 +29,15 @@ Written = list[tuple[Format, dict[str, bytes]]]
 
 
 def written_files(content: Content, formats: list[Format]) -> Written:
-    """Files that follow from a manifest, by format and name. Raises ``Unphysical``, ``FormatFailed``."""
+    """Write the files that follow from a manifest, by format and name.
+
+    Raises
+    ------
+    Unphysical
+        If the manifest describes no possible scan.
+    FormatFailed
+        If a format cannot write its files.
+    """
     return [(one, files_of(one, content)) for one in formats]
 
 

@@ -111,7 +111,7 @@ _EQUATIONS: dict[str, Callable[[ManifestBranch], ModelBranch]] = {
 
 
 def knows(model: str) -> bool:
-    """Whether the scaling errors of this model can be worked out here; those of installed packages cannot.
+    """Test whether the scaling errors of this model can be computed here; those of installed packages cannot.
 
     Raises ``ValueError`` for a model that nobody has: no build states it.
     """

@@ -41,7 +41,7 @@ class Requests:
         self._refused_commits()
         self._refusals()
         self._clamps()
-        self._held_back()
+        self._slew_limited()
         self._swaps()
         if not self._in_c and self.loader.has_long_tables:
             self._wide_registers()
