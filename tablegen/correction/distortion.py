@@ -81,8 +81,8 @@ class Distortion:
     @property
     def left_out(self) -> tuple[int, int]:
         """The rows at the beginning and at the end that are left out."""
-        kept = ascending(self.y)
-        return kept.start, self.rows + 1 - kept.stop
+        rows_imaged = ascending(self.y)
+        return rows_imaged.start, self.rows + 1 - rows_imaged.stop
 
     @cached_property
     def grid(self) -> tuple[Floats, Floats]:
@@ -156,8 +156,8 @@ class Resampler:
         """
         wide = np.pad(image, _MARGIN, mode="reflect", reflect_type="odd")
         at = np.stack([self.row, self.column]) + _MARGIN
-        found: Floats = map_coordinates(wide, at, order=_ORDER, mode="mirror")
-        return np.where(self.inside, found, np.nan)
+        heights: Floats = map_coordinates(wide, at, order=_ORDER, mode="mirror")
+        return np.where(self.inside, heights, np.nan)
 
 
 def _edges(x: Floats) -> tuple[float, float]:
@@ -175,10 +175,12 @@ def ascending(values: Floats) -> slice:
 
 def _standing(values: Floats) -> int | None:
     """Where the ascending part stands still or goes back; None where it does nowhere."""
-    kept = ascending(values)
-    step = np.diff(values[kept])
+    filled = ascending(values)
+    step = np.diff(values[filled])
     at = int(np.argmin(step))
-    return kept.start + at if not float(step[at]) > _FINEST * float(np.mean(step)) * (0 < at < len(step) - 1) else None
+    return (
+        filled.start + at if not float(step[at]) > _FINEST * float(np.mean(step)) * (0 < at < len(step) - 1) else None
+    )
 
 
 def _inverted(x: Floats, at: Floats) -> Floats:
@@ -188,5 +190,5 @@ def _inverted(x: Floats, at: Floats) -> Floats:
     low, high = _edges(part)
     count = len(part)
     places = np.concatenate([[-_HALF], np.arange(count), [count - _HALF]]) + kept.start
-    found: Floats = np.interp(at, np.concatenate([[low], part, [high]]), places, left=-1.0, right=len(x))
-    return found
+    columns: Floats = np.interp(at, np.concatenate([[low], part, [high]]), places, left=-1.0, right=len(x))
+    return columns

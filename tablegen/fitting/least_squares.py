@@ -96,7 +96,7 @@ def solve(
     )
     if not minimum.success or not np.all(np.isfinite(minimum.x)):
         raise Unphysical("the fit does not converge; check the data for gaps, steps and wrong units")
-    values, left = minimum.x, minimum.fun
+    values, misfit = minimum.x, minimum.fun
     jac = np.asarray(minimum.jac)
     _, size, directions = np.linalg.svd(jac * scales, full_matrices=False)
     size = np.append(size, np.zeros(len(values) - len(size)))
@@ -107,12 +107,12 @@ def solve(
     blind = np.sqrt(np.sum(rows[weak[: len(rows)]] ** 2, axis=0)) > 0.1
     if len(rows) < len(values):  # fewer points than parameters: what no row sees
         blind |= np.sum(rows**2, axis=0) < 0.99
-    freedom = len(left) - len(values)
+    freedom = len(misfit) - len(values)
     if freedom > 0:
-        errors = np.sqrt(np.diag(covariance) * float(left @ left) / freedom)
+        errors = np.sqrt(np.diag(covariance) * float(misfit @ misfit) / freedom)
         blind |= errors * few_points(freedom) > scales
     undetermined = tuple(name for name, is_blind in zip(names, blind, strict=True) if is_blind)
-    return Solution(tuple(names), values, covariance, left, jac, undetermined)
+    return Solution(tuple(names), values, covariance, misfit, jac, undetermined)
 
 
 def with_errors(fit: Callable[[Floats], Solution], values: Floats, errors: Floats) -> Solution:

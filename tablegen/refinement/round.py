@@ -73,8 +73,8 @@ class TraceRound(Round):
     @property
     def recorded(self) -> str:
         """Periods and samples."""
-        found = self.displacement
-        return f"{found.periods:.4g} periods of {self.phase.period_s:.6g} s, {found.samples} samples"
+        displacement = self.displacement
+        return f"{displacement.periods:.4g} periods of {self.phase.period_s:.6g} s, {displacement.samples} samples"
 
 
 def refine(
@@ -236,11 +236,11 @@ def worst_scaling(update: LayerUpdate) -> float:
 def _remarks(
     line: LinePlan, measured: Displacement, update: LayerUpdate, phase: Phase, time_s: Floats
 ) -> tuple[Remark, ...]:
-    found: list[Remark] = []
+    remarks: list[Remark] = []
     size = abs(update.before.size_nm)
     by = size / line.drive.size_nm - 1.0
     if abs(by) > _SIZE_NOTE_LIMIT:
-        found.append(
+        remarks.append(
             spoils(
                 f"the line is {size:.5g} nm where the scan file asks for {line.drive.size_nm:.5g} nm "
                 f"({100.0 * by:+.2f} %); sizes are not learnt: calibrate {line.axis}.size, best before refining",
@@ -250,18 +250,18 @@ def _remarks(
     if update.before.size_nm < 0.0:
         doubt = "; if the sensor counts upwards, time 0 is where the line turns, and this is not to be learnt"
         turned = "the displacement falls where the drive rises; its sign was inverted"
-        found.append(spoils(turned + doubt) if phase.drive is None else Remark(turned))
+        remarks.append(spoils(turned + doubt) if phase.drive is None else Remark(turned))
     if measured.stray is not None:
         at = float(time_s[measured.stray])
-        found.append(Remark(f"the reading at {at:.9g} s is far off the others; it adds noise"))
+        remarks.append(Remark(f"the reading at {at:.9g} s is far off the others; it adds noise"))
     if update.harmonics == 0:
-        found.append(
+        remarks.append(
             Remark("the error is within the noise of the sensor: there is nothing more to learn from this trace")
         )
     elif finished(update):
-        found.append(Remark("most of the remaining error is noise: record more periods, or stop refining"))
+        remarks.append(Remark("most of the remaining error is noise: record more periods, or stop refining"))
     if measured.correlated > 3.0:
-        found.append(
+        remarks.append(
             Remark(
                 f"residuals are correlated over {measured.correlated:.0f} samples: besides noise, they contain drift, "
                 f"hum or what the harmonics leave; standard errors were widened "
@@ -269,10 +269,10 @@ def _remarks(
             )
         )
     if measured.periods < 1.99:
-        found.append(Remark("drift cannot be determined from a single period; record several"))
+        remarks.append(Remark("drift cannot be determined from a single period; record several"))
     if phase.drive is None:
-        found.append(Remark("without drive_v it is not checked that the trace belongs to this build"))
-    return tuple(found)
+        remarks.append(Remark("without drive_v it is not checked that the trace belongs to this build"))
+    return tuple(remarks)
 
 
 def finished(update: LayerUpdate) -> bool:

@@ -39,12 +39,12 @@ def slow_line(plan: Plan, frames: Sequence[LatticeLine]) -> WindowLine:
             f"the whole frame: do not crop it, and leave out the lines of the flyback"
         )
     times = (schedule.up.first + np.arange(rows) + 0.5) / schedule.lines
-    asked = asked_position(line, times)
+    requested = asked_position(line, times)
     phases, covariance = _without_drift(frames, times)
-    straight = np.column_stack([np.ones(rows), asked])
+    straight = np.column_stack([np.ones(rows), requested])
     c = np.linalg.lstsq(straight, phases, rcond=None)[0]
     s = c[1]  # periods in the whole frame, of each wave
-    span = float(np.ptp(asked))
+    span = float(np.ptp(requested))
     most = float(np.max(np.abs(s))) * span
     if most < _MIN_PERIODS:
         raise Unphysical(
@@ -98,9 +98,9 @@ def _same_waves(first: LatticeLine, other: LatticeLine) -> Floats:
     """Express the waves of another frame in those of the first, in whole numbers."""
     one, two = (np.column_stack([f.fit.state.q, _across_rows(f)])[:, : len(f.fit.state.q)] for f in (first, other))
     if one.shape == two.shape:
-        found: Floats = two @ np.linalg.inv(one)
-        whole = np.rint(found)
-        if float(np.max(np.abs(found - whole))) < _SAME_WAVES and abs(float(np.linalg.det(whole))) > 0.5:
+        numbers: Floats = two @ np.linalg.inv(one)
+        whole = np.rint(numbers)
+        if float(np.max(np.abs(numbers - whole))) < _SAME_WAVES and abs(float(np.linalg.det(whole))) > 0.5:
             return whole
     raise Unphysical("the images do not show one sample; give frames that follow each other")
 

@@ -48,8 +48,8 @@ class WindowLine:
 
     def value(self, times: Floats) -> Floats:
         """Where the piezo was, in nm, at times in periods."""
-        found: Floats = self.unit_nm * (self.asked(times) + self.basis(times) @ self.coefficients)
-        return found
+        position: Floats = self.unit_nm * (self.asked(times) + self.basis(times) @ self.coefficients)
+        return position
 
     def error(self, asked: Callable[[Floats], Floats], size_nm: float) -> Floats:
         """Return the coefficients of the reached line less the requested one, in nm."""
@@ -58,10 +58,10 @@ class WindowLine:
     @property
     def groups(self) -> list[list[int]]:
         """Coefficients that are noise or not together: those of a degree."""
-        found: dict[int, list[int]] = {}
+        modes_by_degree: dict[int, list[int]] = {}
         for i, degree in enumerate(mode_degrees(self.degree, self.parts)):
-            found.setdefault(degree, []).append(i)
-        return list(found.values())
+            modes_by_degree.setdefault(degree, []).append(i)
+        return list(modes_by_degree.values())
 
 
 def mode_degrees(degree: int, parts: Parts) -> list[int]:
@@ -86,8 +86,8 @@ def error_modes(
 def averaged(lines: Sequence[WindowLine]) -> WindowLine:
     """Average the same line measured several times, each time with its own noise."""
     degree = min(line.degree for line in lines)
-    kept = [[i for i, d in enumerate(mode_degrees(line.degree, line.parts)) if d <= degree] for line in lines]
-    pairs = list(zip(lines, kept, strict=True))
+    modes = [[i for i, d in enumerate(mode_degrees(line.degree, line.parts)) if d <= degree] for line in lines]
+    pairs = list(zip(lines, modes, strict=True))
     mean = np.mean([line.coefficients[i] for line, i in pairs], axis=0)
     covariance = np.mean([line.line_covariance[np.ix_(i, i)] for line, i in pairs], axis=0) / len(lines)
     return replace(lines[0], degree=degree, coefficients=mean, line_covariance=covariance)
