@@ -173,8 +173,8 @@ class FreeRows:
                 halves.append(half - (half @ parabola) @ parabola.T)
             else:
                 halves.append(half - parabola @ (parabola.T @ half))
-        derivatives: Floats = np.concatenate(halves, axis=1)
-        return derivatives
+        levelled_values: Floats = np.concatenate(halves, axis=1)
+        return levelled_values
 
     def _chunks(self, state: FreeRowsState, lag: bool = False) -> Iterator[_Chunk]:
         """With ``lag`` the last two derivatives are those by factors of what goes on in a line."""
@@ -246,10 +246,10 @@ class FreeRows:
         """1, and less where a row leaves far more than the others."""
         power = np.sqrt(np.mean(self._left(state) ** 2, axis=1))
         usual = _LOUD_ROWS * float(np.median(power))
-        image: Floats = (
+        weights: Floats = (
             np.minimum(1.0, (usual / np.maximum(power, 1e-300)) ** 2) if usual > 0.0 else np.ones(len(power))
         )
-        return image
+        return weights
 
     def _result(self, state: FreeRowsState, weights: Floats) -> FreeRowsFit:
         count, whole = len(state.modes) + len(state.q), np.zeros((self._count(state) + 2,) * 2)
