@@ -76,12 +76,12 @@ class RefinedScan:
     @property
     def before_percent(self) -> float:
         """The measured residual, rms, in percent of the line."""
-        return self.round.lesson.before.rms_percent
+        return self.round.update.before.rms_percent
 
     @property
     def after_percent(self) -> float:
         """The one that is predicted for the next trace."""
-        return self.round.lesson.after.rms_percent
+        return self.round.update.after.rms_percent
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -115,7 +115,7 @@ class RefinedScan:
             raise ValueError("the scan was given as a setup; give the path of its file to write into it")
         found = self.round
         best = None if force else found.best
-        if best is None and (found.refinement is None or not found.lesson.harmonics):
+        if best is None and (found.refinement is None or not found.update.harmonics):
             return b""
         plain = msgspec.json.decode(msgspec.json.encode(best or found.refinement))
         values = {key: value for key, value in plain.items() if value is not None}  # as a file has it

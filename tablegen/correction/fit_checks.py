@@ -171,7 +171,7 @@ def _lattice(waves: Floats, rows: int, columns: int, reach: float) -> list[tuple
 
 
 def _around(rows: int, columns: int, along: float, across: float, reach: float) -> tuple[Ints, ...]:
-    """Indices of the amplitudes that are within ``reach`` periods of a wave."""
+    """Return the indices of the amplitudes that are within ``reach`` periods of a wave."""
     count, last = rows * _PADDING, columns * _PADDING // 2
     low, high = (int(np.round(_PADDING * (along + off))) for off in (-reach, reach))
     bottom, top = (int(np.round(_PADDING * (across + off))) for off in (-reach, reach))
@@ -179,7 +179,7 @@ def _around(rows: int, columns: int, along: float, across: float, reach: float) 
 
 
 def _background(amplitude: Floats, own: Bools, along: float, across: float, shape: tuple[int, int]) -> float:
-    """The rms amplitude around a spot, from the median, which does not see other spots."""
+    """Return the rms amplitude around a spot, from the median, which does not see other spots."""
     part = _around(*shape, along, across, _BESIDE)
     inner = np.zeros(amplitude.shape, bool)
     inner[_around(*shape, along, across, _OWN_WAVE[1])] = True

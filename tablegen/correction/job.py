@@ -118,7 +118,13 @@ class Images:
 
 
 def read_scan(trace: Path, retrace: Path | None, choice: Choice) -> Images:
-    """All channels of one file, or of one for each direction. Raises ``Rejected``."""
+    """Read all channels of one file, or of one for each direction.
+
+    Raises
+    ------
+    Rejected
+        If a file cannot be read or has no such channels.
+    """
     groups: list[tuple[list[ScanImage], bool]] = []
     left_out: list[str] = []
     for path, forward in ((trace, True), (retrace, False)):
@@ -171,7 +177,7 @@ def _check_exchange(groups: Sequence[tuple[list[ScanImage], bool]]) -> None:
 
 
 def _judged(channels: Sequence[ScanImage], ways: Sequence[bool], choice: Choice, first: int) -> tuple[int, ...]:
-    """The trace and the retrace that are compared and fitted; one of them alone where there is no other."""
+    """Return the trace and the retrace that are compared and fitted; one of them if there is no other."""
 
     def named(wanted: str, among: range, way: bool | None) -> int:
         found = [i for i in among if channels[i].channel == wanted and way in (None, ways[i])]
@@ -211,7 +217,15 @@ def _height(channel: ScanImage) -> bool:
 
 
 def by_scanner(images: Images, scanner: Path, taken: OldScan) -> StraightScan:
-    """Put straight by a scanner file. Raises ``Rejected`` and ``Unphysical``."""
+    """Correct images by a scanner file.
+
+    Raises
+    ------
+    Rejected
+        If the scanner file is faulty.
+    Unphysical
+        If the scan cannot have been taken so.
+    """
     model = _model(scanner)
     rate_hz = taken.rate_hz or images.first.line_rate_hz
     if rate_hz is None:
@@ -230,7 +244,7 @@ def by_scanner(images: Images, scanner: Path, taken: OldScan) -> StraightScan:
 
 
 def by_scan_file(images: Images, scan: Path, scanner: Path | None, taken: OldScan) -> StraightScan:
-    """The same of an image of a build: the drive is that of the scan file, the scanner its own unless given."""
+    """Correct an image of a build: the drive is that of the scan file, the scanner its own unless given."""
     setup = load(scan)
     plan = make_plan(setup)
     model = (
@@ -252,7 +266,7 @@ def by_scan_file(images: Images, scan: Path, scanner: Path | None, taken: OldSca
 
 
 def _rows_window(first: float, y: AxisScan, back: bool) -> tuple[float, float]:
-    """The window that begins with the first row, ``first`` of a period."""
+    """Return the window that begins with the first row, ``first`` of a period."""
     if back:
         return 0.0, 1.0 - (first - y.turn) / (1.0 - y.turn)
     return first / y.turn, 1.0
@@ -273,7 +287,7 @@ def _model(scanner: Path) -> ScannerModel:
 
 
 def _axis(model: ScannerModel, axis: Literal["x", "y"], taken: OldAxis, rate_hz: float) -> AxisScan:
-    """A triangle."""
+    """Return the scan of an axis that plays a triangle."""
     driver = model.scanner.driver
     size_v = taken.size_v
     if size_v is None and taken.size_nm is not None:
@@ -325,7 +339,7 @@ def _scanned(
 def by_fit(
     images: Images, taken: OldScan, pitch_nm: float | None = None, lattice_nm: float | None = None
 ) -> tuple[StraightScan, PeriodicScan]:
-    """Put straight by a fit to a periodic sample, and the fit.
+    """Correct images by a fit to a periodic sample; return the fit too.
 
     Raises ``Unphysical`` where there is no fit, or where the image does not support the correction: another cell would
     do as well, the displacement is too large, or trace and retrace do not agree better.

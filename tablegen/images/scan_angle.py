@@ -76,7 +76,7 @@ def running_scan_remarks(images: Iterable[ScanImage]) -> list[Remark]:
 
 
 def _conflict(image: ScanImage, axis: str) -> str:
-    """What is wrong with the angle of an image for this axis, and what to try; empty where it fits."""
+    """Describe the conflict of an image's angle with this axis, and what to try; empty without one."""
     if image.angle_deg is None:
         return ""
     fast, text = fast_axis(image.angle_deg), angle_text(image.angle_deg)

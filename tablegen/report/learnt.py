@@ -19,14 +19,14 @@ _TURNS = np.linspace(0.0, 1.0, 601)
 
 def round_page(found: Round, name: str, sources: Sequence[Source], earlier: Sequence[str], refused: str) -> bytes:
     """The page of a round. ``earlier`` are the comments of rounds before, ``refused`` why it is not learnt from."""
-    axis, lesson = found.line.axis, found.lesson
+    axis, update = found.line.axis, found.update
     findings = worst_first(of_remarks(found.remarks))
-    both = f"{lesson.before.rms_percent:.3g} % rms measured; {lesson.after.rms_percent:.2g} % predicted after it."
+    both = f"{update.before.rms_percent:.3g} % rms measured; {update.after.rms_percent:.2g} % predicted after it."
     verdict = TableCell(f"\u2713 {both}", "good")
     if refused:
         findings.insert(0, Finding("limit", 1.0, refused, "\u2717 not used"))
         verdict = TableCell("\u2717 This trace is not learnt from.", "bad")
-    elif not lesson.harmonics:
+    elif not update.harmonics:
         verdict = TableCell("Nothing was learnt: what is left is noise.", "quiet")
     found_in = [_errors(found), _layer(found)]
     if earlier:
@@ -38,14 +38,14 @@ def round_page(found: Round, name: str, sources: Sequence[Source], earlier: Sequ
 
 
 def _errors(found: Round) -> Section:
-    lesson = found.lesson
+    update = found.update
     rows = []
-    for label, departure in (("measured", lesson.before), ("predicted", lesson.after)):
+    for label, departure in (("measured", update.before), ("predicted", update.after)):
         for side, (rms, largest) in departure.residual_percent.items():
             figures = (rms, largest, departure.scaling_percent[side])
             rows.append(row(f"{side}, {label}", *(f"{value:.3g}" for value in figures)))
-    noise = f"{lesson.chord_noise_percent:.2g} rms of a chord"
-    rows.append(row("noise of it", f"{lesson.noise_percent:.2g}", "", noise))
+    noise = f"{update.chord_noise_percent:.2g} rms of a chord"
+    rows.append(row("noise of it", f"{update.noise_percent:.2g}", "", noise))
     head = ("", "rms residual [% of the line]", "largest [% of the line]", "scaling error [%, peak to peak]")
     parts = (Grid("", head, tuple(rows)), Charts(_residuals(found)))
     return Section("errors", "Measured and predicted", parts, f"{found.recorded}.")
@@ -58,11 +58,11 @@ def round_charts(found: Round, name: str) -> PlottedCharts:
 
 
 def _residuals(found: Round) -> tuple[Chart, ...]:
-    lesson = found.lesson
+    update = found.update
     charts = []
-    points = lesson.before.points
+    points = update.before.points
     for side, x in points.by_side(points.position).items():
-        before, after = (100.0 * one.points.by_side(one.error)[side] for one in (lesson.before, lesson.after))
+        before, after = (100.0 * one.points.by_side(one.error)[side] for one in (update.before, update.after))
         curves = (DrawnCurve("measured", "before", x, before), DrawnCurve("predicted", "forward", x, after))
         if side == "backward":
             curves = (curves[0], DrawnCurve("predicted", "backward", x, after))
@@ -73,9 +73,9 @@ def _residuals(found: Round) -> tuple[Chart, ...]:
 
 
 def _layer(found: Round) -> Section:
-    lesson, bound = found.lesson, found.bound
+    update, bound = found.update, found.bound
     text = (
-        f"Harmonics 1 to {lesson.harmonics} of {bound.used}, at a gain of {bound.gain:g}. It converges while the "
+        f"Harmonics 1 to {update.harmonics} of {bound.used}, at a gain of {bound.gain:g}. It converges while the "
         f"response of the scanner is below {bound.largest_gain:.3g} times the modelled one, or off by less than "
         f"{bound.phase_deg:.3g} degrees."
     )
@@ -83,10 +83,10 @@ def _layer(found: Round) -> Section:
 
 
 def _layer_chart(found: Round) -> Chart:
-    lesson = found.lesson
+    update = found.update
     curves = (
-        DrawnCurve("this round", "other", _TURNS, 100.0 * lesson.change.value(_TURNS), faint=True),
-        DrawnCurve("the layer now", "other", _TURNS, 100.0 * lesson.layer.value(_TURNS)),
+        DrawnCurve("this round", "other", _TURNS, 100.0 * update.change.value(_TURNS), faint=True),
+        DrawnCurve("the layer now", "other", _TURNS, 100.0 * update.layer.value(_TURNS)),
     )
     return Chart(
         "layer",

@@ -29,7 +29,7 @@ def operator_charts(
 
 def _trace(number: int, fit: OperatorFit, line: PeriodicLine, driver: Driver) -> Chart:
     """Left out is what a scan is off that was predicted from the other traces; in the fit is fainter."""
-    inside, outside = fit.left[number], fit.left_out[number]
+    inside, outside = fit.in_fit[number], fit.left_out[number]
     curves = []
     for name, errors in (("in the fit", inside), ("left out", outside)):
         if errors.sides is not None:

@@ -27,7 +27,7 @@ _MOST_CHANGE, _LEAST_BETA = 2.0, 0.01  # of a branch between the line's stroke a
 
 
 def wrong_mismatch(axis: ManifestAxis) -> list[str]:
-    """The mismatch by the laws, if it is not that of the branches at the stroke that is played; of known models."""
+    """Check the stated mismatch against that of the branches at the played stroke; of known models only."""
     expected = axis.certificate.expected
     if expected is None or expected.basis != "laws" or expected.mismatch_percent is None:
         return []
@@ -51,26 +51,26 @@ def wrong_mismatch(axis: ManifestAxis) -> list[str]:
     turn, x = axis.drive.turn, np.linspace(*axis.fourier.window, _POINTS)
     there, back = ((at(target, t) - low) / (high - low) for t in (turn * x, turn + (1.0 - turn) * (1.0 - x)))
     apart = forward.inverse(there) - (1.0 - backward.inverse(1.0 - back))
-    found: dict[str, float | int | None] = {"value": 100.0 * stroke.size * float(np.max(np.abs(apart)))}
-    told: dict[str, float | int | None] = {"value": expected.mismatch_percent.value}
-    return wrong + different_figures(told, found, True, "expected.mismatch_percent.")
+    figures: dict[str, float | int | None] = {"value": 100.0 * stroke.size * float(np.max(np.abs(apart)))}
+    stated: dict[str, float | int | None] = {"value": expected.mismatch_percent.value}
+    return wrong + different_figures(stated, figures, True, "expected.mismatch_percent.")
 
 
 def header_texts(folder: Path, stored: StoredBuild) -> dict[str, str]:
-    """The comments of the headers of a build, by name; one that cannot be read is told of elsewhere."""
+    """Return the comments of the headers of a build by name; another check reports one that cannot be read."""
     name = stored.manifest.name
-    found = {}
+    texts = {}
     for suffix in _HEADERS:
         if f"{name}{suffix}" in stored.manifest.files:
             try:
-                found[f"{name}{suffix}"] = read_text(folder / f"{name}{suffix}", BUILD_FILE, "ascii")
+                texts[f"{name}{suffix}"] = read_text(folder / f"{name}{suffix}", BUILD_FILE, "ascii")
             except (OSError, ValueError):
                 continue
-    return found
+    return texts
 
 
 def wrong_texts(name: str, axis: ManifestAxis, texts: dict[str, str]) -> list[str]:
-    """The headers that expect something else of an axis than its certificate."""
+    """List the headers whose expected figures of an axis differ from its certificate."""
     expected = axis.certificate.expected
     wrong = []
     for file, text in texts.items():
@@ -86,7 +86,7 @@ def wrong_texts(name: str, axis: ManifestAxis, texts: dict[str, str]) -> list[st
 
 
 def _stated(name: str, text: str) -> list[float]:
-    """The numbers of the lines about the scanner in the certificate of an axis."""
+    """Return the numbers of the lines about the scanner in the certificate of an axis."""
     rows = [row.strip(" */") for row in text.splitlines()]
     begin = next((i for i, row in enumerate(rows) if row == f"{name} certificate"), len(rows))
     numbers: list[float] = []
@@ -105,7 +105,7 @@ def _stated(name: str, text: str) -> list[float]:
 
 
 def _figures(expected: ManifestExpected) -> list[tuple[float, float]]:
-    """The numbers that a header states, in its order, each with the room that its digits leave."""
+    """Return the numbers that a header states, in its order, each with the tolerance of its digits."""
     if expected.basis == "laws":
         return [] if expected.mismatch_percent is None else [(expected.mismatch_percent.value, _THREE_DIGITS)]
     figures: list[ManifestFigure | None] = [

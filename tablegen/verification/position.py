@@ -44,8 +44,8 @@ def wrong_position(
         "max_error_lsb": float(np.max(np.abs(errors))),
         "rms_error_lsb": float(np.sqrt(np.mean(errors * errors))),
     }
-    told: dict[str, float | int | None] = {name: getattr(stated, name) for name in figures}
-    wrong = different_figures(told, figures, True, "position.")
+    stated_figures: dict[str, float | int | None] = {name: getattr(stated, name) for name in figures}
+    wrong = different_figures(stated_figures, figures, True, "position.")
     if not scaling_known:
         return len(figures), wrong
     sides, stated_sides = position_scaling(axis, period, errors), stated.scaling_error_percent
@@ -63,20 +63,20 @@ def position_errors(axis: ManifestAxis, period: PlayedPeriod, passage: ManifestP
     output, drive = axis.output, axis.drive
     middle = (drive.v_offset - output.v_zero) / output.v_per_code
     w: Floats = np.asarray(0.5 + (period.runs.at(np.arange(ticks, dtype=np.int64)) - middle) / per_unit)
-    wanted = on_grid(_later(reached(axis), 0.5 / ticks), ticks)
-    found = _measured(passage, w, rate_hz) if passage.response is not None else _stepped(passage, w, rate_hz * ticks)
-    return np.asarray((found - wanted) * per_unit)
+    intended = on_grid(_later(reached(axis), 0.5 / ticks), ticks)
+    position = _measured(passage, w, rate_hz) if passage.response is not None else _stepped(passage, w, rate_hz * ticks)
+    return np.asarray((position - intended) * per_unit)
 
 
 def _later(series: ManifestSeries, by: float) -> ManifestSeries:
-    """A series whose value at t is that of this one at t + by, in periods."""
+    """Return a series whose value at t is that of this one at t + by, in periods."""
     angle = 2.0 * pi * by * np.arange(1, len(series.a) + 1)
     a, b, c, s = np.array(series.a), np.array(series.b), np.cos(angle), np.sin(angle)
     return ManifestSeries((a * c + b * s).tolist(), (b * c - a * s).tolist(), series.a0)
 
 
 def _stepped(passage: ManifestPassage, w: Floats, update_hz: float) -> Floats:
-    """What follows values that are each held for a tick, in the middle of ticks, once it has settled."""
+    """Return the settled response, in the middle of ticks, to values that are each held for a tick."""
     omega_s, quality = 2.0 * pi * (passage.frequency_hz or 0.0) / update_hz, passage.quality or 1.0
     if not (isfinite(omega_s) and omega_s > 0.0):
         raise ValueError("a response without a frequency")
@@ -99,8 +99,8 @@ def _stepped(passage: ManifestPassage, w: Floats, update_hz: float) -> Floats:
     ends = [one[-1] for one in played(0.0, 0.0)]
     begin = np.linalg.solve(np.eye(2) - np.linalg.matrix_power(step, len(values)), ends)
     positions, speeds = (np.array(one[:-1]) for one in played(*begin.tolist()))
-    held = np.array(values)
-    return np.asarray(held + part[0, 0] * (positions - held) + part[0, 1] * speeds)
+    codes = np.array(values)
+    return np.asarray(codes + part[0, 0] * (positions - codes) + part[0, 1] * speeds)
 
 
 def _exponential(matrix: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
@@ -115,7 +115,7 @@ def _exponential(matrix: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
 
 
 def _measured(passage: ManifestPassage, w: Floats, rate_hz: float) -> Floats:
-    """The same behind a measured response: its harmonics, each with the images that it has in held codes."""
+    """Return the response of a measured passage: harmonics, each with its images in held codes."""
     ticks = len(w)
     spectrum = np.fft.fft(w)
     harmonic = np.fft.fftfreq(ticks, 1.0 / ticks)

@@ -122,13 +122,13 @@ def test_lines_that_were_not_measured(
 def test_what_was_measured_is_met_within_its_noise() -> None:
     for kind in (ManyPlays, BoucWen):
         _, fit = identified(kind, SIX)
-        assert max(errors.rms for errors in fit.left) < 0.03
+        assert max(errors.rms for errors in fit.in_fit) < 0.03
 
 
 @pytest.mark.rest
 def test_what_is_left_out_is_larger_than_what_is_left() -> None:
     _, fit = identified(ManyPlays, TEN)
-    assert np.median([e.rms for e in fit.left_out]) > np.median([e.rms for e in fit.left])
+    assert np.median([e.rms for e in fit.left_out]) > np.median([e.rms for e in fit.in_fit])
     assert len(fit.operator.lines) == len(TEN)
 
 

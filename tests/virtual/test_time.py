@@ -149,7 +149,7 @@ def test_drive_and_trigger_name_the_same_instant(tmp_path: Path) -> None:
     by_drive, by_trigger = (one.phase.turns for one in found)
     assert np.max(np.abs(by_drive - by_trigger)) < 0.01 / line.program.ticks
     for one in found:
-        assert one.lesson.before.rms_percent < AGREES
+        assert one.update.before.rms_percent < AGREES
 
 
 def test_the_staircase_itself_is_late_by_half_a_tick_and_counted_so(tmp_path: Path) -> None:

@@ -32,9 +32,14 @@ class ResonanceFit(Fit):
 
 
 def fit_resonance(frequency_hz: Floats, gain: Floats, phase_deg: Floats | None = None) -> ResonanceFit:
-    """``SecondOrder`` through gain (any unit, errors in proportion) and phase (degrees, a lag is negative).
+    """Fit ``SecondOrder`` to gain (any unit, errors in proportion) and phase (degrees, a lag is negative).
 
-    Without a phase the delay cannot be told and is 0. Raises ``Unphysical``.
+    Without a phase the delay cannot be told and is 0.
+
+    Raises
+    ------
+    Unphysical
+        If the points show no resonance.
     """
     order = np.argsort(frequency_hz, kind="stable")
     f, g = frequency_hz[order], gain[order]
@@ -130,8 +135,7 @@ def _response(f: Floats, x: Floats) -> tuple[Floats, Floats]:
 
 
 def _best(f: Floats, g: Floats, phase: Floats | None) -> Solution:
-    """The best of several starts: the highest point is the resonance unless another one is higher."""
-
+    """Return the best of several starts: the highest point is the resonance unless another one fits better."""
     weight = np.ones(2)
 
     def residuals(x: Floats) -> Floats:
@@ -150,11 +154,11 @@ def _best(f: Floats, g: Floats, phase: Floats | None) -> Solution:
             # What a second-order lag of at most half a turn leaves at the highest frequency is the delay's.
             start.append(max(-(float(phase[-1]) + (pi if f[-1] > at else 0.0)) / (2.0 * pi * float(f[-1]) / at), 0.0))
         try:
-            found = solve(residuals, start, names, [1.0, 0.3, 1.0, 1.0][: len(start)])
+            solution = solve(residuals, start, names, [1.0, 0.3, 1.0, 1.0][: len(start)])
         except Unphysical:
             continue
-        if best is None or found.residuals @ found.residuals < best.residuals @ best.residuals:
-            best = found
+        if best is None or solution.residuals @ solution.residuals < best.residuals @ best.residuals:
+            best = solution
     if best is None:
         raise Unphysical("no resonance fits this response; is it gain, and phase_deg, against frequency?")
     for _ in range(2 if phase is not None else 0):  # gain and phase each by its own scatter

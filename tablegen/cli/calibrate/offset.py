@@ -9,12 +9,12 @@ from tablegen.cli.calibrate.options import optional_data
 from tablegen.cli.calibrate.run import Common, driver_of, finish, read_columns, shared_options, size_law
 from tablegen.cli.images.samples import (
     CommandOfOffsetImages,
+    acquisition_of,
     image_option,
     read_sample_image,
     refuse_sample,
     sample_of,
     sample_options,
-    taking_of,
 )
 from tablegen.cli.shared.common import fail
 from tablegen.cli.shared.exit_status import ExitStatus
@@ -102,14 +102,14 @@ def _of_images(common: Common, images: tuple[tuple[float, float, Path, Path], ..
     from tablegen.calibration.laws.offset import OffsetFit
     from tablegen.calibration.laws.offset_sizes import OffsetSizesFit, fit_offset_sizes
 
-    sample, taking = sample_of(given), taking_of(given)
+    sample, acquisition = sample_of(given), acquisition_of(given)
     read = [read_sample_image(size, offset, trace, retrace, given) for size, offset, trace, retrace in images]
     driver = driver_of(common)
     law = size_law(common, driver, "--image")
     size_v, offset_v = (np.array([row[i] for row in images]) for i in (0, 1))
 
     def fit() -> OffsetFit | OffsetSizesFit:
-        found = sizes_of([image for image, _ in read], driver, sample, taking)
+        found = sizes_of([image for image, _ in read], driver, sample, acquisition)
         apparent, errors = apparent_of(found, law, driver, sample)
         one = fit_offset_sizes(offset_v, apparent, size_v, driver, law, errors)
         return replace(one, images=found.images, remarks=found.remarks + one.remarks)

@@ -22,12 +22,12 @@ from tablegen.cli.calibrate.run import (
 from tablegen.cli.images.samples import (
     PAIR_NAME,
     CommandOfOperatorPairs,
+    acquisition_of,
     image_option,
     read_sample_image,
     refuse_sample,
     sample_of,
     sample_options,
-    taking_of,
 )
 from tablegen.cli.shared.common import fail, written
 from tablegen.cli.shared.exit_status import ExitStatus
@@ -181,7 +181,7 @@ def _page(
                 *(out.rms, out.scaling, out.mismatch, out.size),
             ),
         )
-        for line, left, out in zip(lines, fit.left, fit.left_out, strict=True)
+        for line, left, out in zip(lines, fit.in_fit, fit.left_out, strict=True)
     ]
     advice = f"a trace of {further.size_v:.3g} V at {further.offset_v:.3g} V would help most"
     files = list(dict.fromkeys(one.source for one in sources))
@@ -200,11 +200,11 @@ def _imaged(
 
     if not images:
         return []
-    sample, taking = sample_of(given), taking_of(given)
+    sample, acquisition = sample_of(given), acquisition_of(given)
     lines = []
     for (_, _, rate_hz, *_), (image, _) in zip(images, pairs, strict=True):
         try:
-            lines.append(imaged_line(image, rate_hz, driver, sample, taking)[0])
+            lines.append(imaged_line(image, rate_hz, driver, sample, acquisition)[0])
         except Unphysical as reason:
             fail([f"{image.name}: {reason}"], ExitStatus.WRONG_INPUT)
     return lines
@@ -232,7 +232,7 @@ def _text(
         f"{'':41}  {'in the fit':<23}   left out",
         f"size [V]  offset [V]  rate [Hz]  noise [%]{_MEASURES}  {_MEASURES}  size [%]  trace",
     ]
-    for line, left, without in zip(lines, fit.left, fit.left_out, strict=True):
+    for line, left, without in zip(lines, fit.in_fit, fit.left_out, strict=True):
         noise = 100.0 * line.noise_nm / float(line.displacement_nm.max() - line.displacement_nm.min())
         out.append(
             f"{line.stroke * driver.span:8.4g}  {driver.volts(line.centre):10.4g}  {line.rate_hz:9.4g}  {noise:9.2g}  "
@@ -282,7 +282,7 @@ def _record(
                 "size_percent": out.size,
             },
         }
-        for line, left, out in zip(lines, fit.left, fit.left_out, strict=True)
+        for line, left, out in zip(lines, fit.in_fit, fit.left_out, strict=True)
     ]
     return {
         "kind": OperatorModel.model(),

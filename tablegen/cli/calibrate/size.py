@@ -9,12 +9,12 @@ from tablegen.cli.calibrate.options import optional_data
 from tablegen.cli.calibrate.run import Common, driver_of, finish, in_file, read_columns, shared_options
 from tablegen.cli.images.samples import (
     CommandOfImages,
+    acquisition_of,
     image_option,
     read_sample_image,
     refuse_sample,
     sample_of,
     sample_options,
-    taking_of,
 )
 from tablegen.cli.shared.common import fail
 from tablegen.cli.shared.exit_status import ExitStatus
@@ -123,14 +123,14 @@ def _of_images(
     from tablegen.calibration.laws.image_sizes import sizes_of
     from tablegen.calibration.laws.size import SizeFit, fit_size
 
-    sample, taking = sample_of(given), taking_of(given)
+    sample, acquisition = sample_of(given), acquisition_of(given)
     read = [read_sample_image(volts, None, trace, retrace, given) for volts, trace, retrace in images]
     driver = driver_of(common)
     base = base_nm or in_file(common, "size", "base_nm") or 200.0
     drive = np.array([image.v_scan for image, _ in read])
 
     def fit() -> SizeFit:
-        found = sizes_of([image for image, _ in read], driver, sample, taking)
+        found = sizes_of([image for image, _ in read], driver, sample, acquisition)
         law = fit_size(drive, found.nm, driver, base, threshold, errors_nm=found.errors_nm, shared=found.shared)
         return replace(law, images=found.images, remarks=found.remarks + law.remarks)
 

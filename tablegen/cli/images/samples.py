@@ -13,7 +13,7 @@ from tablegen.cli.shared.exit_status import ExitStatus
 from tablegen.cli.shared.plot import PlottingCommand
 
 if TYPE_CHECKING:
-    from tablegen.calibration.laws.image_sizes import KnownSample, SampleImage, Taking
+    from tablegen.calibration.laws.image_sizes import Acquisition, KnownSample, SampleImage
     from tablegen.images.files import ScanImage
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -107,7 +107,7 @@ def constant_options(command: F) -> F:
 
 
 def sample_options(command: F) -> F:
-    """Add what says of the sample and of the images; ``sample_of`` and ``taking_of`` read it."""
+    """Add what says of the sample and of the images; ``sample_of`` and ``acquisition_of`` read it."""
     options = [
         *_CONSTANTS,
         click.option(
@@ -158,11 +158,13 @@ def refuse_sample(given: dict[str, Any]) -> None:
             raise click.UsageError(f"--{name.replace('_', '-')} is for images, of --image")
 
 
-def taking_of(given: dict[str, Any]) -> "Taking":
+def acquisition_of(given: dict[str, Any]) -> "Acquisition":
     """How images were taken, by the options."""
-    from tablegen.calibration.laws.image_sizes import Taking
+    from tablegen.calibration.laws.image_sizes import Acquisition
 
-    return Taking(given["turn"], given["window"], given["retrace_mirrored"], given["delay_pixels"], given["aspect"])
+    return Acquisition(
+        given["turn"], given["window"], given["retrace_mirrored"], given["delay_pixels"], given["aspect"]
+    )
 
 
 def read_sample_image(

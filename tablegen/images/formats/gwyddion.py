@@ -37,7 +37,13 @@ class DataField:
 
 
 def gwy_channels(content: bytes, _: str) -> list[Channel]:
-    """The data fields of a .gwy file as channels. Raises ``ValueError`` with what is wrong."""
+    """Return the data fields of a .gwy file as channels.
+
+    Raises
+    ------
+    ValueError
+        If the content is damaged; the message has the reason.
+    """
     channels = []
     for field in data_fields(content):
         width, height = (None if side is None else side * 1e9 for side in (field.width_m, field.height_m))
@@ -47,7 +53,13 @@ def gwy_channels(content: bytes, _: str) -> list[Channel]:
 
 
 def data_fields(content: bytes) -> list[DataField]:
-    """The data fields, by number. Raises ``ValueError`` with what is wrong."""
+    """Return the data fields, by number.
+
+    Raises
+    ------
+    ValueError
+        If the content is damaged; the message has the reason.
+    """
     if content[:4] != _MAGIC:
         raise ValueError("does not begin as a Gwyddion file does")
     _, outer, _ = _object(content, 4, len(content))
@@ -68,7 +80,7 @@ def data_fields(content: bytes) -> list[DataField]:
 
 
 def _angle(content: bytes, at: int, end: int) -> float | None:
-    """The scan angle of metadata in degrees, as instruments call it; None where it is not there."""
+    """Return the scan angle of metadata in degrees, as instruments name it; None if it is not there."""
     _, inside, _ = _object(content, at, end)
     for key, kind, start, stop in _components(content, *inside):
         letters = "".join(c for c in key.rpartition("::")[2].lower() if c.isalpha())

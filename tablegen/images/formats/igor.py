@@ -34,7 +34,13 @@ _UNITS = ((r"Height|ZSensor|Deflection|Amplitude\d?", "m"), (r"Phase\d?", "deg")
 
 
 def ibw_channels(content: bytes, _: str) -> list[Channel]:
-    """The layers of a wave of two or three dimensions. Raises ``ValueError`` with what is wrong."""
+    """Return the layers of a wave of two or three dimensions (.ibw).
+
+    Raises
+    ------
+    ValueError
+        If the content is damaged; the message has the reason.
+    """
     order = next((order for order in "<>" if content[:2] == struct.pack(f"{order}h", _VERSION)), None)
     if order is None:
         raise ValueError("does not begin as an Igor binary wave of version 5 does, which images are")
@@ -111,16 +117,16 @@ def _planned_lines(note: dict[str, str], rows: int, height_nm: float | None, ste
 
 
 def _note(text: bytes) -> dict[str, str]:
-    """The keys of a note and their values; the first of a key that comes again."""
-    found: dict[str, str] = {}
+    """Return the keys of a note and their values; the first of a repeated key."""
+    keys: dict[str, str] = {}
     for line in re.split(r"[\r\n]+", text.decode("latin-1")):
         key, colon, value = line.partition(":")
         if colon:
-            found.setdefault(key.strip(), value.strip())
-    return found
+            keys.setdefault(key.strip(), value.strip())
+    return keys
 
 
 def _labels(text: bytes, layers: int) -> list[str]:
-    """A label for each layer, after that of the dimension itself; empty where the file has none."""
+    """Return a label for each layer, after that of the dimension itself; empty if the file has none."""
     cells = [text[at : at + _LABEL].split(b"\0")[0].decode("latin-1") for at in range(_LABEL, len(text), _LABEL)]
     return [*cells, *[""] * layers][:layers]

@@ -22,7 +22,13 @@ _MAX_SLOTS = 64
 
 
 def jpk_channels(content: bytes, _: str) -> list[Channel]:
-    """The channels of an image. Raises ``ValueError`` with what is wrong."""
+    """Return the channels of a JPK image.
+
+    Raises
+    ------
+    ValueError
+        If the content is damaged; the message has the reason.
+    """
     if content[:2] == b"PK":
         raise ValueError("is an archive of curves, not of images; export the image as .jpk or .jpk-qi-image")
     pages, tags = tiff_pages(content), tiff_tags(content)
@@ -35,7 +41,7 @@ def jpk_channels(content: bytes, _: str) -> list[Channel]:
 
 
 def _is_preview(at: int, page: TiffImage, own: TiffTags, grid: TiffTags) -> bool:
-    """True for a small picture of the scan, which comes first and has other pixels than the grid."""
+    """Test for a small picture of the scan, which comes first and has other pixels than the grid."""
     if own.get(_NAME) == _PREVIEW:
         return True
     return at == 0 and _COLUMNS in grid and page.shape[1] != grid[_COLUMNS]
@@ -71,11 +77,11 @@ def _load(page: TiffImage, factor: float, offset: float, _: int) -> Matrix:
 
 
 def _scale(own: TiffTags) -> tuple[float, float, str]:
-    """What one step of the values is, what is added, and the unit, by the slot that the instrument shows."""
-    wanted, count = own.get(_DEFAULT_SLOT), own.get(_SLOTS)
+    """Return the size of a step, the offset, and the unit, of the slot that the instrument shows."""
+    default, count = own.get(_DEFAULT_SLOT), own.get(_SLOTS)
     for slot in range(min(int(count), _MAX_SLOTS) if isinstance(count, int) else 0):
         at = slot * _BETWEEN_SLOTS
-        if wanted is None or own.get(_SLOT_NAME + at) != wanted:
+        if default is None or own.get(_SLOT_NAME + at) != default:
             continue
         unit = own.get(_UNIT + at)
         named = unit if isinstance(unit, str) else ""

@@ -36,7 +36,13 @@ _FIRST_ROW: dict[str, FirstRow] = {"up": "bottom", "down": "top"}
 
 
 def sxm_channels(content: bytes, _: str) -> list[Channel]:
-    """Both directions of each signal of a .sxm file. Raises ``ValueError`` with what is wrong."""
+    """Return both directions of each signal of a .sxm file.
+
+    Raises
+    ------
+    ValueError
+        If the content is damaged; the message has the reason.
+    """
     if not content.startswith(_MAGIC):
         raise ValueError("does not begin as a Nanonis file does")
     end = content.find(_END, 0, _MAX_HEADER)
@@ -86,7 +92,7 @@ def _load(content: bytes, kind: str, start: int, shape: tuple[int, int], directi
 
 
 def _tags(header: str) -> dict[str, list[str]]:
-    """The lines below each tag."""
+    """Return the lines below each tag."""
     tags: dict[str, list[str]] = {}
     lines: list[str] = []
     for line in header.splitlines():
@@ -123,13 +129,13 @@ def _blocks(tags: dict[str, list[str]]) -> list[tuple[str, str, Direction]]:
     head, *rows = [line.strip().split("\t") for line in tags.get("DATA_INFO", [])] or [[]]
     try:
         name, unit, direction = (head.index(key) for key in ("Name", "Unit", "Direction"))
-        found = [
+        channels = [
             (row[name].strip(), row[unit].strip(), one)
             for row in rows
             for one in _DIRECTIONS[row[direction].strip().lower()]
         ]
     except (ValueError, KeyError, IndexError):
         raise ValueError("has a table DATA_INFO that does not say Name, Unit and Direction of each row") from None
-    if len(found) > _MAX_BLOCKS:
-        raise ValueError(f"has {len(found)} images; at most {_MAX_BLOCKS} are read")
-    return found
+    if len(channels) > _MAX_BLOCKS:
+        raise ValueError(f"has {len(channels)} images; at most {_MAX_BLOCKS} are read")
+    return channels

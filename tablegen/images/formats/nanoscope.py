@@ -1,4 +1,4 @@
-"""Nanoscope files of Bruker and Veeco (.spm, .000): lists of ``\\key: value`` lines, then integers.
+r"""Nanoscope files of Bruker and Veeco (.spm, .000): lists of ``\key: value`` lines, then integers.
 
 The first row is the bottom one; it is the last in time, and rows are turned, if the frame's direction is Down. Of a
 scan that was stopped only the valid rows are read; its aspect ratio is that of the whole scan.
@@ -25,7 +25,13 @@ _List = dict[str, str]
 
 
 def spm_channels(content: bytes, _: str) -> list[Channel]:
-    """The images of a Nanoscope file. Raises ``ValueError`` with what is wrong."""
+    """Return the images of a Nanoscope file.
+
+    Raises
+    ------
+    ValueError
+        If the content is damaged; the message has the reason.
+    """
     if not content.startswith(b"\\*File list"):
         what = "is a file of force curves, not images" if content.startswith(b"\\*Force file list") else ""
         raise ValueError(what or "does not begin as a Nanoscope file does")
@@ -52,9 +58,9 @@ def _lists(header: str) -> list[tuple[str, _List]]:
         if text.startswith("*"):
             lists.append((text, {}))
         elif lists:
-            found = re.match(r"(@\d+:[^:]*|[^:]*):(.*)", text)
-            if found:
-                lists[-1][1].setdefault(found[1].strip().lower(), found[2].strip())
+            entry = re.match(r"(@\d+:[^:]*|[^:]*):(.*)", text)
+            if entry:
+                lists[-1][1].setdefault(entry[1].strip().lower(), entry[2].strip())
     return lists
 
 
@@ -94,7 +100,7 @@ def _channel(content: bytes, at: int, image: _List, others: _List, scan: _List) 
 
 
 def _valid_rows(image: _List, rows: int) -> slice:
-    """The stored rows that were scanned; all where the file does not say, or says what cannot be."""
+    """Return the stored rows that were scanned; all if the file states no valid number of them."""
     first, count = (image.get(f"valid data {what} y", "") for what in ("start", "len"))
     if not (first.isdecimal() and count.isdecimal() and len(first) < 7 and len(count) < 7):
         return slice(0, rows)
@@ -130,16 +136,16 @@ def _size(image: _List, columns: int, rows: int) -> tuple[float | None, float | 
 
 
 def _scale(text: str, others: _List, stored: int) -> tuple[float, str]:
-    """The unit of the values, and how much of it is one step; steps where the file does not say."""
-    found = _SCALED.match(text)
-    most = positive(found["value"]) if found else None
-    if found is None or most is None:
+    """Return the size of a step of the values, and their unit; steps if the file states none."""
+    scale = _SCALED.match(text)
+    most = positive(scale["value"]) if scale else None
+    if scale is None or most is None:
         return 1.0, "LSB"
     step = most / 256.0**stored
-    if not found["by"]:
-        return step, found["unit"]
-    sensitivity = _SCALED.match(others.get(f"@{found['by'].lower()}", ""))
+    if not scale["by"]:
+        return step, scale["unit"]
+    sensitivity = _SCALED.match(others.get(f"@{scale['by'].lower()}", ""))
     each = positive(sensitivity["value"]) if sensitivity else None
     if sensitivity is None or each is None:
-        return step, found["unit"]
-    return step * each, sensitivity["unit"].removesuffix("/V") or found["unit"]
+        return step, scale["unit"]
+    return step * each, sensitivity["unit"].removesuffix("/V") or scale["unit"]

@@ -19,7 +19,7 @@ from tablegen.verification.checks.scaling import (
     rounded_scaling,
     scaling_figures,
 )
-from tablegen.verification.checks.shaped import told_of
+from tablegen.verification.checks.shaped import stated_shaping
 from tablegen.verification.expected_figures import header_texts, wrong_mismatch, wrong_texts
 from tablegen.verification.position import wrong_position
 
@@ -59,12 +59,12 @@ def check_certificates(stored: StoredBuild, same_version: bool, folder: Path | N
 
 def _wrong_rounded(stated: ManifestShaped, sides: dict[str, float] | None, exact: bool) -> list[str]:
     """Scaling errors without shaping that are others; ``sides`` are None where they cannot be known."""
-    told, name = stated.rounded.scaling_error_percent, "shaped.rounded.scaling_error_percent"
+    sides_stated, name = stated.rounded.scaling_error_percent, "shaped.rounded.scaling_error_percent"
     if sides is None:
         return []
-    if sides.keys() != told.keys():
-        return [f"certificate.{name} has {', '.join(told) or 'no direction'}"]
-    return different_figures(told, sides, exact, f"{name}.")
+    if sides.keys() != sides_stated.keys():
+        return [f"certificate.{name} has {', '.join(sides_stated) or 'no direction'}"]
+    return different_figures(sides_stated, sides, exact, f"{name}.")
 
 
 def _check(
@@ -74,12 +74,12 @@ def _check(
     schedule = stored.program.schedule
     rate_hz = float(schedule.line_rate if name == "x" else schedule.frame_rate)
     shaped = period.shaped_by(float(schedule.update_rate_hz))
-    found = period.figures(rate_hz, shaped)
+    computed = period.figures(rate_hz, shaped)
     gentle = axis.fourier.max_scaling_error_percent is not None
     if gentle or axis.certificate.peak_acceleration is not None:
-        found["peak_acceleration"] = peak_acceleration(axis) if gentle else None
-    told = {key: getattr(axis.certificate, key) for key in found}
-    wrong, count = different_figures(told, found, period.is_whole), len(found)
+        computed["peak_acceleration"] = peak_acceleration(axis) if gentle else None
+    stated_figures = {key: getattr(axis.certificate, key) for key in computed}
+    wrong, count = different_figures(stated_figures, computed, period.is_whole), len(computed)
     misplaced = wrong_passage(axis, rate_hz)
     wrong += misplaced
     if not misplaced and (same_version or axis.certificate.position is not None):
@@ -88,7 +88,7 @@ def _check(
     if shaped is not None:
         figures = shaped.figures()
         count += len(figures)
-        wrong += different_figures(told_of(axis.certificate.shaped), figures, period.is_whole, "shaped.")
+        wrong += different_figures(stated_shaping(axis.certificate.shaped), figures, period.is_whole, "shaped.")
         if same_version and knows(axis.drive.model) and axis.certificate.shaped is not None:
             wrong += _wrong_rounded(axis.certificate.shaped, rounded_scaling(axis, period, shaped), period.is_whole)
     if same_version and knows(axis.drive.model):
@@ -110,7 +110,7 @@ def _check(
         wrong += wrong_expectations(axis)
         wrong += wrong_mismatch(axis)
         wrong += wrong_texts(name, axis, texts)
-    step = found["largest_step"]
+    step = computed["largest_step"]
     if isinstance(step, int) and step > axis.output.max_step:
         wrong.append(f"output.max_step is {axis.output.max_step}, the words step by {step}")
     failure = f"{name}: {some([f'axes.{name}.{one}' for one in wrong])}" if wrong else None

@@ -10,7 +10,7 @@ from tablegen.verification.checks.scaling import OPERATOR
 
 
 def wrong_expectations(axis: ManifestAxis) -> list[str]:
-    """What no build of this version states."""
+    """List expectations that no build of this version states."""
     expected, layer = axis.certificate.expected, axis.fourier.refinement is not None
     if expected is None:
         return ["certificate.expected is missing, and the operator says it"] if _by_operator(axis) and not layer else []
@@ -29,10 +29,10 @@ def _wrong(axis: ManifestAxis, expected: ManifestExpected) -> Iterator[str]:
     both, traces = axis.fourier.directions == "both", expected.basis == "traces"
     sides = (["forward", "backward"] if both else ["forward"]) if traces else []
     for name in ("rms_percent", "scaling_percent"):
-        found = getattr(expected, name)
-        if sorted(found) != sorted(sides):
-            yield f"{name} has {', '.join(found) or 'no direction'}, not {', '.join(sides) or 'none'}"
-        for side, figure in found.items():
+        figures = getattr(expected, name)
+        if sorted(figures) != sorted(sides):
+            yield f"{name} has {', '.join(figures) or 'no direction'}, not {', '.join(sides) or 'none'}"
+        for side, figure in figures.items():
             if figure.value < 0.0 or (figure.uncertainty or 0.0) < 0.0:
                 yield f"{name}.{side} is below 0"
     for name, due in (("mismatch_percent", both), ("size_percent", traces), ("distance_percent", traces)):

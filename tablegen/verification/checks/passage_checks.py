@@ -14,7 +14,7 @@ _SAME = 1e-9  # of the largest harmonic; both ways are in float64
 
 
 def wrong_passage(axis: ManifestAxis, rate_hz: float) -> list[str]:
-    """A passage that is not the one of the axis: the response that takes harmonics to their target, or their band."""
+    """Check the passage against the axis: the response that takes harmonics to their target, or their band."""
     stated, resonance = axis.certificate.shaped, axis.drive.resonance
     if (stated is None) != (axis.output.shaping is None):
         return [
@@ -33,7 +33,7 @@ def wrong_passage(axis: ManifestAxis, rate_hz: float) -> list[str]:
 
 
 def _wrong_response(axis: ManifestAxis, rate_hz: float) -> list[str]:
-    """The response behind which the position of an unshaped axis is judged, if it is not the one of the axis."""
+    """Check the response behind which the position of an unshaped axis is judged."""
     stated, resonance = axis.certificate.position, axis.drive.resonance
     if stated is None or resonance is None:
         return []
@@ -51,10 +51,10 @@ def _follows(axis: ManifestAxis, passage: ManifestPassage, rate_hz: float) -> bo
     f_hz: Floats = rate_hz * np.arange(1, axis.fourier.harmonics + 1, dtype=np.float64)
     if passage.response is not None and f_hz[-1] > passage.response.hz[-1]:
         return False
-    held = (np.array(played.a) - 1j * np.array(played.b)) * (real + 1j * imaginary)
-    arrives = np.asarray(held * passes(passage, f_hz))
-    wanted = np.array(target.a) - 1j * np.array(target.b)
-    return bool(np.max(np.abs(arrives - wanted)) <= _SAME * max(float(np.max(np.abs(wanted))), 1e-300))
+    output = (np.array(played.a) - 1j * np.array(played.b)) * (real + 1j * imaginary)
+    arrives = np.asarray(output * passes(passage, f_hz))
+    intended = np.array(target.a) - 1j * np.array(target.b)
+    return bool(np.max(np.abs(arrives - intended)) <= _SAME * max(float(np.max(np.abs(intended))), 1e-300))
 
 
 def _is_resonance(axis: ManifestAxis, passage: ManifestPassage) -> bool:

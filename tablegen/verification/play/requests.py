@@ -41,7 +41,7 @@ class Requests:
         self._refused_commits()
         self._refusals()
         self._clamps()
-        self._held_back()
+        self._slew_limited()
         self._swaps()
         if not self._in_c and self.loader.has_long_tables:
             self._wide_registers()
@@ -68,7 +68,7 @@ class Requests:
         self._ticks(_RESTING_TICKS)
 
     def _without_a_program(self) -> None:
-        """The codes of power-up hold, and there is nothing to start or to commit."""
+        """Request a start and a commit while there is no program: the codes of power-up hold."""
         self.script.commit_unfit()
         self._ticks(_RESTING_TICKS)
         self._rest("at power-up")
@@ -81,7 +81,7 @@ class Requests:
         self._ticks(1)
 
     def _first_program(self) -> DualProgram:
-        """It starts with the tick that takes it, and parks while its codes are on their way."""
+        """Load the first program, which starts with the tick that takes it and parks while codes are under way."""
         script = self.script
         program = self.loader.load("free")
         script.come_to_rest()
@@ -97,7 +97,7 @@ class Requests:
         return program
 
     def _with_next_tick(self, *names: str, frames: int = 0) -> None:
-        """Requests on the clock of the first tick after a rest, once a commit came through."""
+        """Put requests on the clock of the first tick after a rest, once a commit came through."""
         script, pace = self.script, self.placement.tick_clocks
         script.wait(script.commit_clocks + 1)
         script.tick_every(pace)
@@ -183,7 +183,7 @@ class Requests:
         self._ticks(line + 7)
 
     def _refusals(self) -> None:
-        """A program that waits: writes are refused, it is withdrawn, or emptied by a reset."""
+        """Play with a pending program: writes are refused, it is withdrawn, or emptied by a reset."""
         script, loader = self.script, self.loader
         line = script.model.playing.schedule.ticks if script.model.playing else 1
         for empties in ("withdraw", "reset"):
@@ -219,7 +219,7 @@ class Requests:
         self._ticks((line // 2 - self.script.model.tick) % line + 1)
 
     def _clamps(self) -> None:
-        """A program that clamps at both limits of both axes; faults are counted, and forgotten on request."""
+        """Play a program that clamps at both limits of both axes; faults are counted, and cleared on request."""
         script = self.script
         line = script.model.playing.schedule.ticks if script.model.playing else 1
         program = self.loader.load("clamped")
@@ -232,8 +232,8 @@ class Requests:
             self._ticks(program.schedule.ticks)
         self._rest("with codes that clamp, after faults were cleared")
 
-    def _held_back(self) -> None:
-        """A program whose steps are too large, up and down: the guard holds them, and says so."""
+    def _slew_limited(self) -> None:
+        """Play a program whose steps are too large, up and down: the guard limits them, and reports it."""
         script = self.script
         line = script.model.playing.schedule.ticks if script.model.playing else 1
         program = self.loader.load("held")
@@ -308,7 +308,7 @@ class Requests:
         script.request("withdraw", "clear_faults")
 
     def _discards(self, words: list[int], address: int, word: int) -> None:
-        """What becomes of an idle program with a word that does not fit."""
+        """Check that an idle program with an invalid word is discarded."""
         script = self.script
         for discards in ("withdraw", "reset"):
             script.write(PROGRAM, words)
@@ -323,7 +323,7 @@ class Requests:
             script.request("clear_faults")
 
     def _unused_addresses(self) -> None:
-        """Registers and regions that a device does not have: what is written there is ignored."""
+        """Write to registers and regions that a device does not have; it ignores them."""
         script = self.script
         for page in _UNUSED_PAGES:
             script.write(PROGRAM, [_NONSENSE] * 2, first=page + 3)
@@ -381,7 +381,7 @@ class Requests:
             script.write_refused(PROGRAM, [_NONSENSE] * words, first)
 
     def _faults_of_the_clock(self) -> None:
-        """Samples that were missed, ticks that came too early: no pixel is valid until they are forgotten."""
+        """Miss samples and tick too early: no pixel is valid until the faults are cleared."""
         script = self.script
         program = self.loader.load("free")
         script.come_to_rest()
@@ -412,7 +412,7 @@ class Requests:
         self._ramp()
 
     def _missed_in_an_image(self, frame: int) -> None:
-        """A pixel that was valid is so no more once a sample after it was missed, and neither is the missed one."""
+        """Miss a sample in an image: the pixel before it becomes invalid, and so does the missed one."""
         script = self.script
         self._until_valid(frame)
         self._rest("in an image")

@@ -109,7 +109,7 @@ def make_session(
     placement: Placement,
     requests: bool = True,
 ) -> BuildSession:
-    """Requests, and then at most some ``most`` ticks of a program whose words come from ``memories``.
+    """Make requests, and then some ``most`` ticks at most of a program whose words come from ``memories``.
 
     Without memories the device has the program already, as the C of a build does, and a driver reports overruns.
     Without ``requests`` the own program alone is played. A swap in mid-frame comes at a random tick, ticks then come
@@ -155,7 +155,7 @@ def make_session(
 
 
 def _slowly(own: _Own) -> None:
-    """A start, with ticks so far apart that a serial converter gets every sample."""
+    """Play a start with ticks so far apart that a serial converter gets every sample."""
     script = own.script
     script.request("arm", "trigger")
     script.tick_every(0)
@@ -170,7 +170,7 @@ def _slowly(own: _Own) -> None:
 
 
 def _swap_and_back(own: _Own, line: int, settle_lines: int) -> bool:
-    """A variation in mid-frame, and the own program again; whether both came in mid-frame."""
+    """Swap to a variation in mid-frame and back; return True if both swaps came in mid-frame."""
     script = own.script
     variation = own.loader.load("free")
     script.pace(own.pace, own.pace)

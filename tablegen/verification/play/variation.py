@@ -32,7 +32,7 @@ _ZERO = 45  # of a shaping of order 3: no power of 2
 
 
 def variation(own: DualProgram, kind: Kind, bank: int, longer: int = 0) -> DualProgram:
-    """A program for the device of ``own`` whose tables are those of a bank, 0 or 1; lines ``longer`` by so many ticks.
+    """Vary a program for the device of ``own``: tables of a bank, 0 or 1, lines ``longer`` by so many ticks.
 
     A ``free`` one neither clamps nor is held back, and images both ways. A ``clamped`` one is held at both limits of
     both axes, a ``held`` one by the slew guard, up and down. ``held`` ones step y once a line, and so does the
@@ -147,24 +147,24 @@ def _words(own: Program, advances: int, bank: int) -> Ints:
 
 
 def _lifted_words(own: Program) -> float:
-    """The amplitude in words of a table whose gain is ``_LIFTING_GAIN``."""
+    """Return the amplitude in words of a table whose gain is ``_LIFTING_GAIN``."""
     gain, _ = _gain(own.output, 0)
     return gain * _PEAK * (1 << (own.bits - 1)) / _LIFTING_GAIN
 
 
 def _is_lifted(own: Program) -> bool:
-    """True if the table has words enough for a variation whose offset is negative."""
+    """Test whether the table has words enough for a variation whose offset is negative."""
     lifted = -_lift(own) / (1 << (own.bits - 1))  # share of the converter's range, since the gain is almost 2
     return _lifted_words(own) >= _LEAST_CODES and own.output.park_code < (lifted - 0.1) * (1 << own.output.dac_bits)
 
 
 def _lift(own: Program) -> int:
-    """The mean of words that a negative gain lifts far above the park code: only a negative offset takes them back."""
+    """Return the mean of words that a negative gain lifts so far that only a negative offset takes them back."""
     return ceil(_lifted_words(own)) + 2 - (1 << (own.bits - 1))
 
 
 def _gain(output: Output, room: int) -> tuple[int, int]:
-    """A gain whose codes are few steps of the build away from its park code, and the code in their middle.
+    """Choose a gain whose codes are few steps of the build from its park code; return it and their middle.
 
     At least ``room`` codes are left to the converter's ends.
     """

@@ -131,16 +131,16 @@ endmodule
 """
 
 
-def wanted_constants(content: Content) -> dict[str, str]:
-    """The constants of the header as the bench writes them."""
+def expected_constants(content: Content) -> dict[str, str]:
+    """Return the constants of the header as the bench writes them."""
     numbers = {name: str(value) for name, value in scan_constants(content).items()}
     return {"HASH": content.hash, **numbers}
 
 
 def bench_text(content: Content, index_bits: tuple[int, int]) -> str:
-    """The module for the header of a build; ``index_bits`` are those of the memories of x and y."""
+    """Return the bench module for the header of a build; ``index_bits`` are those of the memories of x and y."""
     name = content.name.upper()
-    formats = {key: "%h" if key == "HASH" else "%0d" for key in wanted_constants(content)}
+    formats = {key: "%h" if key == "HASH" else "%0d" for key in expected_constants(content)}
     lines = [f'        $fwrite(constants, "{how}\\n", {name}_{key});' for key, how in formats.items()]
     return _MODULE.format(
         header=f"{content.name}.vh",
@@ -154,9 +154,9 @@ def bench_text(content: Content, index_bits: tuple[int, int]) -> str:
 
 
 def bench_parameters(script: str, capture: str, converters: bool) -> dict[str, int | str]:
-    """The files that the bench reads and writes in the folder of its run; words and wires only with ``converters``.
+    """Return the files of the bench, in the folder of its run; words and wires only with ``converters``.
 
-    They are named from the folder in which the model runs, so that the model is the same wherever that is.
+    Their names are relative to the folder in which the model runs, so that the same model serves every folder.
     """
     names = {
         "SCRIPT": script,
@@ -180,7 +180,7 @@ def write_boot_files(folder: Path) -> None:
 
 
 def read_outputs(folder: Path) -> dict[str, tuple[int, int, int]]:
-    """What came of each module beside the sequencer: what it did, what it lost on purpose, and wrong clocks."""
+    """Read the outputs of each module beside the sequencer: samples, deliberate losses, and wrong clocks."""
     lines = (folder / OUTPUTS).read_text("ascii", "replace").splitlines()
     rows = [line.split() for line in lines]
     return {
@@ -189,14 +189,14 @@ def read_outputs(folder: Path) -> dict[str, tuple[int, int, int]]:
 
 
 def different_constants(folder: Path, content: Content) -> list[str]:
-    """What the simulator reads in the header otherwise than the manifest has it."""
-    wanted = wanted_constants(content)
-    found = (folder / CONSTANTS).read_text("ascii", "replace").split()
-    if len(found) != len(wanted):
-        return [f"{content.name}.vh: {len(found)} of its constants were read, there are {len(wanted)}"]
+    """List the constants that the simulator reads in the header otherwise than the manifest has them."""
+    constants = expected_constants(content)
+    readings = (folder / CONSTANTS).read_text("ascii", "replace").split()
+    if len(readings) != len(constants):
+        return [f"{content.name}.vh: {len(readings)} of its constants were read, there are {len(constants)}"]
     return [
         f"{content.name}.vh: {content.name.upper()}_{key} is {value} to the simulator, it is {right} in the manifest"
-        for (key, right), value in zip(wanted.items(), found, strict=True)
+        for (key, right), value in zip(constants.items(), readings, strict=True)
         if value != right
     ]
 
