@@ -5,6 +5,7 @@ from typing import Literal
 
 from msgspec import Struct
 
+from tablegen.base.warnings import FindingCode
 from tablegen.certificate.line_errors import ScalingError
 
 LARGEST_PERCENT = 1.0  # the error that nobody is told of
@@ -25,6 +26,11 @@ class Excess(Struct, frozen=True):
     percent: float
     limit: float
     parts: ScalingError
+
+    @property
+    def code(self) -> FindingCode:
+        """The code of the finding."""
+        return "scaling-error" if self.what == "scaling error" else "size-error"
 
     @property
     def times(self) -> float:

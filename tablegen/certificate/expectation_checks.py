@@ -17,9 +17,9 @@ _GRID = 32  # points per period of the highest harmonic
 
 
 class Doubt(Struct, frozen=True):
-    """A sentence about one axis: a figure in percent, above ``limit``; ``kind`` says which figure it is."""
+    """A sentence about one axis: a figure in percent, above ``limit``; ``code`` says which figure it is."""
 
-    kind: Literal["scaling error", "distance", "resonance"]
+    code: Literal["expected-scaling-error", "operator-distance", "resonance"]
     text: str
     percent: float
     limit: float
@@ -39,7 +39,7 @@ def doubts(line: LinePlan, certificate: Certificate) -> list[Doubt]:
             f"{side}, above {LARGEST_PERCENT:g} %, since these harmonics do not make the waveform that its operator "
             "needs over the window"
         )
-        found.append(Doubt("scaling error", text, figures[side].value, LARGEST_PERCENT))
+        found.append(Doubt("expected-scaling-error", text, figures[side].value, LARGEST_PERCENT))
     position = certificate.position
     if position is not None and max(position.scaling.values(), default=0.0) > RESONANCE_PERCENT:
         side, percent = position.worst
@@ -58,7 +58,7 @@ def doubts(line: LinePlan, certificate: Certificate) -> list[Doubt]:
             f"trace of its operator, so that little is known there; record a trace of {here}, and give it to "
             "`tablegen calibrate operator` with the others"
         )
-        found.append(Doubt("distance", text, expected.distance, FAR_PERCENT))
+        found.append(Doubt("operator-distance", text, expected.distance, FAR_PERCENT))
     return found
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from tablegen.base.warnings import Finding, worst_first
+from tablegen.base.warnings import Finding, axis_name, worst_first
 from tablegen.certificate.certificate import Certificate
 from tablegen.certificate.matching import apart_note, apart_percent
 from tablegen.planning.line_plan import Plan
@@ -30,7 +30,7 @@ def expected_mismatch(axis: str, basis: str, percent: float, uncertainty: float 
     text = (
         f"the model leaves {percent:.3g}{by} % of the line: trace and retrace of {axis} are so far apart, {what}{why}"
     )
-    return Finding("expect", percent, text)
+    return Finding("expect", percent, text, code="model-mismatch", axis=axis_name(axis))
 
 
 def note_findings(plan: Plan) -> list[Finding]:
@@ -44,15 +44,15 @@ def note_findings(plan: Plan) -> list[Finding]:
             f"a pixel is {float(per_pixel):.4g} ticks, so its start is rounded to the tick; "
             f"line rates near {' or '.join(rates)} make it {' or '.join(map(str, whole))} whole ticks"
         )
-        found.append(Finding("note", 50.0 / schedule.ticks, text))
+        found.append(Finding("note", 50.0 / schedule.ticks, text, code="rounded-pixels", axis="x"))
     if apart := apart_note(plan):
-        found.append(Finding("note", apart_percent(plan), apart))
+        found.append(Finding("note", apart_percent(plan), apart, code="image-offset", axis="x"))
     pixels = (
         f"a frame images {schedule.pixels} x {schedule.up.count}"
         + (f" + {schedule.down.count}" if schedule.down.count else "")
         + (" pixels: y rests" if resting else f" pixels: the lines inside the window of y, of {schedule.lines} a frame")
     )
-    found.append(Finding("note", 0.0, pixels))
+    found.append(Finding("note", 0.0, pixels, code="imaged-pixels"))
     for line in plan.lines:
         settles = settling(line.axis, line.drive, schedule)
         if settles is not None and settles.lines > schedule.settle_lines:
@@ -60,8 +60,10 @@ def note_findings(plan: Plan) -> list[Finding]:
                 f"{line.axis} drifts by more than {settles.bound_nm:.3g} nm a frame after the {schedule.settle_lines} "
                 f"settle_lines that follow a change of offset of {settles.offset_v:.4g} V or a smaller scan"
             )
-            found.append(Finding("expect", 100.0 * settles.bound_nm / line.drive.size_nm, text))
+            percent = 100.0 * settles.bound_nm / line.drive.size_nm
+            found.append(Finding("expect", percent, text, code="offset-drift", axis=axis_name(line.axis)))
         if not line.drive.hysteresis.compensates and not line.drive.resting:
             text = f"hysteresis of {line.axis} is not compensated: the scanner file has no model for it"
-            found.append(Finding("spoils", _TYPICAL_PERCENT, text))
+            axis = axis_name(line.axis)
+            found.append(Finding("spoils", _TYPICAL_PERCENT, text, code="uncompensated-hysteresis", axis=axis))
     return worst_first(found)

@@ -46,31 +46,32 @@ def weighed_warnings(setup: Setup, plan: Plan, certificates: Mapping[str, Certif
         share = _share(line, found, certificates[line.axis])
         text = f"{found.text(line.axis)}{_behind_resonance(found, certificates[line.axis])}"
         why = f"{text}; {share}{_advice(setup, plan, line, found)}"
-        warnings.append((abs(found.percent), setup.scan_file.problem(_key(setup, line, found), why)))
+        problem = setup.scan_file.problem(_key(setup, line, found), why)
+        warnings.append((abs(found.percent), problem.coded(found.code, line.axis)))
     for line, doubt in _doubts(plan, certificates):
         key, advice = _size_key(setup, line), ""
-        if doubt.kind == "scaling error":
+        if doubt.code == "expected-scaling-error":
             from tablegen.certificate.remedies import tried_on_operator
 
             tried = tried_on_operator(setup, plan, line, doubt.limit, own=False)
             key, advice = _band_key(setup, line), "; " + _in_words(tried, doubt.percent)
-        elif doubt.kind == "resonance":
+        elif doubt.code == "resonance":
             from tablegen.certificate.remedies import tried_against_resonance
 
             advice = "; " + _in_words(tried_against_resonance(setup, plan, line, doubt.limit), doubt.percent)
         percent = doubt_percent(doubt, certificates[line.axis])
-        warnings.append((percent, setup.scan_file.problem(key, doubt.text + advice)))
+        warnings.append((percent, setup.scan_file.problem(key, doubt.text + advice).coded(doubt.code, line.axis)))
     if apart := apart_warning(plan):
         given = setup.scan.timing.ticks_per_line is not None
         key = f"timing.{'ticks_per_line' if given else 'line_rate_hz'}"
-        warnings.append((apart_percent(plan), setup.scan_file.problem(key, apart)))
+        warnings.append((apart_percent(plan), setup.scan_file.problem(key, apart).coded("image-offset", "x")))
     return sorted(warnings, key=lambda one: -as_printed(one[0]))
 
 
 def doubt_percent(doubt: Doubt, certificate: Certificate) -> float:
     """Of the scan: a distance is one of volts, and tells what the operator may be wrong by."""
     expected = certificate.expected
-    if doubt.kind != "distance" or expected is None:
+    if doubt.code != "operator-distance" or expected is None:
         return doubt.percent
     return max((figure.value + (figure.uncertainty or 0.0) for figure in expected.rms.values()), default=0.0)
 
@@ -115,7 +116,7 @@ def _doubts(plan: Plan, certificates: Mapping[str, Certificate]) -> list[tuple[L
     """A resonance that is driven is told with the error of the codes, where that is told."""
     told = {line.axis for line, found in _found(plan, certificates) if found.what == "scaling error"}
     every = [(line, doubt) for line in plan.lines for doubt in doubts(line, certificates[line.axis])]
-    return [(line, doubt) for line, doubt in every if doubt.kind != "resonance" or line.axis not in told]
+    return [(line, doubt) for line, doubt in every if doubt.code != "resonance" or line.axis not in told]
 
 
 def _behind_resonance(found: Excess, certificate: Certificate) -> str:

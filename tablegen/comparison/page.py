@@ -10,7 +10,6 @@ from tablegen.comparison.difference import ComparedPair
 from tablegen.comparison.side import WORDS
 from tablegen.report.blocks import Grid, Section, TableCell, row
 from tablegen.report.document import document
-from tablegen.report.ranking import Finding
 from tablegen.version import __version__
 
 
@@ -27,10 +26,9 @@ def comparison_page(both: SideBySide, charts: Sequence[Chart]) -> bytes:
         Section("all", "Everything that was compared", tuple(_grids(both.pairs, folded=True))),
     ]
     verdict = TableCell(f"{both.verdict}.", "good" if both.same else "quiet")
-    findings = [Finding("note", 0.0, note) for note in both.notes]
     title = "{} and {}".format(*both.titles)
     foot = f"Made by tablegen {__version__}. All is worked out from the files; nothing is measured."
-    return document(title, verdict, findings, found, "", foot)
+    return document(title, verdict, both.findings, found, "", foot)
 
 
 def _grids(pairs: Sequence[ComparedPair], folded: bool = False) -> list[Grid]:

@@ -9,6 +9,7 @@ from typing import Literal
 import msgspec
 import numpy as np
 
+from tablegen.base.input_errors import Problem
 from tablegen.base.reading import BUILD_FILE, file_sha256, read_bytes
 from tablegen.base.reading import MANIFEST as MANIFEST_KIND
 from tablegen.certificate.certificate import Certificate
@@ -41,8 +42,8 @@ class PlannedScan:
     setup: Setup
     plan: Plan
     certificates: Mapping[str, Certificate]
-    broken: tuple[str, ...] = ()
-    warnings: tuple[tuple[float, str], ...] = ()
+    broken: tuple[Problem, ...] = ()
+    warnings: tuple[tuple[float, Problem], ...] = ()
 
     @property
     def limited(self) -> bool:
