@@ -41,13 +41,13 @@ class PreparedScan:
 
     @classmethod
     def of_plan(cls, plan: Plan) -> "PreparedScan":
-        """The scan of a plan."""
+        """Prepare the scan of a plan."""
         digest = content_hash(plan_record(plan))
         return cls(plan.name, digest, plan.program, plan.x.fourier.in_order, plan.y.fourier.in_order)
 
     @classmethod
     def of_build(cls, folder: Path) -> "PreparedScan":
-        """The scan that ``tablegen build`` wrote into a folder. Raises ``NotABuild``."""
+        """Prepare the scan that ``tablegen build`` wrote into a folder. Raises ``NotABuild``."""
         stored = read_build(folder)
         manifest = stored.manifest
         if stored.own_hash != manifest.hash:
@@ -61,7 +61,7 @@ class PreparedScan:
         return ("x", self.program.x, self.x_fourier), ("y", self.program.y, self.y_fourier)
 
     def image(self, form: Form = "auto", info: DeviceInfo | None = None) -> ProgramImage:
-        """The image to upload: as tables, as Fourier words, or for each axis what is smaller and the device takes.
+        """Make the image to upload: as tables, as Fourier words, or for each axis what is smaller and the device takes.
 
         Raises ``Unsuitable`` where an axis has no Fourier words that would render its table.
         """
@@ -76,7 +76,7 @@ class PreparedScan:
         return make_image(self.program, self.digest, chosen[0], chosen[1])
 
     def like(self, image: bytes) -> ProgramImage:
-        """The image that a device which plays this scan should hold, each axis in the form that this one has."""
+        """Make the image that a device which plays this scan should hold, each axis in the form that this one has."""
         x, y = harmonics_of(image)
         return make_image(self.program, self.digest, self.x_fourier if x else None, self.y_fourier if y else None)
 
@@ -180,6 +180,6 @@ def _converter_of(shape: AxisShape) -> str:
 
 
 def _described(word_bits: int, dac_bits: int, twos_complement: bool, left: bool) -> str:
-    """A code that fills its word is aligned to both sides."""
+    """Describe the format of a code; one that fills its word is aligned to both sides."""
     side = "" if word_bits == dac_bits else ", left-aligned" if left else ", right-aligned"
     return f"of {word_bits} bits, {'twos-complement' if twos_complement else 'offset-binary'}{side}"
