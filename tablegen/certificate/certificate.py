@@ -96,7 +96,7 @@ def broken_limits(
     advise: Callable[[str], str] = lambda _: "",
     hardware_problem: Callable[[str, str, str], Problem] | None = None,
 ) -> list[Problem]:
-    """The limits of the configuration that a certificate exceeds, each with a remedy.
+    """List the limits of the configuration that a certificate exceeds, each with a remedy.
 
     ``advise`` adds to a scaling error of an axis ("x" or "y") what was tried against it. ``hardware_problem`` places
     one of a key of an axis' amplifier; without it that stands in ``file``.
@@ -215,7 +215,7 @@ def _certify(line: LinePlan) -> Certificate:
 
 
 def _position(line: LinePlan, played: EmittedPeriod) -> "ArrivingErrors | None":
-    """What arrives behind the response of the axis."""
+    """Compute the errors of the position behind the response of the axis; None without a response."""
     if line.drive.response is None:
         return None
     from tablegen.certificate.position_errors import position_errors  # few scanners have one
@@ -224,7 +224,7 @@ def _position(line: LinePlan, played: EmittedPeriod) -> "ArrivingErrors | None":
 
 
 def position_scaling(line: LinePlan) -> float:
-    """The larger scaling error of both directions behind the response of an axis, in percent; 0 where none is known."""
+    """Return the larger scaling error of both directions behind the response of an axis, in percent; 0 without one."""
     played = EmittedPeriod(line)
     position = _position(line, played)
     scaling = (
@@ -234,7 +234,7 @@ def position_scaling(line: LinePlan) -> float:
 
 
 def scaling_errors(line: LinePlan) -> dict[str, ScalingError]:
-    """The scaling errors of an axis alone, by the directions that image."""
+    """Compute the scaling errors of an axis, by the directions that image."""
     return _scaling(line, EmittedPeriod(line))
 
 
@@ -243,7 +243,7 @@ def _scaling(line: LinePlan, played: EmittedPeriod) -> dict[str, ScalingError]:
 
 
 def _directions(line: LinePlan) -> dict[str, Sweep]:
-    """The branches that image; none of an axis at rest."""
+    """Return the branches that image; none of an axis at rest."""
     shape = line.drive.shape
     if line.drive.resting:
         return {}

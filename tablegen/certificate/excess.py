@@ -48,7 +48,7 @@ class Excess(Struct, frozen=True):
         return max(found, key=lambda part: part[0])[1]
 
     def text(self, axis: str) -> str:
-        """The error, what it is above, and its parts, in words."""
+        """Return the error, what it is above, and its parts, in words."""
         parts, above = self.parts, []
         if self.what == "scaling error":
             figure = f"{self.percent:.3g} %"
@@ -67,7 +67,7 @@ class Excess(Struct, frozen=True):
 
 
 def excess(scaling: Mapping[str, ScalingError], most: float | None = None) -> Excess | None:
-    """What should be said of the errors of one axis, by direction; None where nothing should.
+    """Return the worst error of one axis that is to be reported; None where there is none.
 
     An uncompensated line is one to compare with only where the scanner file has a hysteresis to compensate. With
     ``most``, a limit of the scan file in percent, that alone counts.

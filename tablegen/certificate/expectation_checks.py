@@ -26,7 +26,7 @@ class Doubt(Struct, frozen=True):
 
 
 def doubts(line: LinePlan, certificate: Certificate) -> list[Doubt]:
-    """What should be said of the expectation of an axis.
+    """List the doubts about the expectation of an axis.
 
     The uncertainty is not counted: it stands beside the figure, and no change of the scan makes it smaller.
     """

@@ -21,7 +21,7 @@ _GRID = 32  # points per period of the highest harmonic
 
 
 def expected_of(line: LinePlan) -> Expectation | None:
-    """What a line should do on the scanner; None where nothing is known.
+    """Compute what a line should do on the scanner; None where nothing is known.
 
     A layer of ``tablegen refine`` was learnt on the scanner, and knows more than the model.
     """
@@ -36,7 +36,7 @@ def expected_of(line: LinePlan) -> Expectation | None:
 
 
 def certified_expectation(line: LinePlan, played: EmittedPeriod) -> Expectation | None:
-    """The same of the emitted integers: what the converter's steps leave is uncertain too.
+    """Compute the expectation of the emitted integers: what the converter's steps leave is uncertain too.
 
     It is added to the uncertainties: nobody knows how steps and departures of the piezo fall together.
     """
@@ -57,7 +57,7 @@ def _less_certain(figure: Figure, by: float) -> Figure:
 
 
 def rounding_mismatch(line: LinePlan) -> float | None:
-    """The largest distance of trace and retrace inside the window, in percent of the line, by the laws.
+    """Compute the largest distance of trace and retrace inside the window, in percent of the line, by the laws.
 
     None where a model has no branches for the stroke that is played.
     """
@@ -84,5 +84,5 @@ def _rounding(line: LinePlan) -> tuple[float, PlayedStroke] | None:
 
 
 def _share(line: LinePlan, target: Expansion, side: str, x: Floats, low: float, high: float) -> Floats:
-    """The drive where the line is at ``x``, from 0 to 1 between its turns."""
+    """Return the drive where the line is at ``x``, from 0 to 1 between its turns."""
     return (target.at(line.drive.shape.times(side, x), 0)[0] - low) / (high - low)

@@ -9,12 +9,12 @@ _MAX_PIXELS_APART = 0.25  # of a pixel; more is a warning
 
 
 def apart_percent(plan: Plan) -> float:
-    """The largest distance of a pixel's two places, in percent of the line; 0 where one direction images."""
+    """Return the largest distance of a pixel's two places, in percent of the line; 0 where one direction images."""
     return 100.0 * retrace_mismatch(plan.schedule, plan.x.drive.turn)
 
 
 def apart_note(plan: Plan) -> str:
-    """A sentence where there is a distance, with the lines that have none."""
+    """Return a sentence on the distance, with the lines that have none; "" where there is no distance."""
     apart = apart_percent(plan)
     if not apart:
         return ""
@@ -29,7 +29,7 @@ def apart_note(plan: Plan) -> str:
 
 
 def apart_warning(plan: Plan) -> str:
-    """The same sentence where the distance is more than a quarter of a pixel."""
+    """Return the sentence of ``apart_note`` where the distance is more than a quarter of a pixel; "" otherwise."""
     low, high = plan.x.band_limit.window
     pixel = 100.0 * (high - low) / plan.schedule.pixels
     return apart_note(plan) if apart_percent(plan) > _MAX_PIXELS_APART * pixel * (1.0 + 1e-9) else ""

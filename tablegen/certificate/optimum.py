@@ -20,7 +20,7 @@ _PER_WAVE = 16  # of the highest harmonic: accelerations outside the windows, an
 
 
 def with_optimum(line: LinePlan, certificate: Certificate) -> Certificate:
-    """A certificate with the peak acceleration and its optimum at the error that the axis keeps, or has.
+    """Add the peak acceleration, and its optimum at the error that the axis keeps or has, to a certificate.
 
     The optimum is None where the waveform is the operator's own, which leaves no error to trade for acceleration. It
     needs scipy.
@@ -32,7 +32,7 @@ def with_optimum(line: LinePlan, certificate: Certificate) -> Certificate:
 
 
 def least_acceleration(straight: Straightness, harmonics: int, percent: float) -> float | None:
-    """max |w''| per period squared, of the line; None where no waveform of so many harmonics keeps the error."""
+    """Return max |w''| per period squared of the line; None where no waveform of so many harmonics keeps the error."""
     from scipy.optimize import linprog
 
     shape, turn, (low, high) = straight.shape, straight.shape.turn, straight.window

@@ -61,7 +61,7 @@ class Remedy:
 
 
 def tried(setup: Setup, plan: Plan, line: LinePlan, found: Excess, most: float | None = None) -> list[Remedy]:
-    """The remedies of one axis that were planned and measured, a key each: the first value that is enough, or the best.
+    """Plan and measure the remedies of one axis, a key each: the first value that is enough, or the best.
 
     ``found`` is what the axis exceeds, ``most`` as in ``excess``. Where a change of the scan alone is enough, no other
     is looked for; of the hardware, both converter and amplifier are. A change that no plan can be made of is left out.
@@ -70,7 +70,7 @@ def tried(setup: Setup, plan: Plan, line: LinePlan, found: Excess, most: float |
 
 
 def tried_on_operator(setup: Setup, plan: Plan, line: LinePlan, most: float, own: bool) -> list[Remedy]:
-    """The same for the scaling error that the operator of an axis expects of its waveform: at most ``most`` percent.
+    """Plan and measure remedies for the scaling error that an operator expects: at most ``most`` percent.
 
     With ``own`` the errors of the emitted waveform count as well.
     """
@@ -91,7 +91,7 @@ def tried_on_operator(setup: Setup, plan: Plan, line: LinePlan, most: float, own
 
 
 def tried_against_resonance(setup: Setup, plan: Plan, line: LinePlan, most: float) -> list[Remedy]:
-    """The same for the resonance that the steps of the codes drive: shaping of the codes, or more of them."""
+    """Plan and measure remedies for a resonance that the steps of the codes drive: shaping, or more codes."""
     hardware = [setup.hardware(one.axis) for one in plan.lines]
     shaping = _keys(setup.hardware(line.axis).where("dac.shaping"))
     dac = setup.hardware(line.axis).dac
@@ -130,7 +130,7 @@ def _tried(ways: Iterable[Iterable[Change]], trial: Callable[[Change], Remedy | 
 
 
 def changed(setup: Setup, change: Change) -> Setup:
-    """The setup with other values at dotted keys of its files; the values are not checked."""
+    """Return the setup with other values at dotted keys of its files; the values are not checked."""
 
     def put(struct: Any, path: list[str], value: Any) -> Any:
         name, *rest = path
@@ -163,7 +163,7 @@ def _planned(setup: Setup, change: Change) -> Plan | None:
 
 
 def _text(setup: Setup, change: Change) -> str:
-    """The change as its keys and values would be written in the files."""
+    """Write the change as keys and values of the files."""
 
     def part(key: str, value: Any) -> str:
         name = f" in {shown_path(Path(Path(setup.scanner_file.name).name))}" if key.startswith(_SCANNER) else ""
@@ -215,7 +215,7 @@ def _keys(places: Iterable[Place]) -> list[str]:
 
 
 def _amplifiers(setup: Setup, plan: Plan, line: LinePlan, found: Excess) -> Iterator[Change]:
-    """A gain that is as much lower as is needed, or as the drives on this amplifier allow, about the middle of them."""
+    """Yield a gain that is as much lower as is needed, or as the drives on this amplifier allow, about their middle."""
     hardware = setup.hardware(line.axis)
     dac, gain = hardware.dac, hardware.amplifier.gain
     gains, biases = _keys(hardware.where("amplifier.gain")), _keys(hardware.where("amplifier.bias_v"))

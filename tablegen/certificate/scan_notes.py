@@ -12,7 +12,7 @@ _TYPICAL_PERCENT = 10.0  # of a piezo whose hysteresis is not compensated: 10 to
 
 
 def scan_findings(plan: Plan, certificates: Mapping[str, Certificate]) -> list[Finding]:
-    """The worst first; warnings, which the certificate tells of, are not among them."""
+    """List the findings of a scan, the worst first; warnings, which the certificate has, are not among them."""
     found = note_findings(plan)
     for line in plan.lines:
         expected = certificates[line.axis].expected
@@ -23,7 +23,7 @@ def scan_findings(plan: Plan, certificates: Mapping[str, Certificate]) -> list[F
 
 
 def expected_mismatch(axis: str, basis: str, percent: float, uncertainty: float | None) -> Finding:
-    """What the model of an axis is expected to leave between trace and retrace."""
+    """Return the finding of what the model of an axis is expected to leave between trace and retrace."""
     by = "" if uncertainty is None else f" \u00b1 {uncertainty:.2g}"
     what = "the operator expects" if basis == "traces" else "the laws expect"
     why = ", since turnarounds are rounded" if basis == "laws" else ""
@@ -34,7 +34,7 @@ def expected_mismatch(axis: str, basis: str, percent: float, uncertainty: float 
 
 
 def note_findings(plan: Plan) -> list[Finding]:
-    """What the plan alone tells, the worst first."""
+    """List the findings that follow from the plan alone, the worst first."""
     schedule, found, resting = plan.schedule, [], plan.y.drive.resting
     per_pixel = schedule.pixel_ticks
     if per_pixel.denominator != 1:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def brief_warnings(plan: Plan, certificates: Mapping[str, Certificate]) -> list[str]:
-    """What exceeds 1 % or the uncompensated line, and what is to be doubted, without remedies: it costs nothing."""
+    """List the errors above 1 % or above the uncompensated line, and the doubts, without remedies, which take time."""
     found = [
         Finding("spoils", abs(one.percent), f"{one.text(line.axis)}{_behind_resonance(one, certificates[line.axis])}")
         for line, one in _found(plan, certificates)
@@ -30,7 +30,7 @@ def brief_warnings(plan: Plan, certificates: Mapping[str, Certificate]) -> list[
 
 
 def scan_warnings(setup: Setup, plan: Plan, certificates: Mapping[str, Certificate]) -> list[Problem]:
-    """The same with remedies, each at the key that the cause stands at; see ``weighed_warnings``."""
+    """List the warnings with remedies, each at the key of its cause; see ``weighed_warnings``."""
     return [problem for _, problem in weighed_warnings(setup, plan, certificates)]
 
 
@@ -113,14 +113,14 @@ def _found(plan: Plan, certificates: Mapping[str, Certificate]) -> list[tuple[Li
 
 
 def _doubts(plan: Plan, certificates: Mapping[str, Certificate]) -> list[tuple[LinePlan, Doubt]]:
-    """A resonance that is driven is told with the error of the codes, where that is told."""
+    """List the doubts of both axes; one on a resonance is left out where the scaling error already names it."""
     told = {line.axis for line, found in _found(plan, certificates) if found.what == "scaling error"}
     every = [(line, doubt) for line in plan.lines for doubt in doubts(line, certificates[line.axis])]
     return [(line, doubt) for line, doubt in every if doubt.code != "resonance" or line.axis not in told]
 
 
 def _behind_resonance(found: Excess, certificate: Certificate) -> str:
-    """What the steps of the codes make of a scaling error behind the resonance that they drive, where that is more."""
+    """Return a scaling error that the resonance makes larger, in words; "" where it does not."""
     position = certificate.position
     if position is None or found.what != "scaling error":
         return ""
@@ -129,7 +129,7 @@ def _behind_resonance(found: Excess, certificate: Certificate) -> str:
 
 
 def _share(line: LinePlan, found: Excess, certificate: Certificate) -> str:
-    """What of the converter, of the table or of the band the scan uses."""
+    """Return how much of the converter, of the table or of the band the scan uses."""
     if found.cause == "quantisation":
         codes, full = certificate.highest_code - certificate.lowest_code + 1, 1 << line.converter.bits
         word = abs(line.codes_per_unit) * line.scale / 2.0**line.program.bits
