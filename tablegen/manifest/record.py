@@ -30,7 +30,7 @@ def plan_record(plan: Plan) -> dict[str, Any]:
 
 
 def certificate_record(certificate: Certificate) -> dict[str, Any]:
-    """A certificate as JSON-ready data, its figures to six significant digits."""
+    """Return a certificate as JSON-ready data, its figures to six significant digits."""
     record: dict[str, Any] = {
         name: _figure(getattr(certificate, name))
         for name in certificate.__struct_fields__
@@ -58,7 +58,7 @@ def certificate_record(certificate: Certificate) -> dict[str, Any]:
 
 
 def _passage(passage: Passage) -> dict[str, Any]:
-    """What applies of it; all points of a measured response."""
+    """Return the fields of a passage that apply; all points of a measured response."""
     response = passage.response
     if response is None:
         return {key: value for key, value in asdict(passage).items() if value is not None}
@@ -87,7 +87,7 @@ def _shaped(shaped: ShapedErrors) -> dict[str, Any]:
 
 
 def _expected(expectation: Expectation) -> dict[str, Any]:
-    """What is known of it."""
+    """Return the known figures of an expectation."""
 
     def pair(figure: Figure) -> dict[str, Any]:
         return {"value": _figure(figure.value), "uncertainty": _figure(figure.uncertainty)}
@@ -149,14 +149,14 @@ def _sequence(schedule: Schedule) -> dict[str, Any]:
 
 
 def _layer(line: LinePlan) -> dict[str, Any]:
-    """What `tablegen refine` learnt; nothing without a layer, so that such a build keeps its hash."""
+    """Return the layer that `tablegen refine` learnt; nothing without one, so that such a build keeps its hash."""
     if line.layer is None:
         return {}
     return {"refinement": {"harmonics": line.layer.harmonics, "a": line.layer.a.tolist(), "b": line.layer.b.tolist()}}
 
 
 def _followed(line: LinePlan) -> dict[str, Any]:
-    """What the piezo is to follow, where the played series does not tell; and what the boost limit left of it."""
+    """Return the target of the piezo, where the played series does not tell it, and what the boost limit left of it."""
     response = line.drive.response
     if response is None:
         return {}
@@ -169,7 +169,7 @@ def _followed(line: LinePlan) -> dict[str, Any]:
 
 
 def _capped(line: LinePlan, harmonics: Floats) -> tuple[Floats, Floats]:
-    """What these harmonics are multiplied by in place of the inverse response."""
+    """Return what these harmonics are multiplied by in place of the inverse response."""
     assert line.drive.response is not None
     return capped_inverse(line.drive.response, harmonics * float(line.rate), line.drive.max_boost_db)[:2]
 
@@ -182,7 +182,7 @@ def _resonance(line: LinePlan) -> dict[str, Any]:
 
 
 def _asked_table(line: LinePlan) -> dict[str, Any]:
-    """What was asked of a table that the build chose; nothing of one that was written."""
+    """Return the request of a table that the build chose; nothing for one that was written."""
     if line.asked_table is None:
         return {}
     return {"asked": {"max_error_lsb": line.asked_table.max_error_lsb, "free": list(line.asked_table.free)}}
