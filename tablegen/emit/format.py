@@ -39,7 +39,7 @@ class Format(ABC):
 
     @abstractmethod
     def files(self, content: Content) -> dict[str, bytes]:
-        """The files of a build by name, without the runtime. Raises ``Unphysical`` for one that it cannot hold."""
+        """Render the files of a build by name, without the runtime. Raises ``Unphysical`` if it cannot hold it."""
 
     def runtime(self) -> list[Path]:
         """Files that go with it unchanged, such as a sequencer."""
@@ -50,7 +50,7 @@ class Format(ABC):
         return self.runtime()
 
     def check(self, folder: Path, content: Content) -> list[Comparison]:
-        """The files in a folder against the content of a manifest: unless overridden, made again and compared."""
+        """Compare the files in a folder with the content of a manifest; unless overridden, by rendering them again."""
         wanted, wrong = self.files(content), []
         for name, right in wanted.items():
             try:
@@ -91,7 +91,7 @@ class Format(ABC):
 
 
 def differing(name: str, found: Mapping[str, int | str], wanted: Mapping[str, int | str]) -> list[str]:
-    """The constants that a header has not, has otherwise, or has beyond those that it is to have."""
+    """List the constants that a header lacks, has with another value, or has beyond those that are expected."""
     wrong = []
     for key, value in wanted.items():
         if key not in found:

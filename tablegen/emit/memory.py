@@ -40,7 +40,7 @@ class Memory(Struct, frozen=True, eq=False):
         return np.array([word & mask for word in self.words], dtype=f"<u{self.word_bytes}").tobytes()
 
     def described(self, content: Content) -> str:
-        """A line for a comment: which words of which build these are."""
+        """Return a line for a comment: which words of which build these are."""
         return f"{content.name}, {self.what}: {len(self.words)} words of {self.bits} bits; plan {content.hash}"
 
 
@@ -51,7 +51,7 @@ def memories(content: Content) -> list[Memory]:
 
 
 def memory_file(words: Ints | Iterable[int], bits: int) -> bytes:
-    """The words, each in as many hexadecimal digits as ``bits`` take."""
+    """Write the words, each in as many hexadecimal digits as ``bits`` take."""
     digits, mask = -(-bits // 4), (1 << bits) - 1
     values = np.asarray(words if isinstance(words, np.ndarray | list) else list(words), dtype=np.int64)
     if len(values) and digits % 2 == 0:  # whole bytes, which are spelled all at once

@@ -8,7 +8,7 @@ from tablegen.manifest.read import StoredBuild
 
 
 def stored_content(stored: StoredBuild) -> Content:
-    """The content of a build, from its manifest alone."""
+    """Return the content of a build, from its manifest alone."""
 
     def axis(name: Literal["x", "y"], program: Program) -> AxisContent:
         found = getattr(stored.manifest.axes, name)

@@ -164,7 +164,7 @@ def leftover_files(folder: Path, files: Iterable[str]) -> list[str]:
 
 
 def _listed(folder: Path, files: Iterable[str]) -> dict[str, str]:
-    """What the manifest in a folder lists beyond these files, with digests; nothing where it is not one of a build.
+    """Read what the manifest in a folder lists beyond these files, with digests; nothing where it is not of a build.
 
     A manifest of another program, or one that somebody has edited, says nothing of what may be removed.
     """

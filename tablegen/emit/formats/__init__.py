@@ -36,13 +36,13 @@ def names() -> list[str]:
 
 
 def own_names() -> list[str]:
-    """The formats of tablegen."""
+    """List the formats of tablegen."""
     return sorted(_own())
 
 
 @cache
 def get(name: str) -> Format:
-    """The format of a name. Raises ``UnknownFormat``."""
+    """Return the format of a name. Raises ``UnknownFormat``."""
     if name in _own():
         found: object = import_module(f"{__name__}.{_own()[name]}").FORMAT
     elif name in _others():
@@ -105,7 +105,7 @@ def _kind(value: object) -> str:
 
 
 def chosen(wanted: Iterable[str]) -> list[Format]:
-    """The formats of these names, each once. Raises ``UnknownFormat``."""
+    """Return the formats of these names, each once. Raises ``UnknownFormat``."""
     return [get(name) for name in dict.fromkeys(wanted)]
 
 
@@ -128,7 +128,7 @@ def _others() -> "dict[str, list[EntryPoint]]":
 
 
 def _loaded(name: str, entries: "list[EntryPoint]") -> object:
-    """What the one entry point of a name leads to."""
+    """Load what the one entry point of a name leads to."""
     entry, *more = entries
     if more:
         packages = " and ".join(sorted(map(distribution, entries)))
