@@ -38,7 +38,7 @@ def make_index(
     formats: Sequence[str],
     content: Callable[[str, str], bytes],
 ) -> Index:
-    """The index of programs, numbered as they come, and the runtime of their formats.
+    """Make the index of programs, numbered as they come, and the runtime of their formats.
 
     ``failed`` are the scans that could not be built, as the index shows them; ``content`` of the name of a program and
     that of a file is what the file holds, and may raise ``OSError``.
@@ -77,7 +77,7 @@ def make_index(
 
 
 def listed_files(folder: Path) -> dict[str, str]:
-    """The files that the index in a directory lists, with their digests; nothing where there is none of ours.
+    """Read the files that the index in a directory lists, with their digests; nothing without an index of tablegen.
 
     Only names that an index of that library can list are among them, whatever else stands in it.
     """
