@@ -71,7 +71,7 @@ class ScanLibrary:
 def state(
     sweep: ScanLibrary, variant: Variant, formats: Sequence[str] | None, inputs: Inputs, written: WrittenRecords
 ) -> Entry | tuple[Any, str]:
-    """The entry of a program that is up to date; otherwise the setup to build, and the digest of its inputs.
+    """Return the entry of a program that is up to date; otherwise the setup to build, and the digest of its inputs.
 
     Its record has to be one that a sweep of this user has written, whatever else stands in the directory. Raises
     ``Rejected``.
@@ -86,7 +86,7 @@ def state(
 
 
 def _inputs(variant: Variant, formats: Sequence[str] | None, inputs: Inputs) -> tuple[Any, str]:
-    """The setup of a scan, and the digest of its inputs. Raises ``Rejected``."""
+    """Load the setup of a scan, and compute the digest of its inputs. Raises ``Rejected``."""
     setup = variant.setup
     wanted = list(formats or setup.scan.emit.formats or DEFAULT_FORMATS)
     try:
@@ -155,7 +155,7 @@ def _current(sweep: ScanLibrary, variant: Variant, entry: Entry, strict: bool) -
 
 
 def _note(sweep: ScanLibrary, variant: Variant, found: "Made | Exception", only_check: bool) -> None:
-    """What a worker has said of a program."""
+    """Note the result of a worker for a program."""
     match found:
         case Made():
             sweep.entries[variant.name] = found.entry
