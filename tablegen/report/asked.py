@@ -69,7 +69,7 @@ def _codes(subject: Subject, axis: str) -> str:
 
 
 def _table(axis: str, entry: ManifestAxis) -> list[tuple[TableCell, ...]]:
-    """A table that the build chose."""
+    """List the properties of a table that the build chose."""
     table = entry.table
     if table.asked is None:
         return []
@@ -85,7 +85,7 @@ def _settles(line: LinePlan, subject: Subject) -> list[tuple[TableCell, ...]]:
 
 
 def verification(subject: Subject) -> Section:
-    """The checks of a record, or how to get one."""
+    """Show the checks of a record, or how to get one."""
     record, title = subject.verified, "What verify found"
     if record is None:
         text = "No record was given. `tablegen verify DIR --junit verify.xml` makes one, `tablegen report --verified "

@@ -54,7 +54,7 @@ def basis(planned: PlannedScan) -> Section:
 
 
 def _comments(file: Document) -> Iterator[tuple[str, str, str]]:
-    """The table below a comment of `calibrate` or `refine`, what it says, and its files."""
+    """Yield the table below a comment of `calibrate` or `refine`, the text of the comment, and its files."""
     if file.lines is None:
         return
     try:

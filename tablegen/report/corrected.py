@@ -89,7 +89,7 @@ def _lattice(scan: StraightScan) -> Chart:
 
 
 def _arrows(right: Floats, down: Floats, bottom_first: bool, scale: float) -> Arrows:
-    """Some of the arrows of a picture, whose rows run downwards, or upwards with the lowest one first."""
+    """Select some of the arrows of a picture, whose rows run downwards, or upwards with the lowest one first."""
     rows, columns = right.shape
     at_row, at_column = _places(rows), _places(columns)
     grid = np.ix_(at_row, at_column)

@@ -14,7 +14,7 @@ _HEAD = ("", "equation", "factor", "after it")
 
 
 def corrections(subject: Subject) -> Section:
-    """A table an axis, and the shape of the hysteresis that is applied."""
+    """Show a table an axis, and the shape of the hysteresis that is applied."""
     tables, charts = [], []
     for at, (axis, entry) in enumerate(subject.axes):
         line = None if subject.planned is None else subject.planned.plan.lines[at]

@@ -27,7 +27,7 @@ _FOOT = f"Made by tablegen {__version__} from measurements whose SHA-256 are abo
 
 
 def fit_page(fit: Fit, axis: str, sources: Sequence[Source], places: Sequence[str], points: bool = False) -> bytes:
-    """The page of a fit. ``places`` are files and lines of its outliers, ``points`` what would be written."""
+    """Render the page of a fit. ``places`` are files and lines of its outliers, ``points`` what would be written."""
     kind = change(fit, []).kind
     meaningless = doubts(fit, points)
     findings = fit_findings(fit, places, points)
@@ -70,7 +70,7 @@ def _error(estimate: Estimate) -> str:
 
 
 def _traces(fit: HysteresisFit) -> Grid:
-    """What each trace, or pair of images, says by itself."""
+    """List the results of each trace, or pair of images, by itself."""
     rows = []
     for branch in fit.branches:
         for trace in branch.traces:
@@ -87,7 +87,7 @@ def _trace(turn: float, trace: AmplitudeFit, at: int, side: str) -> tuple[TableC
 
 
 def fit_charts(fit: Fit, axis: str) -> PlottedCharts:
-    """The data of a calibration with the fit."""
+    """Draw the data of a calibration with the fit."""
     heading = f"{change(fit, []).kind} of {axis}: data and fit"
     return PlottedCharts(heading, tuple(_chart(number, curve) for number, curve in enumerate(fit.curves, 1)), 3)
 
@@ -141,7 +141,7 @@ def operator_page(
     further: str,
     sources: Sequence[Source],
 ) -> bytes:
-    """The page of an operator.
+    """Render the page of an operator.
 
     ``traces`` have a name, size and offset in V, rate in Hz; rms, scaling error and mismatch in percent as they are in
     the fit; and the same with the size where the trace is left out. ``further`` says what to measure next.

@@ -100,7 +100,7 @@ def _images(planned: PlannedScan, x: AxisRun, y: AxisRun, ratio: float) -> tuple
 
 
 def _size(line: LinePlan) -> float:
-    """nm of the imaged window."""
+    """Return the size of the imaged window in nm."""
     return line.drive.window_nm
 
 
@@ -125,7 +125,7 @@ def _about_window(run: AxisRun, line: LinePlan) -> Floats:
 
 
 def _heights(x: Floats, y: Floats, constant: float) -> Floats:
-    """A hexagonal lattice with a spot at the origin."""
+    """Compute a hexagonal lattice with a spot at the origin."""
     wave = 4.0 * np.pi / (np.sqrt(3.0) * constant)
     total = np.zeros(np.broadcast(x, y).shape)
     for turned in (0.0, 60.0, 120.0):

@@ -18,7 +18,7 @@ _TURNS = np.linspace(0.0, 1.0, 601)
 
 
 def round_page(found: Round, name: str, sources: Sequence[Source], earlier: Sequence[str], refused: str) -> bytes:
-    """The page of a round. ``earlier`` are the comments of rounds before, ``refused`` why it is not learnt from."""
+    """Render the page of a round. ``earlier`` are comments of earlier rounds, ``refused`` why it is not learnt from."""
     axis, lesson = found.line.axis, found.lesson
     findings = worst_first(of_remarks(found.remarks))
     both = f"{lesson.before.rms_percent:.3g} % rms measured; {lesson.after.rms_percent:.2g} % predicted after it."
@@ -52,7 +52,7 @@ def _errors(found: Round) -> Section:
 
 
 def round_charts(found: Round, name: str) -> PlottedCharts:
-    """What a round measured, what it predicts, and what it adds to the drive."""
+    """Draw what a round measured, what it predicts, and what it adds to the drive."""
     heading = f"{name}: refinement of {found.line.axis}"
     return PlottedCharts(heading, (*_residuals(found), _layer_chart(found)), 3)
 

@@ -54,7 +54,7 @@ def charts_of(found: list[Section]) -> dict[str, Chart]:
 
 
 def page(subject: Subject, found: list[Section]) -> bytes:
-    """The page of a scan. The same subject gives the same bytes: no date, and no folder of this machine."""
+    """Render the page of a scan. The same subject gives the same bytes: no date, and no folder of this machine."""
     manifest, planned = subject.manifest, subject.planned
     findings = ranked(subject)
     notice = ""

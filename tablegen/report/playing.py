@@ -98,7 +98,7 @@ class PlayedAxis:
 
 
 def played_axes(planned: PlannedScan) -> tuple[PlayedAxis, ...]:
-    """The axes that move."""
+    """Play the axes that move."""
     setup = without_refinement(planned.setup)
     plain = planned.plan if setup is planned.setup else make_plan(setup)
     others = {model: _planned(setup, model) for model in _models(planned)}
@@ -107,7 +107,7 @@ def played_axes(planned: PlannedScan) -> tuple[PlayedAxis, ...]:
 
 
 def without_refinement(setup: Setup) -> Setup:
-    """The same scan without its layers, which were learnt on the scanner itself."""
+    """Return the same scan without its layers, which were learnt on the scanner itself."""
     scan = setup.scan
     if scan.x.refinement is None and scan.y.refinement is None:
         return setup
@@ -116,7 +116,7 @@ def without_refinement(setup: Setup) -> Setup:
 
 
 def _models(planned: PlannedScan) -> list[str]:
-    """The models to compare with: without correction, and beside an operator the laws."""
+    """List the models to compare with: without correction, and beside an operator the laws."""
     found = [models.UNCOMPENSATED]
     for line in planned.plan.lines:
         if isinstance(line.drive.shape, OperatorLine):
@@ -129,7 +129,7 @@ def _models(planned: PlannedScan) -> list[str]:
 
 
 def _planned(setup: Setup, model: str) -> tuple[LinePlan, LinePlan] | str:
-    """The lines of another model, or why there are none."""
+    """Plan the lines of another model, or return why there are none."""
     try:
         return make_plan(with_model(setup, model)).lines
     except Rejected as rejected:

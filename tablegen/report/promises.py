@@ -14,7 +14,7 @@ _HEAD = ("", "figure", "limit", "")
 
 
 def certificate(subject: Subject) -> Section:
-    """A table an axis."""
+    """Show a table of the certificate for each axis."""
     planned = subject.planned
     limits = Limits() if planned is None else planned.plan.limits
     tables = [
@@ -89,7 +89,7 @@ def _scaling(certificate: ManifestCertificate, most: float | None) -> list[tuple
 
 
 def _shaped(shaped: ManifestShaped) -> list[tuple[TableCell, ...]]:
-    """What shaping is for, and what it costs, beside the same without it."""
+    """List what shaping is for, and what it costs, beside the same without it."""
     now, before, rounded = shaped.changes, shaped.rounded.changes, shaped.rounded
     rows = [row("the same without shaping", f"{figure(rounded.rms_error_lsb, 3)} LSB rms", "", "")]
     for side, value in rounded.scaling_error_percent.items():
@@ -105,7 +105,7 @@ _PARTS = ("uncompensated", "total", "band_limit", "quantisation", "model")
 
 
 def _parts(subject: Subject) -> Grid:
-    """What the scaling errors are made of; peaks of the parts are at different places, and do not add up."""
+    """List the parts of the scaling errors; their peaks are at different places, and do not add up."""
     rows = []
     for axis, entry in subject.axes:
         for side, error in (entry.certificate.scaling_error_percent or {}).items():
@@ -117,7 +117,7 @@ def _parts(subject: Subject) -> Grid:
 def _bounded(
     name: str, value: float, limit: float | None, unit: str, advice: float | None = None, signed: bool = False
 ) -> tuple[TableCell, ...]:
-    """A figure beside its limit; without one, above the figure of ``advice``, it is marked too."""
+    """Show a figure beside its limit; without one, above the figure of ``advice``, it is marked too."""
     shown = f"{figure(value, 4, signed)} {unit}"
     if limit is not None:
         good = abs(value) <= limit

@@ -19,7 +19,7 @@ _POINTS = 321
 
 
 def scan_charts(setup: Setup, plan: Plan, certificates: Mapping[str, Certificate], brief: bool) -> PlottedCharts:
-    """A row for each axis; ``brief`` is without the last chart of it, for which the scan is played."""
+    """Draw a row for each axis; ``brief`` is without its last chart, for which the scan is played."""
     rows = [[drive_of(line), *([shape_chart(line)] if _bent(line) else [])] for line in plan.moving]
     if not brief:
         for row, line, axis in zip(rows, plan.moving, played_axes(PlannedScan(setup, plan, certificates)), strict=True):
@@ -33,7 +33,7 @@ def _bent(line: LinePlan) -> bool:
 
 
 def drive_of(line: LinePlan) -> Chart:
-    """The drive over a period."""
+    """Draw the drive over a period."""
     both = line.band_limit.directions == "both"
     return drive_chart(line.axis, line.drive, line.series, line.band_limit.window, both, float(1 / line.rate))
 

@@ -63,7 +63,7 @@ def inside(branch: BranchError) -> tuple[Floats, Floats]:
 
 
 def residual_chart(axis: str, correction: PlayedCorrection) -> Chart:
-    """What is left in the image, about the best straight line through it."""
+    """Draw what is left in the image, about the best straight line through it."""
     run = correction.run
     return Chart(
         f"residual-{axis}-{correction.name}",
@@ -115,7 +115,7 @@ def _refinement(line: LinePlan) -> list[Chart]:
 
 
 def windows(line: LinePlan, period: float) -> tuple[Band, ...]:
-    """The imaged stretches of a period, in its unit of time."""
+    """Return the imaged stretches of a period, in its unit of time."""
     sides = SIDES if line.band_limit.directions == "both" else SIDES[:1]
     low, high = line.band_limit.window
     found = []
@@ -126,7 +126,7 @@ def windows(line: LinePlan, period: float) -> tuple[Band, ...]:
 
 
 def over_time(run: AxisRun, line: LinePlan, period: float) -> list[DrawnCurve]:
-    """The residual in nm when it happens."""
+    """Return the curves of the residual in nm over time."""
     curves = []
     for side in (side for side in SIDES if side in run.directions):
         x, residual = inside(getattr(run.imaged, side))

@@ -77,7 +77,7 @@ def _db(power: Floats) -> Floats:
 
 
 def _worst_of_bins(f: Floats, power: Floats) -> tuple[Floats, Floats]:
-    """The largest power of each bin, where it is."""
+    """Return the largest power of each bin, where it is."""
     if len(f) <= _BINS:
         return f, power
     which = np.searchsorted(np.geomspace(f[0], f[-1], _BINS + 1), f, side="right")
@@ -87,7 +87,7 @@ def _worst_of_bins(f: Floats, power: Floats) -> tuple[Floats, Floats]:
 
 
 def quantisation(subject: Subject) -> Section:
-    """Emitted code less the code that the float waveform asks for."""
+    """Show the emitted code less the code of the float waveform."""
     charts = []
     for axis, entry in subject.axes:
         k = _looked_at(entry.program)

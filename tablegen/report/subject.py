@@ -73,13 +73,13 @@ class Subject:
 
 
 def series_of(axis: ManifestAxis) -> FourierSeries:
-    """The waveform w(t) that is played."""
+    """Return the waveform w(t) that is played."""
     fourier = axis.fourier
     return FourierSeries(fourier.a0, np.array(fourier.a), np.array(fourier.b))
 
 
 def of_scan(planned: PlannedScan, files: Mapping[str, bytes], verified: VerifyRecord | None = None) -> Subject:
-    """A scan and the files that a build of it writes, the manifest among them."""
+    """Return a scan and the files that a build of it writes, the manifest among them."""
     content = files[MANIFEST]
     manifest = msgspec.convert(read_json(content), Manifest)
     states = tuple(FileState(name, sha256(data).hexdigest()) for name, data in sorted(files.items()))
@@ -87,7 +87,7 @@ def of_scan(planned: PlannedScan, files: Mapping[str, bytes], verified: VerifyRe
 
 
 def of_directory(folder: Path, verified: VerifyRecord | None = None) -> Subject:
-    """The build in a directory. Raises ``NotABuild``."""
+    """Read the build in a directory. Raises ``NotABuild``."""
     manifest = read_build(folder).manifest
     digest = sha256(read_bytes(folder / MANIFEST, MANIFEST_KIND)).hexdigest()
     states = [FileState(MANIFEST, digest)]

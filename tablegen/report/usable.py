@@ -19,7 +19,7 @@ _SIZES = 241
 
 
 def usable(planned: PlannedScan) -> Section:
-    """A chart an axis."""
+    """Draw a chart an axis."""
     found = [_axis(planned, line) for line in planned.plan.moving]
     words = [word for _, words in found for word in words]
     return Section(
@@ -100,7 +100,7 @@ def largest_sizes(planned: PlannedScan, line: LinePlan) -> tuple[Floats, Floats,
 
 
 def _surface(planned: PlannedScan, line: LinePlan) -> OffsetSurface:
-    """m over offset and size."""
+    """Compute m over offset and size."""
     axis = getattr(planned.setup.scanner, line.axis)
     if axis.offset is None:
         return OffsetSurface.everywhere(OffsetLaw())

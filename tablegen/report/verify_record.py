@@ -28,7 +28,7 @@ class VerifyRecord:
 
 
 def read_record(path: Path) -> VerifyRecord:
-    """A JUnit file of `tablegen verify`. Raises ``OSError`` and ``ValueError``, each with a reason."""
+    """Read a JUnit file of `tablegen verify`. Raises ``OSError`` and ``ValueError``, each with a reason."""
     try:
         text = read_text(path, RECORD)  # in no other encoding, whatever it says of itself
     except UnicodeDecodeError:
