@@ -65,7 +65,7 @@ def _scans(a: Subject, b: Subject) -> Iterator[Chart]:
 
 
 def _drive(axis: str, a: ManifestAxis, b: ManifestAxis) -> Chart:
-    """A line of x or a frame of y, each over its own time."""
+    """Draw a line of x or a frame of y, each over its own time."""
     t = np.linspace(0.0, 1.0, _POINTS)
     periods = [entry.line.rate_exact[1] / entry.line.rate_exact[0] for entry in (a, b)]
     times, unit = (1e3, "ms") if max(periods) < 1.0 else (1.0, "s")
@@ -75,7 +75,7 @@ def _drive(axis: str, a: ManifestAxis, b: ManifestAxis) -> Chart:
 
 
 def _apart(axis: str, a: ManifestAxis, b: ManifestAxis) -> Chart:
-    """What an overlay of two drives that are alike cannot show."""
+    """Draw the difference of two drives that an overlay cannot show."""
     t = np.linspace(0.0, 1.0, _POINTS)
     return overlaid(
         f"apart-{axis}",

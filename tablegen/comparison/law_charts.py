@@ -101,7 +101,7 @@ def _branches(axis: str, a: Scanner, b: Scanner) -> Iterator[Chart]:
 
 
 def _shape(axis: str, scanner: Scanner, turn: float, share: float) -> LineShape | None:
-    """The line of a model that works with branches; an operator's table has them too, for its laws."""
+    """Return the line of a model that works with branches; an operator's table has them too, for its laws."""
     from tablegen.compensation.models.harmonic import HarmonicModel
     from tablegen.compensation.models.operator import OperatorModel
 

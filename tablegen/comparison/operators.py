@@ -31,7 +31,7 @@ class ComparedOperator:
 
     @classmethod
     def read(cls, path: Path) -> "ComparedOperator":
-        """Raises ``Rejected``."""
+        """Read an operator file. Raises ``Rejected``."""
         return cls(*read_operator(path, str(path)))
 
     @property
@@ -51,7 +51,7 @@ class ComparedOperator:
         return place[0] / self.driver.span, self.driver.share(place[1])
 
     def loop(self, place: Place) -> Loop | None:
-        """The settled loop there; None where the operator has none."""
+        """Compute the settled loop there; None where the operator has none."""
         stroke, centre = self.shares(place)
         low, high = centre - 0.5 * stroke, centre + 0.5 * stroke
         if low < -1e-9 or high > 1.0 + 1e-9:
@@ -63,7 +63,7 @@ class ComparedOperator:
 
 
 def operator_quantities(one: ComparedOperator, places: Sequence[Place], section: str = "") -> list[ComparedQuantity]:
-    """The numbers of the file but for its traces, and size, residual and mismatch of the line at each place.
+    """List the numbers of the file but for its traces, and size, residual and mismatch of the line at each place.
 
     Errors are standard errors by the traces that were left out, which hold within 90 % of lines.
     """

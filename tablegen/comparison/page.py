@@ -14,7 +14,7 @@ from tablegen.version import __version__
 
 
 def comparison_page(both: SideBySide, charts: Sequence[Chart]) -> bytes:
-    """What differs, the charts, and folded up everything that was compared."""
+    """Render what differs, the charts, and folded up everything that was compared."""
     sides = tuple(
         row(name, f"{side.title}: {WORDS[side.kind]}", side.path.name or str(side.path))
         for name, side in (("A", both.a), ("B", both.b))
@@ -32,7 +32,7 @@ def comparison_page(both: SideBySide, charts: Sequence[Chart]) -> bytes:
 
 
 def _grids(pairs: Sequence[ComparedPair], folded: bool = False) -> list[Grid]:
-    """A table a section."""
+    """Make a table for each section."""
     return [
         Grid(
             section,

@@ -50,7 +50,7 @@ def scan_quantities(subject: Subject) -> list[ComparedQuantity]:
 
 
 def _asked(planned: PlannedScan) -> Iterator[ComparedQuantity]:
-    """The scan file but for the path of the scanner file, whose values are compared."""
+    """Yield the keys of the scan file but for the path of the scanner file, whose values are compared."""
     asked = msgspec.to_builtins(planned.setup.scan)
     yield from keys_of("asked for", "", {key: value for key, value in asked.items() if key not in ("name", "scanner")})
 
@@ -157,7 +157,7 @@ def _certificate(axis: str, entry: ManifestAxis) -> Iterator[ComparedQuantity]:
 
 
 def _expected(axis: str, entry: ManifestAxis) -> Iterator[ComparedQuantity]:
-    """What the model expects on the scanner; what that is uncertain by holds for 90 % of scans."""
+    """Yield what the model expects on the scanner; the uncertainty holds for 90 % of scans."""
     expected = entry.certificate.expected
     if expected is None:
         return
@@ -181,7 +181,7 @@ def _expected(axis: str, entry: ManifestAxis) -> Iterator[ComparedQuantity]:
 
 
 def _memory(subject: Subject) -> Iterator[ComparedQuantity]:
-    """What a device stores. In C the words of all tables have one type, and a table has one word more than it plays."""
+    """Yield what a device stores. Tables in C have one type for both axes, and one word more than they play."""
     axes = subject.manifest.axes.x, subject.manifest.axes.y
     tables = [entry.table for entry in axes]
     bits = storage_bits(max(table.bits for table in tables))
@@ -199,7 +199,7 @@ def _memory(subject: Subject) -> Iterator[ComparedQuantity]:
 
 
 def _output(axis: str, entry: ManifestAxis) -> Iterator[ComparedQuantity]:
-    """The converter and the limits that the device keeps."""
+    """Yield the converter and the limits that the device keeps."""
     section, output = f"{axis} limits", entry.output
     numbers = (
         ("lowest code allowed", output.code_min, ""),

@@ -59,7 +59,7 @@ class ComparedSide:
 
 
 def kind_of(path: Path) -> Kind:
-    """What a path is, by its content. Raises ``Rejected``."""
+    """Return the kind of a path, by its content. Raises ``Rejected``."""
     if path.is_dir():
         return "build"
     values, file = read_toml(path, str(path))
@@ -74,7 +74,7 @@ def kind_of(path: Path) -> Kind:
 
 
 def folder_of(path: Path) -> Path:
-    """A manifest stands for its directory."""
+    """Return the directory of a build, for which its manifest stands too."""
     return path.parent if path.name == MANIFEST else path
 
 
