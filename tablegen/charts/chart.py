@@ -138,7 +138,7 @@ def _range(values: list[Floats], more: list[float], room: float) -> tuple[float,
 
 
 def runs(curve: DrawnCurve) -> Iterator[tuple[Floats, Floats]]:
-    """The stretches of a curve without NaN, thinned to what can be seen; extremes stay."""
+    """Yield the stretches of a curve without NaN, thinned to what can be seen; extremes stay."""
     good = np.isfinite(curve.x) & np.isfinite(curve.y)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]]).astype(np.int8)))
     for first, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):

@@ -34,7 +34,7 @@ _Attributes = Callable[[Part], Markup]
 
 
 def svg(chart: Chart) -> Markup:
-    """The chart for the page: without its title and legend, which stand beside it as text that wraps."""
+    """Render the chart for the page: without its title and legend, which stand beside it as text that wraps."""
     return Markup(
         '<svg class="chart" viewBox="0 0 {} {}" role="img" aria-label="{}" tabindex="0" data-x="{!r} {!r}" '
         'data-y="{!r} {!r}" data-log="{}">{}</svg>'
@@ -56,7 +56,7 @@ def standalone(charts: Sequence[Chart], heading: str = "", columns: int = 2) -> 
 
 
 def embedded(charts: Sequence[Chart], columns: int = 2) -> str:
-    """The same as a part of an HTML page of somebody else, such as a notebook."""
+    """Render the charts as a part of an HTML page of another program, such as a notebook."""
     return str(_alone(charts, "", columns, Markup("")))
 
 
@@ -69,7 +69,7 @@ def _alone(charts: Sequence[Chart], heading: str, columns: int, space: Markup) -
 
 
 def swatch(curve: DrawnCurve) -> Markup:
-    """A piece of a curve, for a legend of the page."""
+    """Draw a piece of a curve, for a legend of the page."""
     return Markup(
         '<svg class="swatch" viewBox="0 0 30 10" width="30" height="10" aria-hidden="true"><path{} d="{}"/></svg>'
     ).format(_classes(Trail(curve, ())), "M15 5h0" if curve.kind == "points" else "M0 5h30")

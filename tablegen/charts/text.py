@@ -118,7 +118,7 @@ class _TextPlot:
                     self._put(row, column, text, "")
 
     def _rule(self, mark: Mark) -> None:
-        """A thin line at a value."""
+        """Draw a thin line at a value."""
         if mark.of == "y" and min(self.y0, self.y1) <= mark.at <= max(self.y0, self.y1):
             for column in range(self.width):
                 self._put(self._row(mark.at), column, "\u2504" if self.unicode else "-", "faint")
@@ -127,7 +127,7 @@ class _TextPlot:
                 self._put(row, self._column(mark.at), "\u250a" if self.unicode else ":", "faint")
 
     def _name(self, mark: Mark) -> None:
-        """The word of a line: at its right end, or beside it in the first row that is free there."""
+        """Write the word of a line: at its right end, or beside it in the first row that is free there."""
         if mark.of == "y":
             self._word(self._row(mark.at), self.width - len(mark.name), mark.name)
             return
@@ -193,7 +193,7 @@ class _TextPlot:
                     self._put(row, column, mark_of(curve), _style(curve))
 
     def _legend(self) -> list[list[Span]]:
-        """Marks with their names, in as many lines as they take; also of bands, and of shades."""
+        """List marks with their names, in as many lines as they take; also of bands, and of shades."""
         entries: list[Span] = []
         entries += [(f"{mark_of(curve)} {curve.name}", _style(curve)) for curve in self.chart.needed_legend]
         entries += [
@@ -223,7 +223,7 @@ class _TextPlot:
         return "\u2550" if self.unicode else "="
 
     def _axis(self) -> list[Span]:
-        """The horizontal axis with its ticks; what bands span is doubled."""
+        """Draw the horizontal axis with its ticks; what bands span is doubled."""
         line, corner, tick = ("\u2500", "\u2514", "\u252c") if self.unicode else ("-", "+", "+")
         cells = [line] * self.width
         for band in self.chart.bands:
@@ -249,7 +249,7 @@ class _TextPlot:
 
 
 def mark_of(curve: DrawnCurve) -> str:
-    """The character that stands for a curve."""
+    """Return the character that stands for a curve."""
     if curve.kind == "points":
         return _POINTS[curve.role]
     return (_FAINT_MARKS if curve.faint else _MARKS)[curve.role]
