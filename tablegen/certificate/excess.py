@@ -40,12 +40,12 @@ class Excess(Struct, frozen=True):
     @property
     def cause(self) -> Cause:
         """The largest part."""
-        found: list[tuple[float, Cause]] = [
+        parts: list[tuple[float, Cause]] = [
             (self.parts.quantisation, "quantisation"),
             (self.parts.band_limit, "band limit"),
             (self.parts.model, "model"),
         ]
-        return max(found, key=lambda part: part[0])[1]
+        return max(parts, key=lambda part: part[0])[1]
 
     def text(self, axis: str) -> str:
         """Return the error, what it is above, and its parts, in words."""
@@ -72,17 +72,17 @@ def excess(scaling: Mapping[str, ScalingError], most: float | None = None) -> Ex
     An uncompensated line is one to compare with only where the scanner file has a hysteresis to compensate. With
     ``most``, a limit of the scan file in percent, that alone counts.
     """
-    found = []
+    candidates = []
     for side, parts in scaling.items():
         error = max(parts.total, parts.band_limit)
         limit = size_limit = LARGEST_PERCENT if most is None else most
         if most is None and parts.uncompensated >= _NOTHING_PERCENT:
             limit = min(limit, parts.uncompensated)
         if error > limit:
-            found.append(Excess("scaling error", side, error, limit, parts))
+            candidates.append(Excess("scaling error", side, error, limit, parts))
         if abs(parts.size) > size_limit:
-            found.append(Excess("size error", side, parts.size, size_limit, parts))
-    return max(found, key=lambda one: one.times, default=None)
+            candidates.append(Excess("size error", side, parts.size, size_limit, parts))
+    return max(candidates, key=lambda one: one.times, default=None)
 
 
 def _figure(percent: float) -> str:

@@ -31,8 +31,8 @@ def expected_of(line: LinePlan) -> Expectation | None:
     known = line.drive.shape.expectation
     if known is not None:
         return known if both else known.forward_only
-    found = _rounding(line) if both else None
-    return None if found is None else Expectation("laws", mismatch=Figure(found[0]), stroke=found[1])
+    rounding = _rounding(line) if both else None
+    return None if rounding is None else Expectation("laws", mismatch=Figure(rounding[0]), stroke=rounding[1])
 
 
 def certified_expectation(line: LinePlan, played: EmittedPeriod) -> Expectation | None:
@@ -61,8 +61,8 @@ def rounding_mismatch(line: LinePlan) -> float | None:
 
     None where a model has no branches for the stroke that is played.
     """
-    found = _rounding(line)
-    return None if found is None else found[0]
+    rounding = _rounding(line)
+    return None if rounding is None else rounding[0]
 
 
 def _rounding(line: LinePlan) -> tuple[float, PlayedStroke] | None:

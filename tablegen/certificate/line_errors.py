@@ -268,8 +268,8 @@ def _followed(line: LinePlan, played: EmittedPeriod, side: str, position: Floats
             series, value, slope = series.less(line.layer), value - layer_value, slope - layer_slope
         return shape.followed(side, position, series, value, slope)
 
-    wanted = follow(line.target)
-    return *(wanted if reached is line.target else follow(reached)), wanted[1]
+    ideal = follow(line.target)
+    return *(ideal if reached is line.target else follow(reached)), ideal[1]
 
 
 def refined(line: LinePlan, side: str, branch: Sweep) -> Refined:

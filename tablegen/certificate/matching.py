@@ -19,8 +19,8 @@ def apart_note(plan: Plan) -> str:
     if not apart:
         return ""
     schedule, (low, high) = plan.schedule, plan.x.band_limit.window
-    asked = exact(plan.x.drive.turn), exact(low), exact(high)
-    lines = matching_lines(*asked, schedule.ticks, schedule.pixels, MAXIMUM_LINE_TICKS)
+    requested = exact(plan.x.drive.turn), exact(low), exact(high)
+    lines = matching_lines(*requested, schedule.ticks, schedule.pixels, MAXIMUM_LINE_TICKS)
     remedy = f"; a timing.ticks_per_line of {' or '.join(map(str, lines))} makes them match" if lines else ""
     return (
         f"the same pixel of trace and retrace shows places up to {apart:.2g} % of the line apart, since pixels begin "

@@ -73,8 +73,8 @@ def arriving(line: LinePlan, played: EmittedPeriod) -> Floats:
     real, imaginary = response.inverse(np.asarray(n * rate))
     beyond = _held(response, rate, ticks, n) - np.sinc(n / ticks) / (real + 1j * imaginary)
     spectrum[n] += 0.5 * ticks * line.codes_per_unit * (series.a - 1j * series.b) * beyond
-    found: Floats = np.fft.irfft(spectrum, ticks)
-    return found
+    position: Floats = np.fft.irfft(spectrum, ticks)
+    return position
 
 
 def _held(response: Response, rate_hz: float, ticks: int, n: Ints) -> "Complex":

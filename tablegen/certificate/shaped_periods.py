@@ -134,8 +134,8 @@ def passed(line: LinePlan, errors: Floats) -> Floats:
         real, imaginary = response.inverse(f[known])
         spectrum[known] /= real + 1j * imaginary
         spectrum[~known] = 0.0
-    found: Floats = np.fft.irfft(spectrum, size)[: len(errors)]
-    return found
+    position: Floats = np.fft.irfft(spectrum, size)[: len(errors)]
+    return position
 
 
 def largest_and_rms(errors: Floats) -> tuple[float, float]:

@@ -262,7 +262,7 @@ def summary(plan: Plan, certificates: dict[str, Certificate]) -> list[str]:
             lines.append(f"  {'' if i else 'settles':<18}{text}")
         lines += [f"{line.axis} certificate"]
         lines += [f"  {label:<18}{value}" for label, value in certificate_lines(certificates[line.axis])]
-        found = excess(certificates[line.axis].scaling)
-        for i, text in enumerate([] if found is None else found.text(line.axis).split("; ")):
+        exceeded = excess(certificates[line.axis].scaling)
+        for i, text in enumerate([] if exceeded is None else exceeded.text(line.axis).split("; ")):
             lines.append(f"  {'' if i else 'warning':<18}{text}")
     return lines
