@@ -161,10 +161,12 @@ def _followed(line: LinePlan) -> dict[str, Any]:
     if response is None:
         return {}
     target = {"a0": line.target.a0, "a": line.target.a.tolist(), "b": line.target.b.tolist()}
-    held = np.array(line.held_harmonics, dtype=np.float64)
-    asked, given = response.inverse(held * float(line.rate)), _capped(line, held)
+    limited = np.array(line.held_harmonics, dtype=np.float64)
+    inverse, applied = response.inverse(limited * float(line.rate)), _capped(line, limited)
     # The phase is kept, so that the ratio is real.
-    factors = np.sqrt((given[0] ** 2 + given[1] ** 2) / (asked[0] ** 2 + asked[1] ** 2)) if len(held) else held
+    factors = (
+        np.sqrt((applied[0] ** 2 + applied[1] ** 2) / (inverse[0] ** 2 + inverse[1] ** 2)) if len(limited) else limited
+    )
     return {"target": target, "held_factors": factors.tolist()}
 
 
