@@ -71,13 +71,13 @@ def deciding_files(formats: Iterable[str]) -> list[Path]:
     record of the installation too, whose path has the version: package managers that give files the times of an
     archive would otherwise hide a change of version from make.
     """
-    wanted = chosen(formats)
-    names = {each.name for each in wanted}
+    formats_used = chosen(formats)
+    names = {each.name for each in formats_used}
     others = {PACKAGE / name for name in (*_OTHER_FOLDERS, *_OTHER_MODULES)}
     others |= {PACKAGE / "emit" / "formats" / f"{n.replace('-', '_')}.py" for n in own_names() if n not in names}
     others.add(PACKAGE / "firmware_templates")
     modules = {path for path in PACKAGE.rglob("*.py") if not others.intersection((path, *path.parents))}
-    for each in wanted:
+    for each in formats_used:
         with failing_as_format(each):
             modules |= {Path(str(sys.modules[type(each).__module__].__file__)), *each.sources()}
     return sorted({*modules, *records(PACKAGE.parent)})

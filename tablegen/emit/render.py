@@ -30,13 +30,13 @@ def render(plan: Plan, certificates: dict[str, Certificate], formats: Sequence[s
     ``formats`` are those of the plan unless given. Raises ``UnknownFormat``, and ``Unphysical`` for a scan that a
     format cannot hold.
     """
-    wanted = chosen(plan.formats if formats is None else formats)
+    chosen_formats = chosen(plan.formats if formats is None else formats)
     record = plan_record(plan)
     digest = content_hash(record)
     content = plan_content(plan, certificates, digest)
     files: dict[str, bytes] = {}
     spelt: dict[str, str] = {MANIFEST: MANIFEST}
-    for each in wanted:
+    for each in chosen_formats:
         own_files = files_of(each, content)
         with failing_as_format(each):
             own_files |= runtime_files(each)
@@ -51,7 +51,7 @@ def render(plan: Plan, certificates: dict[str, Certificate], formats: Sequence[s
                 raise UnknownFormat(f"{each.name!r} writes {name!r} beside {other!r}, which some disks take for one")
             if files.setdefault(name, text) != text:
                 raise UnknownFormat(f"{each.name!r} writes {name}, and so does another format, with other content")
-    files[MANIFEST] = manifest_file(record, digest, [each.name for each in wanted], certificates, files)
+    files[MANIFEST] = manifest_file(record, digest, [each.name for each in chosen_formats], certificates, files)
     return files
 
 

@@ -44,19 +44,19 @@ def own_names() -> list[str]:
 def get(name: str) -> Format:
     """Return the format of a name. Raises ``UnknownFormat``."""
     if name in _own():
-        found: object = import_module(f"{__name__}.{_own()[name]}").FORMAT
+        format_found: object = import_module(f"{__name__}.{_own()[name]}").FORMAT
     elif name in _others():
-        found = _loaded(name, _others()[name])
+        format_found = _loaded(name, _others()[name])
     else:
         raise UnknownFormat(f"{name!r} is not a format; formats are {', '.join(names())}")
-    if not isinstance(found, Format) or found.name != name:
+    if not isinstance(format_found, Format) or format_found.name != name:
         raise UnknownFormat(
             f"{name!r} of {distribution(_others()[name][0])} is no tablegen.emit.format.Format of that name"
         )
     for attribute in ("purpose", "file_names"):
-        if not isinstance(getattr(found, attribute, None), str):
+        if not isinstance(getattr(format_found, attribute, None), str):
             raise UnknownFormat(f"{name!r} of {distribution(_others()[name][0])}: its {attribute} is not a text")
-    return found
+    return format_found
 
 
 def files_of(one: Format, content: Content) -> dict[str, bytes]:
@@ -104,9 +104,9 @@ def _kind(value: object) -> str:
     return f"an object of type {type(value).__name__}"
 
 
-def chosen(wanted: Iterable[str]) -> list[Format]:
+def chosen(names: Iterable[str]) -> list[Format]:
     """Return the formats of these names, each once. Raises ``UnknownFormat``."""
-    return [get(name) for name in dict.fromkeys(wanted)]
+    return [get(name) for name in dict.fromkeys(names)]
 
 
 @cache
@@ -120,11 +120,11 @@ def _own() -> dict[str, str]:
 def _others() -> "dict[str, list[EntryPoint]]":
     from importlib.metadata import entry_points  # a good part of what a build costs, and seldom needed
 
-    found: dict[str, list[EntryPoint]] = {}
+    entry_points_by_name: dict[str, list[EntryPoint]] = {}
     for entry in entry_points(group=GROUP):
         if entry.name not in _own():
-            found.setdefault(entry.name, []).append(entry)
-    return found
+            entry_points_by_name.setdefault(entry.name, []).append(entry)
+    return entry_points_by_name
 
 
 def _loaded(name: str, entries: "list[EntryPoint]") -> object:

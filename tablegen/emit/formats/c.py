@@ -83,33 +83,33 @@ def arrays_file(content: Content) -> str:
 
 def wrong_constants(folder: Path, content: Content) -> tuple[int, list[str]]:
     """How many constants the C header is to have, and those that it has not, or not so."""
-    name, wanted = f"{content.name}.h", _constants(content)
+    name, expected = f"{content.name}.h", _constants(content)
     try:
         text = read_text(folder / name, BUILD_FILE, errors="replace")
     except OSError as error:
-        return len(wanted), [f"{name}: cannot be read: {error.strerror or error}"]
+        return len(expected), [f"{name}: cannot be read: {error.strerror or error}"]
     prefix = f"{content.name.upper()}_"
     defined = re.findall(rf"^[ \t]*#[ \t]*define[ \t]+({prefix}\w+)[ \t]+(\S.*?)[ \t]*$", text, re.MULTILINE)
-    return len(wanted), differing(name, {key: _value(value) for key, value in defined}, wanted)
+    return len(expected), differing(name, {key: _value(value) for key, value in defined}, expected)
 
 
 def wrong_arrays(folder: Path, content: Content) -> tuple[int, list[str]]:
     """How many words the arrays are to have, and in which of them the first wrong one stands."""
-    name, wanted = arrays_file(content), _arrays(content)
-    count = sum(map(len, wanted.values()))
+    name, expected = arrays_file(content), _arrays(content)
+    count = sum(map(len, expected.values()))
     try:
         text = read_text(folder / name, BUILD_FILE, errors="replace")
     except OSError as error:
         return count, [f"{name}: cannot be read: {error.strerror or error}"]
-    found = {array: values.split(",") for array, values in re.findall(_ARRAY, text)}
+    arrays = {array: values.split(",") for array, values in re.findall(_ARRAY, text)}
     wrong = []
-    for array, words in wanted.items():
-        if array not in found:
+    for array, words in expected.items():
+        if array not in arrays:
             wrong.append(f"{name}: {array} is missing")
-        elif len(found[array]) != len(words):
-            wrong.append(f"{name}: {array} has {len(found[array])} words, it takes {len(words)}")
+        elif len(arrays[array]) != len(words):
+            wrong.append(f"{name}: {array} has {len(arrays[array])} words, it takes {len(words)}")
         else:
-            pairs = zip(map(str.strip, found[array]), map(str, words.tolist()), strict=True)
+            pairs = zip(map(str.strip, arrays[array]), map(str, words.tolist()), strict=True)
             differs = [(at, word, right) for at, (word, right) in enumerate(pairs) if word != right]
             wrong += [
                 f"{name}: {array}[{at}] is {word[:16]}, it is {right} in the manifest"

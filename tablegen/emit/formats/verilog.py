@@ -68,31 +68,31 @@ def _width(value: int) -> int:
 
 def wrong_constants(folder: Path, content: Content) -> tuple[int, list[str]]:
     """How many constants the Verilog header is to have, and those that it has not, or not so."""
-    name, wanted = f"{content.name}.vh", _constants(content)
+    name, expected = f"{content.name}.vh", _constants(content)
     try:
         text = read_text(folder / name, BUILD_FILE, errors="replace")
     except OSError as error:
-        return len(wanted), [f"{name}: cannot be read: {error.strerror or error}"]
-    found: dict[str, int | str] = {key: _value(value) for key, value in re.findall(_LOCALPARAM, text)}
-    return len(wanted), differing(name, found, wanted)
+        return len(expected), [f"{name}: cannot be read: {error.strerror or error}"]
+    constants: dict[str, int | str] = {key: _value(value) for key, value in re.findall(_LOCALPARAM, text)}
+    return len(expected), differing(name, constants, expected)
 
 
 def wrong_memories(folder: Path, content: Content) -> tuple[int, list[str]]:
     """How many words the memory files are to have, and in which of them the first wrong one stands."""
     count, wrong = 0, []
     for name, right in _memories(content).items():
-        wanted = right.decode("ascii").split()
-        count += len(wanted)
+        expected = right.decode("ascii").split()
+        count += len(expected)
         try:
-            found = read_text(folder / name, BUILD_FILE, "ascii", "replace").split()
+            words = read_text(folder / name, BUILD_FILE, "ascii", "replace").split()
         except OSError as error:
             wrong.append(f"{name}: cannot be read: {error.strerror or error}")
             continue
-        if len(found) != len(wanted):
-            wrong.append(f"{name}: has {len(found)} words, the manifest {len(wanted)}")
-        elif found != wanted:
-            at = next(i for i, (word, other) in enumerate(zip(found, wanted, strict=True)) if word != other)
-            wrong.append(f"{name}: word {at} is {found[at][:16]}, it is {wanted[at]} in the manifest")
+        if len(words) != len(expected):
+            wrong.append(f"{name}: has {len(words)} words, the manifest {len(expected)}")
+        elif words != expected:
+            at = next(i for i, (word, other) in enumerate(zip(words, expected, strict=True)) if word != other)
+            wrong.append(f"{name}: word {at} is {words[at][:16]}, it is {expected[at]} in the manifest")
     return count, wrong
 
 
