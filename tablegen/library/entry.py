@@ -148,12 +148,12 @@ def is_whole(folder: Path, entry: Entry) -> bool:
 
 def changed_files(folder: Path, entry: Entry) -> list[str]:
     """List the files of a program that are missing or not as they were written."""
-    found = []
+    changed = []
     for name, digest in entry.files.items():
         try:
             same = file_sha256(folder / name, BUILD_FILE) == digest
         except OSError:
             same = False
         if not same:
-            found.append(name)
-    return found
+            changed.append(name)
+    return changed

@@ -43,10 +43,10 @@ def make_index(
     ``failed`` are the scans that could not be built, as the index shows them; ``content`` of the name of a program and
     that of a file is what the file holds, and may raise ``OSError``.
     """
-    wanted = chosen(formats)
-    names = {each.name for each in wanted}
+    chosen_formats = chosen(formats)
+    names = {each.name for each in chosen_formats}
     runtime: dict[str, bytes] = {}
-    for each in wanted:
+    for each in chosen_formats:
         runtime |= runtime_files(each)
     files, notes = dict(runtime), []
     if entries and "c" in names:
@@ -82,12 +82,12 @@ def listed_files(folder: Path) -> dict[str, str]:
     Only names that an index of that library can list are among them, whatever else stands in it.
     """
     try:
-        found = read_json(read_bytes(folder / INDEX, BUILD_FILE))
+        record = read_json(read_bytes(folder / INDEX, BUILD_FILE))
     except (OSError, ValueError):
         return {}
-    if not isinstance(found, dict) or not {"tablegen", "library", "programs", "files"} <= found.keys():
+    if not isinstance(record, dict) or not {"tablegen", "library", "programs", "files"} <= record.keys():
         return {}
-    library, files = found["library"], found["files"]
+    library, files = record["library"], record["files"]
     if not isinstance(library, str) or why_not_a_name(library) is not None or not isinstance(files, dict):
         return {}
     own = [name for name in files if name.startswith(f"{library}_library") or of_the_runtime(name)]

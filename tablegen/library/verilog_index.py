@@ -56,16 +56,16 @@ def verilog_index(library: str, entries: Sequence[Entry], content: Contents, ver
 
 def _constants(entries: Sequence[Entry]) -> dict[str, int]:
     """Return the parameters of a ``dac_sequencer`` that plays all programs."""
-    found = {"PROGRAMS": len(entries), "DAC_BITS": entries[0].x.dac_bits}
+    constants = {"PROGRAMS": len(entries), "DAC_BITS": entries[0].x.dac_bits}
     for letter, axes in (("X", [entry.x for entry in entries]), ("Y", [entry.y for entry in entries])):
-        found |= {
+        constants |= {
             f"{letter}_INTERPOLATED": DEGREES["cubic"] if axes[0].cubic else int(axes[0].interpolated),
             f"{letter}_INDEX_BITS": max(_index_bits(axis) for axis in axes),
             f"{letter}_WORD_BITS": axes[0].table_bits,
         }
-    found |= {key: max(entry.widths[key] for entry in entries) for key in entries[0].widths}
-    found["HARMONICS"] = max(axis.harmonics for entry in entries for axis in entry.axes)
-    return found
+    constants |= {key: max(entry.widths[key] for entry in entries) for key in entries[0].widths}
+    constants["HARMONICS"] = max(axis.harmonics for entry in entries for axis in entry.axes)
+    return constants
 
 
 def _index_bits(axis: AxisEntry) -> int:
