@@ -37,12 +37,12 @@ def fit_page(fit: Fit, axis: str, sources: Sequence[Source], places: Sequence[st
     elif places:
         many = "one outlier" if len(places) == 1 else f"{len(places)} outliers"
         verdict = TableCell(f"! Look at {many} first.", "warn")
-    found = [
+    sections = [
         _parameters(fit),
         Section("data", "Data and fit", (Charts(fit_charts(fit, axis).charts),)),
         _sources(sources),
     ]
-    return document(f"{kind} of {axis}", verdict, findings, found, "", _FOOT)
+    return document(f"{kind} of {axis}", verdict, findings, sections, "", _FOOT)
 
 
 def _parameters(fit: Fit) -> Section:
@@ -107,19 +107,19 @@ def _chart(number: int, curve: Curve) -> Chart:
 def drawn_curves(curve: Curve) -> list[DrawnCurve]:
     """Measured points and the fitted line, of each direction that the curve has."""
     kinds: tuple[Literal["points", "line"], ...] = ("points", "line")
-    found = []
+    curves = []
     for name, kind, (x, y), at in zip(
         ("measured", "fit"), kinds, (curve.measured, curve.fitted), curve.backward or (None, None), strict=True
     ):
         many = kind == "points" and len(x) > _FEW
         if at is not None:
-            found.append(DrawnCurve(f"forward, {name}", "forward", x[:at], y[:at], kind, many))
-            found.append(DrawnCurve(f"backward, {name}", "backward", x[at:], y[at:], kind, many))
+            curves.append(DrawnCurve(f"forward, {name}", "forward", x[:at], y[:at], kind, many))
+            curves.append(DrawnCurve(f"backward, {name}", "backward", x[at:], y[at:], kind, many))
         elif curve.direction:
-            found.append(DrawnCurve(f"{curve.direction}, {name}", curve.direction, x, y, kind, many))
+            curves.append(DrawnCurve(f"{curve.direction}, {name}", curve.direction, x, y, kind, many))
         else:
-            found.append(DrawnCurve(name, "other", x, y, kind, many))
-    return found
+            curves.append(DrawnCurve(name, "other", x, y, kind, many))
+    return curves
 
 
 def _over_decades(curve: Curve) -> bool:
@@ -165,7 +165,7 @@ def operator_page(
         marks=(Mark(0.0, "", "y"),),
         x_range=(0.0, len(traces) + 1.0),
     )
-    found = [
+    sections = [
         Section("traces", "Traces", (Grid(caption, head, rows), Charts((chart,)))),
         Section("family", "Family", (Paragraph(f"Chosen: {family}."), tried)),
         _sources(sources),
@@ -176,7 +176,7 @@ def operator_page(
     )
     note = f"the worst is {traces[worst][0]}, {left_out[worst]:.2g} % rms where it is left out"
     findings = [Finding("expect", 1.0, note), Finding("note", 0.0, further)]
-    return document(f"operator of {axis}", verdict, findings, found, "", _FOOT)
+    return document(f"operator of {axis}", verdict, findings, sections, "", _FOOT)
 
 
 def _candidates(candidates: Sequence[tuple[str, float]]) -> tuple[tuple[TableCell, ...], ...]:

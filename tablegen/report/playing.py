@@ -117,15 +117,15 @@ def without_refinement(setup: Setup) -> Setup:
 
 def _models(planned: PlannedScan) -> list[str]:
     """List the models to compare with: without correction, and beside an operator the laws."""
-    found = [models.UNCOMPENSATED]
+    names = [models.UNCOMPENSATED]
     for line in planned.plan.lines:
         if isinstance(line.drive.shape, OperatorLine):
             table = line.drive.hysteresis
             served = [kind for kind in models.own() if kind.like(table) is not None and kind.order < table.order]
             best = max(served, key=lambda kind: kind.order, default=None)
-            if best is not None and best.model() not in found and getattr(table, "branches", None):
-                found.append(best.model())
-    return found
+            if best is not None and best.model() not in names and getattr(table, "branches", None):
+                names.append(best.model())
+    return names
 
 
 def _planned(setup: Setup, model: str) -> tuple[LinePlan, LinePlan] | str:

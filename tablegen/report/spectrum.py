@@ -72,8 +72,8 @@ def _spectrum(axis: str, entry: ManifestAxis) -> Chart:
 
 
 def _db(power: Floats) -> Floats:
-    found: Floats = 10.0 * np.log10(np.maximum(power, 10.0 ** (0.1 * _FLOOR_DB)))
-    return found
+    decibels: Floats = 10.0 * np.log10(np.maximum(power, 10.0 ** (0.1 * _FLOOR_DB)))
+    return decibels
 
 
 def _worst_of_bins(f: Floats, power: Floats) -> tuple[Floats, Floats]:
