@@ -26,11 +26,11 @@ def comparison_charts(both: SideBySide) -> list[Chart]:
     """Every chart of two sides; those that only one of them could have are left out."""
     if both.a.subject is not None and both.b.subject is not None:
         return [*_scans(both.a.subject, both.b.subject)]
-    found = [] if both.a.scanner is None or both.b.scanner is None else [*law_charts(both.a.scanner, both.b.scanner)]
+    charts = [] if both.a.scanner is None or both.b.scanner is None else [*law_charts(both.a.scanner, both.b.scanner)]
     for name in both.a.operators:
         if name in both.b.operators:
-            found += _loops(name, both.a.operators[name], both.b.operators[name])
-    return found
+            charts += _loops(name, both.a.operators[name], both.b.operators[name])
+    return charts
 
 
 def differing_charts(charts: Sequence[Chart]) -> list[Chart]:

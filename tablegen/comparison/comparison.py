@@ -25,9 +25,9 @@ class SideBySide:
         """Every quantity of both."""
         both = [list(side.quantities) for side in (self.a, self.b)]
         for name in dict.fromkeys([*self.a.operators, *self.b.operators]):
-            found = [side.operators.get(name) for side in (self.a, self.b)]
-            places = sorted({place for one in found if one is not None for place in one.places})
-            for one, quantities in zip(found, both, strict=True):
+            operators = [side.operators.get(name) for side in (self.a, self.b)]
+            places = sorted({place for one in operators if one is not None for place in one.places})
+            for one, quantities in zip(operators, both, strict=True):
                 if one is not None:
                     quantities += operator_quantities(one, places, f"{name} " if name else "")
         return pairs(both[0], both[1], of_scan="build" not in (self.a.kind, self.b.kind))

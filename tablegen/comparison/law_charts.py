@@ -127,8 +127,8 @@ def _shape(axis: str, scanner: Scanner, turn: float, share: float) -> LineShape 
         rate_gain=None,
         folder=Path(),
     )
-    made = None if table is None else table.line(request, ModelProblems.without_files(axis, problems))
-    return None if problems.found else made
+    line = None if table is None else table.line(request, ModelProblems.without_files(axis, problems))
+    return None if problems.found else line
 
 
 def _bent(shape: LineShape, side: str) -> Pair:

@@ -19,7 +19,7 @@ def comparison_page(both: SideBySide, charts: Sequence[Chart]) -> bytes:
         row(name, f"{side.title}: {WORDS[side.kind]}", side.path.name or str(side.path))
         for name, side in (("A", both.a), ("B", both.b))
     )
-    found = [
+    sections = [
         Section("sides", "A and B", (Grid("", ("", "what", "file"), sides),)),
         Section("differences", "What differs", tuple(_grids(both.differing))),
         *([chart_section(charts)] if charts else []),
@@ -28,7 +28,7 @@ def comparison_page(both: SideBySide, charts: Sequence[Chart]) -> bytes:
     verdict = TableCell(f"{both.verdict}.", "good" if both.same else "quiet")
     title = "{} and {}".format(*both.titles)
     foot = f"Made by tablegen {__version__}. All is worked out from the files; nothing is measured."
-    return document(title, verdict, both.findings, found, "", foot)
+    return document(title, verdict, both.findings, sections, "", foot)
 
 
 def _grids(pairs: Sequence[ComparedPair], folded: bool = False) -> list[Grid]:
