@@ -190,12 +190,12 @@ def _looks(part: Part) -> Markup:
 
 
 def _stroke(look: Look, area: Look | None = None) -> Markup:
-    found = Markup(' fill="none"')
+    attributes = Markup(' fill="none"')
     if area is not None:
-        found = Markup(' fill="{}" fill-opacity="{}"').format(area.fill, area.opacity)
-    found += Markup(' stroke="{}" stroke-width="{}" vector-effect="non-scaling-stroke"').format(
+        attributes = Markup(' fill="{}" fill-opacity="{}"').format(area.fill, area.opacity)
+    attributes += Markup(' stroke="{}" stroke-width="{}" vector-effect="non-scaling-stroke"').format(
         look.stroke, _number(look.width, 1)
     )
     if look.dashes:
-        found += Markup(' stroke-dasharray="{}"').format(" ".join(f"{one:g}" for one in look.dashes))
-    return found + Markup(' stroke-linejoin="round"')
+        attributes += Markup(' stroke-dasharray="{}"').format(" ".join(f"{one:g}" for one in look.dashes))
+    return attributes + Markup(' stroke-linejoin="round"')
