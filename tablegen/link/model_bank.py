@@ -161,8 +161,8 @@ class Bank:
         contents = take_apart(image, held.info.x, held.info.y)
         old = self._player.playing
         playing = None if old is None else Playing(old.x, old.y, self._player.state is DeviceState.PLAYING)
-        if found := first_objection(contents, *self.limits, playing, self._info.shaping):
-            raise RequestRefused(*found)
+        if objection := first_objection(contents, *self.limits, playing, self._info.shaping):
+            raise RequestRefused(*objection)
         return program_of(contents, self._info.update_rate_hz)
 
     def take(self, held: Held) -> None:

@@ -116,56 +116,58 @@ def check(scan: PreparedScan, image: ProgramImage, info: DeviceInfo, limits: Lim
 
 
 def _device(image: ProgramImage, info: DeviceInfo, scan: PreparedScan) -> list[str]:
-    found = []
+    reasons = []
     harmonics = harmonics_of(image.data)
     if any(harmonics) and not info.features & Feature.FOURIER:
-        found.append("the device does not support Fourier words; upload --as table")
+        reasons.append("the device does not support Fourier words; upload --as table")
     elif max(harmonics) > info.harmonics:
-        found.append(
+        reasons.append(
             f"{max(harmonics)} harmonics; the device supports at most {info.harmonics}: lower band_limit.harmonics, or "
             "upload --as table"
         )
     if not all(harmonics) and not info.features & Feature.TABLES:
-        found.append("the device does not support tables; upload --as fourier")
+        reasons.append("the device does not support tables; upload --as fourier")
     if len(image.data) > info.image_bytes:
-        found.append(
+        reasons.append(
             f"{len(image.data)} bytes; the device accepts {info.image_bytes}: upload --as fourier, or make the tables "
             "shorter"
         )
     if info.degree < SPLINE_DEGREE:
-        found += [
+        reasons += [
             f"{name}: a cubic table; the device plays none: build it with DAC_SPLINE=1 in C, "
             f"{name.upper()}_INTERPOLATED=3 in Verilog, or set table.mode"
             for name, axis, _ in scan.axes
             if axis.mode == "cubic"
         ]
-    return found
+    return reasons
 
 
 def _rate(scan: PreparedScan, info: DeviceInfo) -> list[str]:
-    wanted = float(scan.program.schedule.update_rate_hz)
-    if not info.update_rate_hz or abs(wanted - info.update_rate_hz) <= _RATE_TOLERANCE_HZ:
+    rate_hz = float(scan.program.schedule.update_rate_hz)
+    if not info.update_rate_hz or abs(rate_hz - info.update_rate_hz) <= _RATE_TOLERANCE_HZ:
         return []
     return [
-        f"built for {wanted:g} ticks a second; the device runs at {info.update_rate_hz}: each line would take "
-        f"{wanted / info.update_rate_hz:.4g} times as long; set dac.update_rate_hz, or allow it with --any-rate"
+        f"built for {rate_hz:g} ticks a second; the device runs at {info.update_rate_hz}: each line would take "
+        f"{rate_hz / info.update_rate_hz:.4g} times as long; set dac.update_rate_hz, or allow it with --any-rate"
     ]
 
 
 def _axis(axis: Program, shape: AxisShape, theirs: AxisShape) -> list[str]:
-    found = []
+    reasons = []
     if shape.word_bits != theirs.word_bits:
-        found.append(f"table words of {shape.word_bits} bits; the device has {theirs.word_bits}: set table.bits")
+        reasons.append(f"table words of {shape.word_bits} bits; the device has {theirs.word_bits}: set table.bits")
     if shape.dac_bits != theirs.dac_bits:
-        found.append(f"codes of {shape.dac_bits} bits; the device has {theirs.dac_bits}: set dac.bits")
+        reasons.append(f"codes of {shape.dac_bits} bits; the device has {theirs.dac_bits}: set dac.bits")
     if len(axis.words) > 1 << theirs.index_bits:
-        found.append(f"a table of {len(axis.words)} words; the device holds {1 << theirs.index_bits}: set table.length")
+        reasons.append(
+            f"a table of {len(axis.words)} words; the device holds {1 << theirs.index_bits}: set table.length"
+        )
     ours = _converter(axis.output)
     if theirs.converter and ours != _converter_of(theirs):
-        found.append(
+        reasons.append(
             f"converter words {ours}; the device sends {_converter_of(theirs)}: set dac.coding, word_bits and align"
         )
-    return found
+    return reasons
 
 
 def _converter(output: Output) -> str:
