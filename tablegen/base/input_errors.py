@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 from msgspec import Struct, field
 
+from tablegen.base.warnings import Axis, FindingCode, axis_name
+
 MOST_PROBLEMS = 50  # of one run; more are no help, and a file may have a million
 _MOST_KEY, _MOST_WHY = 200, 1000  # characters
 
@@ -25,12 +27,21 @@ class Unphysical(ValueError):
 
 
 class Problem(NamedTuple):
-    """One fault of the input, printed as ``scan.toml:14: x.table.bits: 30 is above 24``."""
+    """One fault of the input, printed as ``scan.toml:14: x.table.bits: 30 is above 24``.
+
+    ``code`` and ``axis`` are those of a finding of the certificate, for programs: "" for every other fault.
+    """
 
     file: str
     line: int
     key: str
     why: str
+    code: FindingCode = ""
+    axis: Axis = ""
+
+    def coded(self, code: FindingCode, axis: str) -> "Problem":
+        """Return the problem with the code of its finding and the axis ("x", "y" or "")."""
+        return self._replace(code=code, axis=axis_name(axis))
 
     def __str__(self) -> str:
         place = f"{self.file}:{self.line}" if self.line else self.file

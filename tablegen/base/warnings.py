@@ -10,6 +10,30 @@ from typing import Literal
 from msgspec import Struct
 
 Weight = Literal["limit", "spoils", "expect", "note"]
+FindingCode = Literal[
+    "",
+    "changed-file",
+    "converter-error",
+    "damaged-build",
+    "expected-scaling-error",
+    "expected-size-error",
+    "failed-check",
+    "image-offset",
+    "imaged-pixels",
+    "model-mismatch",
+    "offset-drift",
+    "operator-distance",
+    "other-verify-record",
+    "resonance",
+    "rounded-pixels",
+    "scaling-error",
+    "size-error",
+    "standard-errors",
+    "step-guard",
+    "uncompared-inputs",
+    "uncompensated-hysteresis",
+]
+Axis = Literal["", "x", "y"]
 Tone = Literal["", "good", "warn", "bad", "quiet"]
 _ORDER: tuple[Weight, ...] = ("limit", "spoils", "expect", "note")
 _TONES: dict[Weight, Tone] = {"limit": "bad", "spoils": "warn", "expect": "", "note": "quiet"}
@@ -24,7 +48,8 @@ _SIGNS: dict[Weight, str] = {
 class Finding(Struct, frozen=True):
     """A sentence, its weight, and the percentage of the scan that ranks it within that.
 
-    ``called`` replaces the words for its weight on a page, ``label`` begins its line in a terminal.
+    ``called`` replaces the words for its weight on a page, ``label`` begins its line in a terminal. ``code`` names the
+    kind of finding for programs, which go by it and by ``axis``, never by the sentence; "" where it has none.
     """
 
     weight: Weight
@@ -32,6 +57,12 @@ class Finding(Struct, frozen=True):
     text: str
     called: str = ""
     label: str = "note"
+    code: FindingCode = ""
+    axis: Axis = ""
+
+    def record(self) -> dict[str, str]:
+        """Return the finding as JSON outputs have it."""
+        return {"code": self.code, "axis": self.axis, "text": self.text}
 
     @property
     def tone(self) -> Tone:
@@ -69,6 +100,11 @@ class Remark(str):
 def spoils(text: str, percent: float = 0.0) -> Remark:
     """Return a remark on what makes the image worse, with the percentage of the scan where that is known."""
     return Remark(text, "spoils", percent)
+
+
+def axis_name(axis: str) -> Axis:
+    """Return the name of an axis as findings have it: "x" or "y", and "" for anything else."""
+    return "x" if axis == "x" else "y" if axis == "y" else ""
 
 
 def worst_first(findings: Iterable[Finding]) -> list[Finding]:

@@ -8,6 +8,7 @@ import numpy as np
 from msgspec import Struct
 
 from tablegen.base.input_errors import Document, Problem
+from tablegen.base.warnings import FindingCode
 from tablegen.certificate.expected import certified_expectation
 from tablegen.certificate.line_errors import (
     EmittedPeriod,
@@ -95,7 +96,7 @@ def broken_limits(
     advise: Callable[[str], str] = lambda _: "",
     hardware_problem: Callable[[str, str, str], Problem] | None = None,
 ) -> list[Problem]:
-    """The limits of the configuration that a certificate exceeds, each with a remedy.
+    """List the limits of the configuration that a certificate exceeds, each with a remedy.
 
     ``advise`` adds to a scaling error of an axis ("x" or "y") what was tried against it. ``hardware_problem`` places
     one of a key of an axis' amplifier; without it that stands in ``file``.
@@ -107,13 +108,14 @@ def broken_limits(
                 f"the {axis} axis steps by {certificate.largest_step} codes, above its guard of {certificate.max_step}"
             )
             key = "amplifier.max_slew_v_per_s"
-            problems.append(file.problem(key, why) if hardware_problem is None else hardware_problem(axis, key, why))
+            problem = file.problem(key, why) if hardware_problem is None else hardware_problem(axis, key, why)
+            problems.append(problem.coded("step-guard", axis))
         limit = plan.limits.max_error_lsb
         if limit is not None and certificate.max_error_lsb > limit:
             why = f"the {axis} axis errs by up to {certificate.max_error_lsb:.4g} LSB, above {limit:g}; "
             remedy = _finer_table(plan.x if axis == "x" else plan.y)
             remedy = remedy if limit > 0.5 else "a code alone is rounded by up to 0.5"
-            problems.append(file.problem("limits.max_error_lsb", why + remedy))
+            problems.append(file.problem("limits.max_error_lsb", why + remedy).coded("converter-error", axis))
         limit = plan.limits.max_scaling_error_percent
         if limit is None:
             continue
@@ -123,23 +125,25 @@ def broken_limits(
             parts = max(certificate.scaling.values(), key=lambda error: max(error.total, error.band_limit))
             remedy = _remedy(plan.x if axis == "x" else plan.y, parts)
             why = "; ".join(filter(None, (f"the {axis} axis has a {what}, above {limit:g} %", remedy, advise(axis))))
-            problems.append(file.problem("limits.max_scaling_error_percent", why))
-        elif foreseen := _foreseen(certificate, limit):
-            why = f"on the scanner the {axis} axis is expected to have a {foreseen}"
+            code: FindingCode = "scaling-error" if worst > limit else "size-error"
+            problems.append(file.problem("limits.max_scaling_error_percent", why).coded(code, axis))
+        elif expected := _expected_excess(certificate, limit):
+            code, excess = expected
+            why = f"on the scanner the {axis} axis is expected to have a {excess}"
             why = "; ".join(filter(None, (why, advise(axis))))
-            problems.append(file.problem("limits.max_scaling_error_percent", why))
+            problems.append(file.problem("limits.max_scaling_error_percent", why).coded(code, axis))
     return problems
 
 
-def _foreseen(certificate: Certificate, limit: float) -> str:
-    """What the waveform and what a model expects of the scanner exceed together, and which part is whose; or nothing.
+def _expected_excess(certificate: Certificate, limit: float) -> tuple[FindingCode, str] | None:
+    """Return how the errors of the waveform and of the scanner together exceed a limit; None where they do not.
 
     The uncertainty is not counted: no change of the scan makes it smaller.
     """
     both, expected = certificate.scaling_on_scanner, certificate.expected
     if both is not None and both[1] + both[2] > limit:
         side, on_scanner, own = both
-        return (
+        return "expected-scaling-error", (
             f"scaling error of {on_scanner + own:.4g} % {side}, above {limit:g} %: {on_scanner:.3g} % since these "
             f"harmonics do not make the waveform that its operator needs over the window, {own:.3g} % of the emitted "
             "waveform"
@@ -147,11 +151,11 @@ def _foreseen(certificate: Certificate, limit: float) -> str:
     if expected is not None and expected.size is not None:
         on_scanner, own = expected.size.value, certificate.size_error_percent
         if abs(on_scanner + own) > limit:
-            return (
+            return "expected-size-error", (
                 f"size error of {on_scanner + own:+.4g} %, above {limit:g} %: {on_scanner:+.3g} % by its operator, "
                 f"{own:+.3g} % of the emitted waveform"
             )
-    return ""
+    return None
 
 
 def _finer_table(line: LinePlan, written: str = "lengthen or widen {}") -> str:
@@ -211,7 +215,7 @@ def _certify(line: LinePlan) -> Certificate:
 
 
 def _position(line: LinePlan, played: EmittedPeriod) -> "ArrivingErrors | None":
-    """What arrives behind the response of the axis."""
+    """Compute the errors of the position behind the response of the axis; None without a response."""
     if line.drive.response is None:
         return None
     from tablegen.certificate.position_errors import position_errors  # few scanners have one
@@ -220,7 +224,7 @@ def _position(line: LinePlan, played: EmittedPeriod) -> "ArrivingErrors | None":
 
 
 def position_scaling(line: LinePlan) -> float:
-    """The larger scaling error of both directions behind the response of an axis, in percent; 0 where none is known."""
+    """Return the larger scaling error of both directions behind the response of an axis, in percent; 0 without one."""
     played = EmittedPeriod(line)
     position = _position(line, played)
     scaling = (
@@ -230,7 +234,7 @@ def position_scaling(line: LinePlan) -> float:
 
 
 def scaling_errors(line: LinePlan) -> dict[str, ScalingError]:
-    """The scaling errors of an axis alone, by the directions that image."""
+    """Compute the scaling errors of an axis, by the directions that image."""
     return _scaling(line, EmittedPeriod(line))
 
 
@@ -239,7 +243,7 @@ def _scaling(line: LinePlan, played: EmittedPeriod) -> dict[str, ScalingError]:
 
 
 def _directions(line: LinePlan) -> dict[str, Sweep]:
-    """The branches that image; none of an axis at rest."""
+    """Return the branches that image; none of an axis at rest."""
     shape = line.drive.shape
     if line.drive.resting:
         return {}

@@ -17,20 +17,20 @@ _GRID = 32  # points per period of the highest harmonic
 
 
 class Doubt(Struct, frozen=True):
-    """A sentence about one axis: a figure in percent, above ``limit``; ``kind`` says which figure it is."""
+    """A sentence about one axis: a figure in percent, above ``limit``; ``code`` says which figure it is."""
 
-    kind: Literal["scaling error", "distance", "resonance"]
+    code: Literal["expected-scaling-error", "operator-distance", "resonance"]
     text: str
     percent: float
     limit: float
 
 
 def doubts(line: LinePlan, certificate: Certificate) -> list[Doubt]:
-    """What should be said of the expectation of an axis.
+    """List the doubts about the expectation of an axis.
 
     The uncertainty is not counted: it stands beside the figure, and no change of the scan makes it smaller.
     """
-    found, axis, expected = [], line.axis, certificate.expected
+    doubt_list, axis, expected = [], line.axis, certificate.expected
     figures = {} if expected is None else expected.scaling
     side = max(figures, key=lambda one: figures[one].value, default="")
     if side and figures[side].value > LARGEST_PERCENT:
@@ -39,7 +39,7 @@ def doubts(line: LinePlan, certificate: Certificate) -> list[Doubt]:
             f"{side}, above {LARGEST_PERCENT:g} %, since these harmonics do not make the waveform that its operator "
             "needs over the window"
         )
-        found.append(Doubt("scaling error", text, figures[side].value, LARGEST_PERCENT))
+        doubt_list.append(Doubt("expected-scaling-error", text, figures[side].value, LARGEST_PERCENT))
     position = certificate.position
     if position is not None and max(position.scaling.values(), default=0.0) > RESONANCE_PERCENT:
         side, percent = position.worst
@@ -48,7 +48,7 @@ def doubts(line: LinePlan, certificate: Certificate) -> list[Doubt]:
             f"error is {percent:.3g} % {side}, above {RESONANCE_PERCENT:g} %; of the codes alone it is "
             f"{certificate.scaling[side].total:.3g} %"
         )
-        found.append(Doubt("resonance", text, percent, RESONANCE_PERCENT))
+        doubt_list.append(Doubt("resonance", text, percent, RESONANCE_PERCENT))
     if expected is not None and expected.distance is not None and expected.distance > FAR_PERCENT:
         w = line.drive_series.on_grid(_GRID * line.drive_series.harmonics)
         stroke = line.drive.v_amplitude * float(np.max(w) - np.min(w))
@@ -58,8 +58,8 @@ def doubts(line: LinePlan, certificate: Certificate) -> list[Doubt]:
             f"trace of its operator, so that little is known there; record a trace of {here}, and give it to "
             "`tablegen calibrate operator` with the others"
         )
-        found.append(Doubt("distance", text, expected.distance, FAR_PERCENT))
-    return found
+        doubt_list.append(Doubt("operator-distance", text, expected.distance, FAR_PERCENT))
+    return doubt_list
 
 
 def _hz(passage: Passage) -> str:

@@ -21,7 +21,7 @@ _GRID = 32  # points per period of the highest harmonic
 
 
 def expected_of(line: LinePlan) -> Expectation | None:
-    """What a line should do on the scanner; None where nothing is known.
+    """Compute what a line should do on the scanner; None where nothing is known.
 
     A layer of ``tablegen refine`` was learnt on the scanner, and knows more than the model.
     """
@@ -31,12 +31,12 @@ def expected_of(line: LinePlan) -> Expectation | None:
     known = line.drive.shape.expectation
     if known is not None:
         return known if both else known.forward_only
-    found = _rounding(line) if both else None
-    return None if found is None else Expectation("laws", mismatch=Figure(found[0]), stroke=found[1])
+    rounding = _rounding(line) if both else None
+    return None if rounding is None else Expectation("laws", mismatch=Figure(rounding[0]), stroke=rounding[1])
 
 
 def certified_expectation(line: LinePlan, played: EmittedPeriod) -> Expectation | None:
-    """The same of the emitted integers: what the converter's steps leave is uncertain too.
+    """Compute the expectation of the emitted integers: what the converter's steps leave is uncertain too.
 
     It is added to the uncertainties: nobody knows how steps and departures of the piezo fall together.
     """
@@ -57,12 +57,12 @@ def _less_certain(figure: Figure, by: float) -> Figure:
 
 
 def rounding_mismatch(line: LinePlan) -> float | None:
-    """The largest distance of trace and retrace inside the window, in percent of the line, by the laws.
+    """Compute the largest distance of trace and retrace inside the window, in percent of the line, by the laws.
 
     None where a model has no branches for the stroke that is played.
     """
-    found = _rounding(line)
-    return None if found is None else found[0]
+    rounding = _rounding(line)
+    return None if rounding is None else rounding[0]
 
 
 def _rounding(line: LinePlan) -> tuple[float, PlayedStroke] | None:
@@ -84,5 +84,5 @@ def _rounding(line: LinePlan) -> tuple[float, PlayedStroke] | None:
 
 
 def _share(line: LinePlan, target: Expansion, side: str, x: Floats, low: float, high: float) -> Floats:
-    """The drive where the line is at ``x``, from 0 to 1 between its turns."""
+    """Return the drive where the line is at ``x``, from 0 to 1 between its turns."""
     return (target.at(line.drive.shape.times(side, x), 0)[0] - low) / (high - low)

@@ -43,7 +43,7 @@ class ArrivingErrors(Struct, frozen=True):
 
 
 def position_errors(line: LinePlan, played: EmittedPeriod, directions: Mapping[str, Sweep]) -> ArrivingErrors | None:
-    """The errors of an axis; None where they are not judged.
+    """Compute the position errors of an axis; None where they are not judged.
 
     That is without a response, at rest, of shaped codes, whose certificate is of the position, of an axis that steps
     once a line, and of periods of more than ``MOST_TICKS`` ticks.
@@ -73,12 +73,12 @@ def arriving(line: LinePlan, played: EmittedPeriod) -> Floats:
     real, imaginary = response.inverse(np.asarray(n * rate))
     beyond = _held(response, rate, ticks, n) - np.sinc(n / ticks) / (real + 1j * imaginary)
     spectrum[n] += 0.5 * ticks * line.codes_per_unit * (series.a - 1j * series.b) * beyond
-    found: Floats = np.fft.irfft(spectrum, ticks)
-    return found
+    position: Floats = np.fft.irfft(spectrum, ticks)
+    return position
 
 
 def _held(response: Response, rate_hz: float, ticks: int, n: Ints) -> "Complex":
-    """What arrives in the middle of ticks of a sequence of codes that are held, over the codes, of its harmonics n."""
+    """Compute the position in the middle of ticks of a sequence of held codes, over the codes, of its harmonics n."""
     match response:
         case SecondOrder() as second:
             return _of_second_order(second, rate_hz * ticks, np.exp(2j * pi * n / ticks))
@@ -105,7 +105,7 @@ def _of_second_order(response: SecondOrder, update_hz: float, z: "Complex") -> "
 
 
 def _free(response: SecondOrder, time_s: float) -> tuple[tuple[float, float], tuple[float, float]]:
-    """The matrix that takes position and speed over omega of a free response over a time."""
+    """Return the matrix that takes position and speed over omega of a free response over a time."""
     omega = 2.0 * pi * response.frequency_hz
     damped = 0.5 / response.quality
     root = np.sqrt(complex(damped * damped - 1.0)) * omega * time_s

@@ -88,7 +88,7 @@ def report(
     _write_charts(charts, svg, png, pdf)
     click.echo(f"{output}: {len(content) / 1000:.0f} kB")
     if subject.planned is not None and subject.planned.broken:
-        lines = [f"{output}: the certificate exceeds a limit", *subject.planned.broken]
+        lines = [f"{output}: the certificate exceeds a limit", *map(str, subject.planned.broken)]
         fail(lines, ExitStatus.BROKEN_LIMIT)
     return ExitStatus.OK
 

@@ -320,7 +320,7 @@ class ManifestAxis(Struct):
         )
 
     def asked(self, k: Ints) -> Floats:
-        """The codes, unrounded, that the float waveform asks for at ticks k in [0, ticks) of the period.
+        """Compute the unrounded codes of the float waveform at ticks k in [0, ticks) of the period.
 
         V = v_offset + v_amplitude (w - 1/2), code = (V - v_zero) / v_per_code. Evaluated term by term with exact
         phases, in none of the ways in which the build does it.
@@ -338,7 +338,7 @@ class ManifestAxis(Struct):
         return self._codes_of(w)[which.reshape(-1)]
 
     def _whole_period(self, period: int) -> Floats:
-        """w of every advance: the angle of each is the sum of one of a few far apart and one of a few that follow."""
+        """Compute w of every advance: each angle is the sum of one of a few far apart and one of a few that follow."""
         step = isqrt(period) + 1
         a, b = np.array(self.fourier.a), np.array(self.fourier.b)
         far, near = self._angles(np.arange(0, period, step), period), self._angles(np.arange(step), period)

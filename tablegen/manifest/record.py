@@ -30,7 +30,7 @@ def plan_record(plan: Plan) -> dict[str, Any]:
 
 
 def certificate_record(certificate: Certificate) -> dict[str, Any]:
-    """A certificate as JSON-ready data, its figures to six significant digits."""
+    """Return a certificate as JSON-ready data, its figures to six significant digits."""
     record: dict[str, Any] = {
         name: _figure(getattr(certificate, name))
         for name in certificate.__struct_fields__
@@ -58,7 +58,7 @@ def certificate_record(certificate: Certificate) -> dict[str, Any]:
 
 
 def _passage(passage: Passage) -> dict[str, Any]:
-    """What applies of it; all points of a measured response."""
+    """Return the fields of a passage that apply; all points of a measured response."""
     response = passage.response
     if response is None:
         return {key: value for key, value in asdict(passage).items() if value is not None}
@@ -87,7 +87,7 @@ def _shaped(shaped: ShapedErrors) -> dict[str, Any]:
 
 
 def _expected(expectation: Expectation) -> dict[str, Any]:
-    """What is known of it."""
+    """Return the known figures of an expectation."""
 
     def pair(figure: Figure) -> dict[str, Any]:
         return {"value": _figure(figure.value), "uncertainty": _figure(figure.uncertainty)}
@@ -149,27 +149,29 @@ def _sequence(schedule: Schedule) -> dict[str, Any]:
 
 
 def _layer(line: LinePlan) -> dict[str, Any]:
-    """What `tablegen refine` learnt; nothing without a layer, so that such a build keeps its hash."""
+    """Return the layer that `tablegen refine` learnt; nothing without one, so that such a build keeps its hash."""
     if line.layer is None:
         return {}
     return {"refinement": {"harmonics": line.layer.harmonics, "a": line.layer.a.tolist(), "b": line.layer.b.tolist()}}
 
 
 def _followed(line: LinePlan) -> dict[str, Any]:
-    """What the piezo is to follow, where the played series does not tell; and what the boost limit left of it."""
+    """Return the target of the piezo, where the played series does not tell it, and what the boost limit left of it."""
     response = line.drive.response
     if response is None:
         return {}
     target = {"a0": line.target.a0, "a": line.target.a.tolist(), "b": line.target.b.tolist()}
-    held = np.array(line.held_harmonics, dtype=np.float64)
-    asked, given = response.inverse(held * float(line.rate)), _capped(line, held)
+    limited = np.array(line.held_harmonics, dtype=np.float64)
+    inverse, applied = response.inverse(limited * float(line.rate)), _capped(line, limited)
     # The phase is kept, so that the ratio is real.
-    factors = np.sqrt((given[0] ** 2 + given[1] ** 2) / (asked[0] ** 2 + asked[1] ** 2)) if len(held) else held
+    factors = (
+        np.sqrt((applied[0] ** 2 + applied[1] ** 2) / (inverse[0] ** 2 + inverse[1] ** 2)) if len(limited) else limited
+    )
     return {"target": target, "held_factors": factors.tolist()}
 
 
 def _capped(line: LinePlan, harmonics: Floats) -> tuple[Floats, Floats]:
-    """What these harmonics are multiplied by in place of the inverse response."""
+    """Return what these harmonics are multiplied by in place of the inverse response."""
     assert line.drive.response is not None
     return capped_inverse(line.drive.response, harmonics * float(line.rate), line.drive.max_boost_db)[:2]
 
@@ -182,7 +184,7 @@ def _resonance(line: LinePlan) -> dict[str, Any]:
 
 
 def _asked_table(line: LinePlan) -> dict[str, Any]:
-    """What was asked of a table that the build chose; nothing of one that was written."""
+    """Return the request of a table that the build chose; nothing for one that was written."""
     if line.table_request is None:
         return {}
     return {"asked": {"max_error_lsb": line.table_request.max_error_lsb, "free": list(line.table_request.free)}}

@@ -120,7 +120,7 @@ def _run(shape: TableShape, output: Output) -> MeasuredRun:
 
 
 def axis_tables(setup: Setup, line: LinePlan) -> AxisTables:
-    """The tables of a planned axis. Raises ``Unphysical`` where none keeps the error that its scan file asks for."""
+    """List the tables of a planned axis. Raises ``Unphysical`` where none keeps the requested error."""
     front = table_front(setup, line)
 
     def rows() -> Iterator[TableRow]:

@@ -277,6 +277,7 @@ def test_a_limit_does_not_count_the_uncertainty_and_counts_the_size(tmp_path: Pa
     assert broken_limits(plan, certificates, setup.scan_file) == []
     off = replace(certificates["x"], expected=replace(expected, size=Figure(-0.9, 0.1)))
     (problem,) = broken_limits(plan, {"x": off}, setup.scan_file)
+    assert (problem.code, problem.axis) == ("expected-size-error", "x")
     assert re.search(
         r"expected to have a size error of -0\.9 %, above 0\.8 %: -0\.9 % by its operator, [+-]0", str(problem)
     )

@@ -87,7 +87,7 @@ def test_a_resonance_that_is_driven_is_a_warning_with_remedies(tmp_path: Path) -
     side, percent = certificate.position.worst
     assert percent > 2.0 * certificate.scaling[side].total
     (doubt,) = doubts(plan.x, certificate)
-    assert (doubt.kind, doubt.percent) == ("resonance", percent)
+    assert (doubt.code, doubt.percent) == ("resonance", percent)
     outcome = run("check", tmp_path / "scan.toml")
     assert "scan.toml:23: x.size_nm: the steps of the x codes drive the resonance at 40000 Hz: behind it" in outcome.err
     assert 'tried: dac.shaping = "second" leaves 1.' in outcome.err
