@@ -98,8 +98,11 @@ def _of_second_order(response: SecondOrder, update_hz: float, z: "Complex") -> "
     (a, b), (c, d) = step
     # (z - step) x = (1 - step) (1, 0): state at the begin of a tick, over the code of that tick.
     determinant = z * z - (a + d) * z + (a * d - b * c)
-    position = ((z - d) * (1.0 - a) - b * c) / determinant
-    speed = (c * (1.0 - a) - (z - a) * c) / determinant
+    # A response so slow that it does not move within a tick leaves 0 / 0 at DC, where the position is the code.
+    moves = determinant != 0.0
+    determinant = np.where(moves, determinant, 1.0)
+    position = np.where(moves, ((z - d) * (1.0 - a) - b * c) / determinant, 1.0)
+    speed = np.where(moves, (c * (1.0 - a) - (z - a) * c) / determinant, 0.0)
     at_middle = 1.0 + part[0][0] * (position - 1.0) + part[0][1] * speed
     return np.asarray(z**whole * at_middle)
 

@@ -76,7 +76,7 @@ def make_lab(folder: Path) -> None:
     for number, (centre, stroke) in enumerate(SIX[1::2]):
         time_s, drive_v, nm = record(ForeignPlant(ManyPlays()), centre, stroke, seed=number)
         write_csv(folder / f"o{2 * number + 1}.csv", time_s=time_s, drive_v=drive_v, displacement_nm=nm)
-    save_pair(old_frame("paper", pixels=96, lines=64), folder)
+    save_pair(old_frame("paper", pixels=96, lines=96), folder)
     step = play(load(folder / "scan.toml"), "x", scanner().x)
     write_csv(folder / "trace.csv", **sensed(step.line, scanner().x, 0, samples=1000, periods=6.3))
 

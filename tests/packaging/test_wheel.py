@@ -14,10 +14,16 @@ pytestmark = pytest.mark.common
 def shipped_files() -> set[str]:
     """What the tree says should be inside: all modules, and what lies beside them and is no module."""
     found = {path.relative_to(REPOSITORY).as_posix() for path in REPOSITORY.glob("tablegen/**/*.py")}
-    found |= {"tablegen/py.typed", "tablegen/examples/__init__.py", "tablegen/firmware_templates/__init__.py"}
+    found |= {
+        "tablegen/__init__.pyi",
+        "tablegen/py.typed",
+        "tablegen/examples/__init__.py",
+        "tablegen/firmware_templates/__init__.py",
+    }
     found |= {f"tablegen/examples/{path.name}" for path in REPOSITORY.glob("examples/*.toml")}
-    found |= {f"tablegen/verification/{path.name}" for path in REPOSITORY.glob("tablegen/verification/*.[chv]")}
-    found |= {f"tablegen/verification/{path.name}" for path in REPOSITORY.glob("tablegen/verification/*.ld")}
+    for kind in ("[chv]", "ld"):
+        benches = REPOSITORY.glob(f"tablegen/verification/*/*.{kind}")
+        found |= {path.relative_to(REPOSITORY).as_posix() for path in benches}
     found |= {
         f"tablegen/library/{path.name}"
         for kind in ("v", "j2")
@@ -66,7 +72,7 @@ def test_installed_wheel_verifies_a_build(installed: Path, tmp_path: Path) -> No
     # Negative control: without its cocotb side the copy fails, so that nothing came from the tree.
     copy = tmp_path / "copy"
     shutil.copytree(installed, copy)
-    (copy / "tablegen" / "verification" / "cocotb_stream.py").unlink()
+    (copy / "tablegen" / "verification" / "verilog" / "cocotb_stream.py").unlink()
     with pytest.raises(AssertionError, match="simulation: "):
         python(tmp_path, "-m", "tablegen", "verify", "out", "--ticks", 3000, path=copy)
 
