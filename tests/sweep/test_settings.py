@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from tablegen.base.input_errors import Rejected
 from tablegen.config.settings import MOST_VALUES, Setting, parse_setting
-from tablegen.config.settings import given as check_together
+from tablegen.config.settings import check_repeated_keys as check_together
 
 
 @pytest.mark.parametrize(
