@@ -8,7 +8,7 @@
 # make resources what the Verilog takes on FPGAs, into docs/resources.md
 # make instructions what the C takes on Cortex-M, into docs/instructions.md
 # make link      what an upload takes, into docs/upload.md
-# make fuzz      a million inputs for the C link, with sanitizers, on from the kept corpus
+# make fuzz      a million inputs for the C link, plain and with splines and shaping, with sanitizers, on from the corpus
 # make bench     tablegen beside what others use, into benchmarks/results.md (ONLY=line: that section)
 # make cost      what a build costs, against importing numpy, and whether that is within its limits
 # make figures   the pictures of the README and the docs
@@ -116,15 +116,17 @@ link: $(VENV)/installed-test
 # What is found goes into build/fuzz; what reaches something new may go into the corpus: build/fuzz/link -merge=1.
 FUZZ_RUNS ?= 1000000
 FUZZED := $(wildcard firmware_templates/c/dac_*.[ch]) tests/runtime_c/fuzz/link_fuzz.c
-build/fuzz/link: $(FUZZED)
+# The runtime as most have it, and with all that it can play.
+build/fuzz/link_all: FUZZ_FLAGS := -DDAC_SPLINE=1 -DDAC_SHAPING=3
+build/fuzz/link build/fuzz/link_all: $(FUZZED)
 	@.ci/system-packages clang libclang-rt-dev
 	@mkdir -p $(@D)/found
 	clang -std=c99 -O1 -g -fsanitize=fuzzer,address,undefined -fno-sanitize-recover=all -Wall -Wextra -Werror \
-	    -Ifirmware_templates/c $(filter %.c,$(FUZZED)) -o $@
+	    $(FUZZ_FLAGS) -Ifirmware_templates/c $(filter %.c,$(FUZZED)) -o $@
 
-fuzz: build/fuzz/link
-	build/fuzz/link -runs=$(FUZZ_RUNS) -seed=1 -max_len=400 -timeout=10 -artifact_prefix=build/fuzz/ \
-	    build/fuzz/found tests/runtime_c/fuzz/corpus
+fuzz: build/fuzz/link build/fuzz/link_all
+	for target in $^; do $$target -runs=$(FUZZ_RUNS) -seed=1 -max_len=400 -timeout=10 -artifact_prefix=build/fuzz/ \
+	    build/fuzz/found tests/runtime_c/fuzz/corpus || exit; done
 
 # What tablegen is measured beside stands in an environment of its own.
 OTHERS := build/bench/others

@@ -1,7 +1,7 @@
 /* A whole device for libFuzzer: bytes from the line, ticks in between, and what has to hold whatever comes.
  *
  * An input is a byte of options and then commands:
- *     0x00..0x3f           so many ticks
+ *     0x00..0x3f           so many ticks, one by one or as a buffer
  *     0x40 + type, n       a well-formed frame of this type with n bytes of payload, of the next number
  *     0x50 + type, n       the same with the number of the last one
  *     0x60, n              n bytes as they are
@@ -12,7 +12,8 @@
  *     0x64                 the interlock changes
  *     0x65                 a reset
  *     0x66, n              100 n milliseconds
- * Frames get their tags, so that a key keeps nobody from the states behind it.
+ * Frames get their tags, so that a key keeps nobody from the states behind it. Compiled with DAC_SPLINE=1 uploads are of
+ * cubic tables where the options say so; a shaped program is a change of word 11 of the page of an axis.
  */
 #include <stdlib.h>
 #include <string.h>
@@ -21,8 +22,8 @@
 
 enum { X_BITS = 4, Y_BITS = 3, X_WORDS = 1 << X_BITS, Y_WORDS = 1 << Y_BITS, HARMONICS = 3 };
 enum { LINE_TICKS = 24, LINES = 3 };
-enum { WITH_KEY = 1, WITH_INTERLOCK = 2, WITHOUT_BOOT = 4, HURRIED = 8, FOURIER = 16 };
-enum { MOST_TICKS = 1500, CODE_MIN = 1000, CODE_MAX = 60000, MAX_STEP = 9000, MAX_JUMP = 60000, POWER_UP = 2000 };
+enum { WITH_KEY = 1, WITH_INTERLOCK = 2, WITHOUT_BOOT = 4, HURRIED = 8, FOURIER = 16, CUBIC = 32, FILL = 64 };
+enum { MOST_TICKS = 1500, MOST_FILL = 64, CODE_MIN = 1000, CODE_MAX = 60000, MAX_STEP = 9000, MAX_JUMP = 60000, POWER_UP = 2000 };
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
@@ -34,7 +35,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 static dac_sequencer sequencer;
 static dac_link link_;
-static dac_word x_tables[2][X_WORDS + 1], y_tables[2][Y_WORDS + 1];
+static dac_word x_tables[2][DAC_TABLE_ROOM(X_BITS)], y_tables[2][DAC_TABLE_ROOM(Y_BITS)];
 static int32_t x_words[2 * HARMONICS + 1], y_words[2 * HARMONICS + 1];
 static int32_t sine[5 * X_WORDS / 4];
 static const uint8_t key[16] = {1, 2, 3};
@@ -42,7 +43,7 @@ static const uint8_t hash[32] = {9}, identity[4] = {4, 5, 6, 7};
 static bool permits;
 static uint32_t clock_ms;
 
-static dac_word boot_x[X_WORDS + 1], boot_y[Y_WORDS + 1];
+static dac_word boot_x[DAC_TABLE_ROOM(X_BITS)], boot_y[DAC_TABLE_ROOM(Y_BITS)];
 static dac_program boot;
 static uint8_t image[DAC_LINK_PROGRAM + 2 * (X_WORDS + Y_WORDS)];
 static uint8_t fourier[DAC_LINK_PROGRAM + 8 * (2 * HARMONICS + 1)];
@@ -59,9 +60,9 @@ static uint32_t milliseconds(void)
 
 static dac_link_config config = {
     .x = {{16, 16, false, false, POWER_UP}, {CODE_MIN, CODE_MAX, MAX_STEP, MAX_JUMP}, 16, X_BITS,
-          X_WORDS + 1, {x_tables[0], x_tables[1]}, x_words},
+          DAC_TABLE_ROOM(X_BITS), {x_tables[0], x_tables[1]}, x_words},
     .y = {{16, 16, false, false, POWER_UP}, {CODE_MIN, CODE_MAX, MAX_STEP, MAX_JUMP}, 16, Y_BITS,
-          Y_WORDS + 1, {y_tables[0], y_tables[1]}, y_words},
+          DAC_TABLE_ROOM(Y_BITS), {y_tables[0], y_tables[1]}, y_words},
     .harmonics = HARMONICS,
     .sine_index_bits = X_BITS,
     .sine = sine,
@@ -110,8 +111,10 @@ static void furnish(void)
         boot_x[k] = (dac_word)(1500 * (k < 8 ? k : 16 - k) - 6000);
     for (int k = 0; k < Y_WORDS; k++)
         boot_y[k] = (dac_word)(1000 * k - 4000);
-    boot_x[X_WORDS] = boot_x[0];
-    boot_y[Y_WORDS] = boot_y[0];
+    for (int k = 0; k < DAC_WORDS_BEHIND; k++) {
+        boot_x[X_WORDS + k] = boot_x[k];
+        boot_y[Y_WORDS + k] = boot_y[k];
+    }
     put_program(image, 0);
     put_program(fourier, HARMONICS);
     for (int k = 0; k < X_WORDS + Y_WORDS; k++) {
@@ -130,14 +133,26 @@ static struct {
     uint8_t markers;
     uint32_t ticks, line_ticks; /* of the line so far, and of the whole line */
     uint32_t swaps;
-    dac_word x_table[X_WORDS + 1], y_table[Y_WORDS + 1]; /* of the program that plays, as it was taken */
+    dac_word x_table[DAC_TABLE_ROOM(X_BITS)], y_table[DAC_TABLE_ROOM(Y_BITS)]; /* of the program that plays, as it was taken */
     dac_link_reader reader;
 } watched;
 
+/* How many of the first words stand behind the last. */
+static uint32_t words_behind(const dac_bank_axis *axis)
+{
+#if DAC_SPLINE
+    return axis->cubic ? 3 : 1;
+#else
+    (void)axis;
+    return 1;
+#endif
+}
+
 static void keep_table(dac_word *copy, const dac_bank_axis *axis)
 {
-    memcpy(copy, axis->table, (axis->length + 1) * sizeof *copy);
-    REQUIRE(copy[axis->length] == copy[0]);
+    memcpy(copy, axis->table, (axis->length + words_behind(axis)) * sizeof *copy);
+    for (uint32_t k = 0; k < words_behind(axis); k++)
+        REQUIRE(copy[axis->length + k] == copy[k]);
 }
 
 static void watch_memory(void)
@@ -154,8 +169,8 @@ static void watch_memory(void)
         keep_table(watched.x_table, &bank->x);
         keep_table(watched.y_table, &bank->y);
     }
-    REQUIRE(memcmp(watched.x_table, bank->x.table, (bank->x.length + 1) * sizeof(dac_word)) == 0);
-    REQUIRE(memcmp(watched.y_table, bank->y.table, (bank->y.length + 1) * sizeof(dac_word)) == 0);
+    REQUIRE(memcmp(watched.x_table, bank->x.table, (bank->x.length + words_behind(&bank->x)) * sizeof(dac_word)) == 0);
+    REQUIRE(memcmp(watched.y_table, bank->y.table, (bank->y.length + words_behind(&bank->y)) * sizeof(dac_word)) == 0);
 }
 
 /* `requests`: that acted before it. */
@@ -193,8 +208,35 @@ static void work(unsigned most)
     }
 }
 
+/* A buffer, which is what as many steps make of it; the link works in between. */
+static unsigned fill(unsigned ticks)
+{
+    static dac_sequencer before, filled;
+    dac_output codes[2 * MOST_FILL];
+    uint8_t markers[MOST_FILL];
+
+    memcpy(&before, &sequencer, sizeof before);
+    dac_sequencer_fill(&sequencer, codes, codes + 1, markers, ticks);
+    memcpy(&filled, &sequencer, sizeof filled);
+    memcpy(&sequencer, &before, sizeof before);
+    for (unsigned i = 0; i < ticks; i++) {
+        const unsigned requests = (uint8_t)(sequencer.head - sequencer.tail);
+        dac_tick one;
+        dac_sequencer_step(&sequencer, &one);
+        watch_tick(&one, requests);
+        REQUIRE(one.x == codes[2 * i] && one.y == codes[2 * i + 1] && one.markers == markers[i]);
+    }
+    REQUIRE(memcmp(&filled, &sequencer, sizeof filled) == 0);
+    work(4 * ticks);
+    return ticks;
+}
+
+static bool fills;
+
 static unsigned tick(unsigned ticks)
 {
+    if (fills && ticks != 0)
+        return fill(ticks);
     for (unsigned i = 0; i < ticks; i++) {
         const unsigned requests = (uint8_t)(sequencer.head - sequencer.tail);
         dac_tick one;
@@ -277,10 +319,12 @@ static void say_tagged(uint8_t type, uint8_t seq, const uint8_t *payload, uint8_
 static uint8_t sent[sizeof fourier > sizeof image ? sizeof fourier : sizeof image];
 static size_t sent_bytes;
 
-static void upload(bool as_fourier, const uint8_t *changes, size_t count)
+static void upload(uint8_t options, const uint8_t *changes, size_t count)
 {
     uint8_t info[48] = {0}, part[4 + 240];
-    const uint8_t shapes[] = {X_BITS, 16, 16, 0, Y_BITS, 16, 16, 0};
+    const bool as_fourier = (options & FOURIER) != 0;
+    const uint8_t cubic = options & CUBIC ? 128 : 0;
+    const uint8_t shapes[] = {X_BITS + cubic, 16, 16, 0, Y_BITS + cubic, 16, 16, 0};
     uint32_t crc = DAC_LINK_CRC;
 
     sent_bytes = as_fourier ? sizeof fourier : sizeof image;
@@ -334,7 +378,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         start(WITHOUT_BOOT, 0);
         hurried = false;
         hello();
-        upload(false, NULL, 0);
+        upload(0, NULL, 0);
         dac_link_program_of(&link_, &boot);
         boot.x.table = boot_x;
         boot.y.table = boot_y;
@@ -342,6 +386,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     }
     start(options, starts++);
     hurried = (options & HURRIED) != 0;
+    fills = (options & FILL) != 0;
     sent_bytes = 0;
     hello();
     while (size != 0 && ticks < MOST_TICKS) {
@@ -381,7 +426,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         if (command < 0x60)
             say_tagged(command & 15, command < 0x50 ? ++seq : seq, data, (uint8_t)(count < 228 ? count : 228), NULL);
         else if (command == 0x61)
-            upload((options & FOURIER) != 0, data, count);
+            upload(options, data, count);
         else
             feed(data, count);
         data += count;
