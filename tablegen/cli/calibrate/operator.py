@@ -60,7 +60,7 @@ _MEASURES = "    rms   scaling  mismatch"
     (PAIR_NAME,),
 )
 @sample_options
-def operator(  # noqa: C901
+def operator(
     common: Common,
     data: tuple[Path, ...],
     delay_s: str,
@@ -103,12 +103,7 @@ def operator(  # noqa: C901
     from tablegen.images.scan_angle import angle_remarks
 
     wanted_delay = delay_of(delay_s)
-    if not data and not images:
-        raise click.UsageError("give traces, DATA.CSV..., or images with --pair VOLTS OFFSET_V RATE_HZ TRACE RETRACE")
-    if not data and wanted_delay is None:
-        raise click.UsageError("--delay-s fit is for traces of a sensor; images have --delay-pixels")
-    if not images:
-        refuse_sample(given)
+    _check_usage(bool(data), bool(images), wanted_delay, given)
     tables = [read_columns(path, [TIME, DRIVE, DISPLACEMENT], [TRACE]) for path in data]
     pairs = [read_sample_image(v, at, trace, retrace, given) for v, at, _, trace, retrace in images]
     driver = driver_of(common)
@@ -145,6 +140,16 @@ def operator(  # noqa: C901
     if common.write:
         _write(common, fit, sources, driver, delay)
     return ExitStatus.OK
+
+
+def _check_usage(traces: bool, images: bool, delay_s: float | None, sample: dict[str, Any]) -> None:
+    """Refuse options that do not go together; a delay of None is one that has to be fitted."""
+    if not traces and not images:
+        raise click.UsageError("give traces, DATA.CSV..., or images with --pair VOLTS OFFSET_V RATE_HZ TRACE RETRACE")
+    if not traces and delay_s is None:
+        raise click.UsageError("--delay-s fit is for traces of a sensor; images have --delay-pixels")
+    if not images:
+        refuse_sample(sample)
 
 
 def _charts(
