@@ -3,8 +3,7 @@
 //
 // Counted are the words that were written since the last swap, in any order: those of the program words, and of each
 // axis those of its table, or its Fourier words where the program has harmonics. After a withdrawal or a reset the next
-// write begins a new program: its program words are counted anew, while a table that was written since the last swap
-// stays. The inputs are those of the sequencer's port, so that a word that is written on the clock
+// write begins a new program. The inputs are those of the sequencer's port, so that a word that is written on the clock
 // of a commit counts.
 
 `default_nettype none
@@ -43,19 +42,18 @@ module dac_whole #(
 
     reg [5:0] count;
     initial count = 0;
-    wire counts = program_write && (scan || x || y);
+    wire [5:0] before = begins ? 6'd0 : count;
     always @(posedge clock)
-        if (begins) count <= {5'd0, counts};
-        else if (counts && count != WORDS) count <= count + 1;
+        count <= before + ((program_write && (scan || x || y) && before != WORDS) ? 6'd1 : 6'd0);
 
     wire x_whole, y_whole;
     dac_whole_table #(.INTERPOLATED(X_INTERPOLATED), .INDEX_BITS(X_INDEX_BITS), .HARMONICS(HARMONICS)) x_table (
-        .clock(clock), .begins(take), .write_program(program_write && x),
+        .clock(clock), .begins(begins), .write_program(program_write && x),
         .write_table(write && region == X_TABLE), .write_fourier(write && region == X_FOURIER),
         .address(address[3:0]), .data(data), .whole(x_whole)
     );
     dac_whole_table #(.INTERPOLATED(Y_INTERPOLATED), .INDEX_BITS(Y_INDEX_BITS), .HARMONICS(HARMONICS)) y_table (
-        .clock(clock), .begins(take), .write_program(program_write && y),
+        .clock(clock), .begins(begins), .write_program(program_write && y),
         .write_table(write && region == Y_TABLE), .write_fourier(write && region == Y_FOURIER),
         .address(address[3:0]), .data(data), .whole(y_whole)
     );

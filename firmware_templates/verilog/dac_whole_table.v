@@ -56,10 +56,9 @@ module dac_whole_table #(
     // Counts no further than any program needs: 2^BITS.
     reg [BITS:0] count;
     initial count = 0;
-    wire counts = write_table || (RENDERS && write_fourier);
-    always @(posedge clock)
-        if (begins) count <= {{BITS{1'b0}}, counts};
-        else if (counts && !count[BITS]) count <= count + 1;
+    wire [BITS:0] before = begins ? {BITS+1{1'b0}} : count;
+    wire counts = (write_table || (RENDERS && write_fourier)) && !before[BITS];
+    always @(posedge clock) count <= before + {{BITS{1'b0}}, counts};
     assign whole = count >= needed;
     wire unused_bits = &{write_program, address, data};
 endmodule

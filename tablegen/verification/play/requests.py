@@ -275,14 +275,13 @@ class Requests:
         script.request("park")
         self._ticks(1)
         self._ramp()
-        if not self._in_c:
-            self._part_of_a_program()
         program = loader.load("free")
         script.come_to_rest()
         words = program_words(program.schedule, program.x, program.y)
         outside, inside = loader.edges(words)
+        first = [words[0]]
         for address, word in outside:
-            script.write(PROGRAM, words)  # after a withdrawal they count anew; the tables stay
+            script.write(PROGRAM, first)  # which begins a program
             script.write_unfit(address, word, at_once=not self._in_c)
             script.wait(_REFUSAL_CLOCKS)
             script.state(f"with word {address} of {word:#x}", rests=True)
@@ -295,23 +294,11 @@ class Requests:
         script.request("arm", "trigger")
         self._ticks(program.schedule.ticks + 7)
 
-    def _part_of_a_program(self) -> None:
-        """Registers over the table of another program, since the last swap, are no program."""
-        script, own = self.script, self.loader.own
-        script.wait_writable()
-        script.write(PROGRAM, program_words(own.schedule, own.x, own.y))
-        script.write(Y_TABLE, own.y.words)
-        script.come_to_rest()
-        script.commit_unfit()
-        script.wait(_REFUSAL_CLOCKS)
-        script.state("with a part of a program", rests=True)
-        script.request("withdraw", "clear_faults")
-
     def _discards(self, words: list[int], address: int, word: int) -> None:
         """Check that an idle program with an invalid word is discarded."""
         script = self.script
         for discards in ("withdraw", "reset"):
-            script.write(PROGRAM, words)
+            script.write(PROGRAM, words[:1])
             script.write_unfit(address, word)
             script.write(PROGRAM, [words[address]], first=address)
             script.commit_unfit()  # a right word over a wrong one is not enough
@@ -334,7 +321,6 @@ class Requests:
         """They are committed, and withdrawn again."""
         script = self.script
         for edge in inside:
-            script.write(PROGRAM, words)
             for address, word in edge.items():
                 script.write(PROGRAM, [word], first=address)
             self.loader.commit(program)  # in place of what was written: no tick will take it
