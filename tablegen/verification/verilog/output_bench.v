@@ -164,7 +164,7 @@ module check_spi #(
     reg [31:0] random = 32'h12345678 ^ SEED;
     integer at = -1;  // clocks since a sample was sent; below 0 at rest
     integer until_strobe = 3;
-    integer within, half, bit_number;
+    integer at_in_frame, half, bit_number;
     reg starts, was_free, misses, in_frame, in_second, pulsed, x_low, y_low, active;
 
     wire sclk, cs_x_n, cs_y_n, mosi_x, mosi_y, ldac_n, busy, missed;
@@ -216,9 +216,9 @@ module check_spi #(
         if (misses) lost = lost + 1;
 
         in_second = SECOND != 0 && at >= SECOND;
-        within = in_second ? at - SECOND : at;
-        in_frame = at >= 0 && within < FRAME;
-        half = within / HALF_PERIOD;
+        at_in_frame = in_second ? at - SECOND : at;
+        in_frame = at >= 0 && at_in_frame < FRAME;
+        half = at_in_frame / HALF_PERIOD;
         active = in_frame && half % 2 == 1;
         x_low = in_frame && (TOPOLOGY != 2 || in_second == (Y_FIRST != 0));
         y_low = in_frame && (TOPOLOGY == 0 || (TOPOLOGY == 2 && in_second == (Y_FIRST == 0)));
