@@ -1,13 +1,16 @@
-"""The kept corpus of ``make fuzz`` with sanitizers; and that it finds a device that is broken."""
+"""The kept corpus of ``make fuzz`` with sanitizers, on both of its targets; and that it finds what is broken."""
 
 import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 
+import mutants
 import pytest
 from building import run_clean
+from c_faults import Mutant as CMutant
+from c_mutants_shaping import MUTANTS as SHAPED
 from limits import within
-from link_mutants import MUTANTS, Mutant
+from link_mutants import MUTANTS
 
 from tablegen.base.resources import c_link, c_runtime
 
@@ -29,15 +32,28 @@ FOUND = {
 }
 
 
-def replay(folder: Path, mutant: Mutant | None = None) -> subprocess.CompletedProcess[str]:
-    """Compile the target, with a mutant in it or with none, and give it every file of the corpus."""
+# As `make fuzz` compiles it: the runtime as most have it, and with all that it can play.
+TARGETS: dict[str, tuple[str, ...]] = {"plain": (), "all": ("-DDAC_SPLINE=1", "-DDAC_SHAPING=3")}
+# Codes of a buffer that are not those of steps, of what only the second target plays.
+FOUND_WITH_ALL: dict[str, tuple[str, str, str]] = {
+    "a run along a spline begins with a later segment": ("dac_run.h", "goes_on ? 1 : 0", "1"),
+    "a shaped tick has half a code less": next(
+        (each.file, each.old, each.new) for each in SHAPED if each.breaks == "a tick has half a code less"
+    ),
+}
+
+
+def replay(
+    folder: Path, target: str = "plain", mutant: mutants.Mutant | None = None
+) -> subprocess.CompletedProcess[str]:
+    """Compile a target, with a mutant in it or with none, and give it every file of the corpus."""
     sources: Sequence[Path] = [*c_runtime(), *c_link()]
     for path in sources:
         text = mutant.source if mutant is not None and mutant.file == path.name else path.read_text("utf-8")
         (folder / path.name).write_text(text, "utf-8")
     copies = [folder / path.name for path in sources if path.suffix == ".c"]
     program = folder / "link"
-    run_clean(["clang", *OPTIONS, f"-I{folder}", *copies, FUZZ / "link_fuzz.c", "-o", program])
+    run_clean(["clang", *OPTIONS, *TARGETS[target], f"-I{folder}", *copies, FUZZ / "link_fuzz.c", "-o", program])
     command = [str(program), "-runs=0", f"-artifact_prefix={folder}/", str(CORPUS)]
     return subprocess.run(within(CORPUS_S, command), capture_output=True, text=True, check=False, cwd=folder)
 
@@ -48,8 +64,9 @@ def test_the_corpus_is_small() -> None:
     assert sum(sizes) < 300_000
 
 
-def test_the_corpus_finds_nothing(tmp_path: Path) -> None:
-    done = replay(tmp_path)
+@pytest.mark.parametrize("target", TARGETS)
+def test_the_corpus_finds_nothing(target: str, tmp_path: Path) -> None:
+    done = replay(tmp_path, target)
     assert done.returncode == 0, done.stderr[-3000:]
     assert "DONE" in done.stderr
 
@@ -58,4 +75,9 @@ def test_the_corpus_finds_nothing(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", sorted(FOUND))
 def test_the_corpus_finds_what_is_broken(name: str, tmp_path: Path) -> None:
     (mutant,) = (each for each in MUTANTS if each.breaks == name)
-    assert replay(tmp_path, mutant).returncode != 0
+    assert replay(tmp_path, mutant=mutant).returncode != 0
+
+
+@pytest.mark.parametrize("name", FOUND_WITH_ALL)
+def test_the_corpus_finds_what_is_broken_in_splines_and_shaping(name: str, tmp_path: Path) -> None:
+    assert replay(tmp_path, "all", CMutant(name, *FOUND_WITH_ALL[name])).returncode != 0
