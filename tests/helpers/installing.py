@@ -105,11 +105,12 @@ def clean_environment(wheel: Path, folder: Path, packages: Path, program: str | 
     """Install a wheel into a new virtual environment of an interpreter, and return the folder of its commands.
 
     The environment finds what the wheel requires in a folder of packages, which a ``.pth`` file names, so that no
-    network is needed. Nothing else is in it, not even pip: that of the tests runs under its interpreter.
+    network is needed. Nothing else is in it, not even pip: that of ``program`` installs into it, since the pip of an
+    older Python need not run under a newer one.
     """
     python(folder, "-m", "venv", "--without-pip", folder / "environment", program=program)
     interpreter = folder / "environment" / "bin" / "python"
-    _pip(folder, "install", wheel, interpreter=interpreter)
+    _pip(folder, "install", wheel, interpreter=interpreter, program=program)
     where = python(folder, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))", program=interpreter)
     (Path(where.strip()) / "requirements.pth").write_text(f"{packages}\n", "utf-8")
     return interpreter.parent
@@ -135,10 +136,12 @@ def told_pythons() -> str:
     return "; ".join(told + [f"no Python {absent} here, or `make pythons` has not run"] * bool(absent))
 
 
-def _pip(folder: Path, *arguments: str | Path, interpreter: Path | None = None) -> None:
+def _pip(
+    folder: Path, *arguments: str | Path, interpreter: Path | None = None, program: str | Path = sys.executable
+) -> None:
     for_another = () if interpreter is None else ("--python", interpreter)
     options = ("--no-deps", "--no-index", "--disable-pip-version-check", "--quiet")
-    python(folder, "-m", "pip", *for_another, arguments[0], *options, *arguments[1:])
+    python(folder, "-m", "pip", *for_another, arguments[0], *options, *arguments[1:], program=program)
 
 
 def write_command(folder: Path, packages: Path) -> Path:
