@@ -12,8 +12,8 @@
  *     0x64                 the interlock changes
  *     0x65                 a reset
  *     0x66, n              100 n milliseconds
- * Frames get their tags, so that a key keeps nobody from the states behind it. Compiled with DAC_SPLINE=1 uploads are of
- * cubic tables where the options say so; a shaped program is a change of word 11 of the page of an axis.
+ * Frames get their tags, so that a key keeps nobody from the states behind it. Compiled with DAC_SPLINE=1 uploads are
+ * of cubic tables where the options say so; a shaped program is a change of word 11 of the page of an axis.
  */
 #include <stdlib.h>
 #include <string.h>
@@ -23,7 +23,8 @@
 enum { X_BITS = 4, Y_BITS = 3, X_WORDS = 1 << X_BITS, Y_WORDS = 1 << Y_BITS, HARMONICS = 3 };
 enum { LINE_TICKS = 24, LINES = 3 };
 enum { WITH_KEY = 1, WITH_INTERLOCK = 2, WITHOUT_BOOT = 4, HURRIED = 8, FOURIER = 16, CUBIC = 32, FILL = 64 };
-enum { MOST_TICKS = 1500, MOST_FILL = 64, CODE_MIN = 1000, CODE_MAX = 60000, MAX_STEP = 9000, MAX_JUMP = 60000, POWER_UP = 2000 };
+enum { MOST_TICKS = 1500, MOST_FILL = 64, POWER_UP = 2000 };
+enum { CODE_MIN = 1000, CODE_MAX = 60000, MAX_STEP = 9000, MAX_JUMP = 60000 };
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
@@ -133,7 +134,8 @@ static struct {
     uint8_t markers;
     uint32_t ticks, line_ticks; /* of the line so far, and of the whole line */
     uint32_t swaps;
-    dac_word x_table[DAC_TABLE_ROOM(X_BITS)], y_table[DAC_TABLE_ROOM(Y_BITS)]; /* of the program that plays, as it was taken */
+    /* of the program that plays, as it was taken */
+    dac_word x_table[DAC_TABLE_ROOM(X_BITS)], y_table[DAC_TABLE_ROOM(Y_BITS)];
     dac_link_reader reader;
 } watched;
 
