@@ -22,7 +22,6 @@ from tablegen.base.resources import c_runtime
 from tablegen.certificate.certificate import certify
 from tablegen.certificate.line_errors import EmittedPeriod
 from tablegen.charts.picture_file import picture
-from tablegen.cli.tables_text import tables_text
 from tablegen.config.load import from_values, load
 from tablegen.config.schema import Table
 from tablegen.emit.render import render
@@ -35,6 +34,7 @@ from tablegen.planning.table_search import TableSearch
 from tablegen.report.table_charts import table_charts
 from tablegen.report.table_costs import CELLS, INSTRUCTIONS
 from tablegen.report.table_rows import axis_tables
+from tablegen.report.tables_text import tables_text
 from tablegen.verification.c.emulate import Processor, compile_bare
 
 HERE = Path(__file__).parent

@@ -124,12 +124,38 @@ def _type(annotation: object) -> str:
     return re.sub(r"\b(?:[A-Za-z_]+\.)+(?=[A-Z])", "", inspect.formatannotation(annotation))
 
 
+_SECTION = re.compile(r"^(Parameters|Returns|Yields|Raises|Examples)\n-+\n", re.MULTILINE)
+
+
 def _docstring(thing: object) -> str:
-    text = (inspect.getdoc(thing) or "").replace("``", "`")
+    """The text, then each section of the numpy convention: lists of what a function takes, and its example as code."""
+    text, *sections = _SECTION.split(inspect.getdoc(thing) or "")
+    parts = [_paragraphs(text.strip().replace("``", "`"))]
+    for title, body in zip(sections[::2], sections[1::2], strict=True):
+        if title == "Examples":
+            parts.append(f"```pycon\n{body.strip()}\n```")
+        else:
+            parts += [f"**{title}**", "\n".join(_entries(body.replace("``", "`")))]
+    return "\n\n".join(parts)
+
+
+def _paragraphs(text: str) -> str:
     return "\n\n".join(
         block if block.startswith(("    ", "- ", "|")) else fill(" ".join(block.split()), 120, break_on_hyphens=False)
         for block in re.split(r"\n\n", text)
     )
+
+
+def _entries(body: str) -> list[str]:
+    """A line of a list for each name or type of a section, with what stands below it."""
+    found = []
+    for head, *rest in (entry.splitlines() for entry in re.split(r"\n(?=\S)", body.strip())):
+        names, colon, kind = head.partition(" : ")
+        title = f"`{names}`" + (f" ({kind})" if colon else "")
+        words = " ".join(line.strip() for line in rest)
+        text = fill(f"- {title}: {words}", 120, subsequent_indent="  ", break_on_hyphens=False, break_long_words=False)
+        found.append(text)
+    return found
 
 
 def _fields(kind: type) -> list[str]:

@@ -49,7 +49,7 @@ def show(scan: Path, as_json: bool, formats: tuple[str, ...], plot: Path | None,
         return
     plan = built.plan
     tell(f"{plan.name} on {plan.scanner!r}", bold=True)
-    lines = built.summary.splitlines()
+    lines = built.summary().splitlines()
     if optimum:
         from tablegen.certificate.certificate import Certificate
         from tablegen.certificate.optimum import with_optimum

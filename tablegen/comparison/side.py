@@ -82,7 +82,7 @@ def together(a: Kind, b: Kind) -> bool:
     return any({a, b} <= kinds for kinds in _TOGETHER)
 
 
-def read_side(path: Path, kind: Kind, tell: Callable[[str], None] = lambda _: None) -> ComparedSide:
+def read_side(path: Path, kind: Kind, tell: Callable[[str], object] = lambda _: None) -> ComparedSide:
     """Read one side; a scan is planned and certified. Raises ``Rejected`` and ``NotABuild``."""
     if kind == "build":
         subject = of_directory(path)

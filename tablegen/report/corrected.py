@@ -18,8 +18,8 @@ def correction_charts(scan: StraightScan, name: str) -> PlottedCharts:
     """Up to six: those of a comparison where there is a retrace, that of the lattice where there is one."""
     trace = scan.judged[0]
     charts = [
-        _image("before", scan.taken[trace], None, "before: trace"),
-        _image("after", scan.pictures[trace], scan.size_nm, "after: trace"),
+        height_chart("before", scan.taken[trace], None, "before: trace"),
+        height_chart("after", scan.pictures[trace], scan.size_nm, "after: trace"),
         _moved(scan),
     ]
     brief = charts[1:2]
@@ -31,7 +31,8 @@ def correction_charts(scan: StraightScan, name: str) -> PlottedCharts:
     return PlottedCharts(f"{name}: correction", tuple(charts), 3, tuple(brief))
 
 
-def _image(key: str, picture: ScanPicture, size_nm: tuple[float, float] | None, title: str) -> Chart:
+def height_chart(key: str, picture: ScanPicture, size_nm: tuple[float, float] | None, title: str) -> Chart:
+    """Draw the heights of a picture in shades, levelled line by line; in nm where its size is known, else in pixels."""
     heights = _levelled(picture.heights)
     low, high = (float(np.nanpercentile(heights, share)) for share in (1.0, 99.0))
     unit = f"heights [{picture.unit}]" if picture.unit else "heights [units of the file]"

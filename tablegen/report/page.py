@@ -18,7 +18,7 @@ from tablegen.report.spectrum import quantisation, spectrum
 from tablegen.report.subject import Subject
 from tablegen.report.usable import usable
 
-Tell = Callable[[str], None]
+Tell = Callable[[str], object]
 
 
 def sections(subject: Subject, tell: Tell = lambda _: None) -> list[Section]:

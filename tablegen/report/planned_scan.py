@@ -15,7 +15,7 @@ from tablegen.report.verify_record import VerifyRecord
 def planned_scan(
     scan: Path,
     verified: VerifyRecord | None = None,
-    progress: Callable[[str], None] = lambda _: None,
+    progress: Callable[[str], object] = lambda _: None,
     *,
     remedies: bool = True,
 ) -> Subject:

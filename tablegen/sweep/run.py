@@ -6,11 +6,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
+
 from tablegen.api.build import BrokenLimit
+from tablegen.api.result import Result
 from tablegen.base.input_errors import Problem, Rejected
 from tablegen.base.interruption import ENDINGS, held
 from tablegen.base.reading import BUILD_FILE, file_sha256, holds, read_bytes
 from tablegen.base.workers import results
+from tablegen.charts.picture_file import PlottedCharts
 from tablegen.config.names import of_the_runtime
 from tablegen.config.schema import DEFAULT_FORMATS
 from tablegen.config.variants import Variant
@@ -24,6 +28,7 @@ from tablegen.sweep.inputs import Inputs
 from tablegen.sweep.job import Doubtful, Job, Made, make
 from tablegen.sweep.written_records import WrittenRecords
 
+_SHOWN = 20  # scans with the same reason, by name
 Kind = Literal["wrong input", "limit", "error"]
 
 
@@ -36,8 +41,8 @@ class Failed:
     reasons: list[str]
 
 
-@dataclass
-class ScanLibrary:
+@dataclass(repr=False)
+class ScanLibrary(Result):
     """The scans of a library, and what became of them."""
 
     library: str
@@ -66,6 +71,65 @@ class ScanLibrary:
     def in_order(self) -> list[Entry]:
         """What can be played, as the index numbers it."""
         return [self.entries[variant.name] for variant in self.variants if variant.name in self.entries]
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """Names of the scans by what became of them, and the reasons of those that failed."""
+        failed = [{"name": one.variant.name, "kind": one.kind, "reasons": one.reasons} for one in self.failed]
+        return {
+            "library": self.library,
+            "folder": str(self.folder),
+            "scans": [variant.name for variant in self.variants],
+            "built": self.built,
+            "current": self.current,
+            "failed": failed,
+            "removed": self.removed,
+            "different": self.different,
+            "notes": self.notes,
+        }
+
+    def verdict(self) -> str:
+        """Return what became of the scans in one line, as ``tablegen sweep`` prints it."""
+        count, failed = len(self.variants), len(self.failed)
+        parts = [f"{len(self.built)} built"] * bool(self.built)
+        parts += [f"{len(self.current)} up to date"] * bool(self.current)
+        parts += [f"{failed} failed"] * bool(failed) + [f"{len(self.removed)} removed"] * bool(self.removed)
+        return f"{self.folder}: {count} scan{'s' if count != 1 else ''}: {', '.join(parts)}"
+
+    def remarks(self) -> list[str]:
+        """Return warnings, the reasons of scans that failed, and notes, as ``tablegen sweep`` prints them."""
+        warnings = [f"warning: {entry.name}: {text}" for entry in self.in_order for text in entry.warnings]
+        return [*warnings, *self._reasons(), *(f"note: {note}" for note in self.notes)]
+
+    def _reasons(self) -> list[str]:
+        """Each reason once, with the scans that it holds for."""
+        by_reason: dict[str, list[str]] = {}
+        for failed in self.failed:
+            by_reason.setdefault("\n".join(failed.reasons), []).append(failed.variant.name)
+        lines = []
+        for reason, names in by_reason.items():
+            more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
+            lines.append(f"failed: {', '.join(names[:_SHOWN])}{more}:\n  " + reason.replace("\n", "\n  "))
+        return lines
+
+    def summary(self) -> str:
+        """Return what ``tablegen sweep`` prints."""
+        return "\n".join([*self.remarks(), self.verdict()])
+
+    def charts(self) -> PlottedCharts:
+        """Give the largest scaling error of each program, in the order of the index."""
+        from tablegen.charts.chart import Chart, DrawnCurve
+
+        errors = [max(axis.scaling_error_percent for axis in entry.axes) for entry in self.in_order]
+        numbers = np.arange(float(len(errors)))
+        curve = DrawnCurve("", "before", numbers, np.array(errors), "points")
+        chart = Chart("scaling", "scaling error of each program", "program [number]", "scaling error [%]", (curve,))
+        return PlottedCharts(self.library, (chart,))
+
+    def _lines(self) -> Sequence[str]:
+        names = ", ".join(variant.name for variant in self.variants[:4])
+        more = f" and {len(self.variants) - 4} more" if len(self.variants) > 4 else ""
+        return f"library {self.library!r}", self.verdict(), names + more
 
 
 def state(
