@@ -26,6 +26,8 @@ from tablegen.api.correct import correct as correct
 from tablegen.api.simulate import simulate as simulate
 from tablegen.api.compare import compare as compare
 from tablegen.api.tables import tables as tables
+from tablegen.api.report import report as report
+from tablegen.sweeping.sweep import sweep as sweep
 from tablegen.api.laboratory import Laboratory as Laboratory
 from tablegen.link.device import Device as Device
 from tablegen.config.load import Setup as Setup
@@ -50,6 +52,8 @@ from tablegen.api.correct import Corrected as Corrected
 from tablegen.api.simulate import SimulatedScan as SimulatedScan
 from tablegen.api.compare import Compared as Compared
 from tablegen.api.tables import FeasibleTables as FeasibleTables
+from tablegen.api.report import ReportPage as ReportPage
+from tablegen.sweeping.run import ScanLibrary as ScanLibrary
 from tablegen.manifest.read import StoredBuild as StoredBuild
 from tablegen.link.prepare import PreparedScan as PreparedScan
 from tablegen.verification.build_report import Report as Report

@@ -237,7 +237,7 @@ class Build(Result):
     def charts(self) -> "PlottedCharts":
         """Give the drive of each axis, and the error of the modelled piezo with and without compensation."""
         from tablegen.charts.picture_file import PlottedCharts
-        from tablegen.report.scan_charts import drive_of, modelled_error
+        from tablegen.html_report.scan_charts import drive_of, modelled_error
 
         pairs = [(drive_of(line), modelled_error(line)) for line in self.plan.moving]
         return PlottedCharts(self.name, tuple(chart for pair in pairs for chart in pair))

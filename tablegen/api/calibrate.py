@@ -344,12 +344,12 @@ class Calibrated(Result):
 
     def page(self) -> bytes:
         """Return the HTML page that ``tablegen calibrate --report`` writes."""
-        from tablegen.report.fitted import fit_page
+        from tablegen.html_report.fitted import fit_page
 
         return fit_page(self.fit, self.axis, list(self.sources), self.places(path=False), self.points)
 
     def charts(self) -> PlottedCharts:
-        from tablegen.report.fitted import fit_charts
+        from tablegen.html_report.fitted import fit_charts
 
         return fit_charts(self.fit, self.axis)
 

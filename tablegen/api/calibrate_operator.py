@@ -259,13 +259,13 @@ class CalibratedOperator(Result):
         )
 
     def charts(self) -> PlottedCharts:
-        from tablegen.report.operator_charts import operator_charts
+        from tablegen.html_report.operator_charts import operator_charts
 
         return operator_charts(self.fit, self.lines, self.next_trace, self.driver, self.axis)
 
     def page(self) -> bytes:
         """Return the HTML page that ``tablegen calibrate operator --report`` writes."""
-        from tablegen.report.fitted import operator_page
+        from tablegen.html_report.fitted import operator_page
 
         def figures(line: PeriodicLine, left: LineErrors, out: LineErrors) -> tuple[float, ...]:
             drive = line.stroke * self.driver.span, self.driver.volts(line.centre), line.rate_hz

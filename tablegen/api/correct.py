@@ -178,7 +178,7 @@ class Corrected(Result):
 
     def charts(self) -> PlottedCharts:
         """Give the charts that ``tablegen correct --plot`` draws."""
-        from tablegen.report.corrected import correction_charts
+        from tablegen.html_report.corrected import correction_charts
 
         return correction_charts(self.scan, self.images.first.file)
 

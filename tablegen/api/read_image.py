@@ -183,7 +183,7 @@ class Image(Result):
 
     def charts(self) -> PlottedCharts:
         from tablegen.correction.straight import ScanPicture
-        from tablegen.report.corrected import height_chart
+        from tablegen.html_report.corrected import height_chart
 
         both = [("trace", self)] if self.retrace is None else [("trace", self), ("retrace", self.retrace)]
         charts = []

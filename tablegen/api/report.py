@@ -10,11 +10,11 @@ from tablegen.base.warnings import Finding
 from tablegen.charts.chart import Chart
 from tablegen.charts.picture_file import PlottedCharts
 from tablegen.emit.write import write_files
-from tablegen.report.page import charts_of, page, sections
-from tablegen.report.planned_scan import planned_scan
-from tablegen.report.ranking import ranked
-from tablegen.report.subject import Subject, of_directory
-from tablegen.report.verify_record import read_record
+from tablegen.html_report.page import charts_of, page, sections
+from tablegen.html_report.planned_scan import planned_scan
+from tablegen.html_report.ranking import ranked
+from tablegen.html_report.subject import Subject, of_directory
+from tablegen.html_report.verify_record import read_record
 
 
 def report(

@@ -163,7 +163,7 @@ class SimulatedScan(Result):
 
     def charts(self) -> PlottedCharts:
         """Give residual and scaling error of each run."""
-        from tablegen.report.simulated import own_charts, stage_charts
+        from tablegen.html_report.simulated import own_charts, stage_charts
 
         return own_charts(self.name, self.own_runs) if self.truth is None else stage_charts(self.name, self.stages)
 

@@ -9,9 +9,9 @@ from tablegen.api.result import Result
 from tablegen.base.input_errors import Problems
 from tablegen.charts.picture_file import PlottedCharts
 from tablegen.config.load import Setup, load
+from tablegen.html_report.table_rows import AxisTables, axis_tables
+from tablegen.html_report.tables_text import tables_text
 from tablegen.planning.line_plan import make_plan
-from tablegen.report.table_rows import AxisTables, axis_tables
-from tablegen.report.tables_text import tables_text
 
 
 def tables(
@@ -87,7 +87,7 @@ class FeasibleTables(Result):
 
     def charts(self) -> PlottedCharts:
         """Give a chart an axis: memory and error."""
-        from tablegen.report.table_charts import table_charts
+        from tablegen.html_report.table_charts import table_charts
 
         return table_charts(self.name, self.axes)
 

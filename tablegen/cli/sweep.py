@@ -10,7 +10,7 @@ from tablegen.cli.shared.common import OutputFolder, fail, format_option, scan_a
 from tablegen.cli.shared.exit_status import ExitStatus
 
 if TYPE_CHECKING:
-    from tablegen.sweep.run import ScanLibrary
+    from tablegen.sweeping.run import ScanLibrary
 
 
 @click.command(short_help="Build many scans as a library of programs with one index.")
@@ -86,7 +86,7 @@ def sweep(
 
     quiet_blas()
     from tablegen.emit.write import CannotWrite, NoPlace
-    from tablegen.sweep.sweep import build_library
+    from tablegen.sweeping.sweep import build_library
 
     found = _library(scan, texts, output)
     chosen = list(formats) or None
@@ -114,7 +114,7 @@ def _library(scan: Path, texts: tuple[str, ...], output: Path) -> "ScanLibrary":
     """The scans of the library; a file that cannot be read, or a wrong setting, ends the command."""
     from tablegen.base.input_errors import Rejected
     from tablegen.config.settings import parse_setting
-    from tablegen.sweep.sweep import planned_library
+    from tablegen.sweeping.sweep import planned_library
 
     try:
         return planned_library(scan, [parse_setting(text) for text in texts], output)
@@ -126,9 +126,9 @@ def _listed(found: "ScanLibrary", formats: list[str] | None) -> int:
     """A line a scan: what a sweep would do with it."""
     from tablegen.base.input_errors import Rejected
     from tablegen.library.entry import Entry
-    from tablegen.sweep.inputs import Inputs
-    from tablegen.sweep.run import state
-    from tablegen.sweep.written_records import WrittenRecords
+    from tablegen.sweeping.inputs import Inputs
+    from tablegen.sweeping.run import state
+    from tablegen.sweeping.written_records import WrittenRecords
 
     inputs, written, wrong = Inputs(), WrittenRecords(), 0
     width = max(len(variant.name) for variant in found.variants)

@@ -14,9 +14,9 @@ from tablegen.comparison.scans import scan_quantities
 from tablegen.compensation.models.operator import OperatorModel
 from tablegen.config.load import load_scanner
 from tablegen.config.scanner import Scanner
+from tablegen.html_report.planned_scan import planned_scan
+from tablegen.html_report.subject import Subject, of_directory
 from tablegen.manifest.format import MANIFEST
-from tablegen.report.planned_scan import planned_scan
-from tablegen.report.subject import Subject, of_directory
 
 Kind = Literal["scan", "build", "scanner", "operator"]
 WORDS: dict[Kind, str] = {

@@ -86,6 +86,22 @@ def test_a_scan_is_compared_and_its_tables_are_listed_as_by_the_commands(lab: Pa
         tablegen.compare("scan.toml", "scanner.toml")
 
 
+def test_a_page_and_a_library_are_those_of_the_commands(lab: Path) -> None:
+    page = tablegen.report("scan.toml")
+    check(page)
+    assert run("report", "scan.toml", "-o", "theirs.html").status == 0
+    assert page.content == Path("theirs.html").read_bytes()
+    with pytest.raises(tablegen.Rejected, match="would replace a scan or a scanner file"):
+        page.write("scan.toml")
+    library = tablegen.sweep("scan.toml", {"x.size_nm": [200, 5000]}, "ours", jobs=1, formats=["csv"])
+    check(library)
+    command = run("sweep", "scan.toml", "--set", "x.size_nm=200,5000", "-o", "theirs", "-j", "1", "-f", "csv")
+    assert command.out.strip() == library.verdict().replace("ours", "theirs")
+    assert [one.variant.name for one in library.failed] == ["annexin_200nm_size_nm_5000"]
+    ours, theirs = (sorted(path.relative_to(name) for path in Path(name).rglob("*")) for name in ("ours", "theirs"))
+    assert ours == theirs
+
+
 def test_a_scan_is_simulated_as_by_the_command(lab: Path) -> None:
     check(tablegen.simulate("scan.toml", calibrated=False), "simulate scan.toml --no-calibration")
     with pytest.raises(ValueError, match="has no operator; identify one with calibrate_operator"):

@@ -24,9 +24,9 @@ from tablegen.library.entry import Entry, changed_files, is_whole, parse_entry, 
 from tablegen.library.index import is_indexed, listed_files, make_index
 from tablegen.manifest.format import INDEX, MANIFEST, RECORD
 from tablegen.manifest.read import NotABuild, StoredBuild, read_build
-from tablegen.sweep.inputs import Inputs
-from tablegen.sweep.job import Doubtful, Job, Made, make
-from tablegen.sweep.written_records import WrittenRecords
+from tablegen.sweeping.inputs import Inputs
+from tablegen.sweeping.job import Doubtful, Job, Made, make
+from tablegen.sweeping.written_records import WrittenRecords
 
 _SHOWN = 20  # scans with the same reason, by name
 Kind = Literal["wrong input", "limit", "error"]

@@ -1,11 +1,11 @@
 """What was asked for, and what will be played; the files of the build; what verify found."""
 
 from tablegen.certificate.summary import rate
+from tablegen.html_report.blocks import Bullets, Grid, Paragraph, Section, TableCell, row
+from tablegen.html_report.subject import Subject
 from tablegen.manifest.fields import ManifestAxis, ManifestSequence
 from tablegen.planning.line_plan import LinePlan
 from tablegen.planning.settling import settling, settling_text
-from tablegen.report.blocks import Bullets, Grid, Paragraph, Section, TableCell, row
-from tablegen.report.subject import Subject
 
 
 def asked(subject: Subject) -> Section:

@@ -17,9 +17,9 @@ from tablegen.compensation import models
 from tablegen.compensation.line import LineShape
 from tablegen.compensation.models.operator import OperatorLine
 from tablegen.config.load import Setup
+from tablegen.html_report.subject import PlannedScan
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan, make_plan
-from tablegen.report.subject import PlannedScan
 from tablegen.virtual.own_scanner import OwnAxis
 from tablegen.virtual.simulation import AxisRun, SettledAxis, run_on_each, with_model
 

@@ -10,9 +10,9 @@ from typing import Any
 from markupsafe import Markup
 
 from tablegen.charts.svg import svg, swatch
-from tablegen.report.blocks import Section, TableCell
-from tablegen.report.number_text import coded, visible
-from tablegen.report.ranking import Finding
+from tablegen.html_report.blocks import Section, TableCell
+from tablegen.html_report.number_text import coded, visible
+from tablegen.html_report.ranking import Finding
 
 
 def document(
@@ -44,7 +44,7 @@ def document(
 
 
 def _resource(name: str) -> str:
-    return (resources("tablegen.report") / name).read_text("utf-8")
+    return (resources("tablegen.html_report") / name).read_text("utf-8")
 
 
 @cache

@@ -15,9 +15,9 @@ from tablegen.charts.chart import Chart, DrawnCurve, Mark
 from tablegen.charts.picture_file import PlottedCharts
 from tablegen.fitting.estimate import Curve, Estimate, Fit
 from tablegen.fitting.measured_branch import AmplitudeFit
-from tablegen.report.blocks import Block, Charts, Grid, Paragraph, Section, TableCell, row
-from tablegen.report.document import document
-from tablegen.report.ranking import Finding
+from tablegen.html_report.blocks import Block, Charts, Grid, Paragraph, Section, TableCell, row
+from tablegen.html_report.document import document
+from tablegen.html_report.ranking import Finding
 from tablegen.version import __version__
 
 _LOG_SPAN = 30.0  # of frequencies: above it they are drawn over their logarithm

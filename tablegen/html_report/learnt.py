@@ -8,10 +8,10 @@ from tablegen.base.data_files import Source
 from tablegen.base.warnings import Finding, of_remarks, worst_first
 from tablegen.charts.chart import POSITION, Chart, DrawnCurve, Mark
 from tablegen.charts.picture_file import PlottedCharts
+from tablegen.html_report.blocks import Charts, Grid, Paragraph, Section, TableCell, row
+from tablegen.html_report.document import document
+from tablegen.html_report.scan_errors import windows
 from tablegen.refinement.round import Round
-from tablegen.report.blocks import Charts, Grid, Paragraph, Section, TableCell, row
-from tablegen.report.document import document
-from tablegen.report.scan_errors import windows
 from tablegen.version import __version__
 
 _TURNS = np.linspace(0.0, 1.0, 601)

@@ -3,11 +3,11 @@
 import numpy as np
 
 from tablegen.charts.chart import POSITION, Band, Chart, DrawnCurve, Mark, Role
+from tablegen.html_report.blocks import Charts, Grid, Paragraph, Section, TableCell, row
+from tablegen.html_report.playing import PlayedAxis, PlayedCorrection
+from tablegen.html_report.subject import PlannedScan
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan
-from tablegen.report.blocks import Charts, Grid, Paragraph, Section, TableCell, row
-from tablegen.report.playing import PlayedAxis, PlayedCorrection
-from tablegen.report.subject import PlannedScan
 from tablegen.virtual.line_error import BranchError
 from tablegen.virtual.own_run import measured
 from tablegen.virtual.simulation import AxisRun

@@ -4,10 +4,10 @@ from collections.abc import Mapping
 
 from tablegen.certificate.excess import LARGEST_PERCENT
 from tablegen.config.schema import Limits
+from tablegen.html_report.blocks import Grid, Paragraph, Section, TableCell, row
+from tablegen.html_report.number_text import figure
+from tablegen.html_report.subject import PlannedScan, Subject
 from tablegen.manifest.fields import ManifestAxis, ManifestCertificate, ManifestFigure, ManifestShaped
-from tablegen.report.blocks import Grid, Paragraph, Section, TableCell, row
-from tablegen.report.number_text import figure
-from tablegen.report.subject import PlannedScan, Subject
 
 _HEAD = ("", "figure", "limit", "")
 

@@ -13,10 +13,10 @@ from tablegen.emit.constants import storage_bits
 from tablegen.fixedpoint.spline import WORDS_BEHIND
 from tablegen.fixedpoint.synthesis import WORD_BITS
 from tablegen.fixedpoint.table_shape import TableShape
+from tablegen.html_report.table_costs import CELLS, INSTRUCTIONS
 from tablegen.planning.line_plan import LinePlan
 from tablegen.planning.other_table import with_table
 from tablegen.planning.table_front import table_front
-from tablegen.report.table_costs import CELLS, INSTRUCTIONS
 from tablegen.waveform.sampler import Sampler
 
 _CHUNK_TICKS = 1 << 16  # that are worked out together

@@ -8,12 +8,12 @@ from tablegen.certificate.certificate import Certificate
 from tablegen.charts.chart import POSITION, Chart, DrawnCurve, Mark
 from tablegen.charts.picture_file import PlottedCharts
 from tablegen.config.load import Setup
+from tablegen.html_report.corrections import shape_chart
+from tablegen.html_report.lines import drive_chart
+from tablegen.html_report.playing import played_axes
+from tablegen.html_report.scan_errors import SIDES, residual_chart
+from tablegen.html_report.subject import PlannedScan
 from tablegen.planning.line_plan import LinePlan, Plan
-from tablegen.report.corrections import shape_chart
-from tablegen.report.lines import drive_chart
-from tablegen.report.playing import played_axes
-from tablegen.report.scan_errors import SIDES, residual_chart
-from tablegen.report.subject import PlannedScan
 
 _POINTS = 321
 

@@ -6,11 +6,11 @@ import numpy as np
 
 from tablegen.charts.chart import Band, Chart, DrawnCurve, Mark
 from tablegen.fixedpoint.program import Program
+from tablegen.html_report.blocks import Charts, Paragraph, Section
+from tablegen.html_report.number_text import hertz
+from tablegen.html_report.subject import Subject, series_of
 from tablegen.manifest.fields import ManifestAxis
 from tablegen.numerics.arrays import Floats, Ints
-from tablegen.report.blocks import Charts, Paragraph, Section
-from tablegen.report.number_text import hertz
-from tablegen.report.subject import Subject, series_of
 
 _FLOOR_DB = -160.0
 _MOST_SPECTRUM_TICKS = 1 << 18  # of a period whose codes are transformed

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from tablegen.report.table_rows import AxisTables, TableRow
+from tablegen.html_report.table_rows import AxisTables, TableRow
 
 _HEAD = (
     "     mode           words  bits     packed       in C   error [LSB]    instructions   cells",

@@ -3,20 +3,20 @@
 from collections.abc import Callable
 
 from tablegen.charts.chart import Chart
-from tablegen.report.asked import asked, files, verification
-from tablegen.report.basis import basis
-from tablegen.report.blocks import Charts, Section, TableCell
-from tablegen.report.corrections import corrections
-from tablegen.report.document import document
-from tablegen.report.lattice import lattice
-from tablegen.report.lines import lines
-from tablegen.report.playing import played_axes
-from tablegen.report.promises import certificate
-from tablegen.report.ranking import Finding, ranked
-from tablegen.report.scan_errors import errors
-from tablegen.report.spectrum import quantisation, spectrum
-from tablegen.report.subject import Subject
-from tablegen.report.usable import usable
+from tablegen.html_report.asked import asked, files, verification
+from tablegen.html_report.basis import basis
+from tablegen.html_report.blocks import Charts, Section, TableCell
+from tablegen.html_report.corrections import corrections
+from tablegen.html_report.document import document
+from tablegen.html_report.lattice import lattice
+from tablegen.html_report.lines import lines
+from tablegen.html_report.playing import played_axes
+from tablegen.html_report.promises import certificate
+from tablegen.html_report.ranking import Finding, ranked
+from tablegen.html_report.scan_errors import errors
+from tablegen.html_report.spectrum import quantisation, spectrum
+from tablegen.html_report.subject import Subject
+from tablegen.html_report.usable import usable
 
 Tell = Callable[[str], object]
 

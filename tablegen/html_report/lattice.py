@@ -3,12 +3,12 @@
 import numpy as np
 
 from tablegen.charts.png import data_address, grey_png
+from tablegen.html_report.blocks import PagePicture, Paragraph, Pictures, Section
+from tablegen.html_report.playing import PlayedAxis
+from tablegen.html_report.subject import PlannedScan
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan
 from tablegen.planning.windows import pixel_places
-from tablegen.report.blocks import PagePicture, Paragraph, Pictures, Section
-from tablegen.report.playing import PlayedAxis
-from tablegen.report.subject import PlannedScan
 from tablegen.virtual.simulation import AxisRun
 
 _MOST_PIXELS = 192  # of a side of a picture

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from tablegen.charts.chart import POSITION, Chart, DrawnCurve, Mark, Role
 from tablegen.charts.picture_file import PlottedCharts
 from tablegen.compensation import models
-from tablegen.report.scan_errors import SIDES, inside
+from tablegen.html_report.scan_errors import SIDES, inside
 from tablegen.virtual.own_run import OwnRun
 from tablegen.virtual.report import LABEL, SimulationStage
 from tablegen.virtual.simulation import AxisRun, Run

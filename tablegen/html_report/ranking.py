@@ -6,9 +6,9 @@ from pathlib import Path
 from tablegen.base.input_errors import Problem
 from tablegen.base.warnings import Finding, worst_first
 from tablegen.certificate.scan_notes import expected_mismatch, note_findings
+from tablegen.html_report.subject import Subject
+from tablegen.html_report.verify_record import VerifyRecord
 from tablegen.manifest.fields import ManifestCertificate
-from tablegen.report.subject import Subject
-from tablegen.report.verify_record import VerifyRecord
 
 _CHORD = 0.05  # of the line: a scaling error over it is a place that is wrong by so much of it
 

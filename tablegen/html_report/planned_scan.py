@@ -7,9 +7,9 @@ from tablegen.certificate.certified_scan import certify_scan
 from tablegen.certificate.scan_warnings import weighed_warnings
 from tablegen.config.load import load
 from tablegen.emit.render import render_scan
-from tablegen.report.ranking import placed
-from tablegen.report.subject import PlannedScan, Subject, of_scan
-from tablegen.report.verify_record import VerifyRecord
+from tablegen.html_report.ranking import placed
+from tablegen.html_report.subject import PlannedScan, Subject, of_scan
+from tablegen.html_report.verify_record import VerifyRecord
 
 
 def planned_scan(

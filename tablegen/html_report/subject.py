@@ -13,11 +13,11 @@ from tablegen.base.reading import BUILD_FILE, file_sha256, read_bytes
 from tablegen.base.reading import MANIFEST as MANIFEST_KIND
 from tablegen.certificate.certificate import Certificate
 from tablegen.config.load import Setup
+from tablegen.html_report.verify_record import VerifyRecord
 from tablegen.manifest.fields import Manifest, ManifestAxis
 from tablegen.manifest.format import MANIFEST, read_json
 from tablegen.manifest.read import read_build
 from tablegen.planning.line_plan import Plan
-from tablegen.report.verify_record import VerifyRecord
 from tablegen.waveform.series import FourierSeries
 
 

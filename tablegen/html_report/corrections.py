@@ -4,11 +4,11 @@ import numpy as np
 
 from tablegen.charts.chart import POSITION, Band, Chart, DrawnCurve, Mark
 from tablegen.compensation import models
+from tablegen.html_report.blocks import Charts, Grid, Section, TableCell, row
+from tablegen.html_report.number_text import hertz
+from tablegen.html_report.subject import Subject
 from tablegen.manifest.fields import ManifestAxis
 from tablegen.planning.line_plan import LinePlan
-from tablegen.report.blocks import Charts, Grid, Section, TableCell, row
-from tablegen.report.number_text import hertz
-from tablegen.report.subject import Subject
 
 _HEAD = ("", "equation", "factor", "after it")
 

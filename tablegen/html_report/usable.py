@@ -8,11 +8,11 @@ from tablegen.charts.chart import Chart, DrawnCurve, Mark
 from tablegen.compensation.models.operator import OperatorLine
 from tablegen.compensation.offset import OffsetLaw
 from tablegen.compensation.offset_sizes import OffsetSurface
+from tablegen.html_report.blocks import Charts, Paragraph, Section
+from tablegen.html_report.subject import PlannedScan
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.laws import offset_surface
 from tablegen.planning.line_plan import LinePlan
-from tablegen.report.blocks import Charts, Paragraph, Section
-from tablegen.report.subject import PlannedScan
 
 _OFFSETS = 101
 _SIZES = 241

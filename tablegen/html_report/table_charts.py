@@ -8,7 +8,7 @@ from tablegen.charts.chart import Chart, DrawnCurve, Mark, Role
 from tablegen.charts.picture_file import PlottedCharts
 from tablegen.fixedpoint.program import Mode
 from tablegen.fixedpoint.table_shape import MODES
-from tablegen.report.table_rows import AxisTables
+from tablegen.html_report.table_rows import AxisTables
 
 _ROLES: dict[Mode, Role] = {"direct": "before", "interpolated": "limit", "cubic": "other"}
 _HIGHEST = 4.0  # of what is asked

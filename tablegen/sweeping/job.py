@@ -14,7 +14,7 @@ from tablegen.emit.render import plan_content
 from tablegen.emit.write import leftover_files, outdated_files, write_files
 from tablegen.library.entry import Entry, entry_file, make_entry
 from tablegen.manifest.format import RECORD, read_json
-from tablegen.sweep.written_records import WrittenRecords
+from tablegen.sweeping.written_records import WrittenRecords
 
 
 @dataclass(frozen=True)

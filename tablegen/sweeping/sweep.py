@@ -7,7 +7,7 @@ from typing import Any
 from tablegen.base.workers import default_jobs
 from tablegen.config.settings import Setting
 from tablegen.config.variants import variants
-from tablegen.sweep.run import ScanLibrary, run
+from tablegen.sweeping.run import ScanLibrary, run
 
 
 def sweep(
@@ -56,7 +56,7 @@ def sweep(
 
     Examples
     --------
-    >>> library = tablegen.sweep("scan.toml", {"x.size_nm": [100, 200]}, "library", jobs=1)
+    >>> library = tablegen.sweep("scan.toml", {"x.size_nm": [190, 200]}, "library", jobs=1)
     >>> len(library.built), library.failed
     (2, [])
     """

@@ -5,12 +5,12 @@ from typing import Protocol
 import numpy as np
 
 from tablegen.charts.chart import Band, Chart, DrawnCurve, Mark
+from tablegen.html_report.blocks import Charts, Section
+from tablegen.html_report.playing import PlayedAxis
+from tablegen.html_report.scan_errors import over_time, windows
+from tablegen.html_report.subject import PlannedScan, Subject, series_of
 from tablegen.numerics.arrays import Floats
 from tablegen.planning.line_plan import LinePlan
-from tablegen.report.blocks import Charts, Section
-from tablegen.report.playing import PlayedAxis
-from tablegen.report.scan_errors import over_time, windows
-from tablegen.report.subject import PlannedScan, Subject, series_of
 from tablegen.waveform.series import FourierSeries
 
 _POINTS = 601

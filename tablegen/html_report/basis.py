@@ -12,9 +12,9 @@ from tablegen.base.reading import CONFIGURATION, read_text
 from tablegen.base.warnings import Tone
 from tablegen.compensation.models.operator import OperatorLine
 from tablegen.config.load import Setup
+from tablegen.html_report.blocks import Grid, Paragraph, Section, TableCell, row
+from tablegen.html_report.subject import PlannedScan
 from tablegen.planning.line_plan import LinePlan
-from tablegen.report.blocks import Grid, Paragraph, Section, TableCell, row
-from tablegen.report.subject import PlannedScan
 
 _MARK = re.compile(r"# (calibrate|refine) (.*?): (.*)$")
 _TABLE = re.compile(r"\[\[?([xy](?:\.\w+)+)\]\]?")
