@@ -1,6 +1,5 @@
 """From a scan file, or from values, to a plan, its certificate, its arrays and its files."""
 
-import json
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -22,6 +21,7 @@ from tablegen.emit.format import Format
 from tablegen.emit.formats import UnknownFormat, chosen
 from tablegen.emit.render import format_rejected, render_scan, runtime_files
 from tablegen.emit.write import leftover_files, outdated_files, write_files
+from tablegen.manifest.format import MANIFEST, read_json
 from tablegen.planning.line_plan import Plan, make_plan
 
 if TYPE_CHECKING:
@@ -227,7 +227,7 @@ class Build(Result):
     @property
     def record(self) -> dict[str, Any]:
         """The manifest as plain data."""
-        found: dict[str, Any] = json.loads(self.manifest)
+        found: dict[str, Any] = read_json(self.files[MANIFEST])
         return found
 
     def to_json(self) -> str:
